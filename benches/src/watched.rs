@@ -1,4 +1,4 @@
-//! Runs that somebody watches: rows that are seen, with events and without, a plot, and all measures.
+//! Watched runs: rows that are seen, with events and without, a plot, and all measures.
 
 use std::convert::Infallible;
 use std::hint::black_box;

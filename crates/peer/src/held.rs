@@ -63,7 +63,7 @@ impl<const A: usize> Motions<A> {
 
 /// From that number of samples on their mean is exact but for one rounding.
 ///
-/// A sum in a fixed order takes a time that grows with their number, and binds all who compute it to that order. Below this number it takes less time than
+/// A sum in a fixed order takes a time that grows with their number, and binds every engine to that order. Below this number it takes less time than
 /// exact sums do.
 pub const EXACT_FROM: usize = 256;
 

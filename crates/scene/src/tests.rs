@@ -1,12 +1,14 @@
 //! What is refused, and what is said about it.
 
+mod form;
+mod strategies;
+
 use std::path::Path;
 use std::time::Duration;
 
-use cohaptic_peer::coordination::Law;
-use cohaptic_peer::{Contact, Coordination, Gains};
+use cohaptic_peer::Contact;
 
-use crate::{Change, ChangeKind, Scene, SceneError};
+use crate::{Scene, SceneError};
 
 /// A scene to which faults are done. Its lines are numbered so that the tables below can be read.
 const SCENE: &str = r#"[scene]
@@ -67,28 +69,6 @@ fn check_added(faults: &[(&str, &str)]) {
 #[test]
 fn the_scene_without_faults_is_taken() {
     parse(SCENE, &[]).unwrap_or_else(|error| panic!("{error}"));
-}
-
-#[test]
-fn the_display_form_shows_the_line_with_carets_below_the_place() {
-    let error = refused(&SCENE.replace("delay = \"24ms\"", "delay     = \"8 parsecs\""), &[]);
-    let expected = r#"x.toml:17:13: link.delay: unknown unit "parsecs" in "8 parsecs": expected a duration such as "8ms", "1.5s" or "250us" (units: ns, us, ms, s, min, h)
-   |
-17 | delay     = "8 parsecs"
-   |             ^^^^^^^^^^^"#;
-    assert_eq!(error.to_string(), expected);
-    assert!(!error.is_io());
-}
-
-#[test]
-fn the_display_form_of_an_override_shows_the_override() {
-    let error = refused(SCENE, &["link.dlay=\"8ms\""]);
-    let keys = cohaptic_linkfile::link::LINK_KEYS.join(", ");
-    assert!(keys.starts_with("delay, jitter, order, loss, mark-instead-of-loss, duplicate, corrupt, reorder, rate, queue"), "{keys}");
-    let expected = format!(
-        "--set link.dlay=\"8ms\": link.dlay: unknown key: expected one of {keys}; did you mean \"delay\"?\n |\n | link.dlay=\"8ms\"\n |      ^^^^"
-    );
-    assert_eq!(error.to_string(), expected);
 }
 
 #[test]
@@ -293,127 +273,6 @@ fn what_does_not_fit_together_is_refused() {
 }
 
 #[test]
-fn a_strategy_that_cannot_work_in_a_scene_is_refused() {
-    let of = |strategy: &str| SCENE.replace("average-position", strategy);
-    let refused = |strategy: &str, changes: &[&str], why: &str| {
-        let changes: Vec<String> = changes.iter().copied().map(str::to_owned).collect();
-        let error = Scene::parse(&of(strategy), Path::new("scene.toml"), &changes).unwrap_err().to_string();
-        assert!(error.contains(&format!("the strategy {strategy} {why}")), "{error}");
-    };
-    for strategy in ["passivity-control", "set-position", "wave", "client-server"] {
-        parse(&of(strategy), &[]).unwrap();
-    }
-    for strategy in ["passivity-control", "set-position", "wave"] {
-        refused(strategy, &["peer.compute-delay=1"], "counts the energy of forces that act at once");
-    }
-    for strategy in ["set-position", "wave"] {
-        refused(strategy, &["simulation.integrator=\"rk4\""], "damps each copy by just as much");
-    }
-    refused("wave", &["peer.clock.drift=\"5ppm\""], "sends waves for as long as it takes");
-    refused("set-position", &["coordination.stiffness=0"], "has no set-position without a spring");
-    refused("set-position", &["timeline=[{at=\"1ms\",coordination={stiffness=5}}]"], "keeps energy in its springs");
-    refused("wave", &["timeline=[{at=\"1ms\",coordination={send-when={position=1}}}]"], "needs every sample");
-    for strategy in ["wave", "client-server"] {
-        refused(strategy, &["coordination.send-when.velocity=\"10%\""], "needs every sample");
-    }
-}
-
-#[test]
-fn parameters_change_with_the_timeline_as_far_as_the_strategy_can_follow() {
-    let change = |parameters: &str| format!("[[timeline]]\nat = \"1s\"\ncoordination = {{ {parameters} }}\n");
-    let text = |strategy: &str, parameters: &str| format!("{}{}", SCENE.replace("average-position", strategy), change(parameters));
-    let scene = parse(&text("extrapolated", "stiffness = 5, extrapolated = { horizon = \"20ms\" }"), &[]).unwrap();
-    let [Change { what: ChangeKind::Coordination(gains), .. }, Change { what: ChangeKind::Parameters(settings), .. }] = &*scene.timeline else {
-        panic!("{:?}", scene.timeline)
-    };
-    assert_eq!(*gains, Gains { stiffness: 5.0, damping: 0.0 });
-    assert_eq!(settings.of(Coordination::Extrapolated).duration(0), Duration::from_millis(20));
-    let started = "18:1: timeline: send times of samples are kept from the beginning or not at all";
-    check(&text("extrapolated", "extrapolated = { horizon = \"0s\" }"), started);
-    check(&text("local-lag", "local-lag = { lag = \"11s\" }"), "18:1: timeline: the lag is more than 10000 ticks of a peer");
-}
-
-#[test]
-fn parameters_that_a_strategy_cannot_have_are_refused_at_their_place() {
-    for (key, value, message) in [
-        ("wave.impedance", "0", "coordination.wave.impedance: "),
-        ("wave.on-loss", "\"keep\"", "coordination.wave.on-loss: unknown name \"keep\": expected one of zero, hold"),
-        ("passivity-control.reserve", "-1", "coordination.passivity-control.reserve: "),
-        ("set-position.ceiling", "\"much\"", "coordination.set-position.ceiling: "),
-        ("client-server.server", "\"nobody\"", "coordination.client-server.server: there is no peer \"nobody\""),
-        ("client-server.returns", "\"nothing\"", "coordination.client-server.returns: unknown name \"nothing\""),
-        ("send-when.velocity", "1.0", "coordination.send-when.velocity: with a dead band of 100%"),
-        ("send-when.heartbeat", "\"1s\"", "coordination.send-when: nothing says when a sample is worth sending"),
-        ("send-when.position", "0", "coordination.send-when.position: "),
-    ] {
-        let error = Scene::parse(SCENE, Path::new("scene.toml"), &[format!("coordination.{key}={value}")]).unwrap_err().to_string();
-        assert!(error.contains(message), "{error}");
-    }
-}
-
-#[test]
-fn a_damping_that_no_link_bounds_is_refused() {
-    let local = SCENE.replace("average-position", "local-damping");
-    parse(&local, &[]).unwrap();
-    let unbounded = "5:1: coordination: a damping of \"auto\" needs the age of the oldest sample in use, which the links of this scene do not bound: expected an age, or a damping in N·s/m";
-    for added in
-        ["loss = \"1%\"\n", "jitter = \"1ms\"\n", "rate = \"1Mbit\"\n", "[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { delay = \"30ms\" }\n"]
-    {
-        check(&format!("{local}{added}"), unbounded);
-        parse(&format!("{local}{added}"), &["coordination.local-damping.age=\"50ms\""]).unwrap();
-        parse(&format!("{local}{added}"), &["coordination.local-damping.damping=60"]).unwrap();
-        // Of a strategy that is not in use nothing is asked.
-        parse(&format!("{local}{added}"), &["coordination.strategy=\"average-position\""]).unwrap();
-    }
-    let gains = "[[timeline]]\nat = \"1s\"\ncoordination = { stiffness = 100.0 }\n";
-    check(
-        &format!("{local}{gains}"),
-        "5:1: coordination: the timeline changes the gains, and a damping of \"auto\" does not follow them: expected a damping in N·s/m",
-    );
-    parse(&format!("{local}{gains}"), &["coordination.local-damping.damping=60"]).unwrap();
-    check_replaced(&[(
-        "update = \"8ms\"",
-        "update = \"8ms\"\nlocal-damping = { damping = \"automatic\" }",
-        "9:29: coordination.local-damping.damping: unknown name \"automatic\": expected auto, or a number of at least zero [N·s/m]",
-    )]);
-}
-
-#[test]
-fn a_lag_that_no_links_give_is_refused() {
-    let lagging = SCENE.replace("average-position", "local-lag");
-    let ticks = |text: &str, changes: &[&str]| Law::<f64>::lag(&parse(text, changes).unwrap().law(0).unwrap());
-    // ⌈24 ms/1 ms⌉ + ⌊(8 − 1)/2⌋, and a delay that ends between two ticks.
-    assert_eq!([ticks(&lagging, &[]), ticks(&lagging, &["link.delay=\"24.2ms\""]), ticks(&lagging, &["coordination.update=\"1ms\""])], [27, 28, 24]);
-    let refused = "5:1: coordination: a lag of \"auto\" needs links that all have one constant delay and do nothing else, and peers whose clocks are alike: expected a lag such as \"16ms\"";
-    for added in [
-        "loss = { packets = [3], every = 4 }\n",
-        "jitter = \"1ms\"\n",
-        "rate = \"1Mbit\"\n",
-        "[[links]]\nfrom = \"left\"\nto = \"right\"\ndelay = \"1ms\"\n",
-        "[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { delay = \"30ms\" }\n",
-    ] {
-        check(&format!("{lagging}{added}"), refused);
-        assert_eq!(ticks(&format!("{lagging}{added}"), &["coordination.local-lag.lag=\"30.1ms\""]), 31);
-        // Of a strategy that is not in use nothing is asked.
-        parse(&format!("{lagging}{added}"), &["coordination.strategy=\"average-position\""]).unwrap();
-    }
-    check(&lagging.replace("[[peers]]\nname = \"right\"", "[[peers]]\ntick = \"2ms\"\nname = \"right\""), refused);
-    check(&lagging.replace("[[peers]]\nname = \"right\"", "[[peers]]\nuplink = { delay = \"1ms\" }\nname = \"right\""), refused);
-    // New gains do not touch it.
-    parse(&format!("{lagging}[[timeline]]\nat = \"1s\"\ncoordination = {{ stiffness = 100.0 }}\n"), &[]).unwrap();
-    let long = "the lag is more than 10000 ticks of a peer, which it does not remember: expected at most 10000 ticks";
-    for changes in [["coordination.local-lag.lag=\"10001ms\""], ["link.delay=\"1h\""]] {
-        assert!(parse(&lagging, &changes).unwrap_err().to_string().contains(long), "{changes:?}");
-    }
-    assert_eq!(ticks(&lagging, &["coordination.local-lag.lag=\"10s\""]), 10_000);
-    check_replaced(&[(
-        "update = \"8ms\"",
-        "update = \"8ms\"\nlocal-lag = { lag = 3 }",
-        "9:21: coordination.local-lag.lag: found the integer 3: expected",
-    )]);
-}
-
-#[test]
 fn a_peer_that_is_not_there_or_there_twice_is_refused() {
     check_replaced(&[
         ("name = \"right\"", "name = \"left\"", "15:8: peers.left.name: there is a peer \"left\" already: expected another name"),
@@ -568,81 +427,11 @@ fn an_expectation_that_says_nothing_is_refused() {
 }
 
 #[test]
-fn what_is_no_toml_is_refused_in_the_same_form() {
-    check_replaced(&[
-        ("\"24ms\"", "24ms", "17:9: link.delay: not TOML: "),
-        ("delay =", "delay", "17:7: link: not TOML: "),
-        ("mass = 0.45", "mass = 0.45\nmass = 0.5", "5:1: object.mass: this key or table is there already: expected it once"),
-        ("[link]", "[link]\n[link]", "17:2: link: this key or table is there already"),
-        ("[link]", "[link", "16:6: link: not TOML: "),
-        ("\"7s\"", "\"7s", "2:15: scene.duration: not TOML: "),
-    ]);
-    check("", "1:1: scene: missing key");
-}
-
-#[test]
-fn of_several_faults_the_first_in_the_file_is_said() {
-    let text = SCENE.replace("0.45", "-1").replace("\"24ms\"", "\"x\"").replace("\"7s\"", "\"7x\"");
-    check(&text, "2:12: scene.duration: ");
-    // Parts are not read in the order of the file: [scene] first, wherever it stands.
-    let late = "[link]\ndelay = \"x\"\n".to_owned() + &SCENE.replace("[link]\ndelay = \"24ms\"\n", "").replace("\"7s\"", "7");
-    check(&late, "2:9: link.delay: ");
-    // Faults in overrides come last.
-    assert!(refused(&SCENE.replace("0.45", "-1"), &["link.dlay=1"]).to_string().starts_with("x.toml:4:8: object.mass"));
-}
-
-#[test]
 fn a_default_is_checked_even_where_every_peer_replaces_it() {
     let text = SCENE.replace("[peer]", "[peer]\ntick = \"fast\"").replace("name", "tick = \"1ms\"\nname");
     check(&text, "10:8: peer.tick: \"fast\" does not begin with a plain decimal number");
     let text = SCENE.replace("device = { mass = 0.1, damping = 5.0 }", "device = { damping = 5.0 }").replace("name", "device.mass = 0.1\nname");
     assert!(parse(&text, &[]).is_ok());
-}
-
-#[test]
-fn an_override_that_leads_nowhere_is_refused() {
-    for (given, expected) in [
-        ("link.delay", "--set link.delay: no = in the override: expected KEY=VALUE"),
-        ("=1", "--set =1: the key is no dotted path"),
-        ("link..delay=1ms", "--set link..delay=1ms: link..delay: the key is no dotted path"),
-        (
-            "peers.lefft.tick=1ms",
-            "--set peers.lefft.tick=1ms: peers.lefft: there is no peer \"lefft\": expected one of left, right; did you mean \"left\"?",
-        ),
-        ("links.left=1", "--set links.left=1: links.left: one end of a link"),
-        ("links.left.nobody.delay=1ms", "--set links.left.nobody.delay=1ms: links.left.nobody.to: there is no peer \"nobody\""),
-        ("timeline.3.at=1s", "--set timeline.3.at=1s: timeline.3: there is no entry \"3\": expected the place of one of its 0 entries, from 0"),
-        ("link.delay.mean=1ms", "--set link.delay.mean=1ms: link.delay.mean: link.delay is the text \"24ms\" here and holds no keys"),
-        ("link.delay=8 parsecs", "--set link.delay=8 parsecs: link.delay: unknown unit \"parsecs\""),
-        ("object.mass=nan", "--set object.mass=nan: object.mass: nan is not finite"),
-        ("object.mass=-1", "--set object.mass=-1: object.mass: -1 is out of range"),
-        ("objects.mass=1", "--set objects.mass=1: objects: unknown key"),
-        ("peers.left=3", "--set peers.left=3: peers.left"),
-        ("scene.duration=", "--set scene.duration=: scene.duration: \"\" does not begin"),
-    ] {
-        let shown = refused(SCENE, &[given]).to_string();
-        assert!(shown.starts_with(expected), "\nexpected {expected}\nfound    {shown}");
-    }
-}
-
-#[test]
-fn what_a_text_holds_does_not_reach_the_terminal_raw() {
-    let shown = refused(&SCENE.replace("\"24ms\"", "\"\\u001b[31m\\u202e\""), &["x\u{1b}=1"]).to_string();
-    assert!(shown.contains("\\u{1b}[31m\\u{202e}"), "{shown}");
-    assert!(shown.chars().all(|c| c == '\n' || !c.is_control()));
-}
-
-#[test]
-fn a_line_of_any_length_is_cut_around_the_place() {
-    let text = SCENE.replace("delay = \"24ms\"", &format!("outage = [{}{{ from = 1 }}]", "{ from = \"1s\", to = \"2s\" }, ".repeat(1000)));
-    let error = refused(&text, &[]);
-    let place = error.diagnostic().unwrap();
-    assert_eq!(place.line(), 17);
-    assert!(place.shown_line().chars().count() <= 202);
-    let shown = error.to_string();
-    let lines: Vec<&str> = shown.lines().collect();
-    let caret = lines[3].chars().position(|c| c == '^').unwrap();
-    assert_eq!(lines[2].chars().nth(caret), Some('{'), "{shown}");
 }
 
 /// A process elsewhere can be simulated only from the model of a device; a live session does without.

@@ -145,7 +145,7 @@ proptest! {
     }
 }
 
-/// A device that touches nothing moves by its hand as long as somebody looks, and one without a hand rests, with the sign of its zero.
+/// A device that touches nothing moves by its hand if the run is watched, and one without a hand rests, with the sign of its zero.
 #[test]
 fn devices_that_touch_nothing_are_seen() {
     for link in ["delay = \"3ms\"", "delay = \"3ms\", jitter = \"400us\""] {

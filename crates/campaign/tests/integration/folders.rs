@@ -158,7 +158,7 @@ fn a_manifest_that_is_none_is_refused() {
     }
 }
 
-/// Somebody who wants nothing but the end.
+/// An observer of the end alone.
 struct Never;
 
 impl Watch for Never {

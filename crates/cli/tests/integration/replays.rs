@@ -87,7 +87,7 @@ fn a_file_that_the_scene_names_counts() {
     assert_eq!((outcome.status, outcome.stderr), (Some(2), message("  the file hand.csv: something else in the record than now\n")));
 }
 
-/// Two who turn an object, one by torques in a file: the replay is that of the session to the last bit, and with other torques it is another.
+/// Two peers turn an object, one by torques in a file: the replay is that of the session to the last bit, and with other torques it is another.
 #[test]
 fn torques_of_a_file_are_replayed() {
     let desk = Desk::with(

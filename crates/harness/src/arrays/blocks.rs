@@ -3,11 +3,11 @@
 //! What a lane computes is [`cohaptic_peer::tick`] and the scene's law, as [`cohaptic_peer::Peer`] does, so every bit is the same. Each tick is a loop over
 //! lanes without branches, which the compiler turns into vector instructions.
 
-use std::mem::discriminant;
+mod block;
+mod law;
 
-use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, Observation};
-use cohaptic_peer::tick::{forces, grasp, on_device, on_object};
-use cohaptic_peer::{Contact, Enclosure, Gains, HandForce, Motion, Plant, State, StepMap};
+use cohaptic_peer::coordination::{BuiltIn, Law};
+use cohaptic_peer::{Contact, Enclosure, HandForce, Motion, Plant, State, StepMap};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -15,6 +15,10 @@ use super::lanes::{Lanes, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 use super::samples::Sample;
 use crate::plan::DeviceChoice;
+pub(super) use block::Block;
+use block::{Forces, Late, RESTING, ZERO_MAP, set_map};
+use law::memory_of_lane;
+pub(super) use law::{LawOfLanes, law_of_lanes};
 
 /// All bodies on all axes.
 #[derive(Clone, Debug)]
@@ -42,57 +46,6 @@ pub(super) struct Blocks<const A: usize> {
 
 /// Position and velocity of eight bodies along one axis.
 pub(super) type Motions = Motion<Lanes>;
-
-/// Lanes devices with their copies of the object, along one axis.
-#[derive(Clone, Debug)]
-pub(super) struct Block {
-    device: Motions,
-    object: Motions,
-    /// The mean of the samples held.
-    mean: Motions,
-    hand: Lanes,
-    /// KC and BC.
-    coupling: Gains<Lanes>,
-    grasps: Mask,
-    device_map: StepMap<Lanes>,
-    /// The contacts of all eight, if any of them is one-sided.
-    contacts: Option<Box<[Contact; WIDTH]>>,
-    axis: usize,
-    /// Whether anything ties one of the devices to ground.
-    is_tied: bool,
-}
-
-/// A law of eight lanes, by its own type.
-pub(super) trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>> {
-    /// The law of one lane.
-    #[inline(always)]
-    fn of_lane(&self, lane: usize) -> Self::Of<f64> {
-        self.map(|coefficient| coefficient.0[lane])
-    }
-
-    /// How many numbers it remembers along each axis: for most laws a constant that the compiler knows, so that they pay nothing for those that remember.
-    #[inline(always)]
-    fn remembered(&self) -> usize {
-        self.of_lane(0).memory()
-    }
-
-    /// How many ticks it looks back.
-    #[inline(always)]
-    fn looks_back(&self) -> usize {
-        self.of_lane(0).lag()
-    }
-}
-
-impl<L: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>> LawOfLanes for L {}
-
-/// The forces of a tick on eight peers.
-#[derive(Clone, Copy, Debug)]
-struct Forces {
-    /// FC.
-    coupling: Lanes,
-    /// FC − FT, and the walls.
-    on_object: Lanes,
-}
 
 /// What rows say of eight peers along one axis.
 #[derive(Clone, Copy, Debug)]
@@ -123,13 +76,6 @@ impl Grasped for Centres {
     }
 }
 
-/// Forces that are applied a tick late.
-#[derive(Clone, Debug)]
-struct Late {
-    computed: Forces,
-    is_late: Mask,
-}
-
 /// Positions along each axis, the least and the greatest of each run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moved<const L: usize> {
@@ -137,42 +83,6 @@ pub(super) struct Moved<const L: usize> {
     pub(super) discrepancy: [f64; L],
     /// Whether everything is a finite number, after it moved.
     pub(super) finite: [bool; L],
-}
-
-const ZERO_MAP: StepMap<Lanes> = StepMap::new([[Lanes::ZERO; 2]; 2], [Lanes::ZERO; 2]);
-
-/// What moves nothing, and where nothing acts leaves even the sign of a zero.
-const RESTING: StepMap = StepMap::new([[0.0, -0.0], [0.0, 0.0]], [-0.0, 0.0]);
-
-impl Forces {
-    const NONE: Self = Self { coupling: Lanes::ZERO, on_object: Lanes::ZERO };
-}
-
-/// Replaces the step map of one lane.
-fn set_map(maps: &mut StepMap<Lanes>, lane: usize, map: &StepMap) {
-    let (state, force) = map.coefficients();
-    let mut numbers = state.into_iter().flatten().chain(force);
-    *maps = maps.map(|lanes| {
-        let mut lanes = *lanes;
-        lanes.0[lane] = numbers.next().unwrap_or_default();
-        lanes
-    });
-}
-
-/// The laws of runs that are made of one law, as one of eight lanes; lane l is of run l modulo their number.
-pub(super) fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
-    let coefficients = |law: &BuiltIn| {
-        let mut all = Vec::new();
-        let _ = law.map(|coefficient| all.push(*coefficient));
-        all
-    };
-    debug_assert!(laws.iter().all(|law| discriminant(law) == discriminant(&laws[0])), "runs side by side have one law");
-    let each: Vec<Vec<f64>> = laws.iter().map(coefficients).collect();
-    let mut place = 0..;
-    laws[0].map(|_| {
-        let place = place.next().unwrap_or_default();
-        Lanes(std::array::from_fn(|lane| each[lane % laws.len()][place]))
-    })
 }
 
 /// The motion of one lane.
@@ -430,186 +340,4 @@ fn distances<const L: usize>(mut low: Lanes, mut high: Lanes) -> [f64; L] {
         }
     }
     std::array::from_fn(|run| high.0[run] - low.0[run])
-}
-
-/// [`Block::tick`]. By references of their own the compiler knows that nothing that is written is read in another lane.
-#[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "each by a reference of its own")]
-fn tick_of_lanes<const TIED: bool, L: LawOfLanes>(
-    devices: &mut Motions,
-    objects: &mut Motions,
-    (means, pasts, leads): (&Motions, &Motions, &Lanes),
-    memory: &mut [f64],
-    hands: &Lanes,
-    (coupling, grasps): (&Gains<Lanes>, &Mask),
-    device_map: &StepMap<Lanes>,
-    (law, object_map): (&L, &StepMap<Lanes>),
-) {
-    let remembered = law.remembered();
-    for lane in 0..WIDTH {
-        let (mut device, mut object) = (lane_of(devices, lane), lane_of(objects, lane));
-        let gains = coupling.map(|gain| gain.0[lane]);
-        let touch = |apart| grasps.keep(lane, grasp(&gains, apart));
-        let seen = Observation { own: object, past: lane_of(pasts, lane), mean: lane_of(means, lane), lead: leads.0[lane] };
-        let memory = memory_of_lane(memory, remembered, lane);
-        let (coupling, on_object) = forces(device, touch, &seen, &law.of_lane(lane), memory);
-        let map = device_map.map(|coefficient| coefficient.0[lane]);
-        if TIED {
-            map.advance(&mut device, on_device(hands.0[lane], coupling));
-        } else {
-            map.advance_free(&mut device, on_device(hands.0[lane], coupling));
-        }
-        object_map.map(|coefficient| coefficient.0[lane]).advance_free(&mut object, on_object);
-        set_lane(devices, lane, device);
-        set_lane(objects, lane, object);
-    }
-}
-
-/// What a law remembers of one lane.
-#[inline(always)]
-fn memory_of_lane(memory: &mut [f64], remembered: usize, lane: usize) -> &mut [f64] {
-    if remembered > 0 { &mut memory[lane * remembered..(lane + 1) * remembered] } else { &mut [] }
-}
-
-impl Block {
-    fn empty(axis: usize) -> Self {
-        let zero = Lanes::ZERO;
-        let rest = Motion { position: zero, velocity: zero };
-        Self {
-            device: rest,
-            object: rest,
-            mean: rest,
-            hand: zero,
-            coupling: Gains { stiffness: zero, damping: zero },
-            grasps: Mask::NONE,
-            device_map: ZERO_MAP,
-            contacts: None,
-            axis,
-            is_tied: false,
-        }
-    }
-
-    fn touch(&mut self, axis: usize, lane: usize, contact: Contact) {
-        match contact {
-            Contact::None => {}
-            Contact::Grasp => self.grasps.set(lane, true),
-            Contact::Push(direction) if direction.axis != axis => {}
-            Contact::Push(_) => {
-                let grasps = self.grasps;
-                let so_far = |lane| if grasps.get(lane) { Contact::Grasp } else { Contact::None };
-                self.contacts.get_or_insert_with(|| Box::new(std::array::from_fn(so_far)));
-            }
-        }
-        if let Some(contacts) = &mut self.contacts {
-            contacts[lane] = contact;
-        }
-    }
-
-    /// Forces and motion of a tick in one pass, where nothing but grasps and the law acts.
-    #[inline(always)]
-    fn tick<L: LawOfLanes>(&mut self, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64], object_map: &StepMap<Lanes>) {
-        let common = (law, object_map);
-        let Self { device, object, mean, hand, coupling, grasps, device_map, .. } = self;
-        let (seen, touch) = ((&*mean, past, lead), (&*coupling, &*grasps));
-        if self.is_tied {
-            tick_of_lanes::<true, L>(device, object, seen, memory, hand, touch, device_map, common);
-        } else {
-            tick_of_lanes::<false, L>(device, object, seen, memory, hand, touch, device_map, common);
-        }
-    }
-
-    /// The motion of a copy.
-    #[inline(always)]
-    pub(super) fn object_of(&self, lane: usize) -> Motion {
-        lane_of(&self.object, lane)
-    }
-
-    /// FC of devices that touch these points.
-    #[inline(always)]
-    pub(super) fn coupling(&self, points: &Motions) -> Lanes {
-        let apart = |lane| lane_of(&self.device, lane).relative_to(lane_of(points, lane));
-        let mut coupling = Lanes::ZERO;
-        for lane in 0..WIDTH {
-            coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), apart(lane));
-        }
-        coupling = coupling & self.grasps;
-        if let Some(contacts) = &self.contacts {
-            for lane in 0..WIDTH {
-                let gains = self.coupling.map(|gain| gain.0[lane]);
-                coupling.0[lane] = contacts[lane].force_along(self.axis, &gains, apart(lane));
-            }
-        }
-        coupling
-    }
-
-    #[inline(always)]
-    fn observation(&self, past: &Motions, lead: &Lanes, lane: usize) -> Observation {
-        Observation { own: lane_of(&self.object, lane), past: lane_of(past, lane), mean: lane_of(&self.mean, lane), lead: lead.0[lane] }
-    }
-
-    /// The positions of copies.
-    #[inline(always)]
-    pub(super) const fn positions(&self) -> &[f64; WIDTH] {
-        &self.object.position.0
-    }
-
-    /// The forces of a tick without walls.
-    #[inline(always)]
-    fn forces<L: LawOfLanes>(&self, coupling: Lanes, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64]) -> Forces {
-        let mut on_copy = Lanes::ZERO;
-        let remembered = law.remembered();
-        for lane in 0..WIDTH {
-            let seen = self.observation(past, lead, lane);
-            let coordination = law.of_lane(lane).force(&seen, memory_of_lane(memory, remembered, lane));
-            on_copy.0[lane] = on_object(coupling.0[lane], coordination);
-        }
-        Forces { coupling, on_object: on_copy }
-    }
-
-    #[inline(never)]
-    fn add_walls(&self, walls: &[Option<Enclosure>], on_object: &mut Lanes) {
-        for lane in 0..WIDTH {
-            if let Some(walls) = &walls[lane % walls.len()] {
-                on_object.0[lane] += walls.force_along(self.axis, self.object.position.0[lane], self.object.velocity.0[lane]);
-            }
-        }
-    }
-
-    /// Moves devices and copies to the next tick.
-    #[inline(always)]
-    fn advance(&mut self, object_map: &StepMap<Lanes>, forces: &Forces) {
-        for lane in 0..WIDTH {
-            let map = self.device_map.map(|coefficient| coefficient.0[lane]);
-            let mut device = lane_of(&self.device, lane);
-            let force = on_device(self.hand.0[lane], forces.coupling.0[lane]);
-            if self.is_tied {
-                map.advance(&mut device, force);
-            } else {
-                map.advance_free(&mut device, force);
-            }
-            set_lane(&mut self.device, lane, device);
-            let mut object = lane_of(&self.object, lane);
-            object_map.map(|coefficient| coefficient.0[lane]).advance_free(&mut object, forces.on_object.0[lane]);
-            set_lane(&mut self.object, lane, object);
-        }
-    }
-
-    #[inline(always)]
-    fn size(&self) -> Lanes {
-        let size = |motions: &Motions| motions.position.abs() + motions.velocity.abs();
-        size(&self.device) + size(&self.object)
-    }
-}
-
-impl Late {
-    /// Remembers the forces computed now, and gives those that are applied.
-    #[inline(always)]
-    fn exchange(&mut self, forces: Forces) -> Forces {
-        let applied = Forces {
-            coupling: self.is_late.choose(self.computed.coupling, forces.coupling),
-            on_object: self.is_late.choose(self.computed.on_object, forces.on_object),
-        };
-        self.computed = forces;
-        applied
-    }
 }

@@ -10,7 +10,7 @@ use super::lanes::WIDTH;
 use super::ticks::{Source, Ticks};
 use crate::observer::{InstantRow, StateRow, TickRow, TurnRow};
 
-/// Looks at a run, or does not: the loop over ticks is compiled for each kind, so that a run at which nobody looks pays nothing.
+/// An observer of a run in arrays: the loop over ticks is compiled for each kind, so that an unwatched run pays nothing.
 pub(super) trait RunWatch<B, const A: usize, const P: usize> {
     /// Asked as [`crate::Observer::keep_going`] is.
     fn keep_going(&mut self, now: Instant) -> bool;
@@ -26,7 +26,7 @@ pub(super) trait RunWatch<B, const A: usize, const P: usize> {
     }
 }
 
-/// Looks at nothing, and is asked whether to go on.
+/// An observer that is only asked whether to go on.
 pub(super) struct Unwatched<'k>(pub(super) &'k mut dyn FnMut(Instant) -> bool);
 
 impl<B, const A: usize, const P: usize> RunWatch<B, A, P> for Unwatched<'_> {
@@ -35,7 +35,7 @@ impl<B, const A: usize, const P: usize> RunWatch<B, A, P> for Unwatched<'_> {
     }
 }
 
-/// Somebody who looks at ticks and instants.
+/// An observer of ticks and instants, of any type.
 pub(crate) trait Onlooker {
     /// See [`crate::Observer::on_ticks`].
     fn on_ticks(&mut self, ticks: &Ticks<'_>);
@@ -47,7 +47,7 @@ pub(crate) trait Onlooker {
     fn keep_going(&mut self, now: Instant) -> bool;
 }
 
-/// Looks at all peers of one run.
+/// An observer of all peers of one run.
 pub(super) struct WatchedTicks<'a> {
     onlooker: &'a mut dyn Onlooker,
     /// By how much the law damps each peer [N·s/m], and its turn about each axis [N·m·s/rad].

@@ -1,8 +1,8 @@
 //! One run on several threads, to the same bits as on one.
 //!
-//! Each thread has some of the peers: it moves them, and has the links to them with the samples in flight. Peers have to do with each other by what they
-//! send alone, so threads meet only at ticks at which some peer sends, and hand on what their peers send. Fates of packets have addresses, so it does not
-//! matter who draws them.
+//! Each thread has some of the peers: it moves them, and has the links to them with the samples in flight. Peers act on each other by their
+//! samples alone, so threads meet only at ticks at which some peer sends, and exchange the samples. Fates of packets have addresses, so any thread may
+//! draw them.
 
 mod barrier;
 
@@ -208,7 +208,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> PartToEnd<'a, '_, '_, 
         Some(Ended { part: arrays, ending, ticks: tick, until, max_discrepancy: thread.max_discrepancy })
     }
 
-    /// Whether the observer, who is asked by the first thread, wants the run to go on after that instant.
+    /// Whether the run goes on after that instant: the first thread asks the observer.
     fn goes_on(&mut self, before: Instant) -> bool {
         let Exchange { barrier, goes_on, .. } = self.thread.exchange;
         if let Some(keep_going) = &mut self.keep_going {

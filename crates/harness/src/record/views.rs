@@ -63,7 +63,7 @@ impl Views {
         }
     }
 
-    /// The picture. `positions` are the curves of all copies by axis, then peer: they say what is far beyond.
+    /// The picture. `positions` are the curves of all copies by axis, then peer: their range decides which points are far beyond.
     pub(crate) fn picture(&self, title: &str, names: &[String], positions: &Bands) -> Picture {
         let ranges: Vec<_> = positions.split(3).iter().map(|axis| axis.range(SANE_POSITION)).collect();
         let cut = ranges.iter().any(|(_, cut)| *cut);

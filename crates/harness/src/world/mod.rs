@@ -1,28 +1,34 @@
 //! The running scene: its peers, its network, its clock, with A simulated axes.
 
+mod changes;
 mod live;
+mod member;
 mod remote;
 mod turning;
+mod watch;
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{BuiltIn, LawValues, Role};
-use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
+use cohaptic_peer::coordination::Role;
+use cohaptic_peer::rotation::{Attitude, Rotation};
 use cohaptic_peer::wire::{Extra, SampleKind};
-use cohaptic_peer::{Clock, Contact, Device, Held, LastSent, ObjectCopy, Peer, Reception, RestingDevice, SendWhen, SimulatedDevice, State, Strategy};
-use cohaptic_scene::{Change, ChangeKind, Scene};
+use cohaptic_peer::{Contact, Device, LastSent, Reception, SendWhen, State, Strategy};
+use cohaptic_scene::{Change, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, StepRow, TickRow, TurnRow, TurnStepRow};
-use crate::plan::{DeviceChoice, Plan};
+use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, TickRow, TurnRow};
+use crate::plan::Plan;
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
 
+use changes::{ParameterChange, parameter_changes};
+use member::{DeviceModel, Member};
 pub(crate) use remote::{Arriving, NoRemote, Remote};
 use turning::Turning;
+pub(crate) use watch::Watch;
 
 /// A scene in the middle of a run; E holds its remote peers.
 pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
@@ -57,70 +63,6 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     /// In lockstep, the next tick at which anybody sends.
     earliest_send: u64,
     remote: E,
-}
-
-/// New values of the parameters that the strategy has of its own.
-struct ParameterChange {
-    own: LawValues,
-    /// For each peer β, and the damping of its copy with it [N·s/m].
-    damping: Vec<(f64, f64)>,
-    /// For each peer, if the object turns, the law of its turns, β about each axis, and the damping of the turn of its copy with it [N·m·s/rad].
-    turns: Vec<(BuiltIn, Triple, Triple)>,
-}
-
-/// The changes of parameters in the timeline, the first one last.
-fn parameter_changes(scene: &Scene) -> Vec<ParameterChange> {
-    let change = |change: &Change| {
-        let ChangeKind::Parameters(settings) = &change.what else { return None };
-        let then = scene.with_parameters(settings);
-        let damping = (0..then.peers.len()).map(|place| (then.own_damping(place), then.copy_config(place).damping)).collect();
-        let turns = |place: usize| Some((then.turn_law(place)?, then.own_rotational_damping(place), then.damped_spin(place)?.damping));
-        let turns = (0..then.peers.len()).filter_map(turns).collect();
-        Some(ParameterChange { own: *settings.of(scene.coordination.strategy), damping, turns })
-    };
-    scene.timeline.iter().rev().filter_map(change).collect()
-}
-
-/// A peer with its clock.
-struct Member<const A: usize, S, D> {
-    peer: Peer<A, DeviceModel<A, D>, S>,
-    clock: Clock,
-    tick: u64,
-    /// The tick at which it sends next, and how many ticks later again.
-    next_send: u64,
-    send_every: u64,
-    /// With dead bands alone.
-    last_sent: Option<LastSent<A>>,
-    stale_samples: u64,
-    refused_samples: u64,
-    /// The held part of the coordination force that was computed at the latest tick, if steps are watched.
-    commanded: [f64; A],
-}
-
-/// What stands for a peer's device; D is the type of those that nobody simulates.
-#[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "most peers of most scenes are the large variant, and a box would cost a cache miss a tick")]
-pub(crate) enum DeviceModel<const A: usize, D> {
-    Unsimulated(D),
-    Simulated(SimulatedDevice<A>),
-}
-
-impl<const A: usize, D: Device<A>> Device<A> for DeviceModel<A, D> {
-    #[inline]
-    fn state(&self) -> State<A> {
-        match self {
-            Self::Unsimulated(device) => device.state(),
-            Self::Simulated(device) => device.state(),
-        }
-    }
-
-    #[inline]
-    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
-        match self {
-            Self::Unsimulated(device) => device.advance(now, span, coupling_force),
-            Self::Simulated(device) => device.advance(now, span, coupling_force),
-        }
-    }
 }
 
 /// The two bodies of a peer.
@@ -255,66 +197,6 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 turns: rotation.map(|rotation| Turns { object: *rotation.copy(), device: rotation.device().copied(), length }),
             }
         })
-    }
-
-    /// Changes of the timeline up to and including `now`, each at its own instant.
-    #[inline(never)]
-    fn change(&mut self, now: Instant) {
-        while let Some(change) = self.changes.pop_if(|change| change.at <= now) {
-            match change.what {
-                ChangeKind::Link(link) => self.set_link(change.at, link.from, link.to, &link.config),
-                ChangeKind::AllLinks(links) => {
-                    let places = 0..self.members.len();
-                    for (from, to) in places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to) {
-                        self.set_link(change.at, from, to, links.between(from, to));
-                    }
-                }
-                ChangeKind::Contact { peer, contact } => {
-                    self.members[peer].peer.set_contact(contact);
-                    for (place, member) in self.members.iter_mut().enumerate().filter(|(place, _)| *place != peer) {
-                        member.peer.strategy_mut().set_contact(if peer < place { peer } else { peer - 1 }, contact);
-                    }
-                }
-                ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
-                    DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
-                    DeviceModel::Unsimulated(_) => {}
-                },
-                ChangeKind::HandTorque { peer, torque } => {
-                    if let Some(rotation) = self.members[peer].peer.rotation_mut() {
-                        rotation.set_hand(torque);
-                    }
-                }
-                ChangeKind::SendWhen(when) => self.send_when = Some(when),
-                ChangeKind::Parameters(_) => {
-                    let ParameterChange { own, damping, turns } = self.parameters.pop().expect("there is one for each of these changes");
-                    for (rotation, (law, own_damping, damping)) in self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).zip(turns)
-                    {
-                        rotation.set_law(&law, own_damping, damping);
-                    }
-                    for (member, (own_damping, damping)) in self.members.iter_mut().zip(damping) {
-                        member.peer.set_parameters(&own, own_damping, damping);
-                    }
-                    self.horizon = self.members[0].peer.strategy().horizon();
-                }
-                ChangeKind::Coordination(gains) => {
-                    for member in &mut self.members {
-                        member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
-                    }
-                    self.change_gains_of_turns();
-                }
-                ChangeKind::RotationalGains(_) => self.change_gains_of_turns(),
-            }
-        }
-    }
-
-    fn change_gains_of_turns(&mut self) {
-        if let Some(gains) = self.turning.as_mut().and_then(|turning| turning.next_gains()) {
-            self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).for_each(|rotation| rotation.set_gains(gains));
-        }
-    }
-
-    fn set_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
-        self.network.set_link(at, NodeId::new(from), NodeId::new(to), link.clone()).expect("changes are in order of time");
     }
 
     /// Step 1: those whose time it is send their sample to everybody else.
@@ -557,130 +439,6 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 self.network.access_stats(line).map(|stats| AccessSummary { peer, uplink, stats })
             })
             .collect()
-    }
-}
-
-/// What an observer wants to see.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Watch {
-    pub(crate) ticks: bool,
-    pub(crate) packets: bool,
-    pub(crate) steps: bool,
-    pub(crate) instants: bool,
-    pub(crate) sends: bool,
-    pub(crate) holds: bool,
-}
-
-impl Watch {
-    pub(crate) const NOTHING: Self = Self { ticks: false, packets: false, steps: false, instants: false, sends: false, holds: false };
-
-    /// Whether no more is looked at than ticks and instants.
-    pub(crate) fn is_of_ticks(self) -> bool {
-        Self { ticks: false, instants: false, ..self } == Self::NOTHING
-    }
-
-    pub(crate) fn of(observer: &impl Observer) -> Self {
-        Self {
-            ticks: observer.wants_ticks(),
-            packets: observer.wants_packets(),
-            steps: observer.wants_steps(),
-            instants: observer.wants_instants(),
-            sends: observer.wants_sends(),
-            holds: observer.wants_holds(),
-        }
-    }
-}
-
-impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
-    /// Moves to the next tick, with `commanded` the held part of the coordination force that was computed at this one.
-    fn advance_watched<O: Observer>(
-        &mut self,
-        now: Instant,
-        span: Duration,
-        commanded: [f64; A],
-        (place, axes): (usize, usize),
-        observer: &mut O,
-    ) -> Result<(), O::Error> {
-        let late = std::mem::replace(&mut self.commanded, commanded);
-        let coordination = if self.peer.compute_delay() { late } else { commanded };
-        let before = self.moved_by_coordination();
-        let acting = *self.peer.applied();
-        let turn = self.peer.rotation().map(|rotation| TurnStepRow {
-            span,
-            before: rotation.copy().rate,
-            after: [0.0; 3],
-            travel: rotation.travel(span),
-            held_torque: rotation.on_copy(),
-            coordination_torque: rotation.applied().coordination,
-            own_damping: rotation.own_damping(),
-        });
-        self.peer.advance(now, span);
-        let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });
-        let after = self.moved_by_coordination();
-        let coordination = if self.peer.role() == Role::Copy { coordination } else { acting.coupling };
-        observer.on_step(&StepRow {
-            at: now,
-            peer: place,
-            before: row(&before, axes),
-            after: row(&after, axes),
-            held_force: &acting.on_object[..axes],
-            coordination_force: &coordination[..axes],
-            own_damping: self.peer.own_damping(),
-            turn,
-        })
-    }
-
-    /// The body on which the others act: the copy, or the device of a client.
-    fn moved_by_coordination(&self) -> State<A> {
-        if self.peer.role() == Role::Copy { *self.peer.object().state() } else { self.peer.device().state() }
-    }
-}
-
-impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Member<A, S, D> {
-    fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize, strategy: S) -> Self {
-        let spec = &scene.peers[place];
-        let (clock, integrator) = (spec.clock, scene.integrator);
-        let displaced = |body| {
-            let state = if body == 0 { scene.initial_device(place) } else { initial[place] };
-            disturbance.map_or(state, |disturbance| disturbance.displace(state, scene.axes.count(), place, body))
-        };
-        let device = match plan.devices[place] {
-            DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Unsimulated(RestingDevice { position: displaced(0).position }.into()),
-            DeviceChoice::Simulated => {
-                DeviceModel::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), displaced(0), integrator, &clock))
-            }
-        };
-        let object = ObjectCopy::new(scene.copy_config(place), displaced(1), integrator, &clock);
-        let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
-        let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
-        let mut peer = Peer::new(scene.peer_config(place), device, object, strategy, Held::new(others));
-        if let Some(mut rotation) = scene.rotation_of(place) {
-            if let (Some(disturbance), Some(length)) = (disturbance, scene.gyration()) {
-                disturbance.turn(&mut rotation, length, place);
-            }
-            peer = peer.with_rotation(rotation);
-        }
-        Self {
-            peer,
-            clock,
-            tick: 0,
-            next_send: spec.phase,
-            send_every: u64::try_from(send_every).unwrap_or(u64::MAX),
-            last_sent: None,
-            stale_samples: 0,
-            refused_samples: 0,
-            commanded: [0.0; A],
-        }
-    }
-
-    #[inline]
-    fn is_finite(&self) -> bool {
-        // Each kind by itself: asked as one, both become a selection of addresses, which costs two peers a fiftieth of a tick.
-        let device = match self.peer.device() {
-            DeviceModel::Unsimulated(device) => device.state().is_finite(),
-            DeviceModel::Simulated(device) => device.state().is_finite(),
-        };
-        self.peer.object().state().is_finite() & device & self.peer.rotation().is_none_or(Rotation::is_finite)
     }
 }
 

@@ -198,7 +198,7 @@ fn known(turning: &Turning<'_>) -> Vec<usize> {
     (0..turning.size()).filter(|state| !waits(*state)).collect()
 }
 
-/// Central differences over ±e and ±e/2, taken together so that what is left is of order e⁴.
+/// Central differences over ±e and ±e/2, taken together for an error of order e⁴.
 fn slope(at: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
     let over = |size: f64| -> Vec<f64> { at(size).iter().zip(at(-size)).map(|(up, down)| (up - down) / (2.0 * size)).collect() };
     over(2e-5).iter().zip(over(1e-5)).map(|(coarse, fine)| (4.0 * fine - coarse) / 3.0).collect()
@@ -269,7 +269,7 @@ fn forces_that_wait_are_those_of_real_peers() {
             before[column] = size;
             pushed(&mut members(&scene, false), &turning, &bases, &vec![0.0; turning.size()], Some(&before))
         });
-        // One tick in which nothing that waits acts leaves what is computed at the state before.
+        // One tick in which no delayed force acts leaves the computed forces those of the state before.
         let mut before = vec![0.0; turning.size()];
         before[column] = 1.0;
         let waiting = turning.computed(&before);

@@ -115,7 +115,7 @@ fn one_grasp_has_the_admittances_of_its_exact_parts() {
             assert!(agree(whole.viscosity, part.viscosity) && agree(whole.inertia, part.inertia), "{whole:?} {part:?}");
             assert_eq!((whole.stiffness, part.stiffness), (Estimate { value: 0.0, error: 0.0 }, Estimate { value: 0.0, error: 0.0 }));
         }
-        // r is along x: what is pushed along y does not move along z.
+        // r is along x: a push along y moves nothing along z.
         let refused = Admittance::between_watched(&scene, 0, Some(PushedAxis::Y), Some(PushedAxis::Z), &Unwatched).unwrap_err();
         assert_eq!(refused, AdmittanceError::Uncoupled { from: "y", to: "z" });
     }
@@ -159,7 +159,7 @@ fn the_definition_carried_out_gives_the_same() {
     let soft = ["coordination.stiffness=200", "coordination.rotational-stiffness=[0.15, 0.12, 0.14]"];
     for (scene, push, seen) in [(three(&soft), 1, 1), (three(&soft), 0, 2), (six(&soft), 4, 4), (six(&soft), 0, 5), (six(&soft), 3, 1)] {
         let lifted = between(&scene, 0, push, seen);
-        assert!(lifted.radius().value < 0.97, "what is left of the beginning dies out: {:?}", lifted.radius());
+        assert!(lifted.radius().value < 0.97, "the transient dies out: {:?}", lifted.radius());
         for hz in [1.0, 40.0, 130.0] {
             let (cosine, sine) = (under(&scene, push, seen, hz, 0.5 * PI), under(&scene, push, seen, hz, 0.0));
             // Angles are some 10⁻⁵ rad and their squares are left out; motion apart from the sine has died out by a millionth.

@@ -184,7 +184,7 @@ fn a_hundred_links_are_as_good_as_six() {
     assert_eq!(browser.complaints, [""; 0]);
 }
 
-/// Width and height of what is drawn in the colour of the first peer \[px\].
+/// Width and height of the drawing in the colour of the first peer \[px\].
 fn drawn(browser: &mut Browser) -> [f64; 2] {
     let script = "(() => {
         const canvas = document.getElementById('copies');

@@ -14,7 +14,7 @@ pub(super) struct Barrier {
     is_broken: AtomicBool,
 }
 
-/// Breaks a barrier when it is dropped by a thread that panics, so that nobody waits for it for ever.
+/// Breaks a barrier when it is dropped by a thread that panics, so that no thread waits for it for ever.
 pub(super) struct Guard<'a>(&'a Barrier);
 
 impl Drop for Guard<'_> {
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nobody_goes_on_before_all_have_come() {
+    fn no_thread_goes_on_before_all_have_come() {
         const THREADS: u64 = 3;
         let (barrier, counter) = (Barrier::new(3), AtomicU64::new(0));
         std::thread::scope(|scope| {
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn who_waits_for_one_that_panics_panics_too() {
+    fn a_thread_that_waits_for_one_that_panics_panics_too() {
         let barrier = Barrier::new(2);
         let panics = std::thread::scope(|scope| {
             let broken = scope.spawn(|| {

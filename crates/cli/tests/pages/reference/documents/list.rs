@@ -1,0 +1,445 @@
+//! The documents of all commands and their keys.
+
+/// The document of a command.
+pub(super) struct Document {
+    pub(super) command: &'static str,
+    /// Lines for `sh` that print documents of this kind, one each, and in which every key occurs.
+    pub(super) lines: &'static [&'static str],
+    pub(super) rows: &'static [(&'static str, &'static str)],
+}
+
+/// What the router needs: two devices in namespaces.
+pub(super) const NAMESPACES: &str = "unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V";
+
+pub(super) const DOCUMENTS: [Document; 21] = [
+    Document {
+        command: "run",
+        lines: &[
+            "cohaptic run scenarios/rigid/tray.toml --json",
+            "cohaptic run scenarios/network/shared-access-line.toml --against scene.seed=2 --measure all --json --out out",
+            "cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --out session > said && \
+             cohaptic run scenarios/live/two-and-a-program.toml --inputs session/inputs.csv --force --json",
+        ],
+        rows: &[
+            ("title", "of the scene"),
+            ("duration_s", "how much was simulated: the scene's duration unless it diverged or was interrupted"),
+            ("ticks", "of the peer that made the most"),
+            ("ending", "`complete`, `diverged` (a position or velocity is not finite any more) or `interrupted`"),
+            ("wall_s, realtime_factor", "the time the run took, and `duration_s` divided by it. Only these differ from run to run"),
+            (
+                "peers[].name, peers[].position_m, peers[].velocity_m_s",
+                "state of the copy at the peer's first tick at or after the end: a number with one axis, else a list",
+            ),
+            (
+                "peers[].orientation, peers[].angular_velocity_rad_s",
+                "where the object turns: quaternion w, x, y, z and angular velocity about the axes of the copy",
+            ),
+            ("peers[].stale_samples, peers[].refused_samples", "samples that came too late to be used, and that arrived damaged"),
+            ("link_totals.links, link_totals.@Counters", "how many links there are between peers, and what all did together"),
+            (
+                "link_quantiles.delivered_fraction.NAME, link_quantiles.mean_delay_s.NAME",
+                "over links, `min`, `p01`, `p50`, `p99` and `max`: of n values `p01` is the ⌈n/100⌉-th. Packets delivered, as a part of those offered, and mean delays; `null` where no link has any",
+            ),
+            (
+                "links[].from, links[].to, links[].@Counters",
+                "by sender, then receiver; `links` is `null` where there are more than 1,000: then `--links` writes them",
+            ),
+            ("access_lines[].peer, access_lines[].line, access_lines[].@Counters", "`line` is `uplink` or `downlink`"),
+            ("max_discrepancy_m", "[discrepancy](model.md#discrepancy)"),
+            ("max_rotation_discrepancy_rad", "where the object turns: the largest angle between two copies"),
+            ("measures.NAME", "each [measure](#measures) that is asked for; `null` where it has no value"),
+            ("files", "paths written by `--out` and `--links`"),
+            ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session"),
+            ("against", "the document of the second run; absent without `--against`"),
+        ],
+    },
+    Document {
+        command: "check",
+        lines: &["cohaptic check scenarios/paper/5-1-ap-2100.toml --json"],
+        rows: &[
+            ("scenes[].file, scenes[].passed, scenes[].failures", "in the order of the files; `failures` is a list of texts"),
+            ("scenes[].expects", "whether the scene has an `[expect]`"),
+            ("scenes[].notes", "what was judged in another way than with more time"),
+            (
+                "scenes[].expectations[].expectation",
+                "`stable`, `discrepancy`, `position`, `travel`, `rotation-discrepancy`, `orientation`, `loss`, `delay` or `measures`",
+            ),
+            (
+                "scenes[].expectations[].name, scenes[].expectations[].expected, scenes[].expectations[].found",
+                "the quantity, the expected value and the outcome, in words",
+            ),
+            ("scenes[].expectations[].passed", "whether that is as expected"),
+            ("scenes[].expectations[].unit", "of the next three; empty for ratios"),
+            (
+                "scenes[].expectations[].low, scenes[].expectations[].high",
+                "the limits or `null`. A stable scene has a radius of at most 1, an unstable one of at least 1",
+            ),
+            ("scenes[].expectations[].measured", "what came out; `null` if that is no number"),
+        ],
+    },
+    Document {
+        command: "explain",
+        lines: &["cohaptic explain scenarios/network/ideal.toml --json"],
+        rows: &[
+            ("title", "of the scene"),
+            ("models[].part, models[].model, models[].reason", "a part of the scene, its model, and the reason"),
+            ("left_out", "list of texts"),
+            ("dimensions.plant", "positions and velocities of devices and copies"),
+            ("dimensions.held", "numbers in the samples held"),
+            ("dimensions.in_flight", "packets on the way at once, about"),
+            ("cost.peer_ticks_per_s, cost.packets_per_s", "in a simulated second"),
+            ("cost.realtime_factor", "estimated simulated seconds per second with nothing recorded"),
+            ("cost.record_bytes_per_s", "what `--out` writes in a simulated second, about"),
+        ],
+    },
+    Document {
+        command: "campaign",
+        lines: &["cohaptic campaign scenarios/network/loss-independent.toml --runs 2 --verdicts --out few --json"],
+        rows: &[
+            ("title", "of the scene of the first combination"),
+            ("runs, runs_computed", "in the table; done this time"),
+            ("wall_s, runs_per_s", "of this time"),
+            ("out, file, files", "the folder; the table; the table, verdicts and pictures"),
+            ("diverged", "how many runs"),
+            ("combinations[].vary, combinations[].runs, combinations[].diverged", "`vary` is a list of `KEY=VALUE`"),
+            (
+                "combinations[].mean_discrepancy_m, combinations[].largest_discrepancy_m, combinations[].worst_run",
+                "over the runs that did not diverge; the number of the run with the largest. `null` where all diverged",
+            ),
+            (
+                "combinations[].verdict, combinations[].judged, combinations[].radius, combinations[].error_bound, combinations[].reason",
+                "with `--verdicts`: [verdicts](campaign.md#verdicts)",
+            ),
+            ("notes", "parts that verdicts leave out, and pictures that are not drawn"),
+        ],
+    },
+    Document {
+        command: "compare",
+        lines: &[
+            "cohaptic compare scenarios/network/loss-independent.toml --strategies average-position,local-damping,extrapolated --vary link.delay=8ms,24ms --runs 2 \
+             --out compared --json",
+        ],
+        rows: &[
+            ("title", "of the scene of the first combination that runs"),
+            ("runs, runs_computed", "in the table; done this time"),
+            ("wall_s", "of this time"),
+            ("out, files", "the folder; the table of runs, verdicts, the table of figures, the page"),
+            (
+                "strategies[].name, strategies[].set",
+                "as it is written; what it puts into the scene, a list of `KEY=VALUE`. The first is the baseline",
+            ),
+            ("measures[].name, measures[].unit, measures[].about", "the measures that any run has"),
+            ("combinations[].strategy, combinations[].vary", "`vary` is a list of `KEY=VALUE` without the strategy"),
+            ("combinations[].refused", "why the strategy does not run here; `null` where it does"),
+            ("combinations[].runs", "how many runs there are"),
+            (
+                "combinations[].diverged.count, combinations[].diverged.share, combinations[].diverged.low, combinations[].diverged.high",
+                "runs that diverged or had copies more than 1 m apart, with Wilson's interval of 95 %; `diverged` is `null` where nothing runs",
+            ),
+            (
+                "combinations[].verdict, combinations[].judged, combinations[].radius",
+                "`stable`, `unstable`, `marginal`, `overflow` or `undecided`; by `spectral-radius`, `mean-square` or `two-runs`, which have no radius. `null` where nothing runs",
+            ),
+            ("combinations[].measures[].name, combinations[].measures[].count", "a measure; runs that did neither and have it"),
+            (
+                "combinations[].measures[].mean.value, combinations[].measures[].mean.low, combinations[].measures[].mean.high",
+                "their mean with Student's interval of 95 %, whose ends are `null` of one run; `mean` is `null` of none",
+            ),
+            (
+                "combinations[].measures[].difference.count, combinations[].measures[].difference.value, combinations[].measures[].difference.low, \
+                 combinations[].measures[].difference.high",
+                "the difference to the baseline over the seeds of which both runs have the measure; `null` of the baseline and of no seed",
+            ),
+        ],
+    },
+    Document {
+        command: "stability point",
+        lines: &[
+            "cohaptic stability point scenarios/network/loss-independent.toml --json",
+            "cohaptic stability point scenarios/paper/5-1-pd-1000.toml --losses-in-a-row 1 --json",
+        ],
+        rows: &[
+            ("title", "of the scene"),
+            ("verdict", "`stable`, `marginal`, `overflow` or `unstable`; in the mean square where `mean_square_radius` is there"),
+            ("spectral_radius, error_bound", "with nothing left to chance; the true radius is within the bound"),
+            ("mean_square_radius, mean_square_error_bound", "with random links whose second moment can be followed"),
+            ("rigid_modes, dimension", "how many were removed; how many states are left"),
+            ("method", "`reduced`, `determinant` or `full`"),
+            ("frame_s", "the span that the radius is over"),
+            (
+                "per_second, time_constant_s",
+                "the factor of the slowest disturbance in a second; after how long it is smaller by e, negative where it grows. `null` where the bounds of the radius leave more than a percent open",
+            ),
+            (
+                "time_constant_bounds_s",
+                "the least and the most that the bounds of the radius allow; `null` where it cannot be told whether a disturbance grows",
+            ),
+            ("parts[].@Parts of a scene", "of the worst combination of contacts"),
+            (
+                "modes[].contacts, modes[].verdict, modes[].spectral_radius, modes[].error_bound, modes[].parts[].@Parts of a scene",
+                "each combination of contacts, in words (empty: as they are)",
+            ),
+            ("worst_case.verdict", "if asked for: `stable`, `undecided` or `unstable`"),
+            ("worst_case.lower, worst_case.upper, worst_case.certificate", "bounds of the growth in `worst_case.step_s`"),
+            ("worst_case.links, worst_case.step_s, worst_case.dimension, worst_case.products, worst_case.notes", "what was searched, and how far"),
+            ("worst_case.sequence, worst_case.period", "the pattern that grows as the lower bound"),
+            ("notes", "what the verdict leaves out; where there are two radii, each note names its own"),
+        ],
+    },
+    Document {
+        command: "stability map",
+        lines: &[
+            "cohaptic stability map scenarios/coordination/n3.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --grid 3x3 --curve object.mass=1 --out map --json",
+            "cohaptic stability map scenarios/network/loss-independent.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --grid 2x2 --curve object.mass=1 --out lossy --json",
+        ],
+        rows: &[
+            ("title, files, notes", "of the scene; the files written; the parts left out"),
+            ("x_key, x_unit, x, y_key, y_unit, y", "the two keys and their values"),
+            ("criterion", "`spectral-radius` or `mean-square`"),
+            ("spectral_radius, mean_square_radius", "one of both: a row for each y; `null` where it is not finite"),
+            ("nominal", "in the mean square: which cells leave out chance, a row for each y"),
+            ("nominal_cells, stable_fraction", "how many these are; the share of stable cells"),
+            ("curves[].name, curves[].overrides, curves[].file", "of each `--curve`"),
+            (
+                "curves[].criterion, curves[].spectral_radius, curves[].mean_square_radius, curves[].nominal, curves[].nominal_cells, curves[].stable_fraction",
+                "as above",
+            ),
+            ("wall_s, cells_per_s, cells_computed", "of this time; kept cells are not counted"),
+        ],
+    },
+    Document {
+        command: "stability boundary",
+        lines: &["cohaptic stability boundary scenarios/paper/5-1-ap-2100.toml --along coordination.stiffness=100..6000 --tolerance 0.1 --json"],
+        rows: &[
+            ("title, key, unit, low, high", "of the scene; of the key"),
+            ("criterion", "`spectral-radius` or `mean-square`"),
+            ("first", "the verdict at `low`"),
+            ("crossings[].value, crossings[].from, crossings[].to", "where the verdict changes, and how"),
+            ("marginal", "stretches that cannot be told from 1, each with `low` and `high`"),
+            (
+                "tolerance, samples, finest, coarsest",
+                "how exact a crossing is; how many values were looked at, and their least and greatest distance",
+            ),
+            ("settled", "`false` if it ended after 100000 values"),
+            ("nominal", "at how many values chance is left out"),
+            ("notes, files", "the parts left out; the files written"),
+        ],
+    },
+    Document {
+        command: "admittance",
+        lines: &[
+            "cohaptic admittance scenarios/coordination/n3.toml --peer left --at 0.1 --curve object.mass=1 --json",
+            "cohaptic admittance scenarios/network/loss-independent.toml --peer left --at 0.1 --json",
+        ],
+        rows: &[
+            ("title, peer", "of the scene; which peer was pushed"),
+            ("@Curve of an admittance", "of the scene as it stands"),
+            (
+                "mean_square.verdict, mean_square.radius, mean_square.error_bound",
+                "of the second moment, where links leave something to chance and it can be followed",
+            ),
+            ("curves[].name, curves[].overrides, curves[].@Curve of an admittance", "of each `--curve`"),
+            ("files, interrupted", "what was written; whether frequencies are missing because of Ctrl-C"),
+        ],
+    },
+    Document {
+        command: "live",
+        lines: &["cohaptic live scenarios/live/two-and-a-program.toml --set measure.names=all --for 50ms --listen 127.0.0.1:0 --no-priority --json"],
+        rows: &[
+            ("measures.NAME", "each [measure](#measures) of the scene; of energy, only that of copies that the session simulates"),
+            ("title, duration_s, ending, ticks, max_discrepancy_m, files", "as [of a run](#run)"),
+            ("valid", "whether at most one in a thousand ticks and datagrams was later than the tolerance"),
+            ("late_ticks", "ticks later than the tolerance"),
+            ("lateness_us.@Lateness", "of ticks"),
+            ("release_lateness_us.@Lateness", "of datagrams to other programs"),
+            ("behind_us", "by how much logical time was behind the clock when the last event had happened"),
+            ("peers[].kind, peers[].name, peers[].position_m, peers[].velocity_m_s, peers[].stale_samples, peers[].refused_samples", "as of a run"),
+            (
+                "peers[].seat.taken, peers[].seat.joined, peers[].seat.refused, peers[].seat.out_of_order",
+                "of peers that live elsewhere: samples taken, how often it joined, samples refused and out of order",
+            ),
+            (
+                "peers[].seat.late, peers[].seat.most_late_us",
+                "samples that came after their instant and counted at the next, and by how much at most",
+            ),
+            ("link_totals.NAME, link_quantiles.NAME, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
+            ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
+            ("door.admitted, door.welcomed, door.refused.NAME", "datagrams; refused ones [by cause](live-protocol.md#why-a-datagram-is-refused)"),
+            ("door.joinings, door.sent, door.nobody_there, door.send_failures.NAME, door.oversized, door.kernel_drops", "what else was counted"),
+            ("granted, refused_wishes", "what the system granted, and what it refused with the way out"),
+        ],
+    },
+    Document {
+        command: "relay",
+        lines: &["cohaptic relay --listen 127.0.0.1:0 --to 127.0.0.1:9 --for 50ms --no-priority --json"],
+        rows: &[
+            ("title, form", "of the file, or `LISTEN -> TO`; `mesh` or `proxy`"),
+            ("duration_s, ending", "how long it ran; `complete` (`--for`) or `interrupted`"),
+            ("valid", "whether releases were as late as tolerated"),
+            ("packets", "datagrams that came in. With the copies that links made: sent at all `ports`, `dropped`, `in_flight` and `unsent`"),
+            (
+                "dropped",
+                "datagrams and copies that did not go out, but for those that the kernel dropped before they were read, which are in `ports`",
+            ),
+            ("release_error_us.@Lateness", "of sent datagrams"),
+            ("clamped_us.@Lateness", "of datagrams that were read after time had passed beyond their time stamp"),
+            ("links[].from, links[].to, links[].@Counters", "of each directed link"),
+            (
+                "links[].asked_mean_delay_s, links[].changes",
+                "when the run began (`null` where only a recording knows); how often it was changed since",
+            ),
+            ("links[].delivered_bytes, links[].overload, links[].undeliverable", "as in [the report](relay.md#dropped-datagrams)"),
+            ("ports[].name, ports[].address, ports[].received, ports[].sent", "of a proxy: `listen`, and all `clients` together"),
+            ("ports[].send_failures.NAME, ports[].oversized, ports[].receive_errors", "datagrams that were not sent or read; failures by reason"),
+            ("ports[].receive_buffer_bytes, ports[].kernel_drops", "what the system granted; `null` if it does not tell"),
+            ("refused.NAME", "dropped on entry: `stranger`, `to-itself`, `no-room`, `overload`"),
+            ("in_flight.packets, in_flight.bytes", "on their way at the end"),
+            ("unsent", "came out of their links and were not sent before the end"),
+            ("clients_without_socket", "clients for which no socket could be had"),
+            ("granted, refused_wishes", "what the system granted the thread, and what it refused"),
+        ],
+    },
+    Document {
+        command: "router",
+        lines: &[
+            "cp programs/router.toml . && python3 programs/router.py router.toml --set 'rules=[{ protocol = \"icmp\", link = \"pass\" }]' --for 300ms --json",
+        ],
+        rows: &[
+            ("title, duration_s", "the file; how long it ran"),
+            ("ending", "`complete` (`--for`), `interrupted` or `failed`"),
+            ("valid, release_error_us.@Lateness", "whether releases were as late as tolerated; how late"),
+            ("packets, dropped", "what came in at both devices; what did not go out, for any reason"),
+            ("sides[].name, sides[].device", "left, right"),
+            (
+                "sides[].received.packets, sides[].received.bytes, sides[].received.not_ip, sides[].received.malformed, sides[].received.passed, sides[].received.dropped",
+                "from the device",
+            ),
+            ("sides[].by_default.packets, sides[].by_default.bytes", "of those, what no rule decided"),
+            (
+                "sides[].written.packets, sides[].written.bytes, sides[].written.full, sides[].written.too_long, sides[].written.refused",
+                "to the device",
+            ),
+            ("links[].name, links[].from, links[].to, links[].@Counters", "each link from the left, then from the right"),
+            ("links[].delivered_bytes, links[].overload, links[].asked_mean_delay_s, links[].changes", "as of the [relay](#relay)"),
+            ("rules[].packets, rules[].bytes", "what each rule decided"),
+            ("in_flight.packets, in_flight.bytes", "inside all links at the end"),
+            ("granted, refused_wishes", "what the system granted the thread, and what it refused"),
+        ],
+    },
+    Document {
+        command: "falcon probe",
+        lines: &["cohaptic falcon probe --simulated --virtual-time --json"],
+        rows: &[
+            ("falcons[].@Falcon", "of each device"),
+            ("falcons[].opened, falcons[].error", "whether it could be opened, and why not; nothing more is known of one that was not"),
+            ("falcons[].@Exchanges with a Falcon", "of each device"),
+        ],
+    },
+    Document {
+        command: "falcon home",
+        lines: &["cohaptic falcon home --simulated --virtual-time --json"],
+        rows: &[
+            ("@Falcon", "which device"),
+            ("ending", "`complete`, `interrupted` or `failed`"),
+            ("is_homed, is_active", "whether it was homed, and pulled out"),
+            ("@Exchanges with a Falcon", "what was exchanged"),
+        ],
+    },
+    Document {
+        command: "falcon watch",
+        lines: &["cohaptic falcon watch --simulated --virtual-time --for 2s --json"],
+        rows: &[
+            ("@Falcon", "which device"),
+            ("ending", "`complete`, `interrupted` or `failed`"),
+            ("active_after_s", "when forces first could go out"),
+            ("@Exchanges with a Falcon", "what was exchanged"),
+            ("lowest_m, highest_m, fastest_m_s", "of the grip"),
+            ("forces.@Forces of a Falcon", "what became of the forces asked for"),
+            ("files", "what was written"),
+        ],
+    },
+    Document {
+        command: "falcon simulate",
+        lines: &["cohaptic falcon simulate --for 1s --json"],
+        rows: &[
+            ("hand, seed, asked_n, ending, driver_error", "what was asked for, and how it ended"),
+            ("changes[].t_s, changes[].phase, changes[].light, more_changes", "phases as they came, the first hundred; how many more"),
+            ("@Exchanges with a Falcon", "what was exchanged"),
+            ("forces.@Forces of a Falcon", "what became of the force"),
+            (
+                "device.commands, device.garbage_bytes, device.misheard_bytes, device.largest_count, device.largest_count_unhomed, device.saturated, device.torque_timeouts",
+                "what the device saw",
+            ),
+            (
+                "true_position_m, largest_position_error_m, motor_force_n, largest_motor_force_n",
+                "of the simulated device itself; the position from the base",
+            ),
+        ],
+    },
+    Document {
+        command: "link",
+        lines: &["cohaptic link delay 20ms 2ms distribution normal loss 1% 25% duplicate 1% corrupt 1% rate 1mbit --packets 20000 --json"],
+        rows: &[
+            ("asked.spec", "as it was written"),
+            (
+                "asked.NAME",
+                "what follows from the laws: `mean_s`, `sd_s`, `least_s`, `quantiles_s`, `autocorrelation` (lags 1 to 10), `loss`, `loss_run_mean`, `loss_autocorrelation`, `duplicated`, `damaged`, `rate_bit_s`; what does not follow is left out",
+            ),
+            ("achieved.NAME", "what was measured, with standard errors (`_se`) and intervals of 95 %, as defined by the RFCs; copies count"),
+            ("compared[].name, compared[].asked, compared[].achieved, compared[].standard_error, compared[].outside", "the rows of the table"),
+            ("fates.@Counters but mean_delay_s", "what became of the packets"),
+            ("packets_per_s, interrupted, files", "how fast; whether it was cut short; what was written"),
+        ],
+    },
+    Document {
+        command: "fit",
+        lines: &["python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --json"],
+        rows: &[
+            ("link.NAME", "the link that fits best"),
+            ("goodness.NAME", "what was measured, and how well each law and each model of loss fits"),
+            ("scene", "the `[link]` table as text"),
+            (
+                "skew.seconds_per_second, skew.standard_error, skew.interval_99, skew.significant, skew.location, skew.blocks",
+                "with `--skew`: the [drift](commands-network.md#fit)",
+            ),
+            (
+                "matched.unmatched_sent, matched.unmatched_arrived, matched.ambiguous",
+                "of two captures: the packets that stand in one alone, or cannot be told apart",
+            ),
+        ],
+    },
+    Document {
+        command: "paper",
+        lines: &["cohaptic paper --quick --json"],
+        rows: &[
+            (
+                "claims[].id, claims[].claim, claims[].paper, claims[].ours, claims[].verdict",
+                "what the paper says, what was computed, and the verdict",
+            ),
+            ("claims[].scene, claims[].how", "text of the scene that shows it, or `null`; how it was computed"),
+            ("figures[].id, figures[].file, figures[].title", "`file` is `null` without `--out`"),
+            ("wall_s", "the time it took"),
+        ],
+    },
+    Document {
+        command: "accuracy",
+        lines: &["cohaptic accuracy --quick --only motion --json"],
+        rows: &[
+            ("rows[].subject, rows[].case, rows[].method, rows[].setting", "what was measured"),
+            ("rows[].cost, rows[].cost_unit, rows[].error, rows[].error_unit", "`null` where there is no such number"),
+            ("rows[].reference, rows[].note", "what the error is against; what else is to be known"),
+            ("interrupted, wall_s", "whether it was cut short; the time it took"),
+        ],
+    },
+    Document {
+        command: "Errors",
+        lines: &["cohaptic run scenarios/network/ideal.toml --set link.dlay=8ms --json 2> said"],
+        rows: &[
+            ("status, message", "the exit status; the message as on standard error, without `error:`"),
+            ("place", "where a text is refused, else `null`"),
+            ("place.file, place.argument", "the file (`null` for an option), and the argument, such as `--set link.dlay=8ms` (`null` for a file)"),
+            ("place.line, place.column, place.key", "both from 1; the dotted path or `null`"),
+            ("place.fault", "the fault and the expected form, in one line"),
+        ],
+    },
+];

@@ -1,0 +1,71 @@
+//! Keys that several documents have.
+
+/// A table of keys: each row has keys that are explained together, separated by commas, and what they are.
+pub(super) struct Part {
+    pub(super) name: &'static str,
+    pub(super) rows: &'static [(&'static str, &'static str)],
+}
+
+/// Parts that several documents have. A row names one by its heading: `links[].@Counters`.
+pub(super) const PARTS: [Part; 7] = [
+    Part {
+        name: "Counters",
+        rows: &[
+            ("offered, delivered", "packets that were sent into the line, and that came out"),
+            ("duplicated", "copies that the line made"),
+            ("dropped.NAME", "packets by [cause](emulator.md#fates-and-causes)"),
+            ("in_flight", "packets on the way at the end. The counters [balance](emulator.md#conservation)"),
+            ("marked, damaged", "delivered with a congestion mark; with flipped bits"),
+            ("mean_delay_s", "of what was delivered, in this line alone; `null` if nothing was"),
+        ],
+    },
+    Part { name: "Lateness", rows: &[("count", "how many"), ("p50, p99, p999, max", "quantiles [µs], and the largest value")] },
+    Part {
+        name: "Parts of a scene",
+        rows: &[
+            ("kind", "`whole`, `together` (equal peers as their average), `apart` (their differences), `mode` of a graph, `loose-device`"),
+            ("peer", "the first peer that is meant; absent where all are"),
+            ("dimension, multiplicity", "states, and how often the part occurs"),
+            ("spectral_radius, error_bound", "of this part"),
+        ],
+    },
+    Part {
+        name: "Curve of an admittance",
+        rows: &[
+            (
+                "points[].hz, points[].magnitude_db, points[].phase_deg",
+                "magnitude relative to 1 m/(N·s), with turns to the unit of their axes; phase above −180 and up to 180, negative where the velocity lags",
+            ),
+            ("points[].ideal_db", "magnitude of the free mass, whose phase is −90"),
+            ("viscosity.value, viscosity.error", "of slow motion [N·s/m]; `null` where there is no limit"),
+            ("inertia.value, inertia.error", "of slow motion [kg]"),
+            ("stiffness.value, stiffness.error", "of slow motion [N/m]"),
+            ("verdict, spectral_radius, error_bound", "of the linear scene that is analysed"),
+            ("warning", "what the numbers must not be taken for where a verdict is not `stable`, else `null`"),
+            ("object_mass_kg", "mass of the whole object, or what it is felt as along or about the axes; `null` where infinite"),
+            ("notes", "parts that are left out or taken as closed"),
+        ],
+    },
+    Part {
+        name: "Falcon",
+        rows: &[("simulated, serial, product, bus, address", "which device"), ("firmware", "`running`, or `loaded` by this command")],
+    },
+    Part {
+        name: "Exchanges with a Falcon",
+        rows: &[
+            ("seconds, exchanges, reports, reports_per_s", "how long, and how many packets"),
+            ("timeouts, garbage_bytes, faults, implausible, unlocated, unhomed, farewells", "how often something was wrong"),
+            ("late_turns, worst_late_us", "a turn is late by 0.1 ms or more"),
+            ("phase, light, homed, encoders, buttons", "seen last; encoders top, right, left"),
+            ("position_m, velocity_m_s, force_n", "seen last, from the origin; `null` where they mean nothing"),
+        ],
+    },
+    Part {
+        name: "Forces of a Falcon",
+        rows: &[
+            ("limit_n, largest_n", "the limit, and the largest force"),
+            ("limited, slewed, saturated", "how many forces were changed"),
+            ("zeroed.NAME", "how many were zero, by cause"),
+        ],
+    },
+];

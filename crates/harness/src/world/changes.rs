@@ -1,0 +1,95 @@
+//! The changes of a timeline.
+
+use cohaptic_peer::Strategy;
+use cohaptic_peer::coordination::{BuiltIn, LawValues};
+use cohaptic_peer::rotation::Triple;
+use cohaptic_scene::{Change, ChangeKind, Scene};
+use cohaptic_units::Instant;
+use cohaptic_wan::{LinkModel, NodeId};
+
+use super::member::DeviceModel;
+use super::{Remote, World};
+
+/// New values of the parameters that the strategy has of its own.
+pub(super) struct ParameterChange {
+    own: LawValues,
+    /// For each peer β, and the damping of its copy with it [N·s/m].
+    damping: Vec<(f64, f64)>,
+    /// For each peer, if the object turns, the law of its turns, β about each axis, and the damping of the turn of its copy with it [N·m·s/rad].
+    turns: Vec<(BuiltIn, Triple, Triple)>,
+}
+
+/// The changes of parameters in the timeline, the first one last.
+pub(super) fn parameter_changes(scene: &Scene) -> Vec<ParameterChange> {
+    let change = |change: &Change| {
+        let ChangeKind::Parameters(settings) = &change.what else { return None };
+        let then = scene.with_parameters(settings);
+        let damping = (0..then.peers.len()).map(|place| (then.own_damping(place), then.copy_config(place).damping)).collect();
+        let turns = |place: usize| Some((then.turn_law(place)?, then.own_rotational_damping(place), then.damped_spin(place)?.damping));
+        let turns = (0..then.peers.len()).filter_map(turns).collect();
+        Some(ParameterChange { own: *settings.of(scene.coordination.strategy), damping, turns })
+    };
+    scene.timeline.iter().rev().filter_map(change).collect()
+}
+
+impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
+    /// Changes of the timeline up to and including `now`, each at its own instant.
+    #[inline(never)]
+    pub(super) fn change(&mut self, now: Instant) {
+        while let Some(change) = self.changes.pop_if(|change| change.at <= now) {
+            match change.what {
+                ChangeKind::Link(link) => self.set_link(change.at, link.from, link.to, &link.config),
+                ChangeKind::AllLinks(links) => {
+                    let places = 0..self.members.len();
+                    for (from, to) in places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to) {
+                        self.set_link(change.at, from, to, links.between(from, to));
+                    }
+                }
+                ChangeKind::Contact { peer, contact } => {
+                    self.members[peer].peer.set_contact(contact);
+                    for (place, member) in self.members.iter_mut().enumerate().filter(|(place, _)| *place != peer) {
+                        member.peer.strategy_mut().set_contact(if peer < place { peer } else { peer - 1 }, contact);
+                    }
+                }
+                ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
+                    DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
+                    DeviceModel::Unsimulated(_) => {}
+                },
+                ChangeKind::HandTorque { peer, torque } => {
+                    if let Some(rotation) = self.members[peer].peer.rotation_mut() {
+                        rotation.set_hand(torque);
+                    }
+                }
+                ChangeKind::SendWhen(when) => self.send_when = Some(when),
+                ChangeKind::Parameters(_) => {
+                    let ParameterChange { own, damping, turns } = self.parameters.pop().expect("there is one for each of these changes");
+                    for (rotation, (law, own_damping, damping)) in self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).zip(turns)
+                    {
+                        rotation.set_law(&law, own_damping, damping);
+                    }
+                    for (member, (own_damping, damping)) in self.members.iter_mut().zip(damping) {
+                        member.peer.set_parameters(&own, own_damping, damping);
+                    }
+                    self.horizon = self.members[0].peer.strategy().horizon();
+                }
+                ChangeKind::Coordination(gains) => {
+                    for member in &mut self.members {
+                        member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
+                    }
+                    self.change_gains_of_turns();
+                }
+                ChangeKind::RotationalGains(_) => self.change_gains_of_turns(),
+            }
+        }
+    }
+
+    fn change_gains_of_turns(&mut self) {
+        if let Some(gains) = self.turning.as_mut().and_then(|turning| turning.next_gains()) {
+            self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).for_each(|rotation| rotation.set_gains(gains));
+        }
+    }
+
+    pub(super) fn set_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
+        self.network.set_link(at, NodeId::new(from), NodeId::new(to), link.clone()).expect("changes are in order of time");
+    }
+}

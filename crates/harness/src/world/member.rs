@@ -1,0 +1,149 @@
+//! A peer of a run with its clock and what stands for its device.
+
+use std::time::Duration;
+
+use cohaptic_peer::coordination::Role;
+use cohaptic_peer::rotation::Rotation;
+use cohaptic_peer::{Clock, Device, Held, LastSent, ObjectCopy, Peer, RestingDevice, SimulatedDevice, State, Strategy};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+use super::row;
+use crate::disturbance::Disturbance;
+use crate::observer::{Observer, StepRow, TurnStepRow};
+use crate::plan::{DeviceChoice, Plan};
+
+/// A peer with its clock.
+pub(super) struct Member<const A: usize, S, D> {
+    pub(super) peer: Peer<A, DeviceModel<A, D>, S>,
+    pub(super) clock: Clock,
+    pub(super) tick: u64,
+    /// The tick at which it sends next, and how many ticks later again.
+    pub(super) next_send: u64,
+    pub(super) send_every: u64,
+    /// With dead bands alone.
+    pub(super) last_sent: Option<LastSent<A>>,
+    pub(super) stale_samples: u64,
+    pub(super) refused_samples: u64,
+    /// The held part of the coordination force that was computed at the latest tick, if steps are watched.
+    pub(super) commanded: [f64; A],
+}
+
+/// What stands for a peer's device; D is the type of those that nobody simulates.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "most peers of most scenes are the large variant, and a box would cost a cache miss a tick")]
+pub(crate) enum DeviceModel<const A: usize, D> {
+    Unsimulated(D),
+    Simulated(SimulatedDevice<A>),
+}
+
+impl<const A: usize, D: Device<A>> Device<A> for DeviceModel<A, D> {
+    #[inline]
+    fn state(&self) -> State<A> {
+        match self {
+            Self::Unsimulated(device) => device.state(),
+            Self::Simulated(device) => device.state(),
+        }
+    }
+
+    #[inline]
+    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        match self {
+            Self::Unsimulated(device) => device.advance(now, span, coupling_force),
+            Self::Simulated(device) => device.advance(now, span, coupling_force),
+        }
+    }
+}
+
+impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
+    /// Moves to the next tick, with `commanded` the held part of the coordination force that was computed at this one.
+    pub(super) fn advance_watched<O: Observer>(
+        &mut self,
+        now: Instant,
+        span: Duration,
+        commanded: [f64; A],
+        (place, axes): (usize, usize),
+        observer: &mut O,
+    ) -> Result<(), O::Error> {
+        let late = std::mem::replace(&mut self.commanded, commanded);
+        let coordination = if self.peer.compute_delay() { late } else { commanded };
+        let before = self.moved_by_coordination();
+        let acting = *self.peer.applied();
+        let turn = self.peer.rotation().map(|rotation| TurnStepRow {
+            span,
+            before: rotation.copy().rate,
+            after: [0.0; 3],
+            travel: rotation.travel(span),
+            held_torque: rotation.on_copy(),
+            coordination_torque: rotation.applied().coordination,
+            own_damping: rotation.own_damping(),
+        });
+        self.peer.advance(now, span);
+        let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });
+        let after = self.moved_by_coordination();
+        let coordination = if self.peer.role() == Role::Copy { coordination } else { acting.coupling };
+        observer.on_step(&StepRow {
+            at: now,
+            peer: place,
+            before: row(&before, axes),
+            after: row(&after, axes),
+            held_force: &acting.on_object[..axes],
+            coordination_force: &coordination[..axes],
+            own_damping: self.peer.own_damping(),
+            turn,
+        })
+    }
+
+    /// The body on which the others act: the copy, or the device of a client.
+    fn moved_by_coordination(&self) -> State<A> {
+        if self.peer.role() == Role::Copy { *self.peer.object().state() } else { self.peer.device().state() }
+    }
+}
+
+impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Member<A, S, D> {
+    pub(super) fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize, strategy: S) -> Self {
+        let spec = &scene.peers[place];
+        let (clock, integrator) = (spec.clock, scene.integrator);
+        let displaced = |body| {
+            let state = if body == 0 { scene.initial_device(place) } else { initial[place] };
+            disturbance.map_or(state, |disturbance| disturbance.displace(state, scene.axes.count(), place, body))
+        };
+        let device = match plan.devices[place] {
+            DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Unsimulated(RestingDevice { position: displaced(0).position }.into()),
+            DeviceChoice::Simulated => {
+                DeviceModel::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), displaced(0), integrator, &clock))
+            }
+        };
+        let object = ObjectCopy::new(scene.copy_config(place), displaced(1), integrator, &clock);
+        let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
+        let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
+        let mut peer = Peer::new(scene.peer_config(place), device, object, strategy, Held::new(others));
+        if let Some(mut rotation) = scene.rotation_of(place) {
+            if let (Some(disturbance), Some(length)) = (disturbance, scene.gyration()) {
+                disturbance.turn(&mut rotation, length, place);
+            }
+            peer = peer.with_rotation(rotation);
+        }
+        Self {
+            peer,
+            clock,
+            tick: 0,
+            next_send: spec.phase,
+            send_every: u64::try_from(send_every).unwrap_or(u64::MAX),
+            last_sent: None,
+            stale_samples: 0,
+            refused_samples: 0,
+            commanded: [0.0; A],
+        }
+    }
+
+    #[inline]
+    pub(super) fn is_finite(&self) -> bool {
+        // Each kind by itself: asked as one, both become a selection of addresses, which costs two peers a fiftieth of a tick.
+        let device = match self.peer.device() {
+            DeviceModel::Unsimulated(device) => device.state().is_finite(),
+            DeviceModel::Simulated(device) => device.state().is_finite(),
+        };
+        self.peer.object().state().is_finite() & device & self.peer.rotation().is_none_or(Rotation::is_finite)
+    }
+}

@@ -1,0 +1,34 @@
+//! The rows that an observer asks for.
+
+use crate::observer::Observer;
+
+/// What an observer wants to see.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Watch {
+    pub(crate) ticks: bool,
+    pub(crate) packets: bool,
+    pub(crate) steps: bool,
+    pub(crate) instants: bool,
+    pub(crate) sends: bool,
+    pub(crate) holds: bool,
+}
+
+impl Watch {
+    pub(crate) const NOTHING: Self = Self { ticks: false, packets: false, steps: false, instants: false, sends: false, holds: false };
+
+    /// Whether no more is looked at than ticks and instants.
+    pub(crate) fn is_of_ticks(self) -> bool {
+        Self { ticks: false, instants: false, ..self } == Self::NOTHING
+    }
+
+    pub(crate) fn of(observer: &impl Observer) -> Self {
+        Self {
+            ticks: observer.wants_ticks(),
+            packets: observer.wants_packets(),
+            steps: observer.wants_steps(),
+            instants: observer.wants_instants(),
+            sends: observer.wants_sends(),
+            holds: observer.wants_holds(),
+        }
+    }
+}
