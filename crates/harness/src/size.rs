@@ -143,7 +143,9 @@ mod tests {
         assert!(reason.contains("at most 23170 peers: expected fewer peers, or to look at nothing but counters"), "{reason}");
         assert!(reason.contains("takes 39 MB"), "{reason}");
         let ring = Scene { topology: Topology::ring(70_000, 2).map(Arc::new), ..scene(70_000, "delay = \"24ms\"") };
-        assert!(refused(&ring, true, u64::MAX).unwrap().1.contains("70000 peers with 140000 links between them are too many to be simulated with events"));
+        assert!(
+            refused(&ring, true, u64::MAX).unwrap().1.contains("70000 peers with 140000 links between them are too many to be simulated with events")
+        );
         let jitter = scene(1000, "delay = \"24ms\", jitter = \"2ms\"");
         let [with_events, in_arrays] = [Way::Events, Way::Packets].map(|way| way.bytes(1000, 999_000));
         assert!((refused(&jitter, true, with_events).is_none(), refused(&jitter, false, in_arrays).is_none()) == (true, true));

@@ -13,8 +13,8 @@ use cohaptic_wan::{DropCause, LinkModel};
 
 use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 
-use crate::{RotationSpec, Topology};
 use crate::measures::MeasureName;
+use crate::{RotationSpec, Topology};
 
 /// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
 #[derive(Clone, PartialEq)]
@@ -54,7 +54,8 @@ pub struct Scene {
 impl fmt::Debug for Scene {
     /// Turns, topologies and measures are shown only where there are any: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { file, title, duration, seed, axes, object, rotation, coordination, integrator, peers, topology, links, timeline, measure, expect } = self;
+        let Self { file, title, duration, seed, axes, object, rotation, coordination, integrator, peers, topology, links, timeline, measure, expect } =
+            self;
         let mut shown = f.debug_struct("Scene");
         shown.field("file", file).field("title", title).field("duration", duration).field("seed", seed).field("axes", axes);
         shown.field("object", object).field("coordination", coordination).field("integrator", integrator).field("peers", peers);

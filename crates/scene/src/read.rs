@@ -92,7 +92,21 @@ pub(crate) fn parse_scene(sources: Sources<'_>, live: bool, on_links: OnLinks<'_
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
 fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLinks<'_>) -> Option<Scene> {
     let mut root = TableReader::new(document, file, "a table")?;
-    root.know(&["scene", "object", "coordination", "simulation", "peer", "peers", "topology", "modulators", "link", "links", "timeline", "measure", "expect"]);
+    root.know(&[
+        "scene",
+        "object",
+        "coordination",
+        "simulation",
+        "peer",
+        "peers",
+        "topology",
+        "modulators",
+        "link",
+        "links",
+        "timeline",
+        "measure",
+        "expect",
+    ]);
     let header_node = root.get("scene");
     let header = root.required("scene", "a table [scene] with a duration", read_header).unwrap_or_default();
     let Header { title, duration, seed, axes, count } = header;

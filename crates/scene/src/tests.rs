@@ -2,6 +2,7 @@
 
 mod form;
 mod strategies;
+mod topologies;
 
 use std::path::Path;
 use std::time::Duration;

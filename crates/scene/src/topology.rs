@@ -328,7 +328,9 @@ impl Scene {
                 strategy.name()
             ));
         }
-        self.rotation.is_some().then(|| "an object that turns is followed only where all peers send to all: expected kind = \"full\", or no object.inertia".to_owned())
+        self.rotation
+            .is_some()
+            .then(|| "an object that turns is followed only where all peers send to all: expected kind = \"full\", or no object.inertia".to_owned())
     }
 
     /// What the gains of a peer are multiplied by where they count once for each peer that it hears.

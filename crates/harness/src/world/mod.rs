@@ -115,7 +115,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             datagrams: Datagrams::default(),
             schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
             changes: scene.timeline.iter().rev().cloned().collect(),
-            coordination_factors: (0..if scene.has_gains_by_peer() { scene.peers.len() } else { 1 }).map(|peer| scene.coordination_factor(peer)).collect(),
+            coordination_factors: (0..if scene.has_gains_by_peer() { scene.peers.len() } else { 1 })
+                .map(|peer| scene.coordination_factor(peer))
+                .collect(),
             topology: scene.topology.clone(),
             end: Instant::ZERO.saturating_add(scene.duration),
             now: Instant::ZERO,

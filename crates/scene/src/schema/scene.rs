@@ -346,8 +346,12 @@ static TOPOLOGY: Table = Table::of(&[&[
     optional("role", Form::Words(&HUB_ROLES), "Of a star: what its hub does; without it peer"),
     optional("file", Form::File, "Of a graph: the weights, a row a peer, numbers between commas that are mutual"),
 ]]);
-const TOPOLOGIES: [(&str, &str); 4] =
-    [("full", "every other"), ("ring", "as many before it as behind it"), ("star", "the hub, and the hub every other"), ("graph", "those with a weight above 0")];
+const TOPOLOGIES: [(&str, &str); 4] = [
+    ("full", "every other"),
+    ("ring", "as many before it as behind it"),
+    ("star", "the hub, and the hub every other"),
+    ("graph", "those with a weight above 0"),
+];
 const HUB_ROLES: [(&str, &str); 1] = [("peer", "has a copy, as all have, and passes nothing on")];
 
 static MEASURE: Table = Table::of(&[&[

@@ -30,14 +30,16 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Option<
         }
         fits
     };
-    let neighbours = table.maybe("neighbours", |node, context| {
-        fits(node, Kind::Ring, "ring").then(|| read_neighbours(node, context))?.map(|count| (count, node))
-    });
+    let neighbours =
+        table.maybe("neighbours", |node, context| fits(node, Kind::Ring, "ring").then(|| read_neighbours(node, context))?.map(|count| (count, node)));
     let hub = table.maybe("hub", |node, context| fits(node, Kind::Star, "star").then(|| read_peer_name(node, context))?);
     table.maybe("role", |node, context| {
         let fits = fits(node, Kind::Star, "star");
         if fits && node.as_text() == Some("relay") {
-            context.fault_at(node, "a hub that only passes on what it hears is not simulated: expected \"peer\", a hub with a copy that hears all others");
+            context.fault_at(
+                node,
+                "a hub that only passes on what it hears is not simulated: expected \"peer\", a hub with a copy that hears all others",
+            );
             return None;
         }
         fits.then(|| values::choice(node, context, &[("peer", ())]))?
@@ -63,7 +65,9 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Option<
             let (count, node) = neighbours.map_or((2, node), |(count, node)| (count, node));
             let ring = Topology::ring(peers, count);
             if ring.is_none() && peers >= 2 {
-                let message = format!("{peers} peers on a ring with {count} neighbours each: expected an even number of neighbours, fewer than there are peers");
+                let message = format!(
+                    "{peers} peers on a ring with {count} neighbours each: expected an even number of neighbours, fewer than there are peers"
+                );
                 context.fault_at(node, message);
             }
             ring.map(Arc::new).map(Some)

@@ -36,7 +36,10 @@ impl Paths {
             let begin = receivers.len();
             receivers.extend(receivers_of(from));
             let own = &receivers[begin..];
-            assert!(own.iter().all(|to| to.0 < nodes && *to != from) && own.is_sorted_by(|one, next| one < next), "receivers are other nodes, in order");
+            assert!(
+                own.iter().all(|to| to.0 < nodes && *to != from) && own.is_sorted_by(|one, next| one < next),
+                "receivers are other nodes, in order"
+            );
             assert!(receivers.len() <= MOST_LINKS, "a network has at most 2^29 links");
             first.push(LinkId::new(receivers.len()).0);
         }

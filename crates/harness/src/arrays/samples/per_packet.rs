@@ -13,9 +13,9 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkModel, LinkName, LinkStats, PacketInfo, SteppedLinks};
 
 use super::in_flight::{InFlight, Packet};
-use super::{Sample, count};
 use super::quads::{self, Quad};
 use super::rows::Rows;
+use super::{Sample, count};
 use crate::arrays::bodies::Bodies;
 use crate::arrays::{Shape, nanos};
 
