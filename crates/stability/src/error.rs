@@ -72,7 +72,7 @@ pub enum AnalysisError {
         what: &'static str,
     },
     /// The scene has a topology, and this analysis does not follow it.
-    #[error("{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"; stability point follows a topology")]
+    #[error("{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"")]
     Topology {
         /// The analysis.
         what: &'static str,

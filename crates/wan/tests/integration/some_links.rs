@@ -1,7 +1,8 @@
 //! A network of some links is that part of a network of all.
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{LinkModel, Netem, Network, NetworkConfig, NetworkError, NodeId};
+use cohaptic_wan::netem::Netem;
+use cohaptic_wan::{LinkModel, Network, NetworkConfig, NetworkError, NodeId};
 
 /// To whom each of five nodes sends.
 const RECEIVERS: [&[u16]; 5] = [&[1, 4], &[0], &[], &[0, 1, 2], &[3]];
