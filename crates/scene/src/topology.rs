@@ -196,7 +196,7 @@ impl Topology {
         (0..self.peers()).flat_map(|from| self.neighbours(from).iter().map(move |to| (from, *to as usize)))
     }
 
-    /// The weights of the neighbours of a peer; `None` if all topologies of this form have weights of 1.
+    /// The weights of the neighbours of a peer; `None` if all peers weigh 1.
     fn weights(&self, peer: usize) -> Option<&[f64]> {
         self.weights.get(self.places(peer)).filter(|_| !self.weights.is_empty())
     }

@@ -82,7 +82,7 @@ fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failur
 fn weights(file: &Path) -> Result<Graph, Failure> {
     let text = file::read_text(file)?;
     let rows = read_weights(&text).map_err(|fault| {
-        let line = text[..fault.span.start].lines().count().max(1);
+        let line = text[..fault.span.start].matches('\n').count() + 1;
         Failure::Input(format!("{}:{line}: {}", file.display(), fault.message))
     })?;
     let columns = rows.first().map_or(0, Vec::len);
