@@ -105,7 +105,7 @@ impl Topology {
         let neighbours = |row: &Vec<f64>| row.iter().enumerate().filter(|(_, weight)| **weight > 0.0).map(|(peer, _)| peer).collect();
         let mut graph = Self::unweighted(TopologyKind::Graph, rows.iter().map(neighbours));
         let weights: Vec<f64> = rows.iter().flatten().copied().filter(|weight| *weight > 0.0).collect();
-        if weights.iter().any(|weight| *weight != 1.0) {
+        if weights.iter().any(|weight| weight.to_bits() != 1.0_f64.to_bits()) {
             graph.weights = weights;
         }
         match graph.unreached() {
@@ -215,7 +215,7 @@ impl Topology {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub fn degree(&self, peer: usize) -> f64 {
-        self.weights(peer).map_or(self.neighbours(peer).len() as f64, |weights| weights.iter().sum())
+        self.weights(peer).map_or_else(|| self.neighbours(peer).len() as f64, |weights| weights.iter().sum())
     }
 
     /// The weights of the neighbours of a peer over their mean, so that the mean of what they weigh is the weighted mean; `None` if they are equal.
@@ -270,10 +270,13 @@ pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fau
     Topology::graph(&rows).map(Arc::new).map_err(|WeightsError { row, column, message }| {
         let line = at(row);
         let before = |column: usize| text[line.clone()].split(',').take(column).map(|field| field.len() + 1).sum::<usize>();
-        let span = column.map_or(line.clone(), |column| {
-            let start = line.start + before(column);
-            start..(line.start + before(column + 1)).saturating_sub(1).max(start)
-        });
+        let span = column.map_or_else(
+            || line.clone(),
+            |column| {
+                let start = line.start + before(column);
+                start..(line.start + before(column + 1)).saturating_sub(1).max(start)
+            },
+        );
         Fault { span, message }
     })
 }

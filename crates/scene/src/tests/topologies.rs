@@ -35,11 +35,12 @@ fn a_topology_is_read_with_its_defaults() {
 fn sums_are_over_neighbours_and_scaling_is_by_all() {
     let gains = |overrides: &[&str]| {
         let scene = scene("kind = \"star\"", overrides);
-        [0, 1].map(|peer| scene.coordination_gains(scene.coordination.gains, peer).stiffness)
+        [0, 1].map(|peer| scene.coordination_gains(scene.coordination.gains, peer))
     };
-    assert_eq!(gains(&[]), [8.0, 8.0]);
-    assert_eq!(gains(&["coordination.pull=sum"]), [24.0, 8.0]);
-    assert_eq!(gains(&["coordination.strategy=proportional-derivative", "coordination.scaling=inverse-n"]), [18.0, 6.0]);
+    let times = |factors: [f64; 2]| factors.map(|factor| Gains { stiffness: 8.0 * factor, damping: factor });
+    assert_eq!(gains(&[]), times([1.0, 1.0]));
+    assert_eq!(gains(&["coordination.pull=sum"]), times([3.0, 1.0]));
+    assert_eq!(gains(&["coordination.strategy=proportional-derivative", "coordination.scaling=inverse-n"]), times([2.25, 0.75]));
     let full = parse(&four(""), &["coordination.pull=sum"]).unwrap();
     assert_eq!(full.coordination_gains(full.coordination.gains, 2), Gains { stiffness: 24.0, damping: 3.0 });
 }
