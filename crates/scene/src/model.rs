@@ -39,7 +39,7 @@ pub struct Scene {
     pub integrator: Integrator,
     /// The peers, at least two, in the order of the file. Their names differ.
     pub peers: Vec<PeerSpec>,
-    /// Who sends to whom; `None`: everybody to everybody.
+    /// The peers to which each peer sends; `None`: all others.
     pub topology: Option<Arc<Topology>>,
     /// The directed links between the peers; of no meaning between peers that are no neighbours in the topology.
     pub links: LinkTable,

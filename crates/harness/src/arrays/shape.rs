@@ -37,7 +37,7 @@ pub(crate) struct Shape {
     pub(super) has_queues: bool,
     /// The delay of all links, if they do nothing but delay, all alike, and lead from all to all.
     pub(super) delay: Option<Duration>,
-    /// Who sends to whom, if not all to all.
+    /// The neighbours of each peer, if they are not all others.
     pub(super) topology: Option<Arc<Topology>>,
 }
 

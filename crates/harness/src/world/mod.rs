@@ -52,7 +52,7 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     parameters: Vec<ParameterChange>,
     /// By peer, or of all if it is the same.
     coordination_factors: Vec<f64>,
-    /// Who sends to whom, if not all to all.
+    /// The neighbours of each peer, if they are not all others.
     topology: Option<Arc<Topology>>,
     end: Instant,
     now: Instant,

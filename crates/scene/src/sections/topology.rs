@@ -1,4 +1,4 @@
-//! `[topology]`: who sends to whom.
+//! `[topology]`: the peers to which each peer sends.
 
 use std::sync::Arc;
 

@@ -1,11 +1,11 @@
-//! Whom each receiver hears, and where its links and what it holds lie.
+//! The senders that each receiver hears, and the places of its links and of the samples that it holds.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use cohaptic_scene::Topology;
 
-/// The rows of some receivers, which are counted from 0: a link from each sender, in order, and a place for what is held of each.
+/// The rows of some receivers, which are counted from 0: a link from each sender, in order, and a place for the sample held from each.
 #[derive(Clone, Debug)]
 pub(super) enum Rows {
     /// Each hears all others. There is a link from itself too, over which nothing is sent, so that a place is found by multiplying.
