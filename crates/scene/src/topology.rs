@@ -67,7 +67,7 @@ impl Topology {
         })
     }
 
-    /// A star of that many peers around one of them; `None` if that is none of them, or they are fewer than two.
+    /// A star of `peers` around one of them; `None` if that is none of them, or they are fewer than two.
     #[must_use]
     pub fn star(peers: usize, hub: usize) -> Option<Self> {
         let of = |peer: usize| if peer == hub { (0..peers).filter(|other| *other != hub).collect() } else { vec![hub] };
