@@ -1,11 +1,12 @@
 //! Packets a second over links with queues and with memory, beside the links that need neither: `cargo bench -p cohaptic-benches --bench queues`.
 #![allow(missing_docs, reason = "criterion's macros make public functions")]
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_benches::Mesh;
 use cohaptic_harness::{Model, NoObserver, Simulation};
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Scene, Topology};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
 /// Keys of links beside a delay of 24 ms.
@@ -54,5 +55,20 @@ fn queues(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, queues, threads);
+/// Ten thousand peers on a ring of eight neighbours: a run of 200 ticks is at real time if it takes 200 ms.
+fn rings(criterion: &mut Criterion) {
+    const PEERS: usize = 10_000;
+    const NEIGHBOURS: usize = 8;
+    const TICKS: u64 = 200;
+    let mut group = criterion.benchmark_group("rings");
+    group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(4));
+    group.throughput(Throughput::Elements(TICKS / 8 * (PEERS * NEIGHBOURS) as u64));
+    for (name, keys) in &LINKS[..3] {
+        let scene = Scene { topology: Topology::ring(PEERS, NEIGHBOURS).map(Arc::new), ..scene(PEERS, keys, TICKS) };
+        group.bench_function(BenchmarkId::new(*name, PEERS), |bencher| bencher.iter(|| Mesh::run(&scene)));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, queues, threads, rings);
 criterion_main!(benches);

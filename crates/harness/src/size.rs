@@ -41,7 +41,8 @@ enum Way {
 /// `watched`: whether an observer asks for anything but [`crate::Observer::keep_going`]. The memory is a lower bound: with jitter, queues or many packets on
 /// the way a run takes more. It is not looked at in scenes of up to 500 peers.
 ///
-/// 23,170 peers are the most with events. In arrays there are up to 65,535 peers, and any number where all links have one constant delay.
+/// 23,170 peers are the most with events, or 65,535 on a topology. In arrays there are up to 65,535 peers, and any number where all links have one constant delay
+/// and lead from all to all.
 #[must_use]
 pub fn too_large(scene: &Scene, model: Model, watched: bool) -> Option<TooLarge> {
     if scene.peers.len() <= SMALL { None } else { too_large_for(scene, Way::of(scene, model, watched), free_memory()) }
@@ -49,9 +50,11 @@ pub fn too_large(scene: &Scene, model: Model, watched: bool) -> Option<TooLarge>
 
 fn too_large_for(scene: &Scene, way: Way, free: Option<u64>) -> Option<TooLarge> {
     let peers = scene.peers.len();
-    let (links, needed) = (links(peers), way.bytes(peers));
-    let (peer, what) = if way == Way::Events && peers > MOST_NODES {
-        (MOST_NODES, format!("too many to be simulated with events, which takes at most {MOST_NODES} peers"))
+    let links = scene.link_count();
+    let needed = way.bytes(peers, links);
+    let most = if scene.topology.is_some() { usize::from(u16::MAX) } else { MOST_NODES };
+    let (peer, what) = if way == Way::Events && peers > most {
+        (most, format!("too many to be simulated with events, which takes at most {most} peers"))
     } else {
         let free = free.filter(|free| *free < needed)?;
         (
@@ -60,17 +63,13 @@ fn too_large_for(scene: &Scene, way: Way, free: Option<u64>) -> Option<TooLarge>
         )
     };
     let least = Way::of(scene, Model::Least, false);
-    let cure = if least.bytes(peers) < needed {
-        let needed = Megabytes(least.bytes(peers));
+    let cure = if least.bytes(peers, links) < needed {
+        let needed = Megabytes(least.bytes(peers, links));
         format!("to look at nothing but counters, without plot, records and measures, which takes {needed} or a little more")
     } else {
         "one constant delay for all links, one tick for all peers and no timeline, without plot, records and measures".to_owned()
     };
     Some(TooLarge { peer, reason: format!("{peers} peers with {links} links between them are {what}: expected fewer peers, or {cure}") })
-}
-
-fn links(peers: usize) -> u64 {
-    peers as u64 * (peers as u64).saturating_sub(1)
 }
 
 impl Way {
@@ -83,13 +82,13 @@ impl Way {
         }
     }
 
-    fn bytes(self, peers: usize) -> u64 {
+    fn bytes(self, peers: usize, links: u64) -> u64 {
         let a_link = match self {
             Self::Broadcast => 0,
             Self::Packets => A_LINK_IN_ARRAYS,
             Self::Events => A_LINK_WITH_EVENTS,
         };
-        (peers as u64).saturating_mul(A_PEER).saturating_add(links(peers).saturating_mul(a_link))
+        (peers as u64).saturating_mul(A_PEER).saturating_add(links.saturating_mul(a_link))
     }
 }
 
@@ -114,6 +113,9 @@ impl std::fmt::Display for Megabytes {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+    use std::sync::Arc;
+
+    use cohaptic_scene::Topology;
 
     use super::*;
 
@@ -140,8 +142,12 @@ mod tests {
         assert_eq!(peer, 23_170);
         assert!(reason.contains("at most 23170 peers: expected fewer peers, or to look at nothing but counters"), "{reason}");
         assert!(reason.contains("takes 39 MB"), "{reason}");
+        let ring = Scene { topology: Topology::ring(70_000, 2).map(Arc::new), ..scene(70_000, "delay = \"24ms\"") };
+        assert!(
+            refused(&ring, true, u64::MAX).unwrap().1.contains("70000 peers with 140000 links between them are too many to be simulated with events")
+        );
         let jitter = scene(1000, "delay = \"24ms\", jitter = \"2ms\"");
-        let [with_events, in_arrays] = [Way::Events, Way::Packets].map(|way| way.bytes(1000));
+        let [with_events, in_arrays] = [Way::Events, Way::Packets].map(|way| way.bytes(1000, 999_000));
         assert!((refused(&jitter, true, with_events).is_none(), refused(&jitter, false, in_arrays).is_none()) == (true, true));
         assert!(refused(&jitter, true, with_events - 1).unwrap().1.contains("to look at nothing but counters"));
         assert!(refused(&jitter, false, in_arrays - 1).unwrap().1.contains("one constant delay for all links"));

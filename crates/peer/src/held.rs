@@ -23,6 +23,17 @@ pub struct Held<const A: usize> {
     sums: Option<Box<ExactMeans<A>>>,
     /// How each sample moves on while it is held, if anybody asks for it.
     motions: Option<Motions<A>>,
+    /// The senders, if they are not all others with equal weights.
+    heard: Option<Box<Heard>>,
+}
+
+/// Senders that are some of the others, or differ in weight.
+#[derive(Clone, Debug)]
+struct Heard {
+    /// Their places in the session, in order.
+    senders: Vec<u32>,
+    /// By what their states are multiplied; empty if by nothing.
+    weights: Vec<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -62,9 +73,39 @@ impl<const A: usize> Held<A> {
     pub fn new(initial: impl IntoIterator<Item = State<A>>) -> Self {
         let samples: Vec<_> = initial.into_iter().map(|state| HeldSample { state, next: 0 }).collect();
         let sums = (samples.len() >= EXACT_FROM).then(|| Box::new(ExactMeans::new(samples.iter().map(|sample| &sample.state))));
-        let mut held = Self { samples, mean: State::REST, sums, motions: None };
+        let mut held = Self { samples, mean: State::REST, sums, motions: None, heard: None };
         held.refresh();
         held
+    }
+
+    /// Holds the initial states of some of the other peers, with their places in the session, in order. `weights`, over their mean, are those of a weighted mean;
+    /// `None`: all are equal. States are held times their weights, so that their mean is the weighted one.
+    #[must_use]
+    pub fn of_some(initial: impl IntoIterator<Item = (u32, State<A>)>, weights: Option<Vec<f64>>) -> Self {
+        let (senders, states): (Vec<u32>, Vec<State<A>>) = initial.into_iter().unzip();
+        let weights = weights.unwrap_or_default();
+        let weigh = |(place, state): (usize, State<A>)| weights.get(place).map_or(state, |weight| state.times(*weight));
+        let mut held = Self::new(states.into_iter().enumerate().map(weigh));
+        held.heard = Some(Box::new(Heard { senders, weights }));
+        held
+    }
+
+    /// The place of a peer of the session among those held by the one in the place `own`; `None` if it is not heard.
+    #[inline(always)]
+    pub(crate) fn place_of(&self, sender: u32, own: u32) -> Option<usize> {
+        if let Some(heard) = &self.heard {
+            return heard.senders.binary_search(&sender).ok();
+        }
+        let (sender, own) = (sender as usize, own as usize);
+        let place = if sender < own { sender } else { sender.wrapping_sub(1) };
+        (sender != own && place < self.samples.len()).then_some(place)
+    }
+
+    /// A state as it is held.
+    #[inline]
+    fn weighed(&self, place: usize, state: State<A>) -> State<A> {
+        let weight = self.heard.as_ref().and_then(|heard| heard.weights.get(place));
+        weight.map_or(state, |weight| state.times(*weight))
     }
 
     /// Keeps send times and velocities for [`Held::lead`] from now on, for samples that move on up to an age of `horizon` \[s\]: the samples held so far count as sampled at the instant 0 of their senders' clocks.
@@ -80,19 +121,19 @@ impl<const A: usize> Held<A> {
         }
     }
 
-    /// How many other peers there are.
+    /// How many other peers are heard.
     #[must_use]
     pub fn len(&self) -> usize {
         self.samples.len()
     }
 
-    /// Whether there is no other peer.
+    /// Whether no other peer is heard.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
 
-    /// The state held from the sender in that place, `None` beyond the last.
+    /// The state held from the sender in that place, times its weight if weights differ; `None` beyond the last.
     #[must_use]
     pub fn state(&self, place: usize) -> Option<&State<A>> {
         self.samples.get(place).map(|sample| &sample.state)
@@ -132,6 +173,7 @@ impl<const A: usize> Held<A> {
     pub fn accept(&mut self, place: usize, sequence: u64, sent: Instant, state: State<A>) -> bool {
         let newer = sequence >= self.samples[place].next;
         if newer {
+            let state = self.weighed(place, state);
             // A sequence number of 2^64 − 1 is the last there can be: nothing is newer.
             self.replace(place, HeldSample { state, next: sequence.saturating_add(1) });
             if let Some(motions) = &mut self.motions {
@@ -147,6 +189,7 @@ impl<const A: usize> Held<A> {
     ///
     /// If there is no sender in that place.
     pub fn hold(&mut self, place: usize, sent: Instant, state: State<A>) {
+        let state = self.weighed(place, state);
         self.replace(place, HeldSample { state, next: 0 });
         if let Some(motions) = &mut self.motions {
             motions.set(place, Moving { sent, velocity: state.velocity });
@@ -290,6 +333,22 @@ mod tests {
         held.refresh();
         reversed.refresh();
         assert_eq!((*held.mean(), *reversed.mean()), (at(0.1), at(0.1)));
+    }
+
+    /// Weights 1 and 3: the mean of 0.5·x and 1.5·y, and so are leads; who is not heard has no place.
+    #[test]
+    fn a_weighted_mean_is_that_of_what_states_weigh() {
+        let mut held = Held::of_some([(2, at(4.0)), (7, at(8.0))], Some(vec![0.5, 1.5]));
+        assert_eq!((*held.mean(), held.state(1)), (at(7.0), Some(&at(12.0))));
+        assert_eq!([2, 7, 0, 8].map(|sender| held.place_of(sender, 5)), [Some(0), Some(1), None, None]);
+        held.keep_ages(1.0);
+        held.accept(1, 0, Instant::ZERO, at(2.0));
+        held.hold(0, Instant::ZERO, at(0.0));
+        held.refresh();
+        held.move_on(Instant::from_nanos(500_000_000));
+        assert_eq!((*held.mean(), held.lead()), (at(1.5), [-0.75]));
+        let some = Held::of_some([(1, at(1.0)), (4, at(2.0))], None);
+        assert_eq!((some.place_of(4, 0), *some.mean()), (Some(1), at(1.5)));
     }
 
     #[test]

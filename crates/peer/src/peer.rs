@@ -465,12 +465,10 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.config.contact = contact;
     }
 
-    /// The place of another peer among those that are held, in order with this peer left out; `None` if there is no such peer.
+    /// The place of another peer among those that are held; `None` if it is not heard.
     #[inline(always)]
     pub(crate) fn place_of(&self, sender: u32) -> Option<usize> {
-        let (sender, own) = (sender as usize, self.config.place as usize);
-        let place = if sender < own { sender } else { sender.wrapping_sub(1) };
-        (sender != own && place < self.held.len()).then_some(place)
+        self.held.place_of(sender, self.config.place)
     }
 
     /// What [`crate::Ages`] change: the peer's own state, what it holds, whether a sample has changed since the mean was computed, and the part that turns.

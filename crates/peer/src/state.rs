@@ -13,6 +13,12 @@ impl<const A: usize> State<A> {
     /// At rest at the origin.
     pub const REST: Self = Self { position: [0.0; A], velocity: [0.0; A] };
 
+    /// Both times a number.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        Self { position: self.position.map(|x| x * factor), velocity: self.velocity.map(|v| v * factor) }
+    }
+
     /// Whether every component is a finite number.
     #[must_use]
     #[inline]

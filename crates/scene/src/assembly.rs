@@ -38,21 +38,32 @@ impl Scene {
         spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers.len()))
     }
 
-    /// KT and BT: `gains`, those of the scene or those that the timeline sets, times [`Scene::coordination_factor`].
+    /// KT and BT of a peer: `gains`, those of the scene or those that the timeline sets, times [`Scene::coordination_factor`].
+    ///
+    /// # Panics
+    ///
+    /// If the scene has a topology, and no such peer.
     #[must_use]
-    pub fn coordination_gains(&self, gains: Gains) -> Gains {
-        gains.scaled(self.coordination_factor())
+    pub fn coordination_gains(&self, gains: Gains, peer: usize) -> Gains {
+        gains.scaled(self.coordination_factor(peer))
     }
 
-    /// What KT and BT are multiplied by for the number of peers.
+    /// What KT and BT of a peer are multiplied by for the number of peers, and of those that it hears. A law that sums over the others counts N − 1 of them itself
+    /// where the scene has no topology.
+    ///
+    /// # Panics
+    ///
+    /// If the scene has a topology, and no such peer.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-    pub fn coordination_factor(&self) -> f64 {
-        let peers = self.peers.len();
-        let scaling = self.coordination.scaling.coordination_factor(peers);
-        match self.coordination.pull {
+    pub fn coordination_factor(&self, peer: usize) -> f64 {
+        let scaling = self.coordination.scaling.coordination_factor(self.peers.len());
+        let summed = match self.coordination.pull {
             Pull::Mean => scaling,
-            Pull::Sum => scaling * (peers - 1) as f64,
+            Pull::Sum => scaling * self.heard_by(peer),
+        };
+        match self.coordination.strategy.pull() {
+            Pull::Sum if self.topology.is_some() => summed * self.heard_by(peer),
+            Pull::Sum | Pull::Mean => summed,
         }
     }
 
@@ -123,7 +134,7 @@ impl Scene {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-fn count(peers: usize) -> f64 {
+pub(crate) fn count(peers: usize) -> f64 {
     peers as f64
 }
 

@@ -47,6 +47,7 @@ mod strategies;
 mod strategy_limits;
 #[cfg(test)]
 mod tests;
+mod topology;
 
 pub use cohaptic_linkfile::{Diagnostic, FileError as SceneError, Fingerprint, KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable};
 pub use content::{SceneContent, scene_content, scene_content_of_text};
@@ -57,3 +58,4 @@ pub use read::{at_peer, scene_files};
 pub use rotation::{DeviceRotationSpec, PeerRotation, RotationSpec};
 pub use rotation_parts::{RotationPart, RotationParts};
 pub use strategies::{FromScene, Strategies};
+pub use topology::{Topology, TopologyKind, WeightsError, read_weights};

@@ -13,8 +13,8 @@ use cohaptic_wan::{DropCause, LinkModel};
 
 use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 
-use crate::RotationSpec;
 use crate::measures::MeasureName;
+use crate::{RotationSpec, Topology};
 
 /// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
 #[derive(Clone, PartialEq)]
@@ -39,7 +39,9 @@ pub struct Scene {
     pub integrator: Integrator,
     /// The peers, at least two, in the order of the file. Their names differ.
     pub peers: Vec<PeerSpec>,
-    /// The directed links between the peers.
+    /// The peers to which each peer sends; `None`: all others.
+    pub topology: Option<Arc<Topology>>,
+    /// The directed links between the peers; of no meaning between peers that are no neighbours in the topology.
     pub links: LinkTable,
     /// Changes while the scene runs, in order of time; equal instants in the order of the file.
     pub timeline: Vec<Change>,
@@ -50,15 +52,19 @@ pub struct Scene {
 }
 
 impl fmt::Debug for Scene {
-    /// Turns and measures are shown only where there are any: fingerprints of records are made of this text.
+    /// Turns, topologies and measures are shown only where there are any: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { file, title, duration, seed, axes, object, rotation, coordination, integrator, peers, links, timeline, measure, expect } = self;
+        let Self { file, title, duration, seed, axes, object, rotation, coordination, integrator, peers, topology, links, timeline, measure, expect } =
+            self;
         let mut shown = f.debug_struct("Scene");
         shown.field("file", file).field("title", title).field("duration", duration).field("seed", seed).field("axes", axes);
         shown.field("object", object).field("coordination", coordination).field("integrator", integrator).field("peers", peers);
         shown.field("links", links).field("timeline", timeline).field("expect", expect);
         if let Some(rotation) = rotation {
             shown.field("rotation", rotation);
+        }
+        if let Some(topology) = topology {
+            shown.field("topology", topology);
         }
         if let Some(measure) = measure {
             shown.field("measure", measure);

@@ -29,7 +29,7 @@ impl Scene {
             down = down.max(line(peer.downlink.as_deref())?);
         }
         let (mut slowest, mut longest) = (Duration::ZERO, 0);
-        for model in self.links.configs() {
+        for (model, _) in self.used_links() {
             let (delay, run) = bounded(model)?;
             (slowest, longest) = (slowest.max(delay), longest.max(run));
         }
@@ -48,7 +48,7 @@ impl Scene {
         if self.peers.iter().any(|peer| peer.uplink.is_some() || peer.downlink.is_some()) {
             return None;
         }
-        let mut delays = self.links.used().map(|(link, _)| link.is_constant_delay().then(|| link.mean_delay()));
+        let mut delays = self.used_links().into_iter().map(|(link, _)| link.is_constant_delay().then(|| link.mean_delay()));
         let delay = delays.next()??;
         if delays.any(|other| other != Some(delay)) {
             return None;

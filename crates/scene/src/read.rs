@@ -14,7 +14,7 @@ use crate::context::SceneContext;
 use crate::model::{ChangeKind, Scene};
 use crate::sections::{
     Header, Measured, PeerSources, Stepping, check_enough, read_coordination, read_expect, read_header, read_measure, read_names, read_object,
-    read_peers, read_stepping, read_timeline, refuse_rotational_keys, rotation,
+    read_peers, read_stepping, read_timeline, read_topology, refuse_rotational_keys, refuse_unlinked, rotation,
 };
 
 impl Scene {
@@ -92,13 +92,32 @@ pub(crate) fn parse_scene(sources: Sources<'_>, live: bool, on_links: OnLinks<'_
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
 fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLinks<'_>) -> Option<Scene> {
     let mut root = TableReader::new(document, file, "a table")?;
-    root.know(&["scene", "object", "coordination", "simulation", "peer", "peers", "modulators", "link", "links", "timeline", "measure", "expect"]);
+    root.know(&[
+        "scene",
+        "object",
+        "coordination",
+        "simulation",
+        "peer",
+        "peers",
+        "topology",
+        "modulators",
+        "link",
+        "links",
+        "timeline",
+        "measure",
+        "expect",
+    ]);
     let header_node = root.get("scene");
     let header = root.required("scene", "a table [scene] with a duration", read_header).unwrap_or_default();
     let Header { title, duration, seed, axes, count } = header;
     let peers_node = root.get("peers");
     let names = count.and_then(|count| read_names(peers_node, count, file));
     let file = file.with_names(names.as_ref());
+    let topology_node = root.get("topology");
+    let topology = match topology_node {
+        Some(node) => read_topology(node, file),
+        None => Some(None),
+    };
     let modulators = read_modulators(root.get("modulators"), file);
     let file = file.with_modulators(modulators.as_ref());
     let turns = root.get("object").and_then(Node::as_table).is_some_and(|object| object.get("inertia").is_some());
@@ -147,6 +166,14 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         Some(node) => read_expect(node, duration, has_probe, peers.as_deref(), context).map(Some),
         None => Some(None),
     };
+    if let Some(Some(topology)) = &topology {
+        refuse_unlinked(root.get("links"), None, topology, file);
+        refuse_unlinked(timeline_node, Some("link"), topology, file);
+        let mut expected = |key: &str| Some(&*root.get("expect")?.as_table()?.get(key)?.node);
+        for key in ["loss", "delay"] {
+            refuse_unlinked(expected(key), Some("link"), topology, file);
+        }
+    }
     root.finish();
     if let Some(names) = &names {
         check_enough(names, peers_node, file);
@@ -162,11 +189,16 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         coordination: coordination?,
         integrator: stepping?.integrator,
         peers: peers?,
+        topology: topology?,
         links: links.as_ref().and_then(LinkClasses::table)?,
         timeline: timeline?,
         measure: measure?,
         expect: expect?,
     };
+    if let Some(refused) = scene.refused_topology() {
+        file.fault_at(topology_node.unwrap_or(document), refused);
+        return None;
+    }
     let refused = match scene.refused_coordination().or_else(|| scene.refused_rotation()) {
         None => scene.refused_changes().map(|refused| (timeline_node, refused)),
         Some(refused) => Some((coordination_node, refused)),

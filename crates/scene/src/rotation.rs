@@ -130,7 +130,7 @@ impl Scene {
             Pull::Mean => 1.0,
             Pull::Sum => (self.peers.len() - 1) as f64,
         };
-        let factor = pull * self.coordination_factor();
+        let factor = pull * self.coordination_factor(0);
         let of = |own: Option<Triple>, gain: f64| own.unwrap_or_else(|| rotation.over_mass(self.object.mass, gain)).map(|gain| gain * factor);
         let damping = match self.coordination.strategy.gains() {
             UsedGains::Both => of(given.damping, gains.damping),

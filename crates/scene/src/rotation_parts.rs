@@ -312,7 +312,7 @@ mod tests {
         assert_eq!((rx.copy_mass(), rx.object.damping), (0.4e-4, 2.0 * 1.2e-4 / 0.5));
         let whole = split.rotation_gains_in_time().next().unwrap();
         // N − 1 of the strategy is in its law.
-        let gains = rx.coordination_gains(rx.coordination.gains);
+        let gains = rx.coordination_gains(rx.coordination.gains, 0);
         assert!((2.0 * gains.stiffness / whole.stiffness[0] - 1.0).abs() < 1e-15 && (2.0 * gains.damping / whole.damping[0] - 1.0).abs() < 1e-15);
         assert_eq!(parts.iter().map(|part| part.devices[0]).collect::<Vec<_>>(), [true, false, false, false]);
     }

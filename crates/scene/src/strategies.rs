@@ -134,12 +134,12 @@ impl Scene {
 
     /// What the law of a peer is made from: the gains scaled by the number of peers, its tick, and the parameters of the law itself.
     fn law_parameters(&self, peer: usize) -> LawParameters {
-        let peers = self.peers.len();
         let CoordinationSpec { strategy, gains, settings, .. } = &self.coordination;
         let own = settings.of(*strategy);
         LawParameters {
-            gains: self.coordination_gains(*gains),
-            peers,
+            gains: self.coordination_gains(*gains, peer),
+            // On a topology the number of those heard counts in the gains.
+            peers: if self.topology.is_some() { 2 } else { self.peers.len() },
             tick: self.peers[peer].clock.tick,
             oldest: if own.any_automatic() { self.oldest_sample() } else { None },
             middle: if own.any_automatic() { self.middle_age() } else { None },
@@ -149,7 +149,8 @@ impl Scene {
 
     /// What the strategy of a peer is made from.
     fn session_parameters<const A: usize>(&self, peer: usize) -> SessionParameters<A> {
-        let places = 0..self.peers.len();
+        // A topology has laws alone, which need no more than their parameters.
+        let places = 0..if self.topology.is_some() { 0 } else { self.peers.len() };
         SessionParameters {
             law: self.law_parameters(peer),
             place: peer,

@@ -2,6 +2,7 @@
 
 mod form;
 mod strategies;
+mod topologies;
 
 use std::path::Path;
 use std::time::Duration;
@@ -77,7 +78,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "[object]",
             "[objekt]",
-            "3:2: objekt: unknown key: expected one of scene, object, coordination, simulation, peer, peers, modulators, link, links, timeline, measure, expect; did you mean \"object\"?",
+            "3:2: objekt: unknown key: expected one of scene, object, coordination, simulation, peer, peers, topology, modulators, link, links, timeline, measure, expect; did you mean \"object\"?",
         ),
         ("duration = \"7s\"", "duration = \"7s\"\nspeed = 1", "3:1: scene.speed: unknown key: expected one of title, duration, seed, axes, count"),
         ("mass = 0.45", "mass = 0.45\nmas = 1", "5:1: object.mas: unknown key"),

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_peer::Contact;
-use cohaptic_scene::{FromScene, Scene, Strategies};
+use cohaptic_scene::{FromScene, Scene, Strategies, Topology};
 
 use crate::cost::eigenvalue_operations;
 use crate::full::{Trust, full_along};
@@ -12,7 +12,7 @@ use crate::parts::{Part, Reduced, radius_of, reduced};
 use crate::pieces::{self, Piece};
 use crate::spectrum::bounded_radius;
 use crate::structure::{Contacts, Structure, linear_law};
-use crate::{AnalysisError, Radius, Unwatched, Verdict, Watch, turning};
+use crate::{AnalysisError, Graph, GraphError, Radius, Unwatched, Verdict, Watch, analyse_on_watched, turning};
 
 /// How a verdict is reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -109,6 +109,9 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
 ///
 /// As for [`analyse`], and [`AnalysisError::Stopped`] if the watcher ends it.
 pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
+    if let Some(topology) = &scene.topology {
+        return on_topology(scene, topology, method, watch);
+    }
     let equivalent = (0..scene.peers.len()).all(|peer| linear_law(scene, peer).is_some());
     let pieces = match pieces::split(scene) {
         Ok(pieces) if scene.rotation.is_none() || method != Method::Full => pieces,
@@ -130,6 +133,23 @@ pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Resu
             });
             Ok(combine(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
         }
+    }
+}
+
+/// The analysis of a scene with a topology: that of its peers on a graph.
+fn on_topology(scene: &Scene, topology: &Topology, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
+    match method {
+        Method::Reduced => analyse_on_watched(&scene.without_topology(), &Graph::from(topology), watch).map_err(|error| match error {
+            GraphError::Analysis(error) => error,
+            GraphError::Unequal { .. }
+            | GraphError::Weight { .. }
+            | GraphError::Alone { .. }
+            | GraphError::Neighbours { .. }
+            | GraphError::Irregular
+            | GraphError::NotLinear => AnalysisError::OnTopology { why: error.to_string() },
+        }),
+        Method::Full => Err(AnalysisError::Topology { what: "the method full" }),
+        Method::Determinant => Err(AnalysisError::Topology { what: "the method determinant" }),
     }
 }
 

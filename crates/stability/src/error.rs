@@ -77,6 +77,18 @@ pub enum AnalysisError {
         /// The analysis.
         what: &'static str,
     },
+    /// The scene has a topology, and this analysis does not follow it.
+    #[error("{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"")]
+    Topology {
+        /// The analysis.
+        what: &'static str,
+    },
+    /// The scene has a topology on which these peers cannot be analysed.
+    #[error("on the [topology] of this scene: {why}")]
+    OnTopology {
+        /// Why.
+        why: String,
+    },
     /// Not all samples are sent.
     #[error(
         "with coordination.send-when a sample depends on how far things have moved, which is not linear: simulations tell whether the scene is stable"

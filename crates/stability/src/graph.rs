@@ -1,12 +1,12 @@
 //! Equal peers on a graph: which peer hears which.
 //!
-//! A scene lets everybody hear everybody. Where each of N equal peers hears only its neighbours, with weights that are mutual, the averaging matrix
+//! A scene without a topology lets everybody hear everybody. Where each of N equal peers hears only its neighbours, with weights that are mutual, the averaging matrix
 //! D⁻¹W has a full set of eigenvectors and real eigenvalues λ from −1 to 1 (D^½·D⁻¹W·D^−½ is symmetric). Along each eigenvector every peer does the same thing,
 //! scaled, and hears λ times its own samples: the scene is as many systems of one node. λ = 1 is there once for each connected part, which can be
 //! displaced as a whole.
 
 use cohaptic_peer::coordination::Pull;
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Scene, Topology, TopologyKind};
 
 use crate::analysis::{Analysis, combinations, combine};
 use crate::lifted::Lifted;
@@ -21,8 +21,11 @@ use crate::{AnalysisError, ContactMode, Matrix, Method, PartKind, Unwatched, Wat
 pub enum Graph {
     /// Everybody hears everybody, as in a scene: λ = 1 and N−1 times −1/(N−1).
     Complete,
-    /// Each hears the one before and the one after: λ = cos(2πk/N).
-    Ring,
+    /// Each hears as many before it as behind it, n in all: λ = (2/n)·Σ cos(2πkm/N) over m from 1 to n/2.
+    Ring {
+        /// How many it hears, n: an even number below N; among two peers each hears the other whatever it is.
+        neighbours: usize,
+    },
     /// The first hears all others, who hear the first alone: λ = 1, N−2 times 0, and −1.
     Star,
     /// Each hears the others with mutual weights: a symmetric matrix of N rows.
@@ -58,6 +61,14 @@ pub enum GraphError {
     Alone {
         /// Its name.
         peer: String,
+    },
+    /// There are fewer peers than a ring needs.
+    #[error("{peers} peers on a ring with {neighbours} neighbours each: expected an even number of neighbours, fewer than there are peers")]
+    Neighbours {
+        /// The number of peers.
+        peers: usize,
+        /// The number of neighbours.
+        neighbours: usize,
     },
     /// The stiffness of a peer would depend on how many it hears.
     #[error(
@@ -108,11 +119,10 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
     let (spectrum, degree) = graph.spectrum(scene)?;
     let mut node = [structure.node(scene, 0)];
     let pulls = [scene.coordination.strategy.pull(), scene.coordination.pull];
-    match (if pulls.contains(&Pull::Sum) { Pull::Sum } else { Pull::Mean }, degree) {
-        (Pull::Mean, _) => {}
+    for _ in pulls.into_iter().filter(|pull| *pull == Pull::Sum) {
         // The sum over as many as are heard, in place of that over all others.
-        (Pull::Sum, Some(degree)) => node[0].law = node[0].law.scaled(degree / count(peers - 1)),
-        (Pull::Sum, None) => return Err(GraphError::Irregular),
+        let degree = degree.ok_or(GraphError::Irregular)?;
+        node[0].law = node[0].law.scaled(degree / count(peers - 1));
     }
     let quotient = structure.quotient(scene, &node);
     let mut parts = Vec::new();
@@ -155,6 +165,22 @@ impl Eigenvalue {
     }
 }
 
+impl From<&Topology> for Graph {
+    fn from(topology: &Topology) -> Self {
+        match topology.kind() {
+            TopologyKind::Ring { neighbours } => Self::Ring { neighbours },
+            TopologyKind::Star { .. } => Self::Star,
+            TopologyKind::Graph => {
+                let mut weights = Matrix::zeros(topology.peers(), topology.peers());
+                for (from, to) in topology.pairs() {
+                    weights[(from, to)] = topology.weight(from, to);
+                }
+                Self::Weighted(weights)
+            }
+        }
+    }
+}
+
 impl Graph {
     /// The different eigenvalues of the averaging matrix with their multiplicities; and how many (or how much weight) each peer hears, if all hear as much.
     #[expect(clippy::type_complexity, reason = "used once, above")]
@@ -164,11 +190,16 @@ impl Graph {
         Ok(match self {
             Self::Complete => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(-1.0 / (n - 1.0)), peers - 1)], Some(n - 1.0)),
             // Two peers hear each other, whatever the graph is called.
-            Self::Ring | Self::Star if peers == 2 => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(-1.0), 1)], Some(1.0)),
-            Self::Ring => {
-                let angle = |k: usize| 2.0 * std::f64::consts::PI * count(k) / n;
-                let pair = |k: usize| (Eigenvalue::Other(libm::cos(angle(k))), if 2 * k == peers { 1 } else { 2 });
-                (std::iter::once((Eigenvalue::One, 1)).chain((1..=peers / 2).map(pair)).collect(), Some(2.0))
+            Self::Ring { .. } | Self::Star if peers == 2 => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(-1.0), 1)], Some(1.0)),
+            Self::Ring { neighbours } if *neighbours == 0 || neighbours % 2 != 0 || *neighbours >= peers => {
+                return Err(GraphError::Neighbours { peers, neighbours: *neighbours });
+            }
+            Self::Ring { neighbours } => {
+                let angle = |k: usize, m: usize| 2.0 * std::f64::consts::PI * count(k * m % peers) / n;
+                let half = neighbours / 2;
+                let eigenvalue = |k: usize| (1..=half).map(|m| libm::cos(angle(k, m))).sum::<f64>() / count(half);
+                let pair = |k: usize| (Eigenvalue::Other(eigenvalue(k)), if 2 * k == peers { 1 } else { 2 });
+                (std::iter::once((Eigenvalue::One, 1)).chain((1..=peers / 2).map(pair)).collect(), Some(count(*neighbours)))
             }
             Self::Star => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(0.0), peers - 2), (Eigenvalue::Other(-1.0), 1)], None),
             Self::Weighted(weights) => weighted(weights, scene)?,

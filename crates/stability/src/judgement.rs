@@ -52,5 +52,5 @@ pub fn judge_watched(scene: &Scene, method: Method, limits: &Limits<'_>) -> Resu
 #[must_use]
 pub fn has_chance(scene: &Scene) -> bool {
     let lines = scene.peers.iter().flat_map(|peer| peer.uplink.iter().chain(&peer.downlink));
-    scene.links.used().any(|(link, _)| link.has_chance()) || lines.into_iter().any(|line| line.has_chance())
+    scene.used_links().iter().any(|(link, _)| link.has_chance()) || lines.into_iter().any(|line| line.has_chance())
 }

@@ -35,7 +35,13 @@ pub(crate) fn split(scene: &Scene) -> Result<Vec<Piece<'_>>, &'static str> {
 
 /// [`split`] for an analysis of pieces alone.
 pub(crate) fn pieces<'a>(scene: &'a Scene, what: &'static str) -> Result<Vec<Piece<'a>>, AnalysisError> {
+    refuse_topology(scene, what)?;
     split(scene).map_err(|why| AnalysisError::Turns { what, why })
+}
+
+/// Refuses a topology, for an analysis that does not follow it.
+pub(crate) fn refuse_topology(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
+    if scene.topology.is_some() { Err(AnalysisError::Topology { what }) } else { Ok(()) }
 }
 
 /// Refuses an object that turns, for an analysis that does not follow it at all.

@@ -6,7 +6,7 @@ use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::{Gains, Plant};
 use cohaptic_scene::{FromScene, Scene};
 
-use crate::analysis::{Combination, pairs};
+use crate::analysis::{Combination, analyse, pairs};
 use crate::full::{FullMap, Trust, full_along};
 use crate::lifted::{Autonomous, Body, Lifted, Node};
 use crate::mean_square::{EqualScratch, Followed};
@@ -35,6 +35,30 @@ enum Kind {
     Whole(Box<WholeRadius>),
     /// Of an object that turns, whose motion does not split.
     Turning(Box<TurningRadius>),
+    /// Of a topology.
+    Graph(Box<GraphRadius>),
+}
+
+/// A scene with a topology: its modes anew for each of its numbers.
+#[derive(Debug)]
+struct GraphRadius {
+    /// Every peer by itself.
+    classes: Vec<Vec<usize>>,
+    unfollowed: AnalysisError,
+}
+
+impl GraphRadius {
+    fn new(scene: &Scene) -> Result<Self, AnalysisError> {
+        // A scene that is refused is refused for all its numbers.
+        analyse(scene, Method::Reduced)?;
+        let classes = (0..scene.peers.len()).map(|peer| vec![peer]).collect();
+        Ok(Self { classes, unfollowed: AnalysisError::Topology { what: "the mean square" } })
+    }
+}
+
+/// The radius of a scene with a topology.
+fn radius_on_topology(scene: &Scene) -> Radius {
+    analyse(scene, Method::Reduced).map_or(Radius::UNKNOWN, |analysis| analysis.radius)
 }
 
 /// An object that turns.
@@ -84,6 +108,7 @@ impl SceneRadius {
             Kind::Parts(parts) => parts.followed.as_ref(),
             Kind::Whole(whole) => Err(&whole.unfollowed),
             Kind::Turning(turning) => Err(&turning.unfollowed),
+            Kind::Graph(graph) => Err(&graph.unfollowed),
         }
     }
 
@@ -93,6 +118,7 @@ impl SceneRadius {
             Kind::Parts(parts) => &parts.structure.classes,
             Kind::Whole(whole) => &whole.classes,
             Kind::Turning(turning) => &turning.classes,
+            Kind::Graph(graph) => &graph.classes,
         }
     }
 
@@ -103,6 +129,7 @@ impl SceneRadius {
             Kind::Parts(parts) => parts.radius::<BOUND>(&scene, scratch),
             Kind::Whole(whole) => whole.radius::<BOUND>(&scene, &mut scratch.workspace),
             Kind::Turning(turning) => turning.radius::<BOUND>(&scene, &mut scratch.workspace),
+            Kind::Graph(_) => radius_on_topology(&scene),
         }
     }
 
@@ -113,7 +140,7 @@ impl SceneRadius {
                 let scene = view(scene, self.component.as_deref())?;
                 parts.mean_square(&scene, scratch)
             }
-            Kind::Whole(_) | Kind::Turning(_) => None,
+            Kind::Whole(_) | Kind::Turning(_) | Kind::Graph(_) => None,
         }
     }
 }
@@ -351,6 +378,9 @@ fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matr
 
 /// The linear scenes that a scene falls into, one for each combination of contacts.
 pub(crate) fn scene_radii(scenes: &[&Scene]) -> Result<Vec<SceneRadius>, AnalysisError> {
+    if scenes[0].topology.is_some() {
+        return Ok(vec![SceneRadius { component: None, kind: Kind::Graph(Box::new(GraphRadius::new(scenes[0])?)) }]);
+    }
     let network = NominalNetwork::of(scenes[0])?;
     let pieces = match split(scenes[0]) {
         Ok(pieces) => pieces,

@@ -5,5 +5,6 @@ mod arrays;
 mod bystander;
 mod models;
 mod threads;
+mod topologies;
 mod turning_arrays;
 mod watched;

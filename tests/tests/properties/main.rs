@@ -19,6 +19,7 @@ mod replay;
 mod rotation;
 mod rotation_laws;
 mod symmetry;
+mod topologies;
 mod waves;
 
 /// Half the distance from 1 to the next double: the largest relative error of one rounding.

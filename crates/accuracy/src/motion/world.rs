@@ -49,7 +49,7 @@ impl Pair {
         };
         Self {
             coupling: scene.coupling(0),
-            coordination: scene.coordination_gains(scene.coordination.gains),
+            coordination: scene.coordination_gains(scene.coordination.gains, 0),
             touch: [touch(0), touch(1)],
             plants: [scene.device_plant(0), scene.device_plant(1), copy, copy],
             hands: (0..ticks).map(instant).map(|at| [force(0, at), force(1, at)]).collect(),

@@ -54,6 +54,10 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     }
     let overrides = overrides.as_slice();
     let scene = input::with(path, |text, file| Scene::parse_live(text, file, overrides))?;
+    if scene.topology.is_some() {
+        let message = "in a live session every peer sends to every other: expected a scene without [topology], or kind = \"full\"";
+        return Err(Failure::Input(format!("{}: topology: {message}", input::named(path).display())));
+    }
     if let Some(error) = failure::too_large(&scene, overrides, Model::Least, true) {
         return Err(error.into());
     }

@@ -21,6 +21,7 @@ mod turn;
 mod turning;
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_peer::Lead;
@@ -389,9 +390,18 @@ fn links<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
     }
     let of_part = |from: usize, part: &'_ Arrays<'_, B, A, P, L>| -> Vec<LinkStats> {
         let Samples::PerPacket(samples) = &part.samples else { return Vec::new() };
-        let receivers = part.members.clone().enumerate().filter(|(_, to)| *to != from);
-        receivers.map(|(receiver, _)| samples.stats(from, receiver, run)).collect()
+        let receivers = match &part.shape.topology {
+            None => (0..part.members.len()).collect(),
+            Some(topology) => {
+                let near = topology.neighbours(from).iter().map(|to| *to as usize);
+                near.filter(|to| part.members.contains(to)).map(|to| to - part.members.start).collect::<Vec<_>>()
+            }
+        };
+        receivers.into_iter().filter_map(|receiver| samples.stats(from, receiver, run)).collect()
     };
+    if let Some(topology) = &parts[0].shape.topology {
+        return LinkSummaries::on(Arc::clone(topology), (0..peers).flat_map(|from| parts.iter().flat_map(move |part| of_part(from, part))).collect());
+    }
     LinkSummaries::each(peers, (0..peers).flat_map(|from| parts.iter().flat_map(move |part| of_part(from, part))).collect())
 }
 

@@ -9,6 +9,7 @@ mod broadcast;
 mod in_flight;
 mod per_packet;
 mod quads;
+mod rows;
 
 /// A sample of every run: pairs of numbers, of which those of the axes are positions and velocities.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +27,8 @@ impl<const P: usize, const L: usize> Sample<P, L> {
     }
 }
 
-/// How many others there are, as a number to divide by.
+/// A number of peers to divide by.
 #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-fn others(peers: usize) -> f64 {
-    (peers - 1) as f64
+fn count(peers: usize) -> f64 {
+    peers as f64
 }

@@ -1,11 +1,12 @@
 //! Which scenes can be run in arrays, and which of them side by side.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Coordination, EXACT_FROM, Integrator};
-use cohaptic_scene::{Scene, Strategies};
+use cohaptic_scene::{Scene, Strategies, Topology};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DirectLinks, LinkModel, SteppedLinks};
 
@@ -13,7 +14,7 @@ use super::{nanos, threads};
 use crate::plan::{Plan, Ticking};
 
 /// What two scenes must have in common to be run side by side.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Shape {
     pub(super) law: Coordination,
     /// How many numbers it remembers along each axis.
@@ -34,8 +35,10 @@ pub(crate) struct Shape {
     pub(super) size: Bytes,
     /// Whether the fate of a packet on some link may depend on later ones.
     pub(super) has_queues: bool,
-    /// The delay of all links, if they do nothing but delay, all alike.
+    /// The delay of all links, if they do nothing but delay, all alike, and lead from all to all.
     pub(super) delay: Option<Duration>,
+    /// The neighbours of each peer, if they are not all others.
+    pub(super) topology: Option<Arc<Topology>>,
 }
 
 /// A year: far from where instants end, so that sums of a few need no care.
@@ -64,14 +67,15 @@ impl Shape {
     }
 
     /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and no link counts or damages packets inside.
-    /// `None` for any other, for strategies that are no law of the registry, and on an object that turns for laws with a past, which may have one of its
-    /// attitudes, and for exact means.
+    /// `None` for any other, for strategies that are no law of the registry, on an object that turns for laws with a past, which may have one of its
+    /// attitudes, and for exact means, and for gains that differ from peer to peer.
     pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, BuiltIn)> {
         // All tick together, so that all have one law.
         let law = strategies.law(scene, 0)?;
         let clock = scene.peers.first()?.clock;
         let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
         let size = Bytes::new(kind.datagram_len(scene.axes.count()) as u64);
+        let links = scene.used_links();
         let fits = plan.ticking == Ticking::Lockstep
             && !plan.general_links
             && (scene.rotation.is_none() || Law::<f64>::lag(&law) == 0 && Law::<f64>::memory(&law) == 0 && scene.peers.len() <= EXACT_FROM)
@@ -82,7 +86,9 @@ impl Shape {
             // What each packet carries counts them in 16 bits.
             && (scene.peers.len() <= usize::from(u16::MAX) || one_delay(scene).is_some())
             && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none())
-            && scene.links.used().all(|(link, _)| DirectLinks::takes(link, size) || SteppedLinks::takes(link));
+            // All have one law.
+            && !scene.has_gains_by_peer()
+            && links.iter().all(|(link, _)| DirectLinks::takes(link, size) || SteppedLinks::takes(link));
         fits.then(|| {
             let shape = Self {
                 law: scene.coordination.strategy,
@@ -96,16 +102,20 @@ impl Shape {
                 send_every: u64::try_from(scene.coordination.update.as_nanos() / clock.tick.as_nanos()).unwrap_or(u64::MAX),
                 phases: scene.peers.iter().map(|peer| peer.phase).collect(),
                 size,
-                has_queues: !scene.links.used().all(|(link, _)| DirectLinks::takes(link, size)),
+                has_queues: !links.iter().all(|(link, _)| DirectLinks::takes(link, size)),
                 delay: one_delay(scene),
+                topology: scene.topology.clone(),
             };
             (shape, law)
         })
     }
 }
 
-/// The delay of all links, if they have one and nothing else.
+/// The delay of all links, if they have one and nothing else, and lead from all to all.
 fn one_delay(scene: &Scene) -> Option<Duration> {
+    if scene.topology.is_some() {
+        return None;
+    }
     let mut delays = scene.links.used().map(|(link, _)| link.is_constant_delay().then(|| LinkModel::mean_delay(link)));
     let first = delays.next()??;
     (first <= LONGEST && delays.all(|delay| delay == Some(first))).then_some(first)

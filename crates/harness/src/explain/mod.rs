@@ -5,7 +5,7 @@ mod links;
 
 use cohaptic_peer::coordination::{Law, LawValue, Pull, UsedGains};
 use cohaptic_peer::{Contact, Hand, Integrator, SendWhen};
-use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, RotationPart, RotationParts, Scaling, Scene};
+use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, RotationPart, RotationParts, Scaling, Scene, TopologyKind};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
 
@@ -209,13 +209,14 @@ impl Rows {
 
     fn coordination(&mut self, scene: &Scene) {
         let spec = &scene.coordination;
-        let gains = scene.coordination_gains(spec.gains);
+        let gains = scene.coordination_gains(spec.gains, 0);
         let scaling = match spec.scaling {
             Scaling::None => "as written",
             Scaling::InverseN => "scaled by 4(N-1)/N^2",
         };
         let pull = match spec.pull {
             Pull::Mean => "",
+            Pull::Sum if scene.topology.is_some() => ", times the weight of the peers heard",
             Pull::Sum => ", times N-1",
         };
         let mut model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
@@ -246,7 +247,11 @@ impl Rows {
         }
         self.model("coordination", model, format!("gains {scaling}{pull}; the mean of the samples held is kept until one changes"));
         let len = scene.sample_kind().datagram_len(scene.axes.count());
-        let receivers = if scene.server().is_some() { "from each client to the server and back" } else { "to each other peer" };
+        let receivers = match (scene.server(), &scene.topology) {
+            (Some(_), _) => "from each client to the server and back",
+            (None, Some(_)) => "to each neighbour",
+            (None, None) => "to each other peer",
+        };
         self.model(
             "samples",
             format!("{len} bytes {receivers} every {}{}", Span(spec.update), dead_bands(spec.send_when.as_ref())),
@@ -266,7 +271,21 @@ impl Rows {
         }
     }
 
+    fn topology(&mut self, scene: &Scene) {
+        let Some(topology) = &scene.topology else { return };
+        let model = match topology.kind() {
+            TopologyKind::Ring { neighbours } => format!("a ring: each hears {neighbours}, half of them on either side"),
+            TopologyKind::Star { hub } => format!("a star: {} hears all others, who hear it alone", scene.peers[hub].name),
+            TopologyKind::Graph => format!("a graph of {} neighbours, with their weights", Counted(topology.links() / 2, "pair")),
+        };
+        self.model("topology", model, "[topology]: links and samples held are those of neighbours, and no others");
+        if scene.has_gains_by_peer() {
+            self.leave_out("arrays: the gains follow the weight that a peer hears, so they differ from peer to peer");
+        }
+    }
+
     fn network(&mut self, scene: &Scene) {
+        self.topology(scene);
         let used = used_links(scene);
         for (config, count) in &used {
             let part = format!("{count} {}", if *count == 1 { "link" } else { "links" });
@@ -277,7 +296,7 @@ impl Rows {
             }
         }
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
-        let one_delay = used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
+        let one_delay = scene.topology.is_none() && used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
         if one_delay && !links_change && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
             self.model("packets on the way", "a ring", "all delays are equal, so packets arrive in the order in which they were sent");
             self.leave_out("sorting of arrivals");
@@ -334,7 +353,7 @@ fn describe(peer: &PeerSpec) -> String {
 
 /// The configurations that links between different peers have, and how many links have each.
 fn used_links(scene: &Scene) -> Vec<(&LinkModel, u64)> {
-    scene.links.used().map(|(config, count)| (config.as_ref(), count)).collect()
+    scene.used_links().into_iter().map(|(config, count)| (config.as_ref(), count)).collect()
 }
 
 fn access_lines(scene: &Scene) -> Vec<(&str, &'static str, &LinkModel)> {
@@ -354,7 +373,7 @@ fn dimensions(scene: &Scene, plan: &Plan) -> Dimensions {
     let delays: f64 = links.map(|(config, count)| config.mean_delay().as_secs_f64() * count_f64(count)).sum();
     Dimensions {
         plant: 2 * axes * (peers + devices),
-        held: 2 * axes * peers * (peers - 1),
+        held: 2 * axes * scene.link_count(),
         in_flight: (delays / scene.coordination.update.as_secs_f64()).ceil() as u64,
     }
 }

@@ -15,8 +15,8 @@ use crate::PacketRow;
 /// The links of a scene that are shown, and what their packets did.
 #[derive(Debug)]
 pub(super) struct Network {
-    /// How many peers there are; a link leads from each to each other.
-    peers: usize,
+    /// All links, by sender, then receiver.
+    pairs: Vec<(usize, usize)>,
     /// Delays by link shown \[s\], over when packets were sent.
     delays: Bands,
     shown: Vec<Shown>,
@@ -50,14 +50,14 @@ const STEP: u64 = 10_000;
 impl Network {
     /// For a scene, in a number of spans of time.
     pub(super) fn new(scene: &Scene, spans: usize) -> Self {
-        let peers = scene.peers.len();
         let configured = |from: usize, to: usize| {
             let config = scene.links.between(from, to).as_fixed().filter(|_| scene.timeline.is_empty());
             config.map(|config| config.delay.clone())
         };
-        let shown = pairs(peers).take(MOST_LINKS).map(|(from, to)| Shown { from, to, configured: configured(from, to), ..Shown::default() });
+        let pairs: Vec<(usize, usize)> = scene.linked_pairs().collect();
+        let shown = pairs.iter().copied().take(MOST_LINKS).map(|(from, to)| Shown { from, to, configured: configured(from, to), ..Shown::default() });
         let shown: Vec<Shown> = shown.collect();
-        Self { peers, delays: Bands::new(scene.duration, spans, shown.len()), shown }
+        Self { pairs, delays: Bands::new(scene.duration, spans, shown.len()), shown }
     }
 
     pub(super) fn on_packet(&mut self, row: &PacketRow) {
@@ -98,7 +98,7 @@ impl Network {
                 );
             picture = picture.panel(over_time).panel(shares);
         }
-        let rest: Vec<String> = pairs(self.peers).skip(self.shown.len()).map(|(from, to)| name(from, to)).collect();
+        let rest: Vec<String> = self.pairs.iter().skip(self.shown.len()).map(|(from, to)| name(*from, *to)).collect();
         if !rest.is_empty() {
             let unnamed = rest.len().saturating_sub(MOST_NAMED);
             let end = if unnamed > 0 { format!(" and {unnamed} more") } else { String::new() };
@@ -107,11 +107,6 @@ impl Network {
         }
         picture
     }
-}
-
-/// Every peer with every other, by sender, then receiver.
-fn pairs(peers: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..peers).flat_map(move |from| (0..peers).filter(move |to| *to != from).map(move |to| (from, to)))
 }
 
 impl Shown {

@@ -1,8 +1,10 @@
 //! What links did, each and together.
 
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
+use cohaptic_scene::Topology;
 use cohaptic_wan::LinkStats;
 
 /// One link at the end of a run.
@@ -16,7 +18,7 @@ pub struct LinkSummary {
     pub stats: LinkStats,
 }
 
-/// The N·(N−1) links between N peers at the end of a run, by sender, then receiver.
+/// The N·(N−1) links between N peers at the end of a run, or those of a topology, by sender, then receiver.
 ///
 /// Where all links of a sender did the same, their counters are kept once. Equality and [`fmt::Debug`] are those of the list of all links, however it is kept.
 #[derive(Clone)]
@@ -26,6 +28,8 @@ pub struct LinkSummaries {
     stats: Vec<LinkStats>,
     /// How many links of a sender have an entry together: one, or all N − 1.
     together: usize,
+    /// Which links there are, if not all.
+    topology: Option<Arc<Topology>>,
 }
 
 /// Quantiles over links, each a value that some link has: of n values, the quantile of p is the ⌈p·n⌉-th, counted from the least.
@@ -52,31 +56,46 @@ impl LinkSummaries {
     #[must_use]
     pub fn each(peers: usize, stats: Vec<LinkStats>) -> Self {
         assert_eq!(stats.len(), peers * peers.saturating_sub(1), "every pair of {peers} peers has a link in either direction");
-        Self { peers, stats, together: 1 }
+        Self { peers, stats, together: 1, topology: None }
+    }
+
+    /// What each link of a topology did, by sender, then receiver.
+    ///
+    /// # Panics
+    ///
+    /// If these are not as many as it has.
+    #[must_use]
+    pub fn on(topology: Arc<Topology>, stats: Vec<LinkStats>) -> Self {
+        assert_eq!(stats.len(), topology.links(), "each link of a topology has counters");
+        Self { peers: topology.peers(), stats, together: 1, topology: Some(topology) }
     }
 
     /// What each of the links of a sender did, by sender.
     #[must_use]
     pub fn by_sender(stats: Vec<LinkStats>) -> Self {
         let peers = stats.len();
-        Self { peers, stats, together: peers.saturating_sub(1).max(1) }
+        Self { peers, stats, together: peers.saturating_sub(1).max(1), topology: None }
     }
 
     /// How many there are.
     #[must_use]
-    pub const fn len(&self) -> u64 {
-        self.peers as u64 * (self.peers as u64).saturating_sub(1)
+    pub fn len(&self) -> u64 {
+        let all = || self.peers as u64 * (self.peers as u64).saturating_sub(1);
+        self.topology.as_ref().map_or_else(all, |topology| topology.links() as u64)
     }
 
     /// Whether there is none.
     #[must_use]
-    pub const fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// The counters of the link from one peer to another; `None` if there is no such link.
     #[must_use]
     pub fn between(&self, from: usize, to: usize) -> Option<&LinkStats> {
+        if let Some(topology) = &self.topology {
+            return self.stats.get(topology.place(from, to)? + topology.places(from).start);
+        }
         let is_link = from != to && from < self.peers && to < self.peers;
         if is_link { self.stats.get((from * (self.peers - 1) + to - usize::from(to > from)) / self.together) } else { None }
     }
@@ -84,7 +103,7 @@ impl LinkSummaries {
     /// All of them, one by one.
     #[must_use]
     pub const fn iter(&self) -> EachLink<'_> {
-        EachLink { links: self, from: 0, to: 0 }
+        EachLink { links: self, from: 0, place: 0 }
     }
 
     /// The counters of links, and how many neighbours have them: all links, in no more steps than counters are kept.
@@ -128,7 +147,7 @@ impl LinkSummaries {
 impl PartialEq for LinkSummaries {
     fn eq(&self, other: &Self) -> bool {
         let is_kept_alike = self.together == other.together;
-        self.peers == other.peers && if is_kept_alike { self.stats == other.stats } else { self.iter().eq(other) }
+        self.peers == other.peers && self.topology == other.topology && if is_kept_alike { self.stats == other.stats } else { self.iter().eq(other) }
     }
 }
 
@@ -154,21 +173,26 @@ impl<'a> IntoIterator for &'a LinkSummaries {
 pub struct EachLink<'a> {
     links: &'a LinkSummaries,
     from: usize,
-    to: usize,
+    place: usize,
 }
 
 impl Iterator for EachLink<'_> {
     type Item = LinkSummary;
 
     fn next(&mut self) -> Option<LinkSummary> {
-        self.to += usize::from(self.to == self.from);
-        if self.to >= self.links.peers {
-            (self.from, self.to) = (self.from + 1, 0);
+        loop {
+            let from = self.from;
+            let to = match &self.links.topology {
+                _ if from >= self.links.peers => return None,
+                Some(topology) => topology.neighbours(from).get(self.place).map(|to| *to as usize),
+                None => (self.place + 1 < self.links.peers).then(|| self.place + usize::from(self.place >= from)),
+            };
+            self.place += 1;
+            match to {
+                Some(to) => return self.links.between(from, to).map(|stats| LinkSummary { from, to, stats: *stats }),
+                None => (self.from, self.place) = (from + 1, 0),
+            }
         }
-        let (from, to) = (self.from, self.to);
-        let stats = *self.links.between(from, to)?;
-        self.to += 1;
-        Some(LinkSummary { from, to, stats })
     }
 }
 
@@ -215,6 +239,16 @@ mod tests {
         let many: Vec<LinkStats> = (1..=19 * 18).map(|delivered| stats(1, delivered)).collect();
         let quantiles = LinkSummaries::each(19, many).delivered_fraction();
         assert_eq!(quantiles, Some(LinkQuantiles { min: 1.0, p01: 4.0, p50: 171.0, p99: 339.0, max: 342.0 }));
+    }
+
+    #[test]
+    fn links_of_a_topology_are_listed_and_no_others() {
+        let star = Arc::new(Topology::star(4, 1).unwrap());
+        let links = LinkSummaries::on(Arc::clone(&star), (0..6).map(|number| stats(number, number)).collect());
+        let pairs: Vec<(usize, usize)> = links.iter().map(|link| (link.from, link.to)).collect();
+        assert_eq!((pairs, links.len()), (star.pairs().collect(), 6));
+        assert_eq!((links.between(1, 2), links.between(3, 1), links.between(0, 2)), (Some(&stats(2, 2)), Some(&stats(5, 5)), None));
+        assert_eq!(links.total(), stats(15, 15));
     }
 
     /// Counts of links are those of 10¹⁰ of them.

@@ -40,8 +40,14 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             match change.what {
                 ChangeKind::Link(link) => self.set_link(change.at, link.from, link.to, &link.config),
                 ChangeKind::AllLinks(links) => {
-                    let places = 0..self.members.len();
-                    for (from, to) in places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to) {
+                    let pairs: Vec<(usize, usize)> = match &self.topology {
+                        Some(topology) => topology.pairs().collect(),
+                        None => {
+                            let places = 0..self.members.len();
+                            places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to).collect()
+                        }
+                    };
+                    for (from, to) in pairs {
                         self.set_link(change.at, from, to, links.between(from, to));
                     }
                 }
@@ -73,8 +79,8 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     self.horizon = self.members[0].peer.strategy().horizon();
                 }
                 ChangeKind::Coordination(gains) => {
-                    for member in &mut self.members {
-                        member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
+                    for (member, factor) in self.members.iter_mut().zip(self.coordination_factors.iter().cycle()) {
+                        member.peer.strategy_mut().set_gains(gains.scaled(*factor));
                     }
                     self.change_gains_of_turns();
                 }

@@ -115,9 +115,15 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
             }
         };
         let object = ObjectCopy::new(scene.copy_config(place), displaced(1), integrator, &clock);
-        let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
+        let held = match &scene.topology {
+            None => Held::new(initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state)),
+            Some(topology) => {
+                let near = topology.neighbours(place).iter().map(|other| (*other, initial[*other as usize]));
+                Held::of_some(near, topology.relative_weights(place))
+            }
+        };
         let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
-        let mut peer = Peer::new(scene.peer_config(place), device, object, strategy, Held::new(others));
+        let mut peer = Peer::new(scene.peer_config(place), device, object, strategy, held);
         if let Some(mut rotation) = scene.rotation_of(place) {
             if let (Some(disturbance), Some(length)) = (disturbance, scene.gyration()) {
                 disturbance.turn(&mut rotation, length, place);

@@ -7,13 +7,14 @@ mod remote;
 mod turning;
 mod watch;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_peer::coordination::Role;
 use cohaptic_peer::rotation::{Attitude, Rotation};
 use cohaptic_peer::wire::{Extra, SampleKind};
 use cohaptic_peer::{Contact, Device, LastSent, Reception, SendWhen, State, Strategy};
-use cohaptic_scene::{Change, Scene};
+use cohaptic_scene::{Change, Scene, Topology};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
 
@@ -49,7 +50,10 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     changes: Vec<Change>,
     /// What these changes of parameters are, the next one last.
     parameters: Vec<ParameterChange>,
-    coordination_factor: f64,
+    /// By peer, or of all if it is the same.
+    coordination_factors: Vec<f64>,
+    /// The neighbours of each peer, if they are not all others.
+    topology: Option<Arc<Topology>>,
     end: Instant,
     now: Instant,
     /// Where each copy was at its latest tick.
@@ -111,7 +115,10 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             datagrams: Datagrams::default(),
             schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
             changes: scene.timeline.iter().rev().cloned().collect(),
-            coordination_factor: scene.coordination_factor(),
+            coordination_factors: (0..if scene.has_gains_by_peer() { scene.peers.len() } else { 1 })
+                .map(|peer| scene.coordination_factor(peer))
+                .collect(),
+            topology: scene.topology.clone(),
             end: Instant::ZERO.saturating_add(scene.duration),
             now: Instant::ZERO,
             max_discrepancy: 0.0,
@@ -199,12 +206,11 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         })
     }
 
-    /// Step 1: those whose time it is send their sample to everybody else.
+    /// Step 1: those whose time it is send their sample to everybody else, or to their neighbours.
     fn send<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
         if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.remote.lead()].tick < self.earliest_send {
             return Ok(());
         }
-        let others = self.members.len() - 1;
         for index in 0..self.ticking.len() {
             let from = self.ticking[index];
             let member = &mut self.members[from];
@@ -227,6 +233,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 }
                 continue;
             }
+            let others = self.topology.as_ref().map_or(self.names.len() - 1, |topology| topology.neighbours(from).len());
             let stored = self.datagrams.store(others, self.axes, |datagram| member.peer.sample(local_time, datagram));
             let (handle, len) = stored.expect("a run ends before a state that is not finite is sent");
             // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but a marked packet arrives.
@@ -426,6 +433,10 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     fn link_summaries(&self) -> LinkSummaries {
+        if let Some(topology) = &self.topology {
+            let stats = topology.pairs().filter_map(|(from, to)| self.network.link_stats(NodeId::new(from), NodeId::new(to)));
+            return LinkSummaries::on(Arc::clone(topology), stats.collect());
+        }
         let nodes = || (0..self.members.len()).map(NodeId::new);
         let stats = nodes().flat_map(|from| nodes().filter_map(move |to| self.network.link_stats(from, to)));
         LinkSummaries::each(self.members.len(), stats.collect())
@@ -444,7 +455,14 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
 
 fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
     let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: plan.general_links };
-    let mut network = Network::new(config, |from, to| scene.links.between(from.index(), to.index()).clone());
+    let link = |from: NodeId, to: NodeId| scene.links.between(from.index(), to.index()).clone();
+    let mut network = match &scene.topology {
+        None => Network::new(config, link),
+        Some(topology) => {
+            let receivers = |from: NodeId| topology.neighbours(from.index()).iter().map(|to| NodeId::new(*to as usize));
+            Network::of_some(config, receivers, link)
+        }
+    };
     for (place, peer) in scene.peers.iter().enumerate() {
         let lines = [(AccessLine::Uplink(NodeId::new(place)), &peer.uplink), (AccessLine::Downlink(NodeId::new(place)), &peer.downlink)];
         for (line, config) in lines {

@@ -27,6 +27,7 @@ pub(super) static ROOT: Table = Table::of(&[&[
     optional("simulation", Form::Table(&SIMULATION), "How motion between ticks is computed"),
     optional("peer", Form::Table(&PEER_TABLE), "Holds for every peer that does not say otherwise"),
     optional("peers", Form::List(&Form::Table(&PEERS)), "One peer each: its own keys are laid over those of [peer]"),
+    optional("topology", Form::Table(&TOPOLOGY), "The peers to which each peer sends"),
     optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
     optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
     optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
@@ -337,6 +338,21 @@ const CHANGES_OF_ALL: [Key; 5] = [
     optional("rotational-damping", vector(ROTATIONAL_DAMPING), "Gain on angular velocities; without it as it was"),
     optional("send-when", Form::Table(&SEND_WHEN), "Which samples are sent; without it as it was"),
 ];
+
+static TOPOLOGY: Table = Table::of(&[&[
+    usual("kind", Form::Words(&TOPOLOGIES), "\"full\"", "The neighbours of a peer"),
+    optional("neighbours", Form::Integer(2, u16::MAX as u64), "Of a ring: how many, an even number; without it 2"),
+    optional("hub", Form::Text, "Of a star: the name of a peer; without it the first"),
+    optional("role", Form::Words(&HUB_ROLES), "Of a hub; without it peer"),
+    optional("file", Form::File, "Of a graph: mutual weights, a row a peer"),
+]]);
+const TOPOLOGIES: [(&str, &str); 4] = [
+    ("full", "all others"),
+    ("ring", "half before it, half behind it"),
+    ("star", "the hub, or all others of the hub"),
+    ("graph", "those with a weight above 0"),
+];
+const HUB_ROLES: [(&str, &str); 1] = [("peer", "has a copy")];
 
 static MEASURE: Table = Table::of(&[&[
     usual("names", Form::AnyOf(const { &[Form::Words(&[("all", "every measure")]), Form::List(&MEASURE_NAME)] }), "\"all\"", "Which measures"),

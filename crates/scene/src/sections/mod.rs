@@ -11,6 +11,7 @@ mod peer;
 mod peers;
 mod rotation;
 mod timeline;
+mod topology;
 
 pub(crate) use expect::read_expect;
 pub(crate) use header::{Header, Stepping, read_coordination, read_header, read_stepping};
@@ -19,3 +20,4 @@ pub(crate) use object::read_object;
 pub(crate) use peers::{PeerSources, check_enough, read_names, read_peers};
 pub(crate) use rotation::{refuse_rotational_keys, rotation};
 pub(crate) use timeline::read_timeline;
+pub(crate) use topology::{read_topology, refuse_unlinked};

@@ -86,7 +86,8 @@ impl Prepared {
                 AnalysisError::ChanceWithoutMoments { .. }
                 | AnalysisError::TooManyMoments { .. }
                 | AnalysisError::OtherStrategy { .. }
-                | AnalysisError::Turns { .. },
+                | AnalysisError::Turns { .. }
+                | AnalysisError::Topology { .. },
             ) => Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: true }),
             Err(error) => Err(error),
         }

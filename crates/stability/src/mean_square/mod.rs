@@ -136,8 +136,8 @@ pub fn mean_square_within(scene: &Scene, most: usize) -> Result<MeanSquare, Anal
 /// As for [`mean_square`]; [`AnalysisError::TooManyOperations`] beyond the limit, [`AnalysisError::Stopped`] if the watcher ends it.
 pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSquare, AnalysisError> {
     let limits = &Limits { unknowns: limits.unknowns.min(MOST_UNKNOWNS), ..*limits };
-    let network = NominalNetwork::of(scene)?;
     let pieces = pieces(scene, "the mean square")?;
+    let network = NominalNetwork::of(scene)?;
     let mut notes = Vec::new();
     let mut combines = false;
     let mut found: Option<MeanSquare> = None;

@@ -25,6 +25,7 @@ use self::nominal::Nominal;
 use self::probe::{MOST_SAMPLES, NoPattern, Probe, RatedLine};
 use self::sampling::Sampling;
 use crate::AnalysisError;
+use crate::pieces::refuse_topology;
 
 /// More peers than this are not probed together.
 const MOST_SHARING: usize = 256;
@@ -63,6 +64,7 @@ impl NominalNetwork {
     ///
     /// [`AnalysisError`] if what becomes of samples never repeats: a queue that is offered more than it carries, periods that do not meet.
     pub(crate) fn of(scene: &Scene) -> Result<Self, AnalysisError> {
+        refuse_topology(scene, "this analysis")?;
         if scene.coordination.send_when.is_some() {
             return Err(AnalysisError::DeadBands);
         }

@@ -2,7 +2,9 @@
 
 use cohaptic_peer::{Command, Context, Gains, State, Strategy};
 use cohaptic_scene::{Scene, Strategies};
-use cohaptic_stability::{Graph, GraphError, Matrix, Method, analyse, analyse_on, analyse_with};
+use cohaptic_stability::{
+    AnalysisError, Family, FamilyScratch, Graph, GraphError, KeyRange, Matrix, Method, analyse, analyse_on, analyse_with, mean_square,
+};
 
 use crate::anchors::scene;
 
@@ -69,12 +71,12 @@ fn a_ring_and_a_star_are_what_the_general_path_says() {
     for peers in [3, 4, 5, 7] {
         let count = format!("scene.count={peers}");
         for delay in ["link.delay=8ms", "link.delay=21ms"] {
-            agree(&[&count, delay], &Graph::Ring, ring(peers));
+            agree(&[&count, delay], &Graph::Ring { neighbours: 2 }, ring(peers));
             agree(&[&count, delay], &Graph::Star, star(peers));
             agree(&[&count, delay], &Graph::Weighted(ring(peers)), ring(peers));
         }
     }
-    agree(&["peer.contact=none", "scene.count=4"], &Graph::Ring, ring(4));
+    agree(&["peer.contact=none", "scene.count=4"], &Graph::Ring { neighbours: 2 }, ring(4));
 }
 
 #[test]
@@ -106,11 +108,44 @@ fn a_complete_graph_is_the_scene_itself() {
 #[test]
 fn what_cannot_be_on_a_graph_is_refused() {
     let refused = |overrides: &[&str], graph: Graph| analyse_on(&scene(overrides), &graph).unwrap_err();
-    assert_eq!(refused(&["peers.peer2.device.mass=0.2"], Graph::Ring), GraphError::Unequal { peer: "peer2".into() });
+    assert_eq!(refused(&["peers.peer2.device.mass=0.2"], Graph::Ring { neighbours: 2 }), GraphError::Unequal { peer: "peer2".into() });
     assert_eq!(refused(&["coordination.strategy=proportional-derivative"], Graph::Star), GraphError::Irregular);
-    assert!(matches!(refused(&["peer.contact={ push = '+x' }"], Graph::Ring), GraphError::NotLinear));
+    assert!(matches!(refused(&["peer.contact={ push = '+x' }"], Graph::Ring { neighbours: 2 }), GraphError::NotLinear));
     assert!(matches!(refused(&[], Graph::Weighted(Matrix::zeros(3, 3))), GraphError::Alone { .. }));
     assert!(matches!(refused(&[], Graph::Weighted(ring(4))), GraphError::Weight { row: 0, column: 0, .. }));
     let lopsided = Matrix::from_fn(3, 3, |row, column| if row < column { 1.0 } else { 0.0 });
     assert!(matches!(refused(&[], Graph::Weighted(lopsided)), GraphError::Weight { row: 0, column: 1, .. }));
+}
+
+/// A family of scenes with a topology has the radius of each on its graph, and analyses that do not follow one say so by name.
+#[test]
+fn a_topology_of_a_scene_is_its_graph() {
+    const TEXT: &str = r#"
+        scene = { duration = "1s", count = 6 }
+        object = { mass = 0.3, split-mass = false, damping = 1.0 }
+        coordination = { strategy = "average-position", stiffness = 100.0, damping = 3.0, update = "8ms" }
+        peer = { contact = "none", device = { mass = 0.1, damping = 1.0 }, tick = "2ms" }
+        topology = { kind = "ring", neighbours = 4 }
+        link = { delay = "16ms" }
+    "#;
+    let file = std::path::Path::new("ring.toml");
+    let on = |stiffness: f64| {
+        let scene = Scene::parse(TEXT, file, &[format!("coordination.stiffness={stiffness:?}")]).unwrap();
+        (analyse(&scene, Method::Reduced).unwrap(), analyse_on(&scene.without_topology(), &Graph::Ring { neighbours: 4 }).unwrap())
+    };
+    let keys = vec![KeyRange::parse("coordination.stiffness=10..2000").unwrap()];
+    let family = Family::new(TEXT, file, &[], keys).unwrap();
+    for stiffness in [10.0, 444.5, 2000.0] {
+        let (scene, graph) = on(stiffness);
+        assert_eq!((scene.radius, scene.modes[0].parts.len()), (graph.radius, graph.modes[0].parts.len()), "{stiffness}");
+        let cell = family.bounded_radius(&[stiffness], &mut FamilyScratch::default()).unwrap();
+        assert_eq!(cell.radius, graph.radius, "{stiffness}");
+    }
+    let scene = Scene::parse(TEXT, file, &[]).unwrap();
+    for method in [Method::Full, Method::Determinant] {
+        assert!(matches!(analyse(&scene, method), Err(AnalysisError::Topology { .. })));
+    }
+    assert!(matches!(mean_square(&scene), Err(AnalysisError::Topology { what: "the mean square" })));
+    let few = Graph::Ring { neighbours: 6 };
+    assert_eq!(analyse_on(&scene.without_topology(), &few).unwrap_err(), GraphError::Neighbours { peers: 6, neighbours: 6 });
 }

@@ -176,7 +176,7 @@ fn a_determinant_ends() {
 #[test]
 fn a_graph_and_the_verdict_of_an_admittance_end() {
     let scene = three(&["link.loss=0%", "scene.count=8"]);
-    ends_wherever_it_is_asked(5, |ends| match analyse_on_watched(&scene, &Graph::Ring, ends) {
+    ends_wherever_it_is_asked(5, |ends| match analyse_on_watched(&scene, &Graph::Ring { neighbours: 2 }, ends) {
         Err(GraphError::Analysis(AnalysisError::Stopped)) => true,
         found => found.is_err(),
     });

@@ -19,6 +19,9 @@ impl LinkFile {
         if let Some(peer) = scene.peers.iter().find(|peer| peer.uplink.is_some() || peer.downlink.is_some()) {
             return refused(format!("peer `{}` has an access line, which a test bed's hosts have not; expected links alone", peer.name));
         }
+        if scene.topology.is_some() {
+            return refused("a [topology], and a test bed has links from each host to each other; expected kind = \"full\"".to_owned());
+        }
         let mut changes = Vec::new();
         for change in scene.timeline {
             let at = change.at;

@@ -5,13 +5,14 @@
 //!             (shared) └── link a->c   └── (shared, also by c->b)
 //! ```
 //!
-//! Every pair of nodes has a link in either direction. A node may have an *uplink*, one line that all it sends passes before the links, and a
+//! Every pair of nodes has a link in either direction, unless the network is one [of some](Network::of_some). A node may have an *uplink*, one line that all it sends passes before the links, and a
 //! *downlink*, one line that all it receives passes after them.
 
 mod awaited;
 mod config;
 pub(crate) mod direct_links;
 pub(crate) mod id;
+mod paths;
 mod pending;
 pub(crate) mod stepped_links;
 mod traffic;
@@ -24,6 +25,7 @@ use cohaptic_units::Instant;
 use awaited::Awaited;
 pub use config::{AccessLine, NetworkConfig, NetworkError};
 use id::{LinkId, NodeId, Path};
+use paths::Paths;
 use pending::{InNetwork, LineId, Pending, SizeAndMarks};
 use traffic::{Exits, Traffic};
 
@@ -38,7 +40,7 @@ use crate::line::name::LinkName;
 use crate::line::pipeline::{Outcome, TimeWentBack, check_time};
 use crate::packet::{Marks, Outputs, PacketInfo};
 
-/// The most nodes of a [`Network`]: its links are counted in 29 bits.
+/// The most nodes of a [`Network`] in which all have links to all: links are counted in 29 bits.
 pub const MOST_NODES: usize = 23_170;
 
 /// Number of receivers of a packet for which random words are drawn at once.
@@ -60,6 +62,7 @@ pub struct Network<P> {
     nodes: u16,
     now: Instant,
     lines: Lines<P>,
+    places: Paths,
     /// How many packets each path has taken; kept only where uplinks make it differ from what the link was offered.
     paths: Vec<u64>,
     traffic: Traffic<P>,
@@ -74,7 +77,7 @@ pub struct Network<P> {
 /// The links and the access lines.
 #[derive(Clone, Debug)]
 struct Lines<P> {
-    /// By sender, then receiver; the diagonal is never used.
+    /// By sender, then receiver; where all have links to all the diagonal is there too, and never used.
     links: Vec<Line<P, InNetwork<P>>>,
     uplinks: Vec<Option<Line<P, InNetwork<P>>>>,
     downlinks: Vec<Option<Line<P, InNetwork<P>>>>,
@@ -87,17 +90,38 @@ impl<P: Clone> Network<P> {
     ///
     /// With more than [`MOST_NODES`].
     #[must_use]
-    pub fn new<M: Into<LinkModel>>(config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> M) -> Self {
+    pub fn new<M: Into<LinkModel>>(config: NetworkConfig, link: impl FnMut(NodeId, NodeId) -> M) -> Self {
         let nodes =
             u16::try_from(config.nodes.len()).ok().filter(|nodes| usize::from(*nodes) <= MOST_NODES).expect("a network has at most 23,170 nodes");
+        Self::on(Paths::All { nodes }, config, link)
+    }
+
+    /// A network with links from each node to some others alone: `receivers` gives those of each node, in order. It takes memory for these links and no others.
+    ///
+    /// # Panics
+    ///
+    /// With more than 65,535 nodes or 2^29 links, with a receiver that is no other node, and with receivers that are not in order.
+    #[must_use]
+    pub fn of_some<M: Into<LinkModel>, R: IntoIterator<Item = NodeId>>(
+        config: NetworkConfig,
+        receivers: impl FnMut(NodeId) -> R,
+        link: impl FnMut(NodeId, NodeId) -> M,
+    ) -> Self {
+        let nodes = u16::try_from(config.nodes.len()).expect("a network has at most 65,535 nodes");
+        Self::on(Paths::some(nodes, receivers), config, link)
+    }
+
+    fn on<M: Into<LinkModel>>(places: Paths, config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> M) -> Self {
+        let nodes = places.nodes();
         let mut network = Self {
             nodes,
             now: Instant::ZERO,
             lines: Lines {
-                links: Vec::with_capacity(config.nodes.len() * config.nodes.len()),
+                links: Vec::with_capacity(places.lines()),
                 uplinks: config.nodes.iter().map(|_| None).collect(),
                 downlinks: config.nodes.iter().map(|_| None).collect(),
             },
+            places,
             paths: Vec::new(),
             traffic: Traffic::new(),
             outputs: Vec::new(),
@@ -106,13 +130,15 @@ impl<P: Clone> Network<P> {
             has_filters: false,
             config,
         };
-        for from in 0..nodes {
-            for to in 0..nodes {
-                let path = Path { from: NodeId(from), to: NodeId(to) };
-                let model = if from == to { LinkModel::default() } else { link(path.from, path.to).into() };
+        for from in (0..nodes).map(NodeId) {
+            let mut place = 0;
+            while let Some(to) = network.places.receiver(from, place) {
+                let path = Path { from, to };
+                let model = if from == to { LinkModel::default() } else { link(from, to).into() };
                 network.is_random |= model.is_random();
                 let line = network.line(&network.link_name(path), model);
                 network.lines.links.push(line);
+                place += 1;
             }
         }
         network
@@ -191,7 +217,7 @@ impl<P: Clone> Network<P> {
         Ok(())
     }
 
-    /// Takes a packet from one node to each of the others, in their order: the same as [`Network::handle_packet`] for each, with what they share
+    /// Takes a packet from one node to each of the others that it has a link to, in their order: the same as [`Network::handle_packet`] for each, with what they share
     /// done once. Where no node has an uplink this took a third off the time of a packet.
     ///
     /// # Errors
@@ -203,13 +229,25 @@ impl<P: Clone> Network<P> {
             return Err(NetworkError::NoLink { from, to: from });
         }
         if !self.paths.is_empty() {
-            for to in (0..self.nodes).map(NodeId).filter(|to| *to != from) {
-                self.handle_packet(now, from, to, info, payload.clone())?;
+            let mut place = 0;
+            while let Some(to) = self.places.receiver(from, place) {
+                if to != from {
+                    self.handle_packet(now, from, to, info, payload.clone())?;
+                }
+                place += 1;
             }
             return Ok(());
         }
         self.let_pass(now)?;
         let size = SizeAndMarks::new(info);
+        if let Paths::Some(_) = &self.places {
+            let mut place = 0;
+            while let Some(to) = self.places.receiver(from, place) {
+                self.send(now, Path { from, to }, size, payload.clone(), None);
+                place += 1;
+            }
+            return Ok(());
+        }
         if !self.is_random {
             for to in (0..self.nodes).map(NodeId).filter(|to| *to != from) {
                 self.send(now, Path { from, to }, size, payload.clone(), None);
@@ -323,14 +361,17 @@ impl<P: Clone> Network<P> {
 
     #[inline]
     fn path(&self, from: NodeId, to: NodeId) -> Result<Path, NetworkError> {
-        let exists = from.0 < self.nodes && to.0 < self.nodes && from != to;
+        let exists = from.0 < self.nodes && to.0 < self.nodes && from != to && self.places.has(Path { from, to });
         if exists { Ok(Path { from, to }) } else { Err(NetworkError::NoLink { from, to }) }
     }
 
     /// The link of a path.
     #[inline]
     fn link(&self, path: Path) -> LinkId {
-        LinkId(u32::from(path.from.0) * u32::from(self.nodes) + u32::from(path.to.0))
+        match &self.places {
+            Paths::All { nodes } => LinkId(u32::from(path.from.0) * u32::from(*nodes) + u32::from(path.to.0)),
+            Paths::Some(some) => some.link(path),
+        }
     }
 
     /// Lets time pass. Inner events happen now, so that what they leave behind is there for the next packet; mere arrivals wait to be polled.

@@ -23,3 +23,4 @@ mod naive;
 mod oracle;
 mod queue_laws;
 mod random_links;
+mod some_links;

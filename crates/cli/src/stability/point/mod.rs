@@ -7,7 +7,7 @@ mod worst;
 use std::path::Path;
 use std::process::ExitCode;
 
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Scene, read_weights};
 use cohaptic_stability::{
     Analysis, AnalysisError, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, analyse_spinning, has_chance,
     judge_watched,
@@ -63,9 +63,12 @@ fn nominal(scene: &Scene, mut analysis: Analysis, place: &str) -> Judgement {
 /// The verdict if each peer hears only its neighbours.
 fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failure> {
     let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", input::named(path).display()));
+    if scene.topology.is_some() {
+        return Err(refused("the scene has a graph of its own: expected no --graph, or a scene without [topology]".to_owned()));
+    }
     let graph = match graph {
         "complete" => Graph::Complete,
-        "ring" => Graph::Ring,
+        "ring" => Graph::Ring { neighbours: 2 },
         "star" => Graph::Star,
         file => weights(Path::new(file))?,
     };
@@ -80,16 +83,10 @@ fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failur
 /// A file of weights: one line a peer, numbers between commas.
 fn weights(file: &Path) -> Result<Graph, Failure> {
     let text = file::read_text(file)?;
-    let mut rows: Vec<Vec<f64>> = Vec::new();
-    for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let entry = |entry: &str| {
-            entry
-                .trim()
-                .parse()
-                .map_err(|_| Failure::Input(format!("{}:{}: found {:?}, expected numbers between commas", file.display(), number + 1, entry.trim())))
-        };
-        rows.push(line.split(',').map(entry).collect::<Result<_, _>>()?);
-    }
+    let rows = read_weights(&text).map_err(|fault| {
+        let line = text[..fault.span.start].matches('\n').count() + 1;
+        Failure::Input(format!("{}:{line}: {}", file.display(), fault.message))
+    })?;
     let columns = rows.first().map_or(0, Vec::len);
     if let Some(row) = rows.iter().position(|row| row.len() != columns) {
         let found = rows[row].len();

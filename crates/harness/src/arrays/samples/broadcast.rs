@@ -8,7 +8,7 @@ use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
 use cohaptic_units::Instant;
 
 use super::quads::{self, Quad};
-use super::{Sample, others};
+use super::{Sample, count};
 use crate::arrays::bodies::Bodies;
 
 /// The samples in flight, and those held from each sender.
@@ -142,7 +142,7 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
             self.refresh_exactly(bodies);
             return;
         }
-        let count = others(self.peers);
+        let count = count(self.peers - 1);
         for pair in 0..P {
             let held = &mut self.held[pair];
             // From one receiver to the next, its own sample is replaced by that of the receiver before.

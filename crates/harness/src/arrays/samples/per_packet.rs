@@ -3,6 +3,8 @@
 //! Peers look at what has arrived at their ticks alone, and all tick together. So samples in flight lie in a wheel, by the tick at which it is in force, and
 //! nothing is sorted but the samples that are due together after one overtook another on its link.
 
+mod neighbours;
+
 use std::ops::Range;
 
 use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
@@ -12,7 +14,8 @@ use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkModel, LinkName, LinkStats
 
 use super::in_flight::{InFlight, Packet};
 use super::quads::{self, Quad};
-use super::{Sample, others};
+use super::rows::Rows;
+use super::{Sample, count};
 use crate::arrays::bodies::Bodies;
 use crate::arrays::{Shape, nanos};
 
@@ -21,19 +24,21 @@ use crate::arrays::{Shape, nanos};
 /// Work goes from receiver to receiver: what one holds lies together, and receivers may be shared out among threads.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct PerPacket<const P: usize, const L: usize> {
-    peers: usize,
+    rows: Rows,
     /// The receivers, counted from 0 below.
     receivers: Range<usize>,
     end: Instant,
-    /// By receiver, then sender, then run; the diagonal is never used.
+    /// By receiver, then sender, then run, as [`Rows`] says.
     links: Links<P>,
-    /// Bit by bit the senders that do not send now, in the order of links to a receiver.
+    /// Bit by bit the senders that do not send now, in the order of links to a receiver that hears all.
     idle: Vec<u8>,
+    /// Whether each peer of the scene sends now, if receivers hear their neighbours alone.
+    sends: Vec<bool>,
     in_flight: InFlight<P>,
-    /// Samples held, by pair of numbers, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
+    /// Samples held, by pair of numbers, then receiver, then sender. Each receiver has whole quads, of which the last may be empty.
     held: [Vec<Quad<L>>; P],
-    /// By receiver the sums of its samples, if the means are exact: then there is one run.
-    sums: Vec<ExactMeans<P>>,
+    /// By receiver the sums of its samples, if its mean is exact: then there is one run. Empty if no mean is.
+    sums: Vec<Option<ExactMeans<P>>>,
     /// By place, then run: the lowest sequence number that is newer than the sample held.
     next: Vec<u64>,
     /// By receiver: bit r says whether a sample has arrived in run r since the means were computed.
@@ -50,11 +55,6 @@ enum Links<const P: usize> {
     Stepped(SteppedLinks<Packet<P>>, PacketInfo),
 }
 
-/// How many places a receiver has for what it holds: whole quads.
-const fn row_of(peers: usize) -> usize {
-    (peers - 1).next_multiple_of(4)
-}
-
 impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// The receivers hold the initial states of the others, and nothing is on the way.
     pub(in crate::arrays) fn new(scenes: &[&Scene], initial: &[Sample<P, L>], shape: &Shape, receivers: Range<usize>) -> Self {
@@ -63,8 +63,10 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             false => Links::Direct(DirectLinks::new(shape.end, shape.size)),
             true => Links::Stepped(SteppedLinks::new(shape.end), PacketInfo { size: shape.size, ecn_capable: true }),
         };
-        for (to, from) in receivers.clone().flat_map(|to| (0..peers).map(move |from| (to, from))) {
-            for scene in scenes {
+        let rows = Rows::new(peers, shape.topology.as_ref(), receivers.clone());
+        for (receiver, to) in receivers.clone().enumerate() {
+            for (from, scene) in (0..rows.columns(receiver)).flat_map(|column| scenes.iter().map(move |scene| (column, scene))) {
+                let from = rows.sender(receiver, from);
                 // The diagonal has a link that nothing is ever sent over, so that a place is found by multiplying.
                 let (from, to) = if from == to { (0, 1) } else { (from, to) };
                 let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
@@ -75,43 +77,49 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 }
             }
         }
-        let (row, count) = (row_of(peers), receivers.len());
+        let count = receivers.len();
+        let places = rows.places(count);
         let mut samples = Self {
-            peers,
             end: shape.end,
             links,
             idle: vec![0; (peers * L).div_ceil(DirectLinks::AT_ONCE)],
+            sends: vec![false; peers],
             in_flight: InFlight::new(nanos(shape.tick)),
-            held: std::array::from_fn(|_| (0..count).flat_map(|_| quads::empty(peers - 1)).collect()),
+            held: std::array::from_fn(|_| quads::empty(places)),
             sums: Vec::new(),
-            next: vec![0; count * row * L],
+            next: vec![0; places * L],
             changed: vec![u8::MAX; count],
             stale: vec![0; count * L],
             receivers,
+            rows,
         };
-        for (receiver, peer) in samples.receivers.clone().enumerate() {
-            for (sender, sample) in initial.iter().enumerate().filter(|(sender, _)| *sender != peer) {
-                let place = receiver * row + sender - usize::from(sender > peer);
-                for (pair, run) in (0..P).flat_map(|pair| (0..L).map(move |run| (pair, run))) {
-                    quads::set(&mut samples.held[pair], place, run, sample.position[pair][run], sample.velocity[pair][run]);
-                }
+        let Self { rows, held, .. } = &mut samples;
+        for (receiver, place) in (0..count).flat_map(|receiver| rows.held(receiver).map(move |place| (receiver, place))) {
+            let column = rows.column_of(receiver, place);
+            let (sample, weight) = (&initial[rows.sender(receiver, column)], rows.weight(receiver, column));
+            let weighed = |number: f64| weight.map_or(number, |weight| number * weight);
+            for (pair, run) in (0..P).flat_map(|pair| (0..L).map(move |run| (pair, run))) {
+                quads::set(&mut held[pair], place, run, weighed(sample.position[pair][run]), weighed(sample.velocity[pair][run]));
             }
         }
-        if peers > EXACT_FROM {
-            let states = |receiver: usize| (0..peers - 1).map(move |place| receiver * row + place);
-            let sums = |receiver: usize| states(receiver).map(|place| quads::state(&samples.held, place, 0)).collect::<Vec<_>>();
-            samples.sums = (0..count).map(|receiver| ExactMeans::new(sums(receiver).iter())).collect();
+        if (0..count).any(|receiver| rows.held(receiver).len() >= EXACT_FROM) {
+            let states = |receiver: usize| rows.held(receiver).map(|place| quads::state(held, place, 0)).collect::<Vec<_>>();
+            let sums = |receiver: usize| (rows.held(receiver).len() >= EXACT_FROM).then(|| ExactMeans::new(states(receiver).iter()));
+            samples.sums = (0..count).map(sums).collect();
         }
         samples
     }
 
-    /// Some peers send to all others what `sent` has in their places, and then nothing until `next` of each, or until [`PerPacket::pass`] if that is earlier.
+    /// Some peers send to all that hear them what `sent` has in their places, and then nothing until `next` of each, or until [`PerPacket::pass`] if that is earlier.
     /// A run that has ended goes on sending; nobody looks.
     #[inline(never)]
     #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, and there are eight runs")]
     pub(in crate::arrays) fn send(&mut self, (tick, now): (u64, Instant), senders: &[usize], sent: &[Sample<P, L>], next: impl Fn(usize) -> Instant) {
-        let Self { peers, receivers, links, idle, in_flight, .. } = self;
-        let (row, places) = (*peers * L, row_of(*peers));
+        let Rows::All { peers, .. } = self.rows else {
+            return self.send_to_neighbours((tick, now), senders, sent, next);
+        };
+        let Self { receivers, links, idle, in_flight, .. } = self;
+        let (row, places) = (peers * L, (peers - 1).next_multiple_of(4));
         let packet = |receiver: usize, place: usize, arrival: Instant, sequence: u64| {
             let (sender, run) = (place / L, place % L);
             let sample = &sent[sender];
@@ -166,12 +174,13 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// Time passes on the links of all senders until `next` of each; until the latest tick, which is this one, it has.
     #[cold]
     pub(in crate::arrays) fn pass(&mut self, latest: (u64, Instant), next: impl Fn(usize) -> Instant) {
-        let Self { peers, receivers, links: Links::Stepped(links, _), in_flight, .. } = self else { return };
+        let Self { rows, receivers, links: Links::Stepped(links, _), in_flight, .. } = self else { return };
         for (receiver, peer) in receivers.clone().enumerate() {
-            for place in (0..*peers * L).filter(|place| place / L != peer) {
-                links.pass(next(place / L), LinkId::new(receiver * *peers * L + place), |arrival, packet| {
-                    in_flight.push(latest, Packet { arrival, ..packet }, true);
-                });
+            for column in (0..rows.columns(receiver)).filter(|column| rows.sender(receiver, *column) != peer) {
+                let (next, first) = (next(rows.sender(receiver, column)), rows.link(receiver, column) * L);
+                for link in (first..first + L).map(LinkId::new) {
+                    links.pass(next, link, |arrival, packet| in_flight.push(latest, Packet { arrival, ..packet }, true));
+                }
             }
         }
     }
@@ -187,13 +196,12 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         (peer, run): (usize, usize),
         sent: impl Fn(usize, u64) -> Instant,
     ) -> impl Iterator<Item = Moving<A>> {
-        let first = peer * row_of(self.peers);
-        (0..self.peers - 1).map(move |place| {
-            let sender = place + usize::from(place >= self.receivers.start + peer);
-            let newest = self.next[(first + place) * L + run].checked_sub(1);
+        self.rows.held(peer).map(move |place| {
+            let sender = self.rows.sender(peer, self.rows.column_of(peer, place));
+            let newest = self.next[place * L + run].checked_sub(1);
             Moving {
                 sent: newest.map_or(Instant::ZERO, |newest| sent(sender, newest)),
-                velocity: std::array::from_fn(|axis| quads::velocity(&self.held[axis], first + place, run)),
+                velocity: std::array::from_fn(|axis| quads::velocity(&self.held[axis], place, run)),
             }
         })
     }
@@ -206,21 +214,21 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// The means are those of the samples held.
     #[inline(always)]
     pub(in crate::arrays) fn refresh<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
-        let count = others(self.peers);
         for peer in 0..self.receivers.len() {
             if std::mem::take(&mut self.changed[peer]) == 0 {
                 continue;
             }
-            if let Some(sums) = self.sums.get(peer) {
-                let mean = sums.mean(self.peers - 1);
+            let held = self.rows.held(peer);
+            if let Some(Some(sums)) = self.sums.get(peer) {
+                let mean = sums.mean(held.len());
                 for pair in 0..P {
                     bodies.set_target(pair, peer, [mean.position[pair]; L], [mean.velocity[pair]; L]);
                 }
                 continue;
             }
-            let quads = row_of(self.peers) / 4;
+            let (quads, count) = (held.start / 4..held.end.div_ceil(4), count(held.len()));
             for pair in 0..P {
-                let (x, v) = quads::mean(&self.held[pair][peer * quads..(peer + 1) * quads], count);
+                let (x, v) = quads::mean(&self.held[pair][quads.clone()], count);
                 bodies.set_target(pair, peer, x, v);
             }
         }
@@ -256,7 +264,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             return;
         }
         *next = packet.sequence + 1;
-        if let Some(sums) = self.sums.get_mut(usize::from(packet.receiver)) {
+        if let Some(Some(sums)) = self.sums.get_mut(usize::from(packet.receiver)) {
             let now = State { position: packet.position, velocity: packet.velocity };
             sums.replace(&quads::state(&self.held, place, 0), &now);
         }
@@ -272,9 +280,9 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     pub(in crate::arrays) fn end_early(&mut self, run: usize, sent: impl Fn(usize, u64) -> Instant) {
         for packet in self.in_flight.iter().filter(|packet| usize::from(packet.run) == run) {
             let receiver = usize::from(packet.receiver);
-            let place = packet.place as usize - receiver * row_of(self.peers);
-            let sender = place + usize::from(place >= self.receivers.start + receiver);
-            let (link, sent) = (LinkId::new((receiver * self.peers + sender) * L + run), sent(sender, packet.sequence));
+            let column = self.rows.column_of(receiver, packet.place as usize);
+            let sent = sent(self.rows.sender(receiver, column), packet.sequence);
+            let link = LinkId::new(self.rows.link(receiver, column) * L + run);
             match &mut self.links {
                 Links::Direct(links) => links.forget(link, sent, packet.arrival),
                 Links::Stepped(links, _) => links.forget(link, sent, packet.arrival),
@@ -287,12 +295,12 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         self.stale[receiver * L + run]
     }
 
-    /// The counters of the link from a peer to a receiver.
-    pub(in crate::arrays) fn stats(&self, from: usize, receiver: usize, run: usize) -> LinkStats {
-        let link = LinkId::new((receiver * self.peers + from) * L + run);
-        match &self.links {
+    /// The counters of the link from a peer to a receiver, if there is one.
+    pub(in crate::arrays) fn stats(&self, from: usize, receiver: usize, run: usize) -> Option<LinkStats> {
+        let link = LinkId::new(self.rows.link(receiver, self.rows.column(receiver, from)?) * L + run);
+        Some(match &self.links {
             Links::Direct(links) => links.stats(link),
             Links::Stepped(links, _) => links.stats(link),
-        }
+        })
     }
 }

@@ -15,6 +15,7 @@ pub(super) const SCENES: [&str; 4] = [
     object = { mass = 1, enclosure = { min = -1, max = 1, stiffness = 100, damping = 1 } }
     coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
     simulation = { integrator = "rk4" }
+    topology = {}
     peer = { kind = "falcon", falcon = {}, silence = {}, coupling = { stiffness = 1 }, device = { mass = 1 } }
     peers = [
         { name = "a", hand = { sine = { amplitude = 1, frequency = 1 } }, clock = { offset = "1ms" }, contact = { push = "+x" } },
@@ -80,6 +81,7 @@ pub(super) const SCENES: [&str; 4] = [
     links = [{ from = "peer1", to = "peer2", trace = { file = "data/path.csv" } }, { from = "peer2", to = "peer1", trace = { file = "data/line.trace" } }]
     simulation = {}
     measure = { travel = {} }
+    topology = { kind = "star", hub = "peer1", role = "peer" }
     "#,
     r#"
     scene = { duration = "4s", axes = 3 }

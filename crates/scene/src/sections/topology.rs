@@ -1,0 +1,112 @@
+//! `[topology]`: the peers to which each peer sends.
+
+use std::sync::Arc;
+
+use cohaptic_linkfile::document::{Node, Value, quote};
+use cohaptic_linkfile::mesh::read_peer_name;
+use cohaptic_linkfile::reading::named_file::{file_path, read_file};
+use cohaptic_linkfile::reading::{Context, TableReader, values};
+
+use crate::topology::{Topology, parse_graph};
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    Full,
+    Star,
+    Ring,
+    Graph,
+}
+
+/// The topology; `Some(None)`: everybody sends to everybody.
+pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Option<Arc<Topology>>> {
+    const KINDS: [(&str, Kind); 4] = [("full", Kind::Full), ("star", Kind::Star), ("ring", Kind::Ring), ("graph", Kind::Graph)];
+    let mut table = TableReader::new(node, context, "a table such as { kind = \"ring\", neighbours = 2 }")?;
+    let kind = table.optional("kind", Kind::Full, |node, context| values::choice(node, context, &KINDS));
+    let peers = context.names.map(|names| names.len());
+    let fits = |node: &Node, of: Kind, name: &str| {
+        let fits = kind.is_none_or(|kind| kind == of);
+        if !fits {
+            context.fault_at(node, format!("only a topology of kind = {} has this key: expected that kind, or no such key", quote(name)));
+        }
+        fits
+    };
+    let neighbours =
+        table.maybe("neighbours", |node, context| fits(node, Kind::Ring, "ring").then(|| read_neighbours(node, context))?.map(|count| (count, node)));
+    let hub = table.maybe("hub", |node, context| fits(node, Kind::Star, "star").then(|| read_peer_name(node, context))?);
+    table.maybe("role", |node, context| {
+        let fits = fits(node, Kind::Star, "star");
+        if fits && node.as_text() == Some("relay") {
+            context.fault_at(
+                node,
+                "a hub that only passes on what it hears is not simulated: expected \"peer\", a hub with a copy that hears all others",
+            );
+            return None;
+        }
+        fits.then(|| values::choice(node, context, &[("peer", ())]))?
+    })?;
+    let file = table.maybe("file", |node, context| {
+        if !fits(node, Kind::Graph, "graph") {
+            return None;
+        }
+        let path = file_path(node, context, "the name of a file of weights, relative to the folder of the scene")?;
+        let peers = peers?;
+        read_file(node, context, &path, &format!("weights of {peers} peers"), |text| parse_graph(text, peers))
+    });
+    if kind == Some(Kind::Graph) {
+        table.require("file", "the name of a file of weights, a row a peer and numbers between commas");
+    }
+    table.finish();
+    let (neighbours, hub, file, peers) = (neighbours?, hub?, file?, peers?);
+    match kind? {
+        Kind::Full => Some(None),
+        // Fewer than two peers are refused elsewhere.
+        Kind::Star => Topology::star(peers, hub.unwrap_or(0)).map(Arc::new).map(Some),
+        Kind::Ring => {
+            let (count, node) = neighbours.map_or((2, node), |(count, node)| (count, node));
+            let ring = Topology::ring(peers, count);
+            if ring.is_none() && peers >= 2 {
+                let message = format!(
+                    "{peers} peers on a ring with {count} neighbours each: expected an even number of neighbours, fewer than there are peers"
+                );
+                context.fault_at(node, message);
+            }
+            ring.map(Arc::new).map(Some)
+        }
+        Kind::Graph => file.map(Some),
+    }
+}
+
+fn read_neighbours(node: &Node, context: Context<'_>) -> Option<usize> {
+    let count = values::integer(node, context, 2..=u64::from(u16::MAX), "how many peers each hears, an even number from 2 to 65534")?;
+    if !count.is_multiple_of(2) {
+        context.fault_at(node, format!("{count} neighbours cannot lie half on either side: expected an even number"));
+        return None;
+    }
+    usize::try_from(count).ok()
+}
+
+/// Refuses each entry of a list that names the ends of a link which the topology does not have. `within`: the key of the ends in an entry, if they are not its own.
+pub(crate) fn refuse_unlinked(entries: Option<&Node>, within: Option<&str>, topology: &Topology, context: Context<'_>) {
+    let (Some(entries), Some(names)) = (entries, context.names) else { return };
+    let Value::List(entries) = &entries.value else { return };
+    for entry in entries {
+        let ends: Option<&Node> = match within {
+            None => Some(&**entry),
+            Some(key) => entry.as_table().and_then(|table| table.get(key)).map(|entry| &*entry.node),
+        };
+        let end = |key: &str| {
+            let node = &ends?.as_table()?.get(key)?.node;
+            Some((node, names.index(node.as_text()?)?))
+        };
+        let (Some((_, from)), Some((node, to))) = (end("from"), end("to")) else { continue };
+        if from != to && !topology.has_link(from, to) {
+            let name = |peer: usize| quote(&names.as_slice()[peer]);
+            let message = format!(
+                "{} does not send to {} in this topology, so there is no such link: expected neighbours, or another [topology]",
+                name(from),
+                name(to)
+            );
+            context.fault_at(node, message);
+        }
+    }
+}
