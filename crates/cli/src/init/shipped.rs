@@ -56,6 +56,8 @@ shipped![
     "coordination/set-position-throw",
     "coordination/set-position",
     "coordination/smoothed-average-position",
+    "coordination/topology-ring",
+    "coordination/topology-star",
     "coordination/wave-throw",
     "coordination/wave",
     "network/cells",
