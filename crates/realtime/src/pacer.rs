@@ -167,7 +167,7 @@ struct WakeUps {
 impl WakeUps {
     const STEP: Duration = Duration::from_micros(1);
     const STEPS: usize = 128;
-    /// At that many all are halved.
+    /// At this count all counts are halved.
     const MOST: u32 = 1 << 11;
 
     #[inline]

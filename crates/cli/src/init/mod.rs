@@ -110,6 +110,24 @@ fn change_peers(scene: &mut Table, wanted: usize) {
             entries.retain(|entry| !mentions(entry, &left_out));
         }
     }
+    fit_ring(scene, wanted);
+}
+
+/// A ring has an even number of neighbours, fewer than there are peers: as many of those it had as there are places for. Two peers hear each other on any topology, and need none.
+fn fit_ring(scene: &mut Table, peers: usize) {
+    let most = i64::try_from(peers.saturating_sub(1) / 2 * 2).unwrap_or(i64::MAX);
+    let ring = scene.get_mut("topology").and_then(Value::as_table_mut).filter(|topology| topology.get("kind").and_then(Value::as_str) == Some("ring"));
+    match ring {
+        Some(_) if most == 0 => {
+            scene.remove("topology");
+        }
+        Some(topology) => {
+            if topology.get("neighbours").and_then(Value::as_integer).is_some_and(|neighbours| neighbours > most) {
+                topology.insert("neighbours".to_owned(), Value::Integer(most));
+            }
+        }
+        None => {}
+    }
 }
 
 fn add_like_the_last(peers: &mut Vec<Value>, wanted: usize) {

@@ -46,7 +46,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
     /// The next instant at which anything happens; the end of the scene is the last.
     ///
     /// Where all live here it is a tick, as in virtual time: what arrives in between waits for it anyway. With a process it is any arrival: its record has one
-    /// order, whoever receives.
+    /// order for all receivers.
     pub(crate) fn next_instant(&self) -> Instant {
         let tick = self.next_tick();
         if !self.remote.has_processes {

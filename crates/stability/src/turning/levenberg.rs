@@ -5,7 +5,7 @@ use crate::Matrix;
 /// Some ten steps lead from near a zero to it.
 const MOST_STEPS: usize = 200;
 
-/// A place near `start` at which no residual is left, and the size of what is left there at least. A place moves by `size` numbers.
+/// A place near `start` at which no residual is left, and the size of the residual there at least. A place moves by `size` numbers.
 pub(super) fn zero<P>(start: P, size: usize, residual: impl Fn(&P) -> Vec<f64>, moved: impl Fn(&P, &[f64]) -> P) -> (P, f64) {
     let mut place = start;
     let mut left = residual(&place);

@@ -9,7 +9,7 @@ use cohaptic_units::Instant;
 use super::id::NodeId;
 use super::pending::LineId;
 
-/// The receivers, and the instants to come of what is on the way to them.
+/// The receivers, and the instants to come of the packets on the way to them.
 #[derive(Clone, Debug)]
 pub(super) struct Awaited {
     /// By node.
@@ -39,7 +39,7 @@ impl Awaited {
     /// The engine of a line must be woken.
     pub(super) fn announce(&mut self, at: Instant, line: LineId) {
         let is_awaited = match line {
-            // What is inside it goes to any node.
+            // Its packets go to any node.
             LineId::Uplink(_) => true,
             LineId::Link(link) => self.is_awaited[link.index() % self.is_awaited.len()],
             LineId::Downlink(node) => self.is_awaited[node.index()],

@@ -287,7 +287,7 @@ impl<P: Clone> Network<P> {
 
     /// When [`Network::handle_timeout`] must be called next for a packet to reach one of the receivers of [`Network::awaiting`] in time; `None` if none is on
     /// the way to them. Never before the last instant given, once all events are polled. It may name an instant at which nothing reaches them: where an
-    /// uplink wakes, whoever its packets are for.
+    /// uplink wakes for packets to other nodes.
     #[must_use]
     pub fn poll_awaited(&self) -> Option<Instant> {
         self.traffic.awaited.as_ref()?.next_at()
