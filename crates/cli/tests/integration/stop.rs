@@ -126,7 +126,7 @@ fn the_paper_says_that_it_was_ended() {
 fn an_admittance_keeps_the_points_that_it_has() {
     let desk = Desk::with("two.toml", TWO);
     // The first points are there after milliseconds; there shall be fewer than a busy machine prints in a second.
-    let outcome = stopped_after(8, &desk, "admittance two.toml --peer left --points 1000000 --json --out out", "-INT");
+    let outcome = stopped_after(20, &desk, "admittance two.toml --peer left --points 1000000 --json --out out", "-INT");
     assert_interrupted(&outcome);
     let document = parse(&outcome.stdout);
     let points = document["points"].as_array().unwrap();
