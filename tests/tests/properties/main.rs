@@ -20,6 +20,7 @@ mod rotation;
 mod rotation_laws;
 mod symmetry;
 mod topologies;
+mod turned_growth;
 mod waves;
 
 /// Half the distance from 1 to the next double: the largest relative error of one rounding.
