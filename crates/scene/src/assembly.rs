@@ -35,7 +35,7 @@ impl Scene {
     #[must_use]
     pub fn coupling(&self, place: usize) -> Gains {
         let spec = &self.peers[place];
-        spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers.len()))
+        spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.number()))
     }
 
     /// KT and BT of a peer: `gains`, those of the scene or those that the timeline sets, times [`Scene::coordination_factor`].
@@ -56,7 +56,7 @@ impl Scene {
     /// If the scene has a topology, and no such peer.
     #[must_use]
     pub fn coordination_factor(&self, peer: usize) -> f64 {
-        let scaling = self.coordination.scaling.coordination_factor(self.peers.len());
+        let scaling = self.coordination.scaling.coordination_factor(self.number());
         let summed = match self.coordination.pull {
             Pull::Mean => scaling,
             Pull::Sum => scaling * self.heard_by(peer),
@@ -129,7 +129,7 @@ impl Scene {
     /// The mass of each copy of the object \[kg\]; the whole mass where one peer alone has the object.
     #[must_use]
     pub fn copy_mass(&self) -> f64 {
-        if self.object.split_mass && self.server().is_none() { self.object.mass / count(self.peers.len()) } else { self.object.mass }
+        if self.object.split_mass && self.server().is_none() { self.object.mass / count(self.number()) } else { self.object.mass }
     }
 }
 

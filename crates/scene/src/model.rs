@@ -49,13 +49,31 @@ pub struct Scene {
     pub measure: Option<MeasureSpec>,
     /// What must come out, if the scene is a test.
     pub expect: Option<Expect>,
+    /// For how many peers masses and gains are scaled; `None`: for those that are listed. See [`Scene::scaled_for`](fn@Scene::scaled_for).
+    pub scaled_for: Option<usize>,
 }
 
 impl fmt::Debug for Scene {
     /// Turns, topologies and measures are shown only where there are any: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { file, title, duration, seed, axes, object, rotation, coordination, integrator, peers, topology, links, timeline, measure, expect } =
-            self;
+        let Self {
+            file,
+            title,
+            duration,
+            seed,
+            axes,
+            object,
+            rotation,
+            coordination,
+            integrator,
+            peers,
+            topology,
+            links,
+            timeline,
+            measure,
+            expect,
+            scaled_for,
+        } = self;
         let mut shown = f.debug_struct("Scene");
         shown.field("file", file).field("title", title).field("duration", duration).field("seed", seed).field("axes", axes);
         shown.field("object", object).field("coordination", coordination).field("integrator", integrator).field("peers", peers);
@@ -69,11 +87,27 @@ impl fmt::Debug for Scene {
         if let Some(measure) = measure {
             shown.field("measure", measure);
         }
+        if let Some(number) = scaled_for {
+            shown.field("scaled_for", number);
+        }
         shown.finish()
     }
 }
 
 impl Scene {
+    /// The scene with the masses of copies, and all gains, of that number of peers; those that it lists, its links and all else stay. The motions of equal peers are the same for any number of
+    /// them but for these and the weights with which they hear each other, so that an analysis needs no more peers than two.
+    #[must_use]
+    pub fn scaled_for(&self, peers: usize) -> Self {
+        Self { scaled_for: Some(peers), ..self.clone() }
+    }
+
+    /// For how many peers masses and gains are scaled: those that the scene lists, but for [`Scene::scaled_for`].
+    #[must_use]
+    pub fn number(&self) -> usize {
+        self.scaled_for.unwrap_or(self.peers.len())
+    }
+
     /// The settings of measures: those of `[measure]`, or the usual ones.
     #[must_use]
     pub fn measure_settings(&self) -> MeasureSettings {

@@ -194,6 +194,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         timeline: timeline?,
         measure: measure?,
         expect: expect?,
+        scaled_for: None,
     };
     if let Some(refused) = scene.refused_topology() {
         file.fault_at(topology_node.unwrap_or(document), refused);

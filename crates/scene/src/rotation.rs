@@ -70,7 +70,7 @@ impl Scene {
         let spec = &self.peers[place];
         let device = device.as_ref().map(|device| DeviceRotation {
             handle: device.handle,
-            coupling: device.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers.len())),
+            coupling: device.coupling.scaled(spec.coupling_scaling.coupling_factor(self.number())),
             hand: device.torque.clone(),
         });
         Some(RotationConfig {
@@ -128,7 +128,7 @@ impl Scene {
         let rotation = self.rotation.as_ref()?;
         let pull = match self.coordination.strategy.pull() {
             Pull::Mean => 1.0,
-            Pull::Sum => (self.peers.len() - 1) as f64,
+            Pull::Sum => (self.number() - 1) as f64,
         };
         let factor = pull * self.coordination_factor(0);
         let of = |own: Option<Triple>, gain: f64| own.unwrap_or_else(|| rotation.over_mass(self.object.mass, gain)).map(|gain| gain * factor);

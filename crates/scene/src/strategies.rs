@@ -139,7 +139,7 @@ impl Scene {
         LawParameters {
             gains: self.coordination_gains(*gains, peer),
             // On a topology the number of those heard counts in the gains.
-            peers: if self.topology.is_some() { 2 } else { self.peers.len() },
+            peers: if self.topology.is_some() { 2 } else { self.number() },
             tick: self.peers[peer].clock.tick,
             oldest: if own.any_automatic() { self.oldest_sample() } else { None },
             middle: if own.any_automatic() { self.middle_age() } else { None },

@@ -339,7 +339,7 @@ impl Scene {
     /// What the gains of a peer are multiplied by where they count once for each peer that it hears.
     #[must_use]
     pub(crate) fn heard_by(&self, peer: usize) -> f64 {
-        self.topology.as_ref().map_or_else(|| crate::assembly::count(self.peers.len() - 1), |topology| topology.degree(peer))
+        self.topology.as_ref().map_or_else(|| crate::assembly::count(self.number() - 1), |topology| topology.degree(peer))
     }
 
     /// Whether the gains of peers depend on what they hear, and so differ from peer to peer.

@@ -45,6 +45,9 @@ pub(crate) struct PointArguments {
     /// be equal
     #[arg(long, value_name = "GRAPH", conflicts_with_all = ["method", "losses_in_a_row", "delay_within"])]
     pub(crate) graph: Option<String>,
+    /// The verdict for every number of equal peers too, proven: of those from 2 on, or FROM.., or FROM..TO
+    #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, conflicts_with_all = ["graph", "method", "about"])]
+    pub(crate) every_number: Option<(u64, Option<u64>)>,
     /// The worst case too: at most this number of samples lost in a row
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u32>(0, u32::MAX.into()))]
     pub(crate) losses_in_a_row: Option<u32>,
@@ -109,6 +112,18 @@ fn delays(text: &str) -> Result<(Duration, Duration), String> {
     if low <= high { Ok((low, high)) } else { Err("the shorter delay comes first".to_owned()) }
 }
 
+/// Numbers of peers, as `2..` or `2..100`.
+fn numbers(text: &str) -> Result<(u64, Option<u64>), String> {
+    let expected = || "expected FROM.. or FROM..TO, such as 2.. or 2..100".to_owned();
+    let number = |text: &str| text.trim().parse::<u64>().map_err(|_| expected());
+    let (from, to) = text.split_once("..").ok_or_else(expected)?;
+    let (from, to) = (number(from)?, if to.trim().is_empty() { None } else { Some(number(to)?) });
+    if from < 2 {
+        return Err("a scene has at least 2 peers".to_owned());
+    }
+    if to.is_some_and(|to| to < from) { Err("the smaller number comes first".to_owned()) } else { Ok((from, to)) }
+}
+
 /// How a verdict is reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum MethodName {
@@ -139,8 +154,12 @@ pub(crate) struct MapArguments {
     #[arg(long, value_name = "KEY=LO..HI")]
     pub(crate) y: String,
     /// How many values of each, the ends among them
-    #[arg(long, value_name = "WxH", value_parser = GridSize::parse)]
-    pub(crate) grid: GridSize,
+    #[arg(long, value_name = "WxH", value_parser = GridSize::parse, required_unless_present = "prove")]
+    pub(crate) grid: Option<GridSize>,
+    /// In place of a grid, prove the whole region: boxes that are stable or unstable throughout, and a rest that is not decided, with sides of at least the ranges halved this number of times. Keys that do
+    /// nothing but set gains, masses and dampings
+    #[arg(long, value_name = "HALVINGS", num_args = 0..=1, default_missing_value = "8", conflicts_with = "grid", value_parser = integer::<u32>(0, cohaptic_stability::MOST_HALVINGS.into()))]
+    pub(crate) prove: Option<u32>,
     /// Another map in the same picture, with these keys overridden too, again and again:
     /// --curve scene.count=3,coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE,...")]

@@ -116,7 +116,8 @@ fn change_peers(scene: &mut Table, wanted: usize) {
 /// A ring has an even number of neighbours, fewer than there are peers: as many of those it had as there are places for. Two peers hear each other on any topology, and need none.
 fn fit_ring(scene: &mut Table, peers: usize) {
     let most = i64::try_from(peers.saturating_sub(1) / 2 * 2).unwrap_or(i64::MAX);
-    let ring = scene.get_mut("topology").and_then(Value::as_table_mut).filter(|topology| topology.get("kind").and_then(Value::as_str) == Some("ring"));
+    let ring =
+        scene.get_mut("topology").and_then(Value::as_table_mut).filter(|topology| topology.get("kind").and_then(Value::as_str) == Some("ring"));
     match ring {
         Some(_) if most == 0 => {
             scene.remove("topology");

@@ -126,6 +126,17 @@ impl Family {
         Ok(Scene::parse(&self.text, &self.file, &overrides)?)
     }
 
+    /// The scene with those values of its keys, all of which are learned: of equal peers the first alone has them.
+    pub(crate) fn written(&self, values: &[f64]) -> Result<Scene, FamilyError> {
+        let prepared = self.prepared(values)?;
+        if !prepared.is_varied() {
+            return self.scene(values);
+        }
+        let mut scene = prepared.scene.clone();
+        prepared.write(values, &mut scene);
+        Ok(scene)
+    }
+
     /// Which radii the family has.
     #[must_use]
     pub const fn criterion(&self) -> Criterion {

@@ -30,6 +30,16 @@ impl Body {
         Self { short: (short, first), long: if long == short { first } else { step(long) } }
     }
 
+    /// The step map, if all spans between ticks are equal.
+    pub(crate) fn only_map(&self) -> Option<StepMap> {
+        (self.long == self.short.1).then_some(self.long)
+    }
+
+    /// With another step map over every span.
+    pub(crate) fn with_map(&self, map: StepMap) -> Self {
+        Self { short: (self.short.0, map), long: map }
+    }
+
     pub(crate) fn map(&self, span: Duration) -> &StepMap {
         if span == self.short.0 { &self.short.1 } else { &self.long }
     }

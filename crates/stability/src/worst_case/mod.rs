@@ -27,7 +27,7 @@ mod norm;
 mod of_scene;
 mod pattern;
 pub(crate) mod rounding;
-mod symmetric;
+pub(crate) mod symmetric;
 #[cfg(test)]
 mod tests;
 pub(crate) mod verified;

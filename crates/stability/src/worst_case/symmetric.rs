@@ -3,7 +3,7 @@
 use crate::Matrix;
 
 /// The upper triangle R with RᵀR = A (Cholesky), from the upper triangle of A; `None` if a pivot is not above zero.
-pub(super) fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
+pub(crate) fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
     let size = symmetric.rows();
     let mut factor = Matrix::from_fn(size, size, |i, j| if i <= j { symmetric[(i, j)] } else { 0.0 });
     for pivot in 0..size {
@@ -28,7 +28,7 @@ pub(super) fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
     Some(factor)
 }
 
-pub(super) fn triangle_inverse(upper: &Matrix) -> Matrix {
+pub(crate) fn triangle_inverse(upper: &Matrix) -> Matrix {
     let size = upper.rows();
     let mut inverse = Matrix::zeros(size, size);
     for row in (0..size).rev() {

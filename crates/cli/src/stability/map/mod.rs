@@ -4,6 +4,7 @@ mod answer;
 mod files;
 mod filling;
 mod glance;
+mod prove;
 
 use std::process::ExitCode;
 use std::time::Instant as Clock;
@@ -59,6 +60,9 @@ impl Speed {
 /// Fills the maps and shows or writes them.
 pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let order = Order::new(arguments)?;
+    if let Some(halvings) = arguments.prove {
+        return prove::prove(&order, arguments, halvings);
+    }
     let start = Clock::now();
     let Filled { maps, cells, rows } = filling::fill(&order, arguments)?;
     let named = maps.into_iter().enumerate().map(|(number, map)| {
@@ -87,7 +91,8 @@ impl Order {
     fn new(arguments: &MapArguments) -> Result<Self, Failure> {
         let ranges = [("--x", source::range("--x", &arguments.x)?), ("--y", source::range("--y", &arguments.y)?)];
         let variants = Variant::all(&arguments.curve, &arguments.against)?;
-        let size = arguments.grid;
+        // A proof has no grid.
+        let size = arguments.grid.unwrap_or(crate::arguments::GridSize { width: 1, height: 1 });
         if size.width.saturating_mul(size.height).saturating_mul(variants.len()) > crate::arguments::GridSize::MOST_CELLS {
             let most = crate::arguments::GridSize::MOST_CELLS;
             return Err(Failure::Input(format!("{} maps of {size} cells: expected at most {most} cells in all", variants.len())));

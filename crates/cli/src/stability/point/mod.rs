@@ -1,6 +1,7 @@
 //! `cohaptic stability point`.
 
 mod answer;
+mod every_number;
 mod speed;
 mod worst;
 
@@ -42,11 +43,12 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         }
     };
     let worst = worst::of(&scene, arguments, path)?;
+    let every = every_number::of(&scene, arguments, path)?;
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_POINT,
-        &answer::of(&scene, &judgement, worst.as_ref()),
-        || answer::describe(&scene, &judgement, worst.as_ref()),
+        &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref()),
+        || answer::describe(&scene, &judgement, worst.as_ref()) + &every.as_ref().map(every_number::words).unwrap_or_default(),
         output::NO_FILES,
     )?;
     Ok(ExitCode::SUCCESS)

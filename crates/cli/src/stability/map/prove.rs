@@ -1,0 +1,178 @@
+//! `cohaptic stability map --prove`: a region of boxes that are decided throughout.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant as Clock;
+
+use cohaptic_picture::{Fill, Panel, Picture, Region};
+use cohaptic_stability::{AnalysisError, Guarantee, ProofError, ProvenBox, ProvenRegion};
+use cohaptic_units::print::{Counted, csv_field};
+use serde::Serialize;
+
+use super::Order;
+use crate::analysis_watch::Interruptible;
+use crate::arguments::MapArguments;
+use crate::document_schema::{DocumentSchema, document};
+use crate::failure::{Failure, not_analysed};
+use crate::file::write_into;
+use crate::output::{self, figure};
+use crate::stability::source::axis_of;
+
+/// A variant, and its proof.
+struct Proof {
+    name: String,
+    overrides: Vec<String>,
+    region: ProvenRegion,
+    file: Option<String>,
+}
+
+/// All that a user wants to know of what is proven, in this order.
+const GUARANTEES: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided];
+
+/// Proves the region of each variant and shows or writes it.
+pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> Result<ExitCode, Failure> {
+    let start = Clock::now();
+    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let all = || order.families.iter().map(|family| ProvenRegion::prove(family, halvings, &Interruptible)).collect::<Vec<_>>();
+    let regions = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(all),
+        // Without threads of its own it uses those that there are.
+        Err(_) => all(),
+    };
+    let mut proofs = Vec::new();
+    for (variant, region) in order.variants.iter().zip(regions) {
+        let region = region.map_err(|error| failure(order, arguments, proofs.len(), error))?;
+        proofs.push(Proof { name: variant.name.clone(), overrides: variant.overrides.clone(), region, file: None });
+    }
+    let mut files = Vec::new();
+    if let Some(folder) = &arguments.out {
+        for (number, proof) in proofs.iter_mut().enumerate() {
+            let name = if number == 0 { "proof.csv".to_owned() } else { format!("proof-{}.csv", number + 1) };
+            let path = write_into(folder, &name, table(order, &proof.region))?;
+            proof.file = Some(path.clone());
+            files.push(path);
+        }
+        files.extend(pictures(order, &proofs, folder, arguments)?);
+    }
+    let wall_s = start.elapsed().as_secs_f64();
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::STABILITY_REGION,
+        &answer(order, &proofs, halvings, wall_s, &files),
+        || describe(order, &proofs, wall_s),
+        &files,
+    )?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn failure(order: &Order, arguments: &MapArguments, variant: usize, error: ProofError) -> Failure {
+    match error {
+        ProofError::Analysis(AnalysisError::Stopped) => Failure::Interrupted("the proof was ended before all boxes were looked at".to_owned()),
+        ProofError::Analysis(error) => not_analysed(&arguments.scene.scene, &error),
+        ProofError::Family(error) => order.failure(variant, arguments, error.into()),
+        error => Failure::Input(format!("--prove: {error}")),
+    }
+}
+
+/// The answer of `cohaptic stability map --prove --json`.
+fn answer(order: &Order, proofs: &[Proof], halvings: u32, wall_s: f64, files: &[String]) -> impl Serialize {
+    let (x, y) = (order.x(), order.y());
+    let regions = proofs.iter().map(|proof| {
+        let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| proof.region.share(guarantee));
+        document! {
+            name: proof.name.as_str(),
+            overrides: proof.overrides.as_slice(),
+            // Shares of the area of the ranges.
+            stable: stable,
+            unstable: unstable,
+            undecided: undecided,
+            boxes: proof.region.boxes.len(),
+            certificates: proof.region.attempts,
+            // Of the area, what is proven stable here and proven unstable for the first, and the other way round.
+            stable_alone: both(&proof.region, Guarantee::Stable, &proofs[0].region, Guarantee::Unstable),
+            unstable_alone: both(&proof.region, Guarantee::Unstable, &proofs[0].region, Guarantee::Stable),
+            #[serde(flatten)]
+            file: proof.file.as_ref().map(|file| document! { file: file.as_str() }),
+        }
+    });
+    document! {
+        title: order.title.as_str(),
+        x_key: x.key.as_str(),
+        x_unit: x.unit.as_str(),
+        x_range: [x.low, x.high],
+        y_key: y.key.as_str(),
+        y_unit: y.unit.as_str(),
+        y_range: [y.low, y.high],
+        // How often each range was halved at most.
+        halvings: halvings,
+        regions: regions.collect::<Vec<_>>(),
+        wall_s: wall_s,
+        files: files,
+    }
+}
+
+fn describe(order: &Order, proofs: &[Proof], wall_s: f64) -> String {
+    let percent = |share: f64| format!("{} %", figure(100.0 * share, 4));
+    let mut text = format!("{}\n\n", order.title);
+    for (number, proof) in proofs.iter().enumerate() {
+        let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| percent(proof.region.share(guarantee)));
+        let name = if proofs.len() > 1 { format!("{}: ", proof.name) } else { String::new() };
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            text,
+            "  {name}proven stable {stable} of the area, proven unstable {unstable}, undecided {undecided} ({})",
+            Counted(proof.region.boxes.len(), "box")
+        );
+        if number > 0 {
+            let first = &proofs[0];
+            let here = percent(both(&proof.region, Guarantee::Stable, &first.region, Guarantee::Unstable));
+            let there = percent(both(&proof.region, Guarantee::Unstable, &first.region, Guarantee::Stable));
+            let _ = writeln!(text, "    stable where {} is unstable: {here} at least; unstable where it is stable: {there} at least", first.name);
+        }
+    }
+    let _ = writeln!(text, "  {wall_s:.1} s");
+    text
+}
+
+/// The share of the area in which one region is proven so, and another so.
+fn both(one: &ProvenRegion, of_one: Guarantee, other: &ProvenRegion, of_other: Guarantee) -> f64 {
+    let chosen = |region: &ProvenRegion, guarantee| region.boxes.iter().filter(|one| one.guarantee == guarantee).copied().collect::<Vec<ProvenBox>>();
+    let (ones, others) = (chosen(one, of_one), chosen(other, of_other));
+    let side = |one: [f64; 2], other: [f64; 2]| (one[1].min(other[1]) - one[0].max(other[0])).max(0.0);
+    let common = ones.iter().flat_map(|one| others.iter().map(move |other| side(one.x, other.x) * side(one.y, other.y))).sum::<f64>();
+    let all: f64 = one.boxes.iter().map(|one| (one.x[1] - one.x[0]) * (one.y[1] - one.y[0])).sum();
+    common / all + 0.0
+}
+
+/// One row a box.
+fn table(order: &Order, region: &ProvenRegion) -> String {
+    let [x, y] = [order.x(), order.y()].map(|range| csv_field(&range.key));
+    let mut text = format!("{x} from,{x} to,{y} from,{y} to,verdict\n");
+    for ProvenBox { x, y, guarantee } in &region.boxes {
+        let _ = writeln!(text, "{:?},{:?},{:?},{:?},{}", x[0], x[1], y[0], y[1], guarantee.word());
+    }
+    text
+}
+
+/// `proof.svg`, `proof-2.svg` and so on: a picture for each variant.
+fn pictures(order: &Order, proofs: &[Proof], folder: &Path, arguments: &MapArguments) -> Result<Vec<String>, Failure> {
+    let mut files = Vec::new();
+    for (number, proof) in proofs.iter().enumerate() {
+        let boxes = |guarantee| {
+            let of = proof.region.boxes.iter().filter(move |one| one.guarantee == guarantee);
+            of.map(|one| vec![(one.x[0], one.y[0]), (one.x[1], one.y[0]), (one.x[1], one.y[1]), (one.x[0], one.y[1])]).collect::<Vec<_>>()
+        };
+        let axes = [order.x(), order.y()].map(|range| axis_of(range).range(range.low, range.high));
+        let [x, y] = axes;
+        let panel = Panel::new(x, y)
+            .with(Region::new(boxes(Guarantee::Stable), Fill::Tint(0)).named("proven stable"))
+            .with(Region::new(boxes(Guarantee::Unstable), Fill::Tint(1)).named("proven unstable"))
+            .with(Region::new(boxes(Guarantee::Undecided), Fill::Grey).named("undecided"));
+        let title = if proofs.len() > 1 { format!("{}: {}", order.title, proof.name) } else { order.title.clone() };
+        let name = if number == 0 { "proof.svg".to_owned() } else { format!("proof-{}.svg", number + 1) };
+        let svg = Picture::new(title.as_str()).panel(panel).size(arguments.pictures.size()).svg();
+        files.push(write_into(folder, &name, svg)?);
+    }
+    Ok(files)
+}

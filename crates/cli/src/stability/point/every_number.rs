@@ -1,0 +1,55 @@
+//! The verdict for every number of equal peers.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{AnalysisError, EveryNumber, NumberSpan, ProofError, prove_every_number};
+use serde::Serialize;
+
+use super::ended;
+use crate::analysis_watch::Interruptible;
+use crate::arguments::PointArguments;
+use crate::document_schema::document;
+use crate::failure::{Failure, not_analysed};
+use crate::{input, output};
+
+/// The proof, if it is asked for.
+pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<EveryNumber>, Failure> {
+    let Some((from, to)) = arguments.every_number else { return Ok(None) };
+    prove_every_number(scene, from, to, &Interruptible).map(Some).map_err(|error| match error {
+        ProofError::Analysis(AnalysisError::Stopped) => ended(),
+        ProofError::Analysis(error) => not_analysed(path, &error),
+        error => Failure::Input(format!("{}: --every-number: {error}", output::path(input::named(path)))),
+    })
+}
+
+/// The part of the JSON document.
+pub(super) fn document(every: &EveryNumber) -> impl Serialize + use<> {
+    let spans = every.spans.iter().map(|span| document! { from: span.from, to: span.to, verdict: span.guarantee.word() });
+    document! {
+        // `to` is `null` where there is no end.
+        spans: spans.collect::<Vec<_>>(),
+        // What has no limit as N grows; `null` if everything has one, or the numbers end.
+        without_limit: every.without_limit.clone(),
+        certificates: every.attempts,
+    }
+}
+
+/// The lines below the verdict.
+pub(super) fn words(every: &EveryNumber) -> String {
+    let mut text = "\n  every number N of equal peers, proven:\n".to_owned();
+    for NumberSpan { from, to, guarantee } in &every.spans {
+        let numbers = match to {
+            None => format!("N >= {from}"),
+            Some(to) if to == from => format!("N = {from}"),
+            Some(to) => format!("{from} <= N <= {to}"),
+        };
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "    {:<10}for {numbers}", guarantee.word());
+    }
+    if let Some(what) = &every.without_limit {
+        let _ = writeln!(text, "  note: as N grows, {what}, so that there is no limit from which all beyond could be judged");
+    }
+    text
+}

@@ -1,0 +1,129 @@
+//! Boxes of numbers: lifted systems between whose corners every step matrix is multi-affine.
+//!
+//! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of them is monotone in m and in b, so
+//! that the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box.
+
+use cohaptic_peer::StepMap;
+
+use super::ProofError;
+use super::span::StepSpan;
+use super::steps::{Numbers, Plan, StepMatrix};
+use crate::Matrix;
+use crate::lifted::node::{Body, Scale};
+use crate::lifted::{Node, Sampling};
+use crate::timetable::Timetable;
+
+/// The numbers of a part of a scene at a corner of a box.
+#[derive(Clone, Debug)]
+pub(super) struct Point {
+    pub(super) nodes: Vec<Node>,
+    pub(super) weights: Matrix,
+}
+
+/// What the corners of a box have in common.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Common<'a> {
+    pub(super) timetable: &'a Timetable,
+    pub(super) tied: bool,
+    /// What velocities are multiplied by \[s\].
+    pub(super) time: f64,
+}
+
+/// More numbers than this that vary are refused: a box has two corners to the power of them.
+const MOST_NUMBERS: u32 = 6;
+
+/// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set.
+pub(super) fn steps(points: &[Point], common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
+    let all: Vec<Node> = points.iter().flat_map(|point| point.nodes.iter().cloned()).collect();
+    let sampling = Sampling::of(&all);
+    let scale = Scale { time: common.time, compliance: points[0].nodes[0].compliance(common.time) };
+    check_units(points, scale)?;
+    let plan = Plan::of(common.timetable, !sampling.is_silent(scale.time));
+    let matrices = |point: &Point| plan.matrices(Numbers { nodes: &point.nodes, weights: &point.weights, sampling, scale, tied: common.tied });
+    let corners: Vec<Vec<StepMatrix>> = with_bodies(points)?.iter().map(matrices).collect();
+    Ok((0..corners[0].len()).map(|step| StepSpan::of(corners.iter().map(|steps| &steps[step]))).collect())
+}
+
+/// The points, each at the lower end of one more number and then each at its upper end.
+pub(super) fn doubled(points: &[Point], at: impl Fn(&Point, bool) -> Point) -> Vec<Point> {
+    [false, true].into_iter().flat_map(|upper| points.iter().map(move |point| (point, upper))).map(|(point, upper)| at(point, upper)).collect()
+}
+
+/// Refuses laws whose states mean something else at each corner: numbers that are remembered in units of gains that vary, and ages.
+fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
+    let units = |point: &Point| -> Vec<u64> {
+        let of = |node: &Node| {
+            let remembered = (0..node.law.memory.len()).map(|place| node.memory_unit(place, scale));
+            remembered.chain((node.looks_back() > 0).then(|| node.past_unit(scale.time))).map(f64::to_bits).collect::<Vec<_>>()
+        };
+        point.nodes.iter().flat_map(of).collect()
+    };
+    if points.iter().any(|point| point.nodes.iter().any(|node| node.law.horizon.is_some())) {
+        return Err(ProofError::Ages);
+    }
+    if points.iter().any(|point| units(point) != units(&points[0])) {
+        return Err(ProofError::Remembered);
+    }
+    Ok(())
+}
+
+/// The points with one more number for each coefficient of a step map that varies between them.
+fn with_bodies(points: &[Point]) -> Result<Vec<Point>, ProofError> {
+    type Access = fn(&mut Node) -> Option<&mut Body>;
+    let bodies: [Access; 2] = [|node| Some(&mut node.object), |node| node.device.as_mut()];
+    let mut all = points.to_vec();
+    for node in 0..points[0].nodes.len() {
+        for body in bodies {
+            let found: Vec<Body> = points.iter().filter_map(|point| body(&mut point.nodes[node].clone()).copied()).collect();
+            if found.iter().all(|other| *other == found[0]) {
+                continue;
+            }
+            let ranges = ranges(&found)?;
+            let set = |point: &Point, values: &dyn Fn([f64; 6]) -> [f64; 6]| {
+                let mut point = point.clone();
+                if let Some(place) = body(&mut point.nodes[node]) {
+                    *place = place.with_map(map_of(values(coefficients(&place.only_map().unwrap_or_else(|| map_of([0.0; 6]))))));
+                }
+                point
+            };
+            all = all.iter().map(|point| set(point, &|_| ranges.map(|(low, _)| low))).collect();
+            for places in together(&ranges) {
+                all = doubled(&all, |point, upper| {
+                    let high = |mut values: [f64; 6]| {
+                        places.iter().for_each(|place| values[*place] = ranges[*place].1);
+                        values
+                    };
+                    set(point, &|values| if upper { high(values) } else { values })
+                });
+            }
+        }
+    }
+    if all.len() > 1 << MOST_NUMBERS { Err(ProofError::Numerous { most: MOST_NUMBERS }) } else { Ok(all) }
+}
+
+fn coefficients(map: &StepMap) -> [f64; 6] {
+    let ([[e00, e01], [e10, e11]], [g0, g1]) = map.coefficients();
+    [e00, e01, e10, e11, g0, g1]
+}
+
+const fn map_of([e00, e01, e10, e11, g0, g1]: [f64; 6]) -> StepMap {
+    StepMap::new([[e00, e01], [e10, e11]], [g0, g1])
+}
+
+/// Between which values each coefficient of the step maps of bodies lies.
+fn ranges(bodies: &[Body]) -> Result<[(f64, f64); 6], ProofError> {
+    let values = bodies.iter().map(|body| body.only_map().map(|map| coefficients(&map)).ok_or(ProofError::Drift)).collect::<Result<Vec<_>, _>>()?;
+    let range = |place: usize| {
+        let of = values.iter().map(|values| values[place]);
+        (of.clone().fold(f64::INFINITY, f64::min), of.fold(f64::NEG_INFINITY, f64::max))
+    };
+    let ranges: [(f64, f64); 6] = std::array::from_fn(range);
+    if [0, 2].iter().any(|place| ranges[*place].0 < ranges[*place].1) { Err(ProofError::TiedBody) } else { Ok(ranges) }
+}
+
+/// Which coefficients vary, those together that are multiples of one number: without a change of the damping over the mass, both effects of a force.
+fn together(ranges: &[(f64, f64); 6]) -> Vec<&'static [usize]> {
+    let varies = |place: usize| ranges[place].0 < ranges[place].1;
+    let groups: &[&'static [usize]] = if varies(1) || varies(3) { &[&[1], &[3], &[4], &[5]] } else { &[&[4, 5]] };
+    groups.iter().copied().filter(|places| places.iter().any(|place| varies(*place))).collect()
+}

@@ -1,0 +1,129 @@
+//! Guarantees: verdicts that hold for sets of scenes, not for one.
+//!
+//! A frame of a lifted system is a product of steps ([`steps`]) whose entries are affine in each gain. Over a box of gains it is a mean, a slope along each of them and a small radius ([`span`]), and its
+//! eigenvalues lie in discs that move along ([`discs`]): all inside the unit circle, or one outside, for the whole box. Boxes of which neither can be shown are split.
+//!
+//! Nothing that is looked for has to be right; what is found is checked with bounds of all rounding errors.
+
+mod basis;
+mod corners;
+mod discs;
+mod number;
+mod region;
+mod span;
+mod steps;
+#[cfg(test)]
+mod tests;
+
+pub use number::{EveryNumber, NumberSpan, prove_every_number};
+pub use region::{MOST_HALVINGS, ProvenBox, ProvenRegion};
+
+use cohaptic_scene::Scene;
+
+use crate::{AnalysisError, FamilyError};
+
+/// What is proven of all frames of a box.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Proven {
+    Stable,
+    Unstable,
+}
+
+/// What is known of a set of scenes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Guarantee {
+    /// Every one is stable: proven.
+    Stable,
+    /// Every one is unstable: proven.
+    Unstable,
+    /// Not decided.
+    Undecided,
+}
+
+impl Guarantee {
+    /// The word in JSON and CSV.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Stable => "stable",
+            Self::Unstable => "unstable",
+            Self::Undecided => "undecided",
+        }
+    }
+}
+
+impl From<Proven> for Guarantee {
+    fn from(proven: Proven) -> Self {
+        match proven {
+            Proven::Stable => Self::Stable,
+            Proven::Unstable => Self::Unstable,
+        }
+    }
+}
+
+/// Why nothing can be proven of a set of scenes.
+#[derive(Debug, thiserror::Error)]
+pub enum ProofError {
+    /// The scene cannot be analysed.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    /// A scene of the family is refused.
+    #[error(transparent)]
+    Family(#[from] FamilyError),
+    /// There are not two keys.
+    #[error("expected two open keys for a region")]
+    Keys,
+    /// A key does more than to set numbers.
+    #[error(
+        "{key} does more than to set gains, masses and dampings, and between two of its values there is no box: vary it by `--curve`, or ask `stability map` without --prove"
+    )]
+    Key {
+        /// The key.
+        key: String,
+    },
+    /// Numbers of peers that are none.
+    #[error("expected numbers of peers from 2 on, the least first, such as 2.. or 2..100")]
+    Numbers,
+    /// Peers or links differ.
+    #[error(
+        "{peer} is not equal to the first peer, or its links are not: expected equal peers over equal links; `stability map` varies keys of a scene with other peers"
+    )]
+    Unequal {
+        /// The first that differs.
+        peer: String,
+    },
+    /// A device hangs on nothing.
+    #[error("the device of {peer} touches nothing: expected contact = \"grasp\"")]
+    Loose {
+        /// The first such peer.
+        peer: String,
+    },
+    /// Something is left to chance.
+    #[error(
+        "links leave something to chance, and a guarantee is about one sequence of events: expected links without jitter and loss; `stability point --losses-in-a-row` bounds all losses"
+    )]
+    Chance,
+    /// A law uses the ages of samples.
+    #[error("the coordination uses the ages of samples, which are no gains: ask `stability point` for single scenes")]
+    Ages,
+    /// What is remembered is measured by gains.
+    #[error("the coordination remembers numbers whose unit is a gain that varies: ask `stability point` for single scenes")]
+    Remembered,
+    /// A body that is tied to ground varies.
+    #[error("a body that an arm ties to ground varies: its step map is not monotone; keep its mass, damping and arm as they are")]
+    TiedBody,
+    /// Bodies of clocks that drift vary.
+    #[error("a mass or damping varies and clocks drift: expected drift = 0")]
+    Drift,
+    /// Too many numbers vary.
+    #[error("more than {most} gains, masses and dampings vary at once")]
+    Numerous {
+        /// How many may.
+        most: u32,
+    },
+}
+
+/// Refuses scenes of which a deterministic frame is not all.
+fn refuse(scene: &Scene) -> Result<(), ProofError> {
+    if crate::has_chance(scene) { Err(ProofError::Chance) } else { Ok(()) }
+}

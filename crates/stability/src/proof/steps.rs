@@ -1,0 +1,209 @@
+//! A frame in steps: what each instant at which nodes tick does to the relative state, as a matrix of its own.
+//!
+//! The entries of one step are affine in each gain of a node, in each coefficient of a step map, and in the weights, as long as the others stay: forces are sums of gains times states,
+//! and each body adds one multiple of its force. Over a whole frame that is lost; so a frame stays a product here. Between two steps the state has the bodies and those samples alone that
+//! are still used.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use crate::Matrix;
+use crate::lifted::node::{Rows, Scale, Scratch};
+use crate::lifted::{Node, Sampling};
+use crate::timetable::{Event, Timetable};
+
+/// A sample of a node: from 0 on those of this frame, −1 the last one of the frame before.
+type SampleName = (usize, i64);
+
+/// A tick of a node, and the samples that it holds then.
+#[derive(Clone, Debug)]
+struct Tick {
+    node: usize,
+    span: Duration,
+    held: Vec<SampleName>,
+}
+
+/// What happens at one instant.
+#[derive(Clone, Debug, Default)]
+struct Step {
+    /// What is sampled before anything moves.
+    samples: Vec<SampleName>,
+    at: u64,
+    ticks: Vec<Tick>,
+}
+
+/// When what happens in a frame, and which samples are states between its steps.
+#[derive(Clone, Debug)]
+pub(super) struct Plan {
+    steps: Vec<Step>,
+    /// Before each step, and after the last one.
+    live: Vec<Vec<SampleName>>,
+}
+
+/// The numbers of a lifted system, and the units of its states.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Numbers<'a> {
+    pub(super) nodes: &'a [Node],
+    pub(super) weights: &'a Matrix,
+    pub(super) sampling: Sampling,
+    pub(super) scale: Scale,
+    pub(super) tied: bool,
+}
+
+/// A step matrix, and how far each of its entries may be from the exact one.
+#[derive(Clone, Debug)]
+pub(super) struct StepMatrix {
+    pub(super) matrix: Matrix,
+    pub(super) error: f64,
+}
+
+/// What the operations of a step round, relative to the largest sum of the sizes of the terms of a row: fifteen operations in a row and the coefficients of the step maps, twice for the
+/// difference from the reference. Half of it is left for coefficients that differ by some roundings from those of the numbers meant.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+impl Plan {
+    /// The steps of a timetable. `heard` says whether anything is heard at all.
+    pub(super) fn of(timetable: &Timetable, heard: bool) -> Self {
+        let nodes = timetable.sent.len();
+        let mut held: Vec<BTreeMap<usize, i64>> = vec![BTreeMap::new(); nodes];
+        if heard {
+            for (to, from, sample) in &timetable.held {
+                held[*to].insert(*from, *sample);
+            }
+        }
+        let mut steps: Vec<Step> = vec![Step::default()];
+        let mut sent = vec![0_i64; nodes];
+        for event in &timetable.events {
+            match *event {
+                Event::Sample { node } => {
+                    if steps.last().is_none_or(|step| !step.ticks.is_empty()) {
+                        steps.push(Step::default());
+                    }
+                    if heard && let Some(step) = steps.last_mut() {
+                        step.samples.push((node, sent[node]));
+                    }
+                    sent[node] += 1;
+                }
+                Event::Deliver { from, to, sample } => {
+                    if heard {
+                        held[to].insert(from, sample);
+                    }
+                }
+                Event::Tick { node, at, span } => {
+                    if steps.last().is_none_or(|step| step.ticks.iter().any(|tick| tick.node == node) || !step.ticks.is_empty() && step.at != at) {
+                        steps.push(Step::default());
+                    }
+                    let held = held[node].iter().map(|(from, sample)| (*from, *sample)).collect();
+                    if let Some(step) = steps.last_mut() {
+                        step.at = at;
+                        step.ticks.push(Tick { node, span, held });
+                    }
+                }
+            }
+        }
+        let live = live(&steps, &timetable.sent);
+        Self { steps, live }
+    }
+
+    /// The matrices of all steps.
+    pub(super) fn matrices(&self, numbers: Numbers<'_>) -> Vec<StepMatrix> {
+        (0..self.steps.len()).map(|step| self.matrix(step, numbers)).collect()
+    }
+
+    fn matrix(&self, step: usize, numbers: Numbers<'_>) -> StepMatrix {
+        let Numbers { nodes, weights, sampling, scale, tied } = numbers;
+        let channels = sampling.channels();
+        let (before, after) = (&self.live[step], &self.live[step + 1]);
+        let mut rows: Vec<Rows> = Vec::with_capacity(nodes.len());
+        let mut count = 0;
+        for node in nodes {
+            rows.push(node.rows(count));
+            count += node.states();
+        }
+        let reference = (!tied).then(|| rows[0].object);
+        let states = count - usize::from(reference.is_some());
+        let columns = states + before.len() * channels;
+        let mut z = Matrix::zeros(count, columns);
+        for (column, row) in (0..count).filter(|row| Some(*row) != reference).enumerate() {
+            z[(row, column)] = 1.0;
+        }
+        let mut store: BTreeMap<SampleName, Vec<Vec<f64>>> = BTreeMap::new();
+        let unit = |place: usize| (0..columns).map(|column| if column == place { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+        for (place, name) in before.iter().enumerate() {
+            store.insert(*name, (0..channels).map(|channel| unit(states + place * channels + channel)).collect());
+        }
+        let Step { samples, ticks, .. } = &self.steps[step];
+        for name in samples {
+            let (x, v) = (z.row(rows[name.0].object), z.row(rows[name.0].object + 1));
+            let channel = |channel| {
+                let (position, velocity) = sampling.shares(channel, scale.time);
+                x.iter().zip(v).map(|(x, v)| position * x + velocity * v).collect()
+            };
+            store.insert(*name, (0..channels).map(channel).collect());
+        }
+        let law_rows = 1 + nodes.iter().map(|node| node.law.memory.len()).max().unwrap_or(0);
+        let mut scratch = Scratch::default();
+        scratch.resize(columns);
+        for Tick { node, span, held } in ticks {
+            let mut heard = Matrix::zeros(law_rows, columns);
+            for name in held {
+                let Some(sample) = store.get(name) else { continue };
+                for (channel, entries) in sample.iter().enumerate() {
+                    // Samples are taken as they are: their ages do not matter.
+                    for (row, by) in nodes[*node].heard(sampling, channel, 0.0, scale.time).enumerate() {
+                        let weight = weights[(*node, name.0)] * by;
+                        heard.row_mut(row).iter_mut().zip(entries).for_each(|(sum, entry)| *sum += weight * entry);
+                    }
+                }
+            }
+            nodes[*node].tick(&mut z, rows[*node], |row| heard.row(row), None, *span, scale, &mut scratch);
+        }
+        let moved = |by: f64, column: usize| reference.map_or(0.0, |reference| by * z[(reference, column)]);
+        let mut matrix = Matrix::zeros(states + after.len() * channels, columns);
+        let mut next = 0;
+        for (node, rows) in nodes.iter().zip(&rows) {
+            let first = rows.device.unwrap_or(rows.object);
+            for row in (first..first + node.states()).filter(|row| Some(*row) != reference) {
+                let by = node.displacement(*rows, row, scale.time);
+                (0..columns).for_each(|column| matrix[(next, column)] = z[(row, column)] - moved(by, column));
+                next += 1;
+            }
+        }
+        for name in after {
+            for channel in 0..channels {
+                let (entries, by) = (&store[name][channel], sampling.translation(channel, scale.time));
+                (0..columns).for_each(|column| matrix[(next, column)] = entries[column] - moved(by, column));
+                next += 1;
+            }
+        }
+        let largest = nodes.iter().map(|node| node.step_norm(scale)).fold(1.0, f64::max);
+        StepMatrix { matrix, error: ROUNDING * largest }
+    }
+}
+
+/// Which samples are states before each step, and after the last: those sent before that are used from there on, in this frame or in a later one.
+fn live(steps: &[Step], sent: &[usize]) -> Vec<Vec<SampleName>> {
+    let mut last: BTreeMap<SampleName, usize> = BTreeMap::new();
+    for (place, step) in steps.iter().enumerate() {
+        for name in step.ticks.iter().flat_map(|tick| &tick.held) {
+            last.insert(*name, place);
+        }
+    }
+    let whole = |number: usize| i64::try_from(number).unwrap_or(i64::MAX);
+    let oldest = last.keys().map(|(_, sample)| *sample).min().unwrap_or(0).min(0);
+    let later = |(node, sample): SampleName| {
+        let period = whole(sent[node]).max(1);
+        (1..).map(|frames| sample - frames * period).take_while(|sample| *sample >= oldest).any(|sample| last.contains_key(&(node, sample)))
+    };
+    let mut there: BTreeSet<SampleName> =
+        (0..sent.len()).flat_map(|node| (oldest - whole(sent[node])..0).map(move |sample| (node, sample))).collect();
+    let mut live = Vec::with_capacity(steps.len() + 1);
+    for place in 0..=steps.len() {
+        let used = |name: &SampleName| last.get(name).is_some_and(|last| *last >= place) || later(*name);
+        live.push(there.iter().copied().filter(used).collect());
+        if let Some(step) = steps.get(place) {
+            there.extend(step.samples.iter().copied());
+        }
+    }
+    live
+}

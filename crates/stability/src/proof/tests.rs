@@ -1,0 +1,259 @@
+//! Proofs against the radii of single scenes, which are computed another way and have bounds of their own.
+
+use cohaptic_scene::Scene;
+use proptest::prelude::*;
+
+use super::discs::decide;
+use super::span::StepSpan;
+use super::steps::StepMatrix;
+use super::*;
+use crate::{Family, KeyRange, Matrix, Method, Unwatched, Verdict, analyse};
+
+const SCENE: &str = r#"
+    scene = { duration = "1s", count = 2 }
+    object = { mass = 0.45 }
+    coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+    peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    link = { delay = "8ms" }
+"#;
+
+fn owned(set: &[&str]) -> Vec<String> {
+    set.iter().map(|text| (*text).to_owned()).collect()
+}
+
+fn scene(set: &[&str]) -> Scene {
+    Scene::parse(SCENE, "two.toml".as_ref(), &owned(set)).unwrap()
+}
+
+const PD: &str = "coordination.strategy=\"proportional-derivative\"";
+
+/// The verdict on that number of peers, by the radius of that one scene.
+fn single(set: &[&str], number: u64) -> Verdict {
+    let count = format!("scene.count={number}");
+    analyse(&scene(&[set, &[&count]].concat()), Method::Reduced).unwrap().verdict()
+}
+
+fn spans(set: &[&str], from: u64, to: Option<u64>) -> EveryNumber {
+    prove_every_number(&scene(set), from, to, &Unwatched).unwrap()
+}
+
+/// On both sides of each end of a span, at its ends and in the middle, single scenes say the same; and nothing is left open but numbers beyond all limits.
+#[test]
+fn every_number_is_judged_as_single_scenes_are() {
+    for set in [
+        &[][..],
+        &["link.delay=16ms"],
+        &[PD],
+        &["object.split-mass=false"],
+        &["object.split-mass=false", "link.delay=24ms"],
+        &["object.split-mass=false", PD],
+        &["object.split-mass=false", PD, "coordination.scaling=\"inverse-n\"", "peer.coupling.scaling=\"inverse-n\""],
+        &["coordination.strategy=\"local-damping\""],
+        &["object.damping=2", "peer.device.damping=1"],
+        &["peer.compute-delay=1"],
+        &["scene.axes=3", "object.enclosure={ min = -0.1, max = 0.1, stiffness = 500.0, damping = 1.0 }"],
+    ] {
+        let found = spans(set, 2, None);
+        let mut next = 2;
+        for span in &found.spans {
+            assert_eq!(span.from, next, "{set:?} {found:?}");
+            next = span.to.map_or(0, |to| to + 1);
+            let far = span.to.unwrap_or(500_000).min(500_000);
+            for number in [span.from, span.from.midpoint(far), far, span.from + (far.max(span.from) - span.from) / 100] {
+                if number > 500_000 {
+                    continue;
+                }
+                // A radius knows nothing of a number that a proof left open, and the other way round.
+                match (span.guarantee, single(set, number.min(2_000).max(span.from.min(2_000)))) {
+                    (Guarantee::Stable, Verdict::Stable | Verdict::Marginal)
+                    | (Guarantee::Unstable, Verdict::Unstable | Verdict::Marginal | Verdict::Overflow) => {}
+                    (Guarantee::Undecided, _) => assert!(found.without_limit.is_some(), "{set:?} {found:?}"),
+                    (guarantee, verdict) => panic!("{set:?}: {guarantee:?} for {span:?}, and {verdict:?} for {number}"),
+                }
+            }
+        }
+        assert_eq!((next, found.spans.last().unwrap().to), (0, None), "{set:?}: without gaps to the end");
+    }
+}
+
+#[test]
+fn average_position_without_a_divided_mass_is_stable_for_every_number() {
+    let found = spans(&["object.split-mass=false"], 2, None);
+    assert_eq!(found.spans, [NumberSpan { from: 2, to: None, guarantee: Guarantee::Stable }]);
+    assert_eq!(found.without_limit, None);
+}
+
+/// Proportional-derivative coordination gains N − 1 springs: beyond 17 peers it is unstable, but for a stretch.
+#[test]
+fn numbers_of_which_other_numbers_say_nothing_are_found() {
+    let found = spans(&["object.split-mass=false", PD], 2, Some(1000));
+    let all: Vec<(u64, Option<u64>, Guarantee)> = found.spans.iter().map(|span| (span.from, span.to, span.guarantee)).collect();
+    let expected = [(2, 17, Guarantee::Stable), (18, 144, Guarantee::Unstable), (145, 179, Guarantee::Stable), (180, 1000, Guarantee::Unstable)];
+    assert_eq!(all, expected.map(|(from, to, guarantee)| (from, Some(to), guarantee)));
+    for number in [17, 18, 144, 145, 179, 180] {
+        let is_stable = expected.iter().any(|(from, to, guarantee)| (*from..=*to).contains(&number) && *guarantee == Guarantee::Stable);
+        assert_eq!(single(&["object.split-mass=false", PD], number) == Verdict::Stable, is_stable, "{number}");
+    }
+}
+
+#[test]
+fn scenes_without_a_proof_are_refused_by_name() {
+    let refused = |set: &[&str]| prove_every_number(&scene(set), 2, None, &Unwatched).unwrap_err().to_string();
+    for (set, words) in [
+        (&["link.loss=10%"][..], "leave something to chance"),
+        (&["peers=[{ name = \"peer2\", device = { mass = 0.2 } }]"], "peer2 is not equal to the first peer"),
+        (&["peer.contact=\"none\""], "touches nothing"),
+        (&["coordination.strategy=\"extrapolated\""], "ages of samples"),
+        (&["coordination.strategy=\"passivity-control\""], "passivity-control"),
+    ] {
+        let message = refused(set);
+        assert!(message.contains(words), "{set:?}: {message}");
+    }
+    assert!(matches!(prove_every_number(&scene(&[]), 1, None, &Unwatched), Err(ProofError::Numbers)));
+    assert!(matches!(prove_every_number(&scene(&[]), 9, Some(8), &Unwatched), Err(ProofError::Numbers)));
+}
+
+fn family(set: &[&str], x: &str, y: &str) -> Family {
+    Family::new(SCENE, "two.toml".as_ref(), &owned(set), vec![KeyRange::parse(x).unwrap(), KeyRange::parse(y).unwrap()]).unwrap()
+}
+
+const GAINS: [&str; 2] = ["coordination.stiffness=100..6000", "coordination.damping=0..60"];
+
+/// No box that is proven has a point of the other kind: at thousands of points within proven boxes, their corners among them, single radii with their own bounds agree.
+#[test]
+fn no_box_holds_a_point_that_contradicts_it() {
+    for (set, [x, y]) in [
+        (&["scene.count=3"][..], GAINS),
+        (&["scene.count=5", "link.delay=20ms", PD], ["coordination.stiffness=100..2000", "coordination.damping=0..5"]),
+        (&["scene.count=4", "link.delay=5ms", "peer.compute-delay=1"], ["coordination.stiffness=0..6000", "peer.coupling.stiffness=0..6000"]),
+        (&["scene.count=8", PD], ["object.mass=0.1..2", "object.damping=0..10"]),
+        (&["scene.count=3"], ["peer.device.mass=0.02..0.5", "peer.coupling.damping=0..20"]),
+        (&["scene.count=3", "peers=[{ name = \"peer2\", device = { mass = 0.2 } }, { name = \"peer3\", contact = \"none\" }]"], GAINS),
+    ] {
+        let family = family(set, x, y);
+        let region = ProvenRegion::prove(&family, 6, &Unwatched).unwrap();
+        let mut scratch = crate::FamilyScratch::default();
+        let mut decided = 0;
+        for (number, one) in region.boxes.iter().enumerate().filter(|(_, one)| one.guarantee != Guarantee::Undecided) {
+            // Each box has other points, spread by the golden ratio.
+            let share = |place: usize, irrational: f64| ((number + 1) as f64 * (place as f64 + irrational) * 0.618_033_988_749_894_9).fract();
+            let between = |[low, high]: [f64; 2], share: f64| (low + share * (high - low)).clamp(low, high);
+            let inside = (0..6).map(|place| [between(one.x, share(place, 0.3)), between(one.y, share(place, 0.7))]);
+            let corners = [[one.x[0], one.y[0]], [one.x[1], one.y[0]], [one.x[0], one.y[1]], [one.x[1], one.y[1]]];
+            for values in inside.chain(corners) {
+                let verdict = family.bounded_radius(&values, &mut scratch).unwrap().radius.verdict();
+                let contradicts = match one.guarantee {
+                    Guarantee::Stable => verdict == Verdict::Unstable,
+                    Guarantee::Unstable | Guarantee::Undecided => verdict == Verdict::Stable,
+                };
+                assert!(!contradicts, "{set:?} {x} {y}: {one:?}, and {verdict:?} at {values:?}");
+                decided += 1;
+            }
+        }
+        assert!(decided > 300, "{set:?} {x} {y}: {decided} points of {} boxes", region.boxes.len());
+        let shares = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided].map(|guarantee| region.share(guarantee));
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12 && shares[2] < 0.35, "{set:?} {x} {y}: {shares:?}");
+    }
+}
+
+/// Dividing on never takes back what was proven, and leaves less open.
+#[test]
+fn finer_boxes_decide_more() {
+    let family = family(&["scene.count=3"], GAINS[0], GAINS[1]);
+    let regions = [3, 5, 7].map(|halvings| ProvenRegion::prove(&family, halvings, &Unwatched).unwrap());
+    let open = regions.each_ref().map(|region| region.share(Guarantee::Undecided));
+    assert!(open[0] > 2.0 * open[1] && open[1] > 2.0 * open[2], "{open:?}");
+    for pair in regions.windows(2) {
+        assert!(pair[0].share(Guarantee::Stable) <= pair[1].share(Guarantee::Stable));
+        assert!(pair[0].share(Guarantee::Unstable) <= pair[1].share(Guarantee::Unstable));
+    }
+}
+
+#[test]
+fn keys_that_do_more_than_to_set_numbers_are_refused() {
+    let refused = |set: &[&str], x: &str, y: &str| ProvenRegion::prove(&family(set, x, y), 3, &Unwatched).unwrap_err().to_string();
+    assert!(refused(&[], "link.delay=0ms..40ms", GAINS[1]).starts_with("link.delay does more than"));
+    assert!(refused(&["link.loss=5%"], GAINS[0], GAINS[1]).contains("leave something to chance"));
+}
+
+/// The steps of a frame multiply to the matrix of the frame: the same eigenvalues, but for zeros, as the analysis of the scene.
+#[test]
+fn the_product_of_the_steps_is_the_frame() {
+    for set in [&[][..], &["link.delay=24ms"], &["link.delay=3ms", "coordination.update=5ms"], &["peer.compute-delay=1"], &["coordination.damping=0"]]
+    {
+        let scene = scene(set);
+        let network = crate::network::NominalNetwork::of(&scene).unwrap();
+        let contacts = crate::structure::Contacts { touching: vec![true; 2], at_wall: false, absent: vec![false; 2] };
+        let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
+        let node = structure.node(&scene, 0);
+        let time = structure.time(&scene, std::slice::from_ref(&node));
+        for (weight, tied, timetable) in [(1.0, structure.tied, &structure.timetable), (-1.0, true, structure.apart[0].as_ref().unwrap())] {
+            let point = corners::Point { nodes: vec![node.clone()], weights: Matrix::from_fn(1, 1, |_, _| weight) };
+            let product = StepSpan::product(&corners::steps(&[point.clone()], corners::Common { timetable, tied, time }).unwrap());
+            let sampling = crate::lifted::Sampling::of(&point.nodes);
+            let lifted = crate::lifted::Lifted { nodes: &point.nodes, weights: &point.weights, timetable, sampling, time, tied };
+            let expected = lifted.frame(&mut crate::lifted::frame::Autonomous).monodromy();
+            let sorted = |matrix: &Matrix| {
+                let mut values: Vec<(f64, f64)> =
+                    crate::eigenvalues(matrix).iter().map(|value| (value.re, value.im)).filter(|(re, im)| re.hypot(*im) > 1e-3).collect();
+                values.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1)));
+                values
+            };
+            let (found, expected) = (sorted(&product.mean), sorted(&expected));
+            assert_eq!(found.len(), expected.len(), "{set:?}");
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!((found.0 - expected.0).hypot(found.1 - expected.1) < 1e-9, "{set:?}: {found:?} is not {expected:?}");
+            }
+            assert!(product.radius.largest() < 1e-9, "{set:?}");
+        }
+    }
+}
+
+fn matrix(size: usize) -> impl Strategy<Value = Matrix> {
+    proptest::collection::vec(-1.0..1.0_f64, size * size).prop_map(move |entries| Matrix::from_fn(size, size, |i, j| entries[i * size + j]))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Products over a box enclose the products of what is in it, wherever in the box.
+    #[test]
+    fn products_enclose(
+        steps in proptest::collection::vec((matrix(3), matrix(3), matrix(3), matrix(3)), 1..5),
+        width in 0.0..0.3_f64,
+        at in (-1.0..=1.0_f64, -1.0..=1.0_f64),
+    ) {
+        let mut exact = Matrix::identity(3);
+        let mut spans = Vec::new();
+        for (mean, one, other, both) in &steps {
+            let there = |s: f64, t: f64| Matrix::from_fn(3, 3, |i, j| mean[(i, j)] + width * (s * one[(i, j)] + t * other[(i, j)] + s * t * both[(i, j)]));
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(s, t)| StepMatrix { matrix: there(s, t), error: 1e-14 });
+            spans.push(StepSpan::of(corners.iter()));
+            exact = there(at.0, at.1).times(&exact);
+        }
+        let product = StepSpan::product(&spans);
+        for i in 0..3 {
+            for j in 0..3 {
+                let near = product.mean[(i, j)] + at.0 * product.slopes[0][(i, j)] + at.1 * product.slopes[1][(i, j)];
+                prop_assert!((exact[(i, j)] - near).abs() <= product.radius[(i, j)] + 1e-13, "{i} {j}: {} is not within {} of {near}", exact[(i, j)], product.radius[(i, j)]);
+            }
+        }
+    }
+
+    /// What is decided of all matrices of a box holds for those in it, near the unit circle above all.
+    #[test]
+    fn decisions_hold(mean in matrix(4), slope in matrix(4), width in 0.0..0.05_f64, radius in 0.8..1.25_f64, at in -1.0..=1.0_f64) {
+        let scale = radius / crate::radius(&mean);
+        let there = |s: f64| Matrix::from_fn(4, 4, |i, j| scale * mean[(i, j)] + s * width * slope[(i, j)]);
+        let corners = [-1.0, 1.0].map(|s| StepMatrix { matrix: there(s), error: 1e-15 });
+        let span = StepSpan::of(corners.iter());
+        for s in [-1.0, -0.5, 0.0, 0.5, 1.0, at] {
+            let found = crate::radius(&there(s));
+            match decide(&span) {
+                Some(Proven::Stable) => prop_assert!(found < 1.0 + 1e-9, "{found} at {s}"),
+                Some(Proven::Unstable) => prop_assert!(found > 1.0 - 1e-9, "{found} at {s}"),
+                None => {}
+            }
+        }
+    }
+}
