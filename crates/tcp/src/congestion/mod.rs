@@ -43,6 +43,7 @@ impl Congestion {
 
     /// The threshold after a loss; from here on growth begins anew.
     pub(crate) fn reduced(&mut self) -> u32 {
+        self.count = 0;
         match &mut self.cubic {
             Some(cubic) => cubic.reduced(self.window),
             None => (self.window / 2).max(2),
@@ -51,7 +52,7 @@ impl Congestion {
 
     /// A timeout: one segment, and what was learnt about the path is forgotten.
     pub(crate) fn restart(&mut self, window: u32) {
-        (self.window, self.count) = (window.max(1), 0);
+        self.window = window.max(1);
         if let Some(cubic) = &mut self.cubic {
             *cubic = Cubic::default();
         }

@@ -4,6 +4,7 @@ use cohaptic_units::Instant;
 
 use super::{Connection, Timer};
 use crate::connection::parts::Phase;
+use crate::connection::recovery::DUPLICATES;
 use crate::scoreboard::News;
 use crate::segment::{Flags, Segment};
 use crate::sequence::{Position, extend};
@@ -86,7 +87,9 @@ impl Connection {
         if self.receive.has_sack {
             self.take_blocks(segment, una, highest, ack);
             self.send.delivered += u64::from(ack.news.delivered);
-            self.note_latest(ack);
+            if let Some(start) = ack.news.reordered {
+                self.note_reordering(start, self.send.board.highest_sacked().unwrap_or(highest).max(highest));
+            }
         } else if ack.has_advanced {
             self.end_duplicates(ack.news.acked);
         }
@@ -98,15 +101,16 @@ impl Connection {
         let mut rest = blocks;
         if let Some((start, end)) = blocks.first().map(block) {
             let is_within_next = blocks.get(1).map(block).is_some_and(|next| next.0 <= start && end <= next.1);
-            if start < ack.position || is_within_next {
+            // Below what this segment acknowledges, which an earlier one may have overtaken.
+            if start < extend(segment.acknowledgement, una) || is_within_next {
                 rest = &blocks[1..];
                 ack.tells_duplicate = true;
                 self.note_duplicate(start, end);
             }
         }
         for (start, end) in rest.iter().map(block) {
-            if start < end && end <= self.send.next && start >= ack.position {
-                self.send.board.sack(start, end, highest, &mut ack.news);
+            if start < end && end <= self.send.next {
+                self.send.board.sack(start.max(ack.position), end, highest, &mut ack.news);
             }
         }
     }
@@ -132,7 +136,7 @@ impl Connection {
     fn adapt_window(&mut self, now: Instant, ack: &Ack, delivered: u32, has_lost: bool) {
         if matches!(self.recovery.phase, Phase::Reduced | Phase::Recovery) {
             self.reduce_window(delivered, ack.has_advanced, has_lost);
-        } else if ack.has_advanced && delivered > 0 {
+        } else if ack.has_advanced || (ack.news.has_sacked && self.rack.degree > DUPLICATES) {
             let least = self.round_trips.least().unwrap_or_default();
             self.congestion.grow(now, delivered, least);
         }

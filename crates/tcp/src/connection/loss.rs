@@ -8,16 +8,20 @@ use super::acknowledge::Ack;
 use super::parts::Phase;
 use super::recovery::DUPLICATES;
 use super::{Connection, Timer};
+use crate::sequence::Position;
 
 /// For how many recoveries a larger reordering window stays (RFC 8985, section 6.2).
 const PERSISTS: u32 = 16;
 
 impl Connection {
-    /// The latest transmission that has arrived (RFC 8985, section 6.2, step 2), and reordering.
-    pub(super) fn note_latest(&mut self, ack: &Ack) {
-        self.rack.has_reordering |= ack.news.reordered;
+    /// What begins at `start` has arrived behind what ends at `end`, and was sent once.
+    pub(super) fn note_reordering(&mut self, start: Position, end: Position) {
+        self.rack.has_reordering = true;
+        let degree = end.saturating_sub(start).div_ceil(self.send.mss as u64);
+        self.rack.degree = self.rack.degree.max(u32::try_from(degree).unwrap_or(u32::MAX));
     }
 
+    /// The latest transmission that has arrived (RFC 8985, section 6.2, step 2).
     fn advance_rack(&mut self, now: Instant, ack: &Ack) {
         let Some((sent_at, was_again)) = ack.news.latest else { return };
         let round_trip = now.saturating_duration_since(sent_at.0);

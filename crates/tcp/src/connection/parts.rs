@@ -142,6 +142,8 @@ pub(super) struct Rack {
     pub(super) delivered: Option<SentAt>,
     pub(super) rtt: Duration,
     pub(super) has_reordering: bool,
+    /// By how many segments at most.
+    pub(super) degree: u32,
     /// The reordering window in quarters of the least round trip, and for how many recoveries it stays.
     pub(super) quarters: u32,
     pub(super) persists: u32,

@@ -65,8 +65,8 @@ pub(crate) struct News {
     pub(crate) first_sacked: Option<Instant>,
     /// The latest transmission that arrived, and whether it was sent again.
     pub(crate) latest: Option<(SentAt, bool)>,
-    /// Whether a segment arrived after one that was sent later, and was never sent again.
-    pub(crate) reordered: bool,
+    /// The first segment that arrived after one that was sent later, and was never sent again.
+    pub(crate) reordered: Option<Position>,
 }
 
 impl Scoreboard {
@@ -129,7 +129,7 @@ impl Scoreboard {
                     news.has_acked_again = true;
                 } else {
                     news.first_acked = news.first_acked.or(Some(sent.at));
-                    news.reordered |= sent.start < highest_sacked;
+                    news.note_order(sent.start, highest_sacked);
                 }
             }
         }
@@ -174,7 +174,7 @@ impl Scoreboard {
                 news.hear(sent);
                 if !sent.ever_again {
                     news.first_sacked = news.first_sacked.or(Some(sent.at));
-                    news.reordered |= sent.start < highest_sacked;
+                    news.note_order(sent.start, highest_sacked);
                 }
             }
         }
@@ -206,6 +206,12 @@ impl Scoreboard {
 }
 
 impl News {
+    fn note_order(&mut self, start: Position, highest_sacked: Position) {
+        if start < highest_sacked {
+            self.reordered = Some(self.reordered.map_or(start, |other| other.min(start)));
+        }
+    }
+
     fn hear(&mut self, sent: &Sent) {
         let sent_at = (sent.at, sent.order);
         if self.latest.is_none_or(|(latest, _)| sent_at > latest) {

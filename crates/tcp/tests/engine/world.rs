@@ -82,6 +82,7 @@ pub(crate) struct World {
     pub(crate) is_encoded: bool,
     pub(crate) marks: bool,
     links: [Link<Packet>; 2],
+    chunk: Vec<u8>,
 }
 
 #[derive(Clone)]
@@ -114,6 +115,7 @@ impl World {
             drops: Box::new(|_, _| false),
             is_encoded: true,
             marks: false,
+            chunk: vec![0; 16_384],
             links: [Link::new(seed, &LinkName::between("client", "server"), there), Link::new(seed, &LinkName::between("server", "client"), back)],
         }
     }
@@ -148,10 +150,14 @@ impl World {
     /// Both programs act, and all that may leave leaves.
     pub(crate) fn flush(&mut self) {
         for side in 0..2 {
-            self.transmit(side);
-            self.run_program(side);
-            self.transmit(side);
+            self.flush_one(side);
         }
+    }
+
+    fn flush_one(&mut self, side: usize) {
+        self.transmit(side);
+        self.run_program(side);
+        self.transmit(side);
     }
 
     fn transmit(&mut self, side: usize) {
@@ -188,7 +194,7 @@ impl World {
             program.connected_at = Some(self.now);
         }
         if end.state().is_synchronised() {
-            let mut chunk = [0; 16_384];
+            let chunk = &mut self.chunk;
             while program.written < program.to_write {
                 let count = usize::try_from(program.to_write - program.written).unwrap().min(chunk.len());
                 if self.is_encoded {
@@ -210,9 +216,9 @@ impl World {
         if !program.reads {
             return;
         }
-        let mut chunk = [0; 16_384];
+        let chunk = &mut self.chunk;
         loop {
-            match end.read(&mut chunk) {
+            match end.read(chunk) {
                 Ok(0) => {
                     program.end_at.get_or_insert(self.now);
                     return;
@@ -248,10 +254,12 @@ impl World {
                 }
             }
         }
-        for end in self.ends.iter_mut().flatten() {
-            end.handle_timeout(at);
+        for side in 0..2 {
+            if let Some(end) = self.ends[side].as_mut().filter(|end| end.poll_timeout() == Some(at)) {
+                end.handle_timeout(at);
+                self.flush_one(side);
+            }
         }
-        self.flush();
         true
     }
 
@@ -276,7 +284,7 @@ impl World {
             }
         }
         // Segments leave within the call that permits them.
-        self.flush();
+        self.flush_one(side);
     }
 
     /// Runs until `end` or until nothing happens any more.
