@@ -25,8 +25,12 @@ fn main() {
         let mut seconds: Vec<f64> = (0..seeds)
             .map(|seed| {
                 let mut config = cohaptic_tcp::TcpConfig::default();
-                if std::env::var("ND").is_ok() { config.delayed_ack = Duration::from_nanos(1); }
-                if std::env::var("RENO").is_ok() { config.congestion = cohaptic_tcp::CongestionControl::Reno; }
+                if std::env::var("ND").is_ok() {
+                    config.delayed_ack = Duration::from_nanos(1);
+                }
+                if std::env::var("RENO").is_ok() {
+                    config.congestion = cohaptic_tcp::CongestionControl::Reno;
+                }
                 let mut world = World::new(words, seed).config(&config).programs(Program::default(), Program::writes(octets)).connect();
                 world.is_encoded = false;
                 world.run_to_the_last_octet(Duration::from_secs(3600));

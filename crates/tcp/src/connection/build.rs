@@ -23,7 +23,8 @@ impl Connection {
             timestamps: self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value))),
             sack: SackBlocks::default(),
         };
-        let flags = Flags::SYN.with_if(Flags::ACK, has_come).with_if(Flags::ECE, self.send.has_ecn).with_if(Flags::CWR, self.send.has_ecn && !has_come);
+        let flags =
+            Flags::SYN.with_if(Flags::ACK, has_come).with_if(Flags::ECE, self.send.has_ecn).with_if(Flags::CWR, self.send.has_ecn && !has_come);
         let acknowledgement = if has_come { on_wire(self.receive.next) } else { 0 };
         Segment {
             sequence: on_wire(self.send.first),
@@ -96,7 +97,8 @@ impl Connection {
         if !self.receive.has_sack {
             return 0;
         }
-        let blocks = usize::from(self.receive.duplicate.is_some()) + if self.receive.assembler.has_gaps() { self.receive.assembler.blocks().count() } else { 0 };
+        let blocks = usize::from(self.receive.duplicate.is_some())
+            + if self.receive.assembler.has_gaps() { self.receive.assembler.blocks().count() } else { 0 };
         if blocks == 0 { 0 } else { 4 + 8 * blocks.min(if self.receive.has_timestamps { 3 } else { 4 }) }
     }
 
@@ -124,6 +126,7 @@ impl Connection {
     /// An acknowledgement has left.
     fn has_acknowledged(&mut self) {
         self.receive.acked = self.receive.next;
+        self.receive.has_offered = true;
         (self.receive.ack_now, self.receive.ack_at, self.receive.pushed) = (false, None, 0);
         self.receive.quick = self.receive.quick.saturating_sub(1);
     }

@@ -40,7 +40,9 @@ impl Connection {
             _ if self.receive.assembler.unread() > 0 => self.abort(),
             State::SynReceived => self.abort(),
             State::FinWait2 => self.linger_until = Some(now.saturating_add(self.config.time_wait)),
-            State::Established | State::FinWait1 | State::CloseWait | State::Closing | State::LastAck | State::TimeWait | State::Closed => self.shutdown(),
+            State::Established | State::FinWait1 | State::CloseWait | State::Closing | State::LastAck | State::TimeWait | State::Closed => {
+                self.shutdown()
+            }
         }
     }
 

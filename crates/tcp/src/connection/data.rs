@@ -140,7 +140,7 @@ impl Connection {
         }
         // A window that has at least doubled (RFC 9293, section 3.8.6.2.2).
         let offered = receive.window();
-        if !receive.is_ended && self.state.is_synchronised() && 2 * offered <= self.config.receive_buffer as u64 {
+        if receive.has_offered && !receive.is_ended && self.state.is_synchronised() && 2 * offered <= self.config.receive_buffer as u64 {
             let free = self.free_window().min(65_535 << self.receive.scale);
             self.receive.ack_now |= free > 0 && free >= 2 * offered;
         }

@@ -88,6 +88,7 @@ impl Connection {
             duplicate: None,
             segment: DEFAULT_MSS,
             ack_now: false,
+            has_offered: false,
             ack_at: None,
             quick: 0,
             is_interactive: false,

@@ -84,6 +84,8 @@ pub(super) struct Receive {
     /// The largest segment so far, at least a guess.
     pub(super) segment: usize,
     pub(super) ack_now: bool,
+    /// A window has been offered beside that of the SYN, which is smaller.
+    pub(super) has_offered: bool,
     /// When a delayed acknowledgement is due.
     pub(super) ack_at: Option<Instant>,
     /// How many more acknowledgements do not wait.

@@ -23,13 +23,9 @@ impl Connection {
             State::Closed => self.replies.extend(segment.refusal(self.config.ttl)),
             State::SynSent => self.handle_in_syn_sent(now, segment),
             State::TimeWait => self.handle_in_time_wait(now, segment),
-            State::SynReceived
-            | State::Established
-            | State::FinWait1
-            | State::FinWait2
-            | State::CloseWait
-            | State::Closing
-            | State::LastAck => self.handle_synchronised(now, segment),
+            State::SynReceived | State::Established | State::FinWait1 | State::FinWait2 | State::CloseWait | State::Closing | State::LastAck => {
+                self.handle_synchronised(now, segment)
+            }
         }
     }
 
@@ -123,10 +119,7 @@ impl Connection {
         let behind = recent.wrapping_sub(value);
         // A pure acknowledgement that was overtaken by one of the same kind is harmless, and lost if refused.
         let is_harmless = segment.sequence_length() == 0 && extend(segment.sequence, self.receive.next) == self.receive.next && behind < 1000;
-        self.receive.has_timestamps
-            && (1..1 << 31).contains(&behind)
-            && !is_harmless
-            && now.saturating_duration_since(at) < TIMESTAMPS_COUNT
+        self.receive.has_timestamps && (1..1 << 31).contains(&behind) && !is_harmless && now.saturating_duration_since(at) < TIMESTAMPS_COUNT
     }
 
     /// A segment out of window is answered by what is expected, and a duplicate told of.

@@ -104,11 +104,8 @@ fn a_user_timeout_ends_it_earlier() {
 #[test]
 fn a_closed_window_is_probed_less_and_less_often() {
     let config = TcpConfig { receive_buffer: 10_000, ..TcpConfig::default() };
-    let mut world = World::new("delay 50ms", 1)
-        .config(&config)
-        .programs(Program::writes(1_000_000), Program::default().but_does_not_read())
-        .logged()
-        .connect();
+    let mut world =
+        World::new("delay 50ms", 1).config(&config).programs(Program::writes(1_000_000), Program::default().but_does_not_read()).logged().connect();
     world.run_until(millis(3_600_000));
     assert_eq!(world.programs[0].error, None, "a window that is closed but answered is no failure");
     let probes = world.left(0, |segment| segment.payload.is_empty() && !segment.flags.has(Flags::SYN));

@@ -24,17 +24,7 @@ pub(crate) struct Program {
 
 impl Default for Program {
     fn default() -> Self {
-        Self {
-            to_write: 0,
-            shuts: false,
-            reads: true,
-            written: 0,
-            read: 0,
-            connected_at: None,
-            last_read_at: None,
-            end_at: None,
-            error: None,
-        }
+        Self { to_write: 0, shuts: false, reads: true, written: 0, read: 0, connected_at: None, last_read_at: None, end_at: None, error: None }
     }
 }
 
@@ -142,7 +132,8 @@ impl World {
 
     pub(crate) fn connect(mut self) -> Self {
         let config = self.configs[0].clone();
-        self.ends[0] = Some(Connection::connect(self.now, config, "10.0.0.1:50000".parse().unwrap(), "10.0.0.2:80".parse().unwrap(), 77_000).unwrap());
+        self.ends[0] =
+            Some(Connection::connect(self.now, config, "10.0.0.1:50000".parse().unwrap(), "10.0.0.2:80".parse().unwrap(), 77_000).unwrap());
         self.flush();
         self
     }
@@ -180,7 +171,12 @@ impl World {
         let size = segment.packet_length();
         let packet = if self.is_encoded {
             let packet = segment.to_packet();
-            assert!(packet.len() == size && Segment::parse(&packet).as_ref() == Ok(&segment), "{:?} became {:?}", segment.options, Segment::parse(&packet).map(|parsed| parsed.options));
+            assert!(
+                packet.len() == size && Segment::parse(&packet).as_ref() == Ok(&segment),
+                "{:?} became {:?}",
+                segment.options,
+                Segment::parse(&packet).map(|parsed| parsed.options)
+            );
             Packet::Octets(packet)
         } else {
             Packet::Whole(Box::new(segment))
@@ -225,7 +221,11 @@ impl World {
                 }
                 Ok(count) => {
                     if self.is_encoded {
-                        assert!(chunk[..count].iter().zip(program.read..).all(|(seen, at)| *seen == octet(at)), "wrong octets behind {}", program.read);
+                        assert!(
+                            chunk[..count].iter().zip(program.read..).all(|(seen, at)| *seen == octet(at)),
+                            "wrong octets behind {}",
+                            program.read
+                        );
                     }
                     program.read += count as u64;
                     program.last_read_at = Some(self.now);
@@ -276,7 +276,7 @@ impl World {
             Some(end) if end.state() != State::Closed => end.handle_segment(self.now, segment),
             slot => {
                 let is_syn = segment.flags.has(Flags::SYN) && !segment.flags.has(Flags::ACK);
-                if side == 1 && self.is_listening && is_syn && slot.is_none() {
+                if side == 1 && self.is_listening && is_syn {
                     *slot = Some(Connection::accept(self.now, self.configs[1].clone(), segment, 99_000).unwrap());
                 } else if let Some(reset) = segment.refusal(64) {
                     self.send(side, reset);
