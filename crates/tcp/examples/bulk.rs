@@ -1,5 +1,5 @@
 //! Processor time for a gigabyte over 1 Gbit/s and 1 ms, both ends and the links together; octets or whole segments on the links.
-#![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "it measures and prints")]
+#![allow(clippy::print_stdout, clippy::unwrap_used, clippy::cast_precision_loss, clippy::disallowed_methods, reason = "it measures and prints")]
 #![allow(dead_code, reason = "the world of the tests has more")]
 
 #[path = "../tests/engine/world.rs"]

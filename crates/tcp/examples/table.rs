@@ -1,5 +1,5 @@
 //! Median seconds from `connect` to the last octet over links, beside Linux 6.18.
-#![allow(clippy::print_stdout, reason = "it prints a table")]
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "it prints a table, and stops where it fails")]
 #![allow(dead_code, reason = "the world of the tests has more")]
 
 #[path = "../tests/engine/world.rs"]

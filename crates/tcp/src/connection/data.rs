@@ -125,7 +125,7 @@ impl Connection {
             receive.ack_now = true;
         }
         if !receive.ack_now && unacked > 0 {
-            receive.ack_at.get_or_insert(now.saturating_add(self.config.delayed_ack));
+            receive.ack_at.get_or_insert_with(|| now.saturating_add(self.config.delayed_ack));
         }
     }
 

@@ -183,10 +183,9 @@ fn a_slow_reader_holds_the_writer_back() {
     for tenth in 1..=400u64 {
         world.run_until(millis(100 * tenth));
         let mut chunk = [0; 3000];
-        while let Ok(count @ 1..) = world.ends[1].as_mut().unwrap().read(&mut chunk) {
+        if let Ok(count) = world.ends[1].as_mut().unwrap().read(&mut chunk) {
             assert!(chunk[..count].iter().zip(read..).all(|(seen, at)| *seen == octet(at)));
             read += count as u64;
-            break;
         }
         world.flush();
         assert!(world.programs[0].written <= read + 70_000 + 128, "{} written, {read} read", world.programs[0].written);
