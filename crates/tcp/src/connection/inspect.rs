@@ -4,6 +4,15 @@ use super::Connection;
 use crate::info::Info;
 
 impl Connection {
+    /// Whether data is left that only the peer's program can set free: the window is closed, and a probe was answered by that (nothing is on the way).
+    ///
+    /// An owner that sees this at every connection, while no program waits for time, knows that nothing will happen any more.
+    #[must_use]
+    pub fn is_held_by_window(&self) -> bool {
+        let is_answered = self.counters.window_probes > 0 && self.counters.probes == 0;
+        is_answered && self.send.board.is_empty() && self.send.has_new() && !self.is_window_open()
+    }
+
     /// Figures, as of Linux's `TCP_INFO`.
     #[must_use]
     pub fn info(&self) -> Info {
