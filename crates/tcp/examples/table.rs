@@ -32,7 +32,7 @@ fn main() {
                     config.congestion = cohaptic_tcp::CongestionControl::Reno;
                 }
                 let mut world = World::new(words, seed).config(&config).programs(Program::default(), Program::writes(octets)).connect();
-                world.is_encoded = false;
+                (world.is_encoded, world.is_checked) = (false, false);
                 world.run_to_the_last_octet(Duration::from_secs(3600));
                 world.programs[0].last_read_at.unwrap().as_secs_f64()
             })

@@ -80,10 +80,11 @@ fn a_lost_tail_is_probed() {
 }
 
 fn throughput(config: &TcpConfig, every: u64, words: &str, megabytes: u64) -> f64 {
-    let lossy = LinkConfig { loss: Loss::Pattern(Pattern::of_packets(core::iter::once(every - 1..every).collect(), Some(every)).unwrap()), ..link(words) };
+    let lossy =
+        LinkConfig { loss: Loss::Pattern(Pattern::of_packets(core::iter::once(every - 1..every).collect(), Some(every)).unwrap()), ..link(words) };
     let mut world =
         World::with_links([link(words), lossy], 1).config(config).programs(Program::default(), Program::writes(megabytes * 1_000_000)).connect();
-    world.is_encoded = false;
+    (world.is_encoded, world.is_checked) = (false, false);
     // What comes before the sawtooth does not count.
     while world.programs[0].read < megabytes * 400_000 {
         world.step();

@@ -8,7 +8,7 @@ fn median(words: &str, octets: u64, seeds: u64) -> f64 {
     let mut seconds: Vec<f64> = (0..seeds)
         .map(|seed| {
             let mut world = World::new(words, seed).programs(Program::default(), Program::writes(octets)).connect();
-            world.is_encoded = false;
+            (world.is_encoded, world.is_checked) = (false, false);
             world.run_to_the_last_octet(Duration::from_secs(3600));
             world.programs[0].last_read_at.unwrap().as_secs_f64()
         })

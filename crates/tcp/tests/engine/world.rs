@@ -70,6 +70,8 @@ pub(crate) struct World {
     pub(crate) drops: Filter,
     /// Whether packets cross the links as octets; otherwise as they are, which is faster.
     pub(crate) is_encoded: bool,
+    /// Whether every octet is looked at.
+    pub(crate) is_checked: bool,
     pub(crate) marks: bool,
     links: [Link<Packet>; 2],
     chunk: Vec<u8>,
@@ -104,6 +106,7 @@ impl World {
             log: None,
             drops: Box::new(|_, _| false),
             is_encoded: true,
+            is_checked: true,
             marks: false,
             chunk: vec![0; 16_384],
             links: [Link::new(seed, &LinkName::between("client", "server"), there), Link::new(seed, &LinkName::between("server", "client"), back)],
@@ -172,7 +175,7 @@ impl World {
         let packet = if self.is_encoded {
             let packet = segment.to_packet();
             assert!(
-                packet.len() == size && Segment::parse(&packet).as_ref() == Ok(&segment),
+                !self.is_checked || packet.len() == size && Segment::parse(&packet).as_ref() == Ok(&segment),
                 "{:?} became {:?}",
                 segment.options,
                 Segment::parse(&packet).map(|parsed| parsed.options)
@@ -193,7 +196,7 @@ impl World {
             let chunk = &mut self.chunk;
             while program.written < program.to_write {
                 let count = usize::try_from(program.to_write - program.written).unwrap().min(chunk.len());
-                if self.is_encoded {
+                if self.is_checked {
                     chunk[..count].iter_mut().zip(program.written..).for_each(|(to, at)| *to = octet(at));
                 }
                 match end.write(&chunk[..count]) {
@@ -220,7 +223,7 @@ impl World {
                     return;
                 }
                 Ok(count) => {
-                    if self.is_encoded {
+                    if self.is_checked {
                         assert!(
                             chunk[..count].iter().zip(program.read..).all(|(seen, at)| *seen == octet(at)),
                             "wrong octets behind {}",
