@@ -7,7 +7,7 @@ use crate::ranges::Ranges;
 use crate::send_buffer::KEPT;
 use crate::sequence::Position;
 
-/// Octets in order, which can be read, and pieces that wait for what is missing before them.
+/// Octets in order, which can be read, and pieces that wait for missing ones before them.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Assembler {
     ready: VecDeque<u8>,
@@ -99,7 +99,7 @@ impl Assembler {
         count
     }
 
-    /// Lets go of what is out of order, which nobody will complete.
+    /// Lets go of the pieces out of order, which nobody will complete.
     pub(crate) fn forget_gaps(&mut self) {
         self.pieces.clear();
         self.ranges.clear();

@@ -15,7 +15,7 @@ pub(crate) use reduction::Reduction;
 /// No threshold yet.
 pub(crate) const UNBOUNDED: u32 = u32::MAX;
 
-/// The congestion window in segments, and how it grows (RFC 5681 with RFC 3465's counting of what is acknowledged, without its limit, as Linux).
+/// The congestion window in segments, and how it grows (RFC 5681 with RFC 3465's counting of acknowledged segments, without its limit, as Linux).
 #[derive(Clone, Debug)]
 pub(crate) struct Congestion {
     pub(crate) window: u32,

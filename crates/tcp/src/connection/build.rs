@@ -102,7 +102,7 @@ impl Connection {
         if blocks == 0 { 0 } else { 4 + 8 * blocks.min(if self.receive.has_timestamps { 3 } else { 4 }) }
     }
 
-    /// The window to offer, scaled: what is free, but nothing small (RFC 9293, section 3.8.6.2.2), and never less than before.
+    /// The window to offer, scaled: the free part of the buffer, but nothing small (RFC 9293, section 3.8.6.2.2), and never less than before.
     fn offer_window(&mut self) -> u16 {
         let unit = 1u64 << self.receive.scale;
         let most = 65_535u64 << self.receive.scale;

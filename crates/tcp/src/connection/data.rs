@@ -55,7 +55,7 @@ impl Connection {
             self.receive.assembler.insert(&mut self.receive.next, start, &payload[..count]);
             self.learn_rhythm(now, count);
         }
-        // What was cut off, what is out of order and what fills a gap is acknowledged at once (RFC 5681, section 4.2).
+        // Data that was cut off, is out of order or fills a gap is acknowledged at once (RFC 5681, section 4.2).
         self.receive.ack_now |= known || had_gaps || self.receive.assembler.has_gaps() || start > self.receive.next;
     }
 

@@ -84,7 +84,7 @@ pub(super) struct Receive {
     /// The largest segment so far, at least a guess.
     pub(super) segment: usize,
     pub(super) ack_now: bool,
-    /// A window has been offered beside that of the SYN, which is smaller.
+    /// A window has been offered after the smaller one of the SYN.
     pub(super) has_offered: bool,
     /// When a delayed acknowledgement is due.
     pub(super) ack_at: Option<Instant>,
@@ -106,7 +106,7 @@ impl Receive {
     }
 }
 
-/// How the sender reacts to what is lost (RFC 5681, 6582, 6675; the names of Linux in brackets).
+/// How the sender reacts to losses (RFC 5681, 6582, 6675; the names of Linux in brackets).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 pub(super) enum Phase {
     #[default]

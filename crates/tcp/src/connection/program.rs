@@ -163,7 +163,7 @@ impl Connection {
         self.config.user_timeout = timeout;
     }
 
-    /// The time to live of what is sent from now on.
+    /// Sets the time to live of segments from now on.
     pub const fn set_ttl(&mut self, ttl: u8) {
         self.config.ttl = ttl;
     }

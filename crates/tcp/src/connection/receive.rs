@@ -122,7 +122,7 @@ impl Connection {
         self.receive.has_timestamps && (1..1 << 31).contains(&behind) && !is_harmless && now.saturating_duration_since(at) < TIMESTAMPS_COUNT
     }
 
-    /// A segment out of window is answered by what is expected, and a duplicate told of.
+    /// A segment out of window is answered by the expected number, and a duplicate told of.
     fn answer_out_of_window(&mut self, now: Instant, segment: &Segment<'_>, start: Position, end: Position) {
         if segment.flags.has(Flags::SYN) {
             self.challenge(now);
@@ -136,7 +136,7 @@ impl Connection {
         }
     }
 
-    /// A challenge ACK: whoever is at the other end must know the sequence number (RFC 5961).
+    /// A challenge ACK: the peer must know the sequence number (RFC 5961).
     pub(super) fn challenge(&mut self, now: Instant) {
         self.answer_at_times(now);
     }

@@ -164,7 +164,7 @@ impl Connection {
         }
     }
 
-    /// The last segment once more, beside what is believed on the way.
+    /// The last segment once more; the estimate of segments on the way stays.
     fn last_again(&mut self, now: Instant) -> Option<Segment<'static>> {
         let last = self.send.board.last()?;
         let (start, end) = (last.start, last.end);

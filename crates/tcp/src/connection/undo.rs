@@ -6,7 +6,7 @@ use super::parts::Phase;
 use crate::sequence::Position;
 
 impl Connection {
-    /// From here on it is counted what is sent again.
+    /// From here on, segments that are sent again are counted.
     pub(super) fn begin_undo(&mut self) {
         if !self.send.board.has_sent_again() {
             self.recovery.again_at = None;

@@ -79,7 +79,7 @@ impl Scoreboard {
         u32::try_from(self.queue.len()).unwrap_or(u32::MAX)
     }
 
-    /// What is believed to be on the way (RFC 6675, pipe, in segments).
+    /// The estimate of segments on the way (RFC 6675, pipe).
     pub(crate) fn in_flight(&self) -> u32 {
         (self.packets_out() + self.again_out).saturating_sub(self.sacked_out + self.lost_out)
     }
@@ -185,7 +185,7 @@ impl Scoreboard {
         self.queue.get(self.index(*self.to_send.first()?)?)
     }
 
-    /// A segment leaves again. `counts`: it is on the way, beside what is believed lost.
+    /// A segment leaves again. `counts`: it is on the way from now on, its lost transmission apart.
     pub(crate) fn sent_again(&mut self, start: Position, at: Instant, counts: bool) {
         let Some(index) = self.index(start) else { return };
         self.transmissions += 1;

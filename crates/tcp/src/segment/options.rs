@@ -108,7 +108,7 @@ impl Options {
         }
     }
 
-    /// Reads options. What is malformed ends the list, as in Linux.
+    /// Reads options. A malformed one ends the list, as in Linux.
     pub(crate) fn read(mut bytes: &[u8]) -> Self {
         let mut options = Self::default();
         while let [kind, rest @ ..] = bytes {
