@@ -1,0 +1,133 @@
+//! Segments to send.
+
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
+
+use cohaptic_units::Instant;
+
+use super::Connection;
+use crate::info::State;
+use crate::segment::{Ecn, Flags, Options, SackBlocks, Segment, TIMESTAMPS_LENGTH};
+use crate::sequence::{Position, on_wire};
+
+impl Connection {
+    /// The SYN, with ACK if one has come.
+    pub(super) fn build_syn(&self, now: Instant) -> Segment<'static> {
+        let has_come = self.state == State::SynReceived;
+        let window = self.config.receive_buffer.min(65_535);
+        let room = self.config.segment_room(self.local.is_ipv4());
+        let options = Options {
+            mss: Some(u16::try_from(room).unwrap_or(u16::MAX)),
+            window_scale: (!has_come || self.receive.scale > 0 || self.send.scale > 0).then_some(self.receive.scale),
+            sack_permitted: self.receive.has_sack,
+            timestamps: self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value))),
+            sack: SackBlocks::default(),
+        };
+        let flags =
+            Flags::SYN.with_if(Flags::ACK, has_come).with_if(Flags::ECE, self.send.has_ecn).with_if(Flags::CWR, self.send.has_ecn && !has_come);
+        let acknowledgement = if has_come { on_wire(self.receive.next) } else { 0 };
+        Segment {
+            sequence: on_wire(self.send.first),
+            acknowledgement,
+            window: u16::try_from(window).unwrap_or(u16::MAX),
+            options,
+            ..self.empty(flags)
+        }
+    }
+
+    /// A segment without data, options or window, at the next position.
+    fn empty(&self, flags: Flags) -> Segment<'static> {
+        Segment {
+            source: self.local,
+            destination: self.remote,
+            sequence: on_wire(self.send.next),
+            acknowledgement: on_wire(self.receive.next),
+            flags,
+            window: 0,
+            options: Options::default(),
+            ecn: Ecn::NotCapable,
+            ttl: self.config.ttl,
+            payload: Cow::Borrowed(&[]),
+        }
+    }
+
+    /// A reset at the next position.
+    pub(super) fn build_reset(&self) -> Segment<'static> {
+        self.empty(Flags::RST | Flags::ACK)
+    }
+
+    /// A segment with ACK from `start` to `end`, which may include the FIN. It acknowledges all that has come.
+    pub(super) fn build(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
+        let data_end = end.min(self.send.buffer.end()).max(start);
+        let payload = if data_end > start { self.send.buffer.copy(start, data_end) } else { Vec::new() };
+        let has_fin = end > data_end;
+        let is_last = data_end == self.send.buffer.end() && !payload.is_empty();
+        let flags = Flags::ACK
+            .with_if(Flags::FIN, has_fin)
+            .with_if(Flags::PSH, is_last)
+            .with_if(Flags::ECE, self.send.tells_mark)
+            .with_if(Flags::CWR, self.send.tells_reduction && !payload.is_empty());
+        if !payload.is_empty() {
+            self.send.tells_reduction = false;
+        }
+        let options = self.options(now, payload.len());
+        let window = self.offer_window();
+        self.has_acknowledged();
+        Segment { sequence: on_wire(start), flags, window, options, payload: Cow::Owned(payload), ..self.empty(flags) }
+    }
+
+    /// Timestamps and as many selective acknowledgements as fit beside the data.
+    fn options(&mut self, now: Instant, payload: usize) -> Options {
+        let timestamps = self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value)));
+        let mut sack = SackBlocks::default();
+        if self.receive.has_sack && (self.receive.duplicate.is_some() || self.receive.assembler.has_gaps()) {
+            let taken = payload + if timestamps.is_some() { TIMESTAMPS_LENGTH } else { 0 };
+            let room = self.config.segment_room(self.local.is_ipv4()).saturating_sub(taken);
+            for (start, end) in self.blocks() {
+                sack.push(on_wire(start), on_wire(end));
+            }
+            sack.truncate((room.saturating_sub(4) / 8).min(if timestamps.is_some() { 3 } else { 4 }));
+            self.receive.duplicate = None;
+        }
+        Options { timestamps, sack, ..Options::default() }
+    }
+
+    /// What selective acknowledgements take beside data \[byte\].
+    pub(super) fn sack_length(&self) -> usize {
+        if !self.receive.has_sack {
+            return 0;
+        }
+        let blocks = usize::from(self.receive.duplicate.is_some())
+            + if self.receive.assembler.has_gaps() { self.receive.assembler.blocks().count() } else { 0 };
+        if blocks == 0 { 0 } else { 4 + 8 * blocks.min(if self.receive.has_timestamps { 3 } else { 4 }) }
+    }
+
+    /// The window to offer, scaled: the free part of the buffer, but nothing small (RFC 9293, section 3.8.6.2.2), and never less than before.
+    fn offer_window(&mut self) -> u16 {
+        let unit = 1u64 << self.receive.scale;
+        let most = 65_535u64 << self.receive.scale;
+        let current = self.receive.window();
+        let free = self.free_window();
+        let window = if free > current { (free & !(unit - 1)).max(current) } else { current };
+        // A window that is kept may not shrink by being said in units.
+        let window = window.next_multiple_of(unit).min(most);
+        self.receive.edge = self.receive.edge.max(self.receive.next + window);
+        u16::try_from(window >> self.receive.scale).unwrap_or(u16::MAX)
+    }
+
+    /// What the receive buffer has free, zero if that is little \[byte\].
+    pub(super) fn free_window(&self) -> u64 {
+        let capacity = self.config.receive_buffer;
+        let free = capacity.saturating_sub(self.receive.assembler.unread());
+        let is_little = free < capacity / 2 && (free < capacity / 16 || free < self.receive.segment);
+        if is_little { 0 } else { free as u64 }
+    }
+
+    /// An acknowledgement has left.
+    fn has_acknowledged(&mut self) {
+        self.receive.acked = self.receive.next;
+        self.receive.has_offered = true;
+        (self.receive.ack_now, self.receive.ack_at, self.receive.pushed) = (false, None, 0);
+        self.receive.quick = self.receive.quick.saturating_sub(1);
+    }
+}

@@ -1,0 +1,39 @@
+//! What a connection tells about itself.
+
+use super::Connection;
+use crate::info::Info;
+
+impl Connection {
+    /// Whether data is left that only the peer's program can set free: the window is closed, and a probe was answered by that (nothing is on the way).
+    ///
+    /// An owner that sees this at every connection, while no program waits for time, knows that nothing will happen any more.
+    #[must_use]
+    pub fn is_held_by_window(&self) -> bool {
+        let is_answered = self.counters.window_probes > 0 && self.counters.probes == 0;
+        is_answered && self.send.board.is_empty() && self.send.has_new() && !self.is_window_open()
+    }
+
+    /// Figures, as of Linux's `TCP_INFO`.
+    #[must_use]
+    pub fn info(&self) -> Info {
+        Info {
+            state: self.state,
+            srtt: self.round_trips.srtt(),
+            rttvar: self.round_trips.variation(),
+            least_rtt: self.round_trips.least(),
+            timeout: self.round_trips.timeout(&self.config),
+            congestion_window: self.congestion.window,
+            slow_start_threshold: self.congestion.threshold,
+            in_flight: self.send.board.in_flight(),
+            retransmissions: self.counters.retransmissions,
+            timeouts: self.counters.timeouts,
+            recoveries: self.counters.recoveries,
+            undone: self.counters.undone,
+            segment_size: self.segment_size(),
+            send_window: self.send.window,
+            unacknowledged: self.send.buffer.len(),
+            unread: self.receive.assembler.unread(),
+            window_probes: self.counters.window_probes,
+        }
+    }
+}

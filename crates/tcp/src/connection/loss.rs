@@ -1,0 +1,138 @@
+//! Which segments are lost: by time (RFC 8985), by count (RFC 6675), by duplicates (RFC 6582) or by the timer (RFC 6298).
+
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+
+use super::acknowledge::Ack;
+use super::parts::Phase;
+use super::recovery::DUPLICATES;
+use super::{Connection, Timer};
+use crate::sequence::Position;
+
+/// For how many recoveries a larger reordering window stays (RFC 8985, section 6.2).
+const PERSISTS: u32 = 16;
+
+impl Connection {
+    /// What begins at `start` has arrived behind what ends at `end`, and was sent once.
+    pub(super) fn note_reordering(&mut self, start: Position, end: Position) {
+        self.rack.has_reordering = true;
+        let degree = end.saturating_sub(start).div_ceil(self.send.mss as u64);
+        self.rack.degree = self.rack.degree.max(u32::try_from(degree).unwrap_or(u32::MAX));
+    }
+
+    /// The latest transmission that has arrived (RFC 8985, section 6.2, step 2).
+    fn advance_rack(&mut self, now: Instant, ack: &Ack) {
+        let Some((sent_at, was_again)) = ack.news.latest else { return };
+        let round_trip = now.saturating_duration_since(sent_at.0);
+        // An answer sooner than any round trip is the answer to the first transmission.
+        if was_again && self.round_trips.least().is_some_and(|least| round_trip < least) {
+            return;
+        }
+        self.rack.rtt = round_trip;
+        self.rack.delivered = self.rack.delivered.max(Some(sent_at));
+    }
+
+    /// How long a segment may be late (RFC 8985, section 6.2, step 4).
+    fn reordering_window(&self) -> Duration {
+        if !self.rack.has_reordering && (self.recovery.phase >= Phase::Recovery || self.send.board.sacked_out >= DUPLICATES) {
+            return Duration::ZERO;
+        }
+        let least = self.round_trips.least().unwrap_or_default();
+        (least / 4 * self.rack.quarters.max(1)).min(self.round_trips.srtt().unwrap_or_default())
+    }
+
+    /// A larger reordering window for each round trip with a duplicate.
+    pub(super) fn adapt_patience(&mut self, ack: &Ack) {
+        if self.rack.saw_duplicate && self.send.una >= self.rack.grown_at {
+            self.rack.quarters = (self.rack.quarters.max(1) + 1).min(255);
+            self.rack.persists = PERSISTS;
+            self.rack.grown_at = self.send.next;
+        } else if self.rack.persists == 0 && ack.has_advanced {
+            self.rack.quarters = 1;
+        }
+        self.rack.saw_duplicate = false;
+    }
+
+    /// Returns whether the timer was set for segments that may only be late.
+    pub(super) fn find_losses(&mut self, now: Instant, ack: &Ack) -> bool {
+        if self.send.board.is_empty() {
+            return false;
+        }
+        if !self.receive.has_sack {
+            let is_told = self.recovery.phase < Phase::Recovery && self.send.board.sacked_out >= DUPLICATES;
+            if is_told || (self.recovery.phase == Phase::Recovery && ack.has_advanced) {
+                self.send.board.mark_first_lost();
+            }
+            return false;
+        }
+        if !self.config.rack {
+            self.send.board.detect_by_count(DUPLICATES);
+            return false;
+        }
+        self.advance_rack(now, ack);
+        self.detect_by_time(now)
+    }
+
+    fn detect_by_time(&mut self, now: Instant) -> bool {
+        let Some(delivered) = self.rack.delivered else { return false };
+        let patience = self.rack.rtt.saturating_add(self.reordering_window());
+        let Some(at) = self.send.board.detect_by_time(now, delivered, patience) else { return false };
+        self.timer = Some((at.max(now), Timer::Reordering));
+        true
+    }
+
+    /// The reordering timer has run out.
+    pub(super) fn reordering_is_over(&mut self, now: Instant) {
+        let before = self.send.board.lost_out;
+        self.timer = None;
+        let waits = self.detect_by_time(now);
+        if self.send.board.lost_out > before {
+            if self.recovery.phase < Phase::Recovery {
+                self.enter_recovery(false);
+            }
+            self.reduce_window(1, false, true);
+        }
+        if !waits {
+            self.set_retransmission_timer(now, true);
+        }
+    }
+
+    /// The retransmission timer has run out (RFC 5681, section 3.1, and RFC 6298, section 5).
+    pub(super) fn enter_loss(&mut self, now: Instant) {
+        let is_first = self.recovery.phase <= Phase::Disorder
+            || self.send.una >= self.recovery.high
+            || (self.recovery.phase == Phase::Loss && self.counters.retries == 0);
+        let patience = self.rack.rtt.saturating_add(self.reordering_window());
+        let has_sack = self.receive.has_sack;
+        self.send.board.mark_all_lost(now, (has_sack && self.config.rack && self.rack.delivered.is_some()).then_some(patience), has_sack);
+        if is_first {
+            self.recovery.prior_threshold = Some(self.current_threshold());
+            self.recovery.prior_window = self.congestion.window;
+            self.congestion.threshold = self.congestion.reduced();
+            self.begin_undo();
+        }
+        self.congestion.restart(self.send.board.in_flight() + 1);
+        self.recovery.phase = Phase::Loss;
+        self.recovery.high = self.send.next;
+        self.tail.end = None;
+        self.send.tells_reduction = self.send.has_ecn;
+        self.counters.timeouts += 1;
+    }
+
+    /// Whether the tail loss probe has repaired a loss (RFC 8985, section 7.4).
+    pub(super) fn end_tail_probe(&mut self, ack: &Ack) {
+        let Some(end) = self.tail.end.filter(|end| ack.position >= *end) else { return };
+        if !self.tail.is_again || ack.tells_duplicate {
+            self.tail.end = None;
+        } else if ack.position > end {
+            self.tail.end = None;
+            self.enter_reduced();
+            if self.recovery.phase == Phase::Reduced {
+                self.end_reduction_at_once(ack);
+            }
+        } else if ack.is_duplicate {
+            self.tail.end = None;
+        }
+    }
+}

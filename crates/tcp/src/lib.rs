@@ -1,0 +1,58 @@
+//! TCP as Linux does it, as a state machine without sockets or clock.
+//!
+//! You need it if a test or a simulation of yours wants real TCP in virtual time: handshakes, retransmissions, congestion control, windows, resets and
+//! their errors, to the nanosecond and the same on every run.
+//!
+//! A [`Connection`] is one end. Time is an argument: segments go in by [`Connection::handle_segment`], time by [`Connection::handle_timeout`], segments come
+//! out of [`Connection::poll_transmit`] and the next deadline of [`Connection::poll_timeout`]. The program has [`Connection::read`],
+//! [`Connection::write`], [`Connection::shutdown`] and [`Connection::close`]. [`Segment::to_packet`] and [`Segment::parse`] are the way to real IP packets and
+//! back. [`TcpConfig`] has every constant.
+//!
+//! There are RFC 9293 (TCP), 5961 (resets off the mark), 7323 (timestamps, large windows), 6298 (timeouts), 5681 and 6582 (Reno, NewReno), 2018, 2883 and
+//! 6675 (selective acknowledgements), 6937 (rate reduction), 8985 (RACK-TLP), 9438 (CUBIC) and 3168 (ECN), with Linux's choice where they leave one. There
+//! are not: urgent data, ICMP, path MTU discovery, Fast Open, pacing, `HyStart`, F-RTO. Listeners are left to the owner of the connections, which knows ports:
+//! it makes a connection of a SYN with [`Connection::accept`], and counts those that nobody has taken.
+//!
+//! ```
+//! use cohaptic_tcp::{Connection, TcpConfig};
+//! use cohaptic_units::Instant;
+//!
+//! let (client, server) = ("10.0.0.1:50000".parse()?, "10.0.0.2:80".parse()?);
+//! let mut now = Instant::ZERO;
+//! let mut a = Connection::connect(now, TcpConfig::default(), client, server, 1)?;
+//! let syn = a.poll_transmit(now).expect("the SYN leaves at once");
+//!
+//! now = Instant::from_nanos(10_000_000);
+//! let mut b = Connection::accept(now, TcpConfig::default(), &syn, 2)?;
+//! a.handle_segment(now, &b.poll_transmit(now).expect("the answer"));
+//! assert_eq!(a.write(b"hello")?, 5);
+//! while let Some(segment) = a.poll_transmit(now) {
+//!     b.handle_segment(now, &segment);
+//! }
+//! let mut text = [0; 8];
+//! assert_eq!(b.read(&mut text)?, 5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![cfg_attr(not(test), no_std)]
+#![cfg_attr(test, allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "tests compare exact values and count samples"))]
+
+extern crate alloc;
+
+mod assembler;
+mod config;
+mod congestion;
+mod connection;
+mod error;
+mod info;
+mod ranges;
+mod rtt;
+mod scoreboard;
+mod segment;
+mod send_buffer;
+mod sequence;
+
+pub use config::{ConfigError, CongestionControl, Keepalive, TcpConfig};
+pub use connection::Connection;
+pub use error::Error;
+pub use info::{Info, State};
+pub use segment::{Ecn, Flags, Options, ParseError, SackBlocks, Segment};

@@ -1,0 +1,105 @@
+//! Round trips and the timeout that follows from them (RFC 6298).
+
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+
+use crate::TcpConfig;
+
+/// How long a least round trip counts.
+const LEAST_COUNTS: Duration = Duration::from_secs(300);
+
+/// The estimator of RFC 6298, in nanoseconds without rounding: eight times SRTT and four times RTTVAR are whole.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RoundTrips {
+    srtt_8: u64,
+    var_4: u64,
+    least: Option<(Duration, Instant)>,
+    /// How often the timeout was doubled since the last sample.
+    pub(crate) backoff: u32,
+}
+
+impl RoundTrips {
+    /// Takes a round trip in, and ends the doubling.
+    pub(crate) fn sample(&mut self, now: Instant, round_trip: Duration) {
+        let nanos = nanos(round_trip).max(1);
+        if self.srtt_8 == 0 {
+            (self.srtt_8, self.var_4) = (nanos * 8, nanos * 2);
+        } else {
+            // In units of an eighth: the error is a fraction.
+            let error_8 = (nanos * 8).abs_diff(self.srtt_8);
+            self.var_4 = self.var_4 - self.var_4 / 4 + error_8 / 8;
+            self.srtt_8 = self.srtt_8 - self.srtt_8 / 8 + nanos;
+        }
+        self.backoff = 0;
+        let is_least = self.least.is_none_or(|(least, at)| round_trip <= least || now.saturating_duration_since(at) > LEAST_COUNTS);
+        if is_least {
+            self.least = Some((round_trip.max(Duration::from_nanos(1)), now));
+        }
+    }
+
+    pub(crate) fn srtt(&self) -> Option<Duration> {
+        (self.srtt_8 != 0).then_some(Duration::from_nanos(self.srtt_8 / 8))
+    }
+
+    pub(crate) fn variation(&self) -> Duration {
+        Duration::from_nanos(self.var_4 / 4)
+    }
+
+    pub(crate) fn least(&self) -> Option<Duration> {
+        self.least.map(|(least, _)| least)
+    }
+
+    /// SRTT + 4·RTTVAR within the bounds, without doubling.
+    pub(crate) fn base_timeout(&self, config: &TcpConfig) -> Duration {
+        let timeout = match self.srtt() {
+            Some(srtt) => srtt + Duration::from_nanos(self.var_4).max(config.least_variance),
+            None => config.initial_timeout,
+        };
+        timeout.clamp(config.least_timeout, config.greatest_timeout)
+    }
+
+    /// The timeout, doubled as often as it has run out.
+    pub(crate) fn timeout(&self, config: &TcpConfig) -> Duration {
+        doubled(self.base_timeout(config), self.backoff, config)
+    }
+}
+
+/// A time, doubled `times` times, up to the greatest.
+pub(crate) fn doubled(base: Duration, times: u32, config: &TcpConfig) -> Duration {
+    // Beyond 30 doublings any time is above the greatest, and none below it overflows.
+    base.saturating_mul(1 << times.min(30)).min(config.greatest_timeout)
+}
+
+fn nanos(span: Duration) -> u64 {
+    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX / 16).min(u64::MAX / 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_round_trips_by_hand() {
+        let config = TcpConfig { least_variance: Duration::ZERO, ..TcpConfig::default() };
+        let mut round_trips = RoundTrips::default();
+        let mut after = |milliseconds| {
+            round_trips.sample(Instant::ZERO, Duration::from_millis(milliseconds));
+            [round_trips.srtt().unwrap(), round_trips.variation(), round_trips.timeout(&config)].map(|span| span.as_nanos())
+        };
+        assert_eq!(after(100), [100_000_000, 50_000_000, 300_000_000]);
+        assert_eq!(after(200), [112_500_000, 62_500_000, 362_500_000]);
+        assert_eq!(after(100), [110_937_500, 50_000_000, 310_937_500]);
+    }
+
+    #[test]
+    fn the_variance_has_a_floor_and_doubling_an_end() {
+        let config = TcpConfig::default();
+        let mut round_trips = RoundTrips::default();
+        assert_eq!(round_trips.timeout(&config), Duration::from_secs(1));
+        round_trips.sample(Instant::ZERO, Duration::from_millis(10));
+        assert_eq!(round_trips.timeout(&config), Duration::from_millis(210));
+        round_trips.backoff = 40;
+        assert_eq!(round_trips.timeout(&config), Duration::from_secs(120));
+    }
+}

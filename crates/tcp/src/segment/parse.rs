@@ -1,0 +1,109 @@
+//! From the octets of an IP packet to a segment.
+
+use alloc::borrow::Cow;
+use core::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+
+use super::checksum::Sum;
+use super::encode::{IPV4_HEADER, IPV6_HEADER, TCP, TCP_HEADER, pseudo};
+use super::{Ecn, Flags, Options, Segment};
+
+/// Why octets are not a segment.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParseError {
+    /// Fewer octets than the headers say.
+    #[error("the packet is cut off")]
+    Truncated,
+    /// Neither IPv4 nor IPv6.
+    #[error("the packet is neither IPv4 nor IPv6")]
+    Version,
+    /// A length in a header is impossible.
+    #[error("a length in a header is impossible")]
+    Length,
+    /// Another protocol, or behind extension headers.
+    #[error("the packet does not carry TCP")]
+    Protocol,
+    /// A fragment of a packet.
+    #[error("the packet is a fragment")]
+    Fragment,
+    /// The checksum of the IPv4 header or of the segment is wrong.
+    #[error("a checksum is wrong")]
+    Checksum,
+}
+
+impl<'a> Segment<'a> {
+    /// Reads an IP packet, checks both checksums, and borrows the data.
+    ///
+    /// # Errors
+    ///
+    /// If the packet is damaged, or is no TCP segment.
+    pub fn parse(packet: &'a [u8]) -> Result<Self, ParseError> {
+        match packet.first().ok_or(ParseError::Truncated)? >> 4 {
+            4 => Self::parse_v4(packet),
+            6 => Self::parse_v6(packet),
+            _ => Err(ParseError::Version),
+        }
+    }
+
+    fn parse_v4(packet: &'a [u8]) -> Result<Self, ParseError> {
+        let fixed = packet.first_chunk::<IPV4_HEADER>().ok_or(ParseError::Truncated)?;
+        let header_length = usize::from(fixed[0] & 15) * 4;
+        let length = usize::from(u16::from_be_bytes([fixed[2], fixed[3]]));
+        if header_length < IPV4_HEADER || length < header_length {
+            return Err(ParseError::Length);
+        }
+        let packet = packet.get(..length).ok_or(ParseError::Truncated)?;
+        let (header, tcp) = packet.split_at(header_length);
+        if Sum::default().add(header).finish() != 0 {
+            return Err(ParseError::Checksum);
+        }
+        if fixed[9] != TCP {
+            return Err(ParseError::Protocol);
+        }
+        // The flag of more fragments and the offset.
+        if fixed[6] & 0x3f != 0 || fixed[7] != 0 {
+            return Err(ParseError::Fragment);
+        }
+        let address = |at: usize| Ipv4Addr::new(fixed[at], fixed[at + 1], fixed[at + 2], fixed[at + 3]);
+        let sum = Sum::default().add(&fixed[12..20]);
+        Self::parse_tcp(tcp, sum, [IpAddr::V4(address(12)), IpAddr::V4(address(16))], Ecn::from_bits(fixed[1]), fixed[8])
+    }
+
+    fn parse_v6(packet: &'a [u8]) -> Result<Self, ParseError> {
+        let (fixed, rest) = packet.split_first_chunk::<IPV6_HEADER>().ok_or(ParseError::Truncated)?;
+        let length = usize::from(u16::from_be_bytes([fixed[4], fixed[5]]));
+        let tcp = rest.get(..length).ok_or(ParseError::Truncated)?;
+        if fixed[6] != TCP {
+            return Err(ParseError::Protocol);
+        }
+        let address = |at: usize| {
+            let mut octets = [0; 16];
+            octets.copy_from_slice(&fixed[at..at + 16]);
+            IpAddr::V6(Ipv6Addr::from(octets))
+        };
+        Self::parse_tcp(tcp, Sum::default().add(&fixed[8..]), [address(8), address(24)], Ecn::from_bits(fixed[1] >> 4), fixed[7])
+    }
+
+    fn parse_tcp(tcp: &'a [u8], addresses_sum: Sum, [from, to]: [IpAddr; 2], ecn: Ecn, ttl: u8) -> Result<Self, ParseError> {
+        let fixed = tcp.first_chunk::<TCP_HEADER>().ok_or(ParseError::Truncated)?;
+        if addresses_sum.add_word(pseudo(tcp.len())).add(tcp).finish() != 0 {
+            return Err(ParseError::Checksum);
+        }
+        let header_length = usize::from(fixed[12] >> 4) * 4;
+        let options = tcp.get(TCP_HEADER..header_length).ok_or(ParseError::Length)?;
+        let short = |at: usize| u16::from_be_bytes([fixed[at], fixed[at + 1]]);
+        let long = |at: usize| u32::from_be_bytes([fixed[at], fixed[at + 1], fixed[at + 2], fixed[at + 3]]);
+        Ok(Self {
+            source: SocketAddr::new(from, short(0)),
+            destination: SocketAddr::new(to, short(2)),
+            sequence: long(4),
+            acknowledgement: long(8),
+            flags: Flags::from_bits(fixed[13]),
+            window: short(14),
+            options: Options::read(options),
+            ecn,
+            ttl,
+            payload: Cow::Borrowed(&tcp[header_length..]),
+        })
+    }
+}

@@ -1,0 +1,16 @@
+//! The engine against figures that do not come from it: RFCs, closed forms, Linux.
+#![allow(
+    clippy::unwrap_used,
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "tests fail where they stop, and count samples"
+)]
+
+mod fuzz;
+mod recovery;
+mod rows;
+mod smoltcp;
+mod timing;
+mod traps;
+mod world;

@@ -1,0 +1,332 @@
+//! Two ends, two links and the time: programs that write and read, in virtual time.
+
+use std::time::Duration;
+
+use cohaptic_tcp::{Connection, Ecn, Error, Flags, Segment, State, TcpConfig};
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::netem::Netem;
+use cohaptic_wan::{Fate, Link, LinkConfig, LinkName};
+
+/// What a program does once its connection is up: it writes so many octets, shuts its half if it should, and reads whatever comes.
+#[derive(Clone, Debug)]
+pub(crate) struct Program {
+    pub(crate) to_write: u64,
+    pub(crate) shuts: bool,
+    pub(crate) reads: bool,
+    pub(crate) written: u64,
+    pub(crate) read: u64,
+    /// When the connection was established, when the last octet was read, and when the end was.
+    pub(crate) connected_at: Option<Instant>,
+    pub(crate) last_read_at: Option<Instant>,
+    pub(crate) end_at: Option<Instant>,
+    pub(crate) error: Option<(Instant, Error)>,
+}
+
+impl Default for Program {
+    fn default() -> Self {
+        Self { to_write: 0, shuts: false, reads: true, written: 0, read: 0, connected_at: None, last_read_at: None, end_at: None, error: None }
+    }
+}
+
+impl Program {
+    pub(crate) fn writes(octets: u64) -> Self {
+        Self { to_write: octets, ..Self::default() }
+    }
+
+    pub(crate) fn and_shuts(self) -> Self {
+        Self { shuts: true, ..self }
+    }
+
+    pub(crate) fn but_does_not_read(self) -> Self {
+        Self { reads: false, ..self }
+    }
+}
+
+/// The octet at a place of any stream, so that what was lost, doubled or invented is seen.
+pub(crate) fn octet(at: u64) -> u8 {
+    u8::try_from((at * 31 + at / 251) % 251).unwrap()
+}
+
+/// A segment that left: when, from which end, and of what it consists.
+#[derive(Clone, Debug)]
+pub(crate) struct Left {
+    pub(crate) at: Instant,
+    pub(crate) from: usize,
+    pub(crate) segment: Segment<'static>,
+}
+
+type Filter = Box<dyn FnMut(usize, &Segment<'static>) -> bool>;
+
+/// End 0 is the client, end 1 the server.
+pub(crate) struct World {
+    pub(crate) now: Instant,
+    pub(crate) ends: [Option<Connection>; 2],
+    pub(crate) programs: [Program; 2],
+    pub(crate) configs: [TcpConfig; 2],
+    pub(crate) is_listening: bool,
+    /// Everything that left, if it is kept.
+    pub(crate) log: Option<Vec<Left>>,
+    /// Says which segments are lost on the way.
+    pub(crate) drops: Filter,
+    /// Whether packets cross the links as octets; otherwise as they are, which is faster.
+    pub(crate) is_encoded: bool,
+    /// Whether every octet is looked at.
+    pub(crate) is_checked: bool,
+    pub(crate) marks: bool,
+    links: [Link<Packet>; 2],
+    chunk: Vec<u8>,
+}
+
+#[derive(Clone)]
+enum Packet {
+    Octets(Vec<u8>),
+    Whole(Box<Segment<'static>>),
+}
+
+pub(crate) fn link(words: &str) -> LinkConfig {
+    if words.is_empty() {
+        return LinkConfig::default();
+    }
+    Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap()
+}
+
+impl World {
+    /// The links are the same both ways, in the words of netem.
+    pub(crate) fn new(words: &str, seed: u64) -> Self {
+        Self::with_links([link(words), link(words)], seed)
+    }
+
+    pub(crate) fn with_links([there, back]: [LinkConfig; 2], seed: u64) -> Self {
+        Self {
+            now: Instant::ZERO,
+            ends: [None, None],
+            programs: [Program::default(), Program::default()],
+            configs: [TcpConfig::default(), TcpConfig::default()],
+            is_listening: true,
+            log: None,
+            drops: Box::new(|_, _| false),
+            is_encoded: true,
+            is_checked: true,
+            marks: false,
+            chunk: vec![0; 16_384],
+            links: [Link::new(seed, &LinkName::between("client", "server"), there), Link::new(seed, &LinkName::between("server", "client"), back)],
+        }
+    }
+
+    pub(crate) fn config(mut self, config: &TcpConfig) -> Self {
+        self.configs = [config.clone(), config.clone()];
+        self
+    }
+
+    pub(crate) fn programs(mut self, client: Program, server: Program) -> Self {
+        self.programs = [client, server];
+        self
+    }
+
+    pub(crate) fn logged(mut self) -> Self {
+        self.log = Some(Vec::new());
+        self
+    }
+
+    pub(crate) fn dropping(mut self, drops: impl FnMut(usize, &Segment<'static>) -> bool + 'static) -> Self {
+        self.drops = Box::new(drops);
+        self
+    }
+
+    pub(crate) fn connect(mut self) -> Self {
+        let config = self.configs[0].clone();
+        self.ends[0] =
+            Some(Connection::connect(self.now, config, "10.0.0.1:50000".parse().unwrap(), "10.0.0.2:80".parse().unwrap(), 77_000).unwrap());
+        self.flush();
+        self
+    }
+
+    /// Both programs act, and all that may leave leaves.
+    pub(crate) fn flush(&mut self) {
+        for side in 0..2 {
+            self.flush_one(side);
+        }
+    }
+
+    fn flush_one(&mut self, side: usize) {
+        self.transmit(side);
+        self.run_program(side);
+        self.transmit(side);
+    }
+
+    fn transmit(&mut self, side: usize) {
+        while let Some(segment) = self.ends[side].as_mut().and_then(|end| end.poll_transmit(self.now)) {
+            self.send(side, segment);
+        }
+    }
+
+    pub(crate) fn send(&mut self, side: usize, mut segment: Segment<'static>) {
+        if let Some(log) = &mut self.log {
+            log.push(Left { at: self.now, from: side, segment: segment.clone() });
+        }
+        if (self.drops)(side, &segment) {
+            return;
+        }
+        if self.marks && segment.ecn == Ecn::Capable0 {
+            segment.ecn = Ecn::Congestion;
+            self.marks = false;
+        }
+        let size = segment.packet_length();
+        let packet = if self.is_encoded {
+            let packet = segment.to_packet();
+            assert!(
+                !self.is_checked || packet.len() == size && Segment::parse(&packet).as_ref() == Ok(&segment),
+                "{:?} became {:?}",
+                segment.options,
+                Segment::parse(&packet).map(|parsed| parsed.options)
+            );
+            Packet::Octets(packet)
+        } else {
+            Packet::Whole(Box::new(segment))
+        };
+        self.links[side].handle_packet(self.now, Bytes::new(size as u64), packet).unwrap();
+    }
+
+    fn run_program(&mut self, side: usize) {
+        let (Some(end), program) = (self.ends[side].as_mut(), &mut self.programs[side]) else { return };
+        if program.connected_at.is_none() && end.state().is_synchronised() {
+            program.connected_at = Some(self.now);
+        }
+        if end.state().is_synchronised() {
+            let chunk = &mut self.chunk;
+            while program.written < program.to_write {
+                let count = usize::try_from(program.to_write - program.written).unwrap().min(chunk.len());
+                if self.is_checked {
+                    chunk[..count].iter_mut().zip(program.written..).for_each(|(to, at)| *to = octet(at));
+                }
+                match end.write(&chunk[..count]) {
+                    Ok(count) => program.written += count as u64,
+                    Err(Error::WouldBlock) => break,
+                    Err(error) => {
+                        program.error = Some((self.now, error));
+                        program.to_write = program.written;
+                    }
+                }
+            }
+            if program.shuts && program.written == program.to_write {
+                end.shutdown();
+            }
+        }
+        if !program.reads {
+            return;
+        }
+        let chunk = &mut self.chunk;
+        loop {
+            match end.read(chunk) {
+                Ok(0) => {
+                    program.end_at.get_or_insert(self.now);
+                    return;
+                }
+                Ok(count) => {
+                    if self.is_checked {
+                        assert!(
+                            chunk[..count].iter().zip(program.read..).all(|(seen, at)| *seen == octet(at)),
+                            "wrong octets behind {}",
+                            program.read
+                        );
+                    }
+                    program.read += count as u64;
+                    program.last_read_at = Some(self.now);
+                }
+                Err(Error::WouldBlock) => return,
+                Err(error) => program.error = Some((self.now, error)),
+            }
+        }
+    }
+
+    pub(crate) fn next_at(&self) -> Option<Instant> {
+        let links = self.links.iter().filter_map(Link::poll_timeout);
+        links.chain(self.ends.iter().flatten().filter_map(Connection::poll_timeout)).min()
+    }
+
+    /// The next instant at which something happens. `false`: nothing ever will.
+    pub(crate) fn step(&mut self) -> bool {
+        let Some(at) = self.next_at() else { return false };
+        assert!(at >= self.now, "time went back from {} to {at}", self.now);
+        self.now = at;
+        for side in 0..2 {
+            self.links[side].handle_timeout(at).unwrap();
+            while let Some(event) = self.links[side].poll_event() {
+                if matches!(event.record.fate, Fate::Delivered(_)) {
+                    self.arrive(1 - side, &event.payload);
+                }
+            }
+        }
+        for side in 0..2 {
+            if let Some(end) = self.ends[side].as_mut().filter(|end| end.poll_timeout() == Some(at)) {
+                end.handle_timeout(at);
+                self.flush_one(side);
+            }
+        }
+        true
+    }
+
+    fn arrive(&mut self, side: usize, packet: &Packet) {
+        let parsed;
+        let segment = match packet {
+            Packet::Octets(octets) => {
+                parsed = Segment::parse(octets).unwrap();
+                &parsed
+            }
+            Packet::Whole(segment) => segment,
+        };
+        match &mut self.ends[side] {
+            Some(end) if end.state() != State::Closed => end.handle_segment(self.now, segment),
+            slot => {
+                let is_syn = segment.flags.has(Flags::SYN) && !segment.flags.has(Flags::ACK);
+                if side == 1 && self.is_listening && is_syn {
+                    *slot = Some(Connection::accept(self.now, self.configs[1].clone(), segment, 99_000).unwrap());
+                } else if let Some(reset) = segment.refusal(64) {
+                    self.send(side, reset);
+                }
+            }
+        }
+        // Segments leave within the call that permits them.
+        self.flush_one(side);
+    }
+
+    /// Runs until `end` or until nothing happens any more.
+    pub(crate) fn run_until(&mut self, end: Instant) {
+        while self.next_at().is_some_and(|at| at <= end) {
+            self.step();
+        }
+        self.now = self.now.max(end);
+    }
+
+    /// Runs until all that is to be written was read, within `limit`.
+    pub(crate) fn run_to_the_last_octet(&mut self, limit: Duration) {
+        let end = self.now + limit;
+        while !self.is_all_read() {
+            assert!(self.now <= end, "not all was read within {limit:?}: {self:?}");
+            assert!(self.step(), "nothing will happen: {self:?}");
+        }
+    }
+
+    fn is_all_read(&self) -> bool {
+        self.programs[0].read >= self.programs[1].to_write && self.programs[1].read >= self.programs[0].to_write
+    }
+
+    /// When segments left `side` that `which` holds for.
+    pub(crate) fn left(&self, side: usize, which: impl Fn(&Segment<'static>) -> bool) -> Vec<Instant> {
+        self.log.iter().flatten().filter(|left| left.from == side && which(&left.segment)).map(|left| left.at).collect()
+    }
+}
+
+impl std::fmt::Debug for World {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(f, "at {}", self.now)?;
+        for (end, program) in self.ends.iter().zip(&self.programs) {
+            writeln!(f, "{program:?}\n{:#?}", end.as_ref().map(Connection::info))?;
+        }
+        Ok(())
+    }
+}
+
+pub(crate) const fn millis(milliseconds: u64) -> Instant {
+    Instant::from_nanos(milliseconds * 1_000_000)
+}
