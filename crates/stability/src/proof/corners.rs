@@ -32,15 +32,16 @@ pub(super) struct Common<'a> {
 /// More numbers than this that vary are refused: a box has two corners to the power of them.
 const MOST_NUMBERS: u32 = 6;
 
-/// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set.
-pub(super) fn steps(points: &[Point], common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
+/// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set. Bodies are between those of `ends`, whatever those of
+/// the points are.
+pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
     let all: Vec<Node> = points.iter().flat_map(|point| point.nodes.iter().cloned()).collect();
     let sampling = Sampling::of(&all);
     let scale = Scale { time: common.time, compliance: points[0].nodes[0].compliance(common.time) };
     check_units(points, scale)?;
     let plan = Plan::of(common.timetable, !sampling.is_silent(scale.time));
     let matrices = |point: &Point| plan.matrices(Numbers { nodes: &point.nodes, weights: &point.weights, sampling, scale, tied: common.tied });
-    let corners: Vec<Vec<StepMatrix>> = with_bodies(points)?.iter().map(matrices).collect();
+    let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(matrices).collect();
     Ok((0..corners[0].len()).map(|step| StepSpan::of(corners.iter().map(|steps| &steps[step]))).collect())
 }
 
@@ -67,14 +68,14 @@ fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
     Ok(())
 }
 
-/// The points with one more number for each coefficient of a step map that varies between them.
-fn with_bodies(points: &[Point]) -> Result<Vec<Point>, ProofError> {
+/// The points with one more number for each coefficient of a step map that varies between the ends.
+fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, ProofError> {
     type Access = fn(&mut Node) -> Option<&mut Body>;
     let bodies: [Access; 2] = [|node| Some(&mut node.object), |node| node.device.as_mut()];
     let mut all = points.to_vec();
     for node in 0..points[0].nodes.len() {
         for body in bodies {
-            let found: Vec<Body> = points.iter().filter_map(|point| body(&mut point.nodes[node].clone()).copied()).collect();
+            let found: Vec<Body> = ends.iter().filter_map(|nodes| body(&mut nodes[node].clone()).copied()).collect();
             if found.iter().all(|other| *other == found[0]) {
                 continue;
             }

@@ -84,16 +84,17 @@ pub enum ProofError {
     /// Numbers of peers that are none.
     #[error("expected numbers of peers from 2 on, the least first, such as 2.. or 2..100")]
     Numbers,
-    /// Peers or links differ.
-    #[error(
-        "{peer} is not equal to the first peer, or its links are not: expected equal peers over equal links; `stability map` varies keys of a scene with other peers"
-    )]
-    Unequal {
-        /// The first that differs.
-        peer: String,
+    /// Fewer peers than the scene has besides those that grow in number.
+    #[error("fewer than {least} peers leave none of those that are equal: expected {least} and more")]
+    Fewer {
+        /// The least number.
+        least: u64,
     },
-    /// A device hangs on nothing.
-    #[error("the device of {peer} touches nothing: expected contact = \"grasp\"")]
+    /// No two peers are equal.
+    #[error("no two peers are equal over equal links, of which there could be more: expected some; `stability map` varies keys of a scene as it is")]
+    Unequal,
+    /// A device hangs on nothing, and nothing brings it to rest.
+    #[error("the device of {peer} touches nothing and does not come to rest: expected a damping or a contact")]
     Loose {
         /// The first such peer.
         peer: String,

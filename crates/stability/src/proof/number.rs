@@ -1,9 +1,10 @@
 //! Every number of equal peers at once.
 //!
-//! Equal peers over equal links move in two ways that do not mix: together, and apart from each other by a node that hears itself with the weight −1/(N−1) (`structure`). The number N is in the
-//! mass of a copy, m or m/N; in the gains, multiplied by 1, 2/N, N − 1 or 2(N − 1)/N; in the weight; and in the weight times the gains. Each is monotone in N, so that those of the
-//! ends of a span of numbers enclose them, and spans are halved until each is [decided](super::discs). Of a span without end, the other end is N = 2⁵³, which is as far from
-//! the limit as a rounding, if there is a limit.
+//! The largest class of equal peers grows, and all others keep their members. Averages of classes and differences within one do not mix (`structure`), and only numbers in them depend on N: the mass of a copy, m or
+//! m/N; gains, multiplied by 1, 2/N, N − 1, 4(N − 1)/N² or 4(N − 1)²/N²; and the weights. Of F peers in the other classes, with ν = 1/(N − 1), a class of n is heard with weight nν, itself with (n − 1)ν, and
+//! the growing one with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So what a gain hears is that gain times a constant, and that gain times ν times another. Each of these
+//! factors is monotone in N from 2 on, so that those of the ends of a span of numbers enclose them, and spans are halved until each is [decided](super::discs). Of a span without end, the other end is N = 2⁵³, which
+//! is as far from the limit as a rounding, if there is a limit.
 
 use cohaptic_scene::Scene;
 
@@ -14,10 +15,10 @@ use super::{Guarantee, ProofError, Proven};
 use crate::analysis::pairs;
 use crate::lifted::Node;
 use crate::network::NominalNetwork;
+use crate::parts::alone;
 use crate::pieces::pieces;
 use crate::structure::{Structure, count};
-use crate::timetable::Timetable;
-use crate::{Matrix, Watch};
+use crate::{Matrix, Verdict, Watch};
 
 /// Numbers of peers from one to another, ends included, of which the same is known.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -33,6 +34,8 @@ pub struct NumberSpan {
 /// What is proven of every number of equal peers.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct EveryNumber {
+    /// The first of the equal peers of which there are more and more, by its place in [`Scene::peers`].
+    pub growing: usize,
     /// In order, without gaps; neighbours differ.
     pub spans: Vec<NumberSpan>,
     /// What grows or vanishes without a limit as N grows, in words.
@@ -44,22 +47,26 @@ pub struct EveryNumber {
 /// As good as without end: a weight of 1/(N − 1) is below a rounding.
 const ENDLESS: u64 = 1 << 53;
 /// Where nothing has a limit, numbers are followed up to this.
-const MOST_FOLLOWED: u64 = 1_000_000;
+const MOST_FOLLOWED: u64 = 100_000;
 /// More certificates than this are not looked for.
 const MOST_ATTEMPTS: u64 = 200_000;
 
-/// Decides a scene with equal peers for every number of them from `from` to `to`, or without end. How many peers the scene itself has does not matter.
+/// Decides a scene for every number of peers from `from` to `to`, or without end, where the largest class of equal peers over equal links grows and all others stay as they are. How many of that class the scene
+/// itself has does not matter, but that there are two. Numbers for which none is left are passed over.
 ///
 /// # Errors
 ///
-/// [`ProofError`] if peers or links differ, if something is left to chance or not linear, or if the watch ends it.
+/// [`ProofError`] if no two peers are equal, if something is left to chance or not linear, or if the watch ends it.
 pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn Watch) -> Result<EveryNumber, ProofError> {
     if from < 2 || to.is_some_and(|to| to < from) {
         return Err(ProofError::Numbers);
     }
     super::refuse(scene)?;
-    let network = NominalNetwork::of(scene)?;
-    let followed = Followed::new(scene, &network)?;
+    let followed = Followed::new(scene, &NominalNetwork::of(scene)?)?;
+    if to.is_some_and(|to| to < followed.least) {
+        return Err(ProofError::Fewer { least: followed.least });
+    }
+    let from = from.max(followed.least);
     let without_limit = if to.is_some() { None } else { followed.without_limit()? };
     let end = match to {
         Some(to) => to,
@@ -75,9 +82,17 @@ pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn
             return Err(ProofError::Analysis(crate::AnalysisError::Stopped));
         }
         attempts += 1;
-        let found = if attempts > MOST_ATTEMPTS { None } else { followed.decide(low, high)? };
+        // The least number has no second member of the class that grows, and no differences within it.
+        let is_mixed = low == followed.least && high > low;
+        let found = if attempts > MOST_ATTEMPTS || is_mixed { None } else { followed.decide(low, high)? };
         if found.is_none() && low < high && attempts <= MOST_ATTEMPTS {
-            let middle = if high / low > 4 { 2 * low } else { low.midpoint(high) };
+            let middle = if is_mixed {
+                low
+            } else if high / low > 4 {
+                2 * low
+            } else {
+                low.midpoint(high)
+            };
             waiting.push((middle + 1, high));
             waiting.push((low, middle));
             continue;
@@ -92,43 +107,57 @@ pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn
     if without_limit.is_some() {
         spans.push(NumberSpan { from: end + 1, to: None, guarantee: Guarantee::Undecided });
     }
-    Ok(EveryNumber { spans, without_limit, attempts })
+    Ok(EveryNumber { growing: followed.growing, spans, without_limit, attempts })
 }
 
-/// A motion of the scene, in one combination of contacts: its equal peers, for any number of them.
+/// A motion of the scene, in one combination of contacts: its classes, of which one grows.
 struct Motion {
     scene: Scene,
     structure: Structure,
+    /// The class that grows.
+    growing: usize,
 }
 
 struct Followed {
     motions: Vec<Motion>,
+    /// The first peer of the class that grows.
+    growing: usize,
+    /// The least number of peers of which one is of the class that grows.
+    least: u64,
 }
 
 impl Followed {
     fn new(scene: &Scene, network: &NominalNetwork) -> Result<Self, ProofError> {
         let all = pieces(scene, "every number of peers")?;
-        let mut motions = Vec::new();
+        let (mut motions, mut least, mut first) = (Vec::new(), 2, 0);
         for (piece, combination) in pairs(&all, &mut false)? {
             let structure = Structure::of(&[&*piece.scene], network, &combination.contacts)?;
-            if structure.classes.len() > 1 {
-                let other = structure.classes[1][0];
-                return Err(ProofError::Unequal { peer: scene.peers[other].name.clone() });
+            let Some(growing) =
+                (0..structure.classes.len()).filter(|class| structure.apart[*class].is_some()).max_by_key(|class| structure.classes[*class].len())
+            else {
+                return Err(ProofError::Unequal);
+            };
+            for class in 0..structure.classes.len() {
+                // It does not depend on N.
+                if alone(&structure, &piece.scene, class, 1).is_some_and(|(part, _)| part.radius.verdict() != Verdict::Stable) {
+                    return Err(ProofError::Loose { peer: scene.peers[structure.classes[class][0]].name.clone() });
+                }
             }
-            if structure.has_loose_devices(0) {
-                return Err(ProofError::Loose { peer: scene.peers[0].name.clone() });
-            }
-            motions.push(Motion { scene: piece.scene.clone().into_owned(), structure });
+            least = least.max(structure.peers - structure.classes[growing].len() + 1);
+            first = structure.classes[growing][0];
+            motions.push(Motion { scene: piece.scene.clone().into_owned(), structure, growing });
         }
-        Ok(Self { motions })
+        Ok(Self { motions, growing: first, least: least as u64 })
     }
 
     /// What every number of peers from `low` to `high` has in common, if that is proven.
     fn decide(&self, low: u64, high: u64) -> Result<Option<Proven>, ProofError> {
         let mut all = Some(Proven::Stable);
         for motion in &self.motions {
-            for apart in [true, false] {
-                match motion.decide(low, high, apart)? {
+            let has_differences = |class: &usize| motion.structure.apart[*class].is_some() && (*class != motion.growing || motion.size(low) > 1);
+            let parts = std::iter::once(None).chain((0..motion.structure.classes.len()).filter(has_differences).map(Some));
+            for part in parts {
+                match motion.decide(low, high, part)? {
                     // One part that grows is enough.
                     Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
                     Some(Proven::Stable) => {}
@@ -142,7 +171,7 @@ impl Followed {
     /// The number of a node that has no limit as N grows, in words.
     fn without_limit(&self) -> Result<Option<String>, ProofError> {
         for motion in &self.motions {
-            let (far, near) = (motion.node(ENDLESS), motion.node(ENDLESS / 2));
+            let [far, near] = [ENDLESS, ENDLESS / 2].map(|number| motion.nodes(number).swap_remove(motion.growing));
             let differs = |far: f64, near: f64| (far - near).abs() > 1e-9 * far.abs().max(near.abs());
             let force = |node: &Node| node.object.only_map().map(|map| map.coefficients().1[1]).ok_or(ProofError::Drift);
             let held = |node: &Node| node.law.held_by().stiffness + node.law.held_by().damping;
@@ -162,52 +191,68 @@ impl Followed {
 }
 
 impl Motion {
-    fn node(&self, number: u64) -> Node {
-        let scene = self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX));
-        self.structure.node(&scene, 0)
+    /// The nodes of all classes.
+    fn nodes(&self, number: u64) -> Vec<Node> {
+        self.structure.nodes(&self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX)))
     }
 
-    /// What is proven of the part in which peers move together, or apart from each other.
-    fn decide(&self, low: u64, high: u64, apart: bool) -> Result<Option<Proven>, ProofError> {
+    /// How many members the class that grows has among that number of peers.
+    fn size(&self, number: u64) -> u64 {
+        number.saturating_sub((self.structure.peers - self.structure.classes[self.growing].len()) as u64)
+    }
+
+    /// The weight of the average of a class (column) in the target of a class (row): a constant, and a multiple of ν.
+    fn weight(&self, row: usize, column: usize) -> (f64, f64) {
+        let classes = &self.structure.classes;
+        let (own, others) = (f64::from(u8::from(row == column)), count(self.structure.peers - classes[self.growing].len()));
+        if column == self.growing { (1.0, 1.0 - others - own) } else { (0.0, count(classes[column].len()) - own) }
+    }
+
+    /// What is proven of the averages of all classes, or of how the members of one differ.
+    fn decide(&self, low: u64, high: u64, apart: Option<usize>) -> Result<Option<Proven>, ProofError> {
+        let structure = &self.structure;
         let numbers = if low == high { vec![low] } else { vec![low, high] };
-        let nodes: Vec<Node> = numbers.iter().map(|number| self.node(*number)).collect();
-        let weight = |place: usize| if apart { -1.0 / (count_of(numbers[place]) - 1.0) } else { 1.0 };
-        let (first, last) = (&nodes[0], &nodes[nodes.len() - 1]);
-        let mut points = vec![Point { nodes: vec![first.clone()], weights: Matrix::from_fn(1, 1, |_, _| weight(0)) }];
-        if last.law != first.law {
-            points = doubled(&points, |point, upper| {
-                let law = if upper { &last.law } else { &first.law };
-                Point { nodes: vec![Node { law: law.clone(), ..point.nodes[0].clone() }], ..point.clone() }
-            });
-        }
-        if apart && numbers.len() > 1 {
-            // What is heard is the weight times the gains: a number of its own beside what holds the copy.
-            points = doubled(&points, |point, upper| {
-                let place = usize::from(upper);
-                let ratio = gain(&nodes[place]) / gain(&point.nodes[0]);
-                let weight = weight(place) * if ratio.is_finite() { ratio } else { 1.0 };
-                Point { weights: Matrix::from_fn(1, 1, |_, _| weight), ..point.clone() }
-            });
-        }
-        if last.coupling != first.coupling {
-            points = doubled(&points, |point, upper| {
-                let coupling = if upper { last.coupling } else { first.coupling };
-                Point { nodes: vec![Node { coupling, ..point.nodes[0].clone() }], ..point.clone() }
-            });
-        }
-        if last.object != first.object {
-            points = doubled(&points, |point, upper| {
-                let object = if upper { last.object } else { first.object };
-                Point { nodes: vec![Node { object, ..point.nodes[0].clone() }], ..point.clone() }
-            });
-        }
-        let timetable: &Timetable = match (apart, &self.structure.apart[0]) {
-            (true, Some(timetable)) => timetable,
-            (true, None) => return Err(ProofError::Numbers),
-            (false, _) => &self.structure.timetable,
+        let ends: Vec<Vec<Node>> = numbers.iter().map(|number| self.nodes(*number)).collect();
+        let time = structure.time(&self.scene, &ends[0]);
+        let ends: Vec<Vec<Node>> = match apart {
+            Some(class) => ends.iter().map(|nodes| vec![nodes[class].clone()]).collect(),
+            None => ends,
         };
-        let common = Common { timetable, tied: apart || self.structure.tied, time: self.structure.time(&self.scene, &nodes) };
-        Ok(decide(&StepSpan::product(&steps(&points, common)?)))
+        let (first, last) = (&ends[0], &ends[ends.len() - 1]);
+        let classes = first.len();
+        let weights = |nu: f64| {
+            Matrix::from_fn(classes, classes, |row, column| {
+                let (constant, slope) = if apart.is_some() { (0.0, -1.0) } else { self.weight(row, column) };
+                constant + slope * nu
+            })
+        };
+        let nu = |place: usize| 1.0 / (count_of(numbers[place]) - 1.0);
+        let at = |upper: bool| if upper { last } else { first };
+        let with = |point: &Point, change: &dyn Fn(usize, &Node) -> Node| {
+            let nodes = point.nodes.iter().enumerate().map(|(class, node)| change(class, node)).collect();
+            Point { nodes, ..point.clone() }
+        };
+        let differ = |of: &dyn Fn(&Node, &Node) -> bool| first.iter().zip(last).any(|(first, last)| of(first, last));
+        let mut points = vec![Point { nodes: first.clone(), weights: weights(nu(0)) }];
+        if differ(&|first, last| first.law != last.law) {
+            points = doubled(&points, |point, upper| with(point, &|class, node| Node { law: at(upper)[class].law.clone(), ..node.clone() }));
+        }
+        if numbers.len() > 1 && weights(0.0) != weights(1.0) {
+            // ν times the gains is a number of its own beside the gains.
+            points = doubled(&points, |point, upper| {
+                let ratio = gain(&at(upper)[0]) / gain(&point.nodes[0]);
+                Point { weights: weights(nu(usize::from(upper)) * if ratio.is_finite() { ratio } else { 1.0 }), ..point.clone() }
+            });
+        }
+        if differ(&|first, last| first.coupling != last.coupling) {
+            points = doubled(&points, |point, upper| with(point, &|class, node| Node { coupling: at(upper)[class].coupling, ..node.clone() }));
+        }
+        let timetable = match apart {
+            Some(class) => structure.apart[class].as_ref().unwrap_or(&structure.timetable),
+            None => &structure.timetable,
+        };
+        let common = Common { timetable, tied: apart.is_some() || structure.tied, time };
+        Ok(decide(&StepSpan::product(&steps(&points, &ends, common)?)))
     }
 }
 

@@ -8,6 +8,7 @@ use super::discs::decide;
 use super::span::StepSpan;
 use super::{Guarantee, ProofError, Proven};
 use crate::analysis::pairs;
+use crate::lifted::Node;
 use crate::network::NominalNetwork;
 use crate::parts::alone;
 use crate::pieces::pieces;
@@ -142,8 +143,9 @@ impl Motion {
         let nodes: Vec<_> = scenes.iter().map(|scene| structure.nodes(scene)).collect();
         let time = structure.time(scenes[0], &nodes[0]);
         let of = |classes: std::ops::Range<usize>, weights: &Matrix, timetable: &Timetable, tied: bool| {
-            let points: Vec<Point> = nodes.iter().map(|nodes| Point { nodes: nodes[classes.clone()].to_vec(), weights: weights.clone() }).collect();
-            Ok::<_, ProofError>(decide(&StepSpan::product(&steps(&points, Common { timetable, tied, time })?)))
+            let ends: Vec<Vec<Node>> = nodes.iter().map(|nodes| nodes[classes.clone()].to_vec()).collect();
+            let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone() }).collect();
+            Ok::<_, ProofError>(decide(&StepSpan::product(&steps(&points, &ends, Common { timetable, tied, time })?)))
         };
         let mut proven = Some(Proven::Stable);
         let mut add = |part: Option<Proven>| {

@@ -129,7 +129,7 @@ fn header(order: &Order, arguments: &MapArguments) -> Result<Vec<String>, Failur
         format!("set {:?}", arguments.scene.overrides.set),
         format!("x {:?}", arguments.x),
         format!("y {:?}", arguments.y),
-        format!("grid {}", arguments.grid),
+        format!("grid {}x{}", order.grid.columns(), order.grid.rows()),
         format!("maps {}", order.variants.len()),
     ];
     for (number, (variant, family)) in order.variants.iter().zip(&order.families).enumerate() {

@@ -47,6 +47,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
     }
     let mut files = Vec::new();
     if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
         for (number, proof) in proofs.iter_mut().enumerate() {
             let name = if number == 0 { "proof.csv".to_owned() } else { format!("proof-{}.csv", number + 1) };
             let path = write_into(folder, &name, table(order, &proof.region))?;

@@ -50,7 +50,7 @@ pub(super) fn of(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorst
         #[serde(flatten)]
         worst: worst.map(|worst| document! { worst_case: worst::document(worst) }),
         #[serde(flatten)]
-        every: every.map(|every| document! { every_number: every_number::document(every) }),
+        every: every.map(|every| document! { every_number: every_number::document(scene, every) }),
         notes: notes(judgement),
     }
 }

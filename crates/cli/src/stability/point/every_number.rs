@@ -25,9 +25,11 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
 }
 
 /// The part of the JSON document.
-pub(super) fn document(every: &EveryNumber) -> impl Serialize + use<> {
+pub(super) fn document(scene: &Scene, every: &EveryNumber) -> impl Serialize + use<> {
     let spans = every.spans.iter().map(|span| document! { from: span.from, to: span.to, verdict: span.guarantee.word() });
     document! {
+        // The first of the equal peers of which there are more and more.
+        peer: scene.peers[every.growing].name.clone(),
         // `to` is `null` where there is no end.
         spans: spans.collect::<Vec<_>>(),
         // What has no limit as N grows; `null` if everything has one, or the numbers end.
@@ -37,8 +39,8 @@ pub(super) fn document(every: &EveryNumber) -> impl Serialize + use<> {
 }
 
 /// The lines below the verdict.
-pub(super) fn words(every: &EveryNumber) -> String {
-    let mut text = "\n  every number N of equal peers, proven:\n".to_owned();
+pub(super) fn words(scene: &Scene, every: &EveryNumber) -> String {
+    let mut text = format!("\n  every number N of peers, of which more and more are equal to {}, proven:\n", scene.peers[every.growing].name);
     for NumberSpan { from, to, guarantee } in &every.spans {
         let numbers = match to {
             None => format!("N >= {from}"),

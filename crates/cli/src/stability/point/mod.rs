@@ -48,7 +48,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         arguments.scene.json,
         DocumentSchema::STABILITY_POINT,
         &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref()),
-        || answer::describe(&scene, &judgement, worst.as_ref()) + &every.as_ref().map(every_number::words).unwrap_or_default(),
+        || answer::describe(&scene, &judgement, worst.as_ref()) + &every.as_ref().map(|every| every_number::words(&scene, every)).unwrap_or_default(),
         output::NO_FILES,
     )?;
     Ok(ExitCode::SUCCESS)

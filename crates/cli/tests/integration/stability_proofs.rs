@@ -1,0 +1,90 @@
+//! `cohaptic stability point --every-number` and `cohaptic stability map --prove`: verdicts on sets of scenes, beside those on single ones.
+
+use crate::desk::Desk;
+use crate::scenes::TWO;
+
+const EQUAL: &str = r#"
+scene = { title = "Equal peers", duration = "1s", count = 3 }
+object = { mass = 0.45, split-mass = false }
+coordination = { strategy = "proportional-derivative", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+link = { delay = "8ms" }
+"#;
+
+const GAINS: &str = "--x coordination.stiffness=100..6000 --y coordination.damping=0..60";
+
+/// Single scenes on either side of each change say what the spans say.
+#[test]
+fn spans_of_numbers_change_where_single_verdicts_do() {
+    let desk = Desk::with("equal.toml", EQUAL);
+    let document = desk.json("stability point equal.toml --every-number 2..200 --json");
+    let spans = document["every_number"]["spans"].as_array().unwrap();
+    assert!(spans.len() > 1 && spans[0]["from"] == 2 && spans.last().unwrap()["to"] == 200, "{document:#}");
+    for span in spans {
+        for end in ["from", "to"] {
+            let single = desk.json(&format!("stability point equal.toml --json --set scene.count={}", span[end]));
+            assert_eq!(single["verdict"], span["verdict"], "{span}");
+        }
+    }
+    let average = "stability point equal.toml --set coordination.strategy=average-position";
+    let text = desk.text(&format!("{average} --every-number"));
+    assert!(text.contains("of which more and more are equal to peer1, proven:\n    stable    for N >= 2\n"), "{text}");
+    let without_end = desk.json(&format!("{average} --every-number 5.. --json"));
+    let expected = serde_json::json!([{ "from": 5, "to": null, "verdict": "stable" }]);
+    assert_eq!((&without_end["every_number"]["spans"], &without_end["every_number"]["without_limit"]), (&expected, &serde_json::Value::Null));
+    let text = desk.text("stability point equal.toml --every-number");
+    assert!(text.contains("note: as N grows, the gains of the coordination grow with N"), "{text}");
+}
+
+#[test]
+fn a_region_is_written_as_boxes_and_pictures_the_same_on_any_number_of_threads() {
+    let desk = Desk::with("equal.toml", EQUAL);
+    let line = |folder: &str, rest: &str| {
+        format!("stability map equal.toml {GAINS} --prove 4 --against coordination.strategy=average-position --out {folder} {rest}")
+    };
+    let document = desk.json(&line("out", "--json --threads 1"));
+    assert_eq!(desk.files("out"), ["proof-2.csv", "proof-2.svg", "proof.csv", "proof.svg"]);
+    desk.text(&line("again", "--threads 3"));
+    for file in desk.files("out") {
+        assert_eq!(desk.read(&format!("out/{file}")), desk.read(&format!("again/{file}")), "{file}");
+    }
+    let regions = document["regions"].as_array().unwrap();
+    let share = |region: usize, key: &str| regions[region][key].as_f64().unwrap();
+    for region in 0..2 {
+        let sum: f64 = ["stable", "unstable", "undecided"].map(|key| share(region, key)).iter().sum();
+        assert!((sum - 1.0).abs() < 1e-12 && share(region, "undecided") < 0.5, "{document:#}");
+    }
+    // Average position is stable wherever proportional-derivative coordination is, and elsewhere.
+    assert!(share(1, "stable_alone") > 0.05 && share(1, "unstable_alone") < 1e-12, "{document:#}");
+    let table = desk.read("out/proof.csv");
+    assert!(
+        table.starts_with("coordination.stiffness from,coordination.stiffness to,coordination.damping from,coordination.damping to,verdict\n"),
+        "{table}"
+    );
+    assert_eq!(table.lines().count() - 1, usize::try_from(regions[0]["boxes"].as_u64().unwrap()).unwrap());
+    assert!(desk.read("out/proof.svg").contains("proven stable"));
+    let text = desk.text(&format!("stability map equal.toml {GAINS} --prove 2"));
+    assert!(text.contains("proven stable ") && text.contains("undecided "), "{text}");
+}
+
+#[test]
+fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
+    let desk = Desk::with("equal.toml", EQUAL);
+    for (line, words) in [
+        ("stability point equal.toml --every-number 1..", "at least 2 peers"),
+        ("stability point equal.toml --every-number 9..8", "the smaller number comes first"),
+        ("stability point equal.toml --every-number some", "expected FROM.. or FROM..TO"),
+        ("stability point equal.toml --every-number --set link.loss=5%", "leave something to chance"),
+        ("stability map equal.toml --x link.delay=0ms..9ms --y coordination.damping=0..9 --prove", "link.delay does more than to set"),
+        ("stability map equal.toml --x link.loss=0%..9% --y coordination.damping=0..9 --prove", "link.loss does more than to set"),
+        ("stability map equal.toml --x object.mass=1..2 --y coordination.damping=0..9", "--grid"),
+        ("stability map equal.toml --x object.mass=1..2 --y coordination.damping=0..9 --prove --grid 2x2", "cannot be used with"),
+        ("stability map equal.toml --x object.mass=1..2 --y coordination.damping=0..9 --prove 99", "99"),
+    ] {
+        desk.cohaptic(line).assert_refused(2, &[words]);
+    }
+    let unequal = Desk::with("two.toml", TWO);
+    unequal
+        .cohaptic("stability point two.toml --every-number --set peers.right.device.mass=0.3")
+        .assert_refused(2, &["two.toml: --every-number: no two peers are equal"]);
+}
