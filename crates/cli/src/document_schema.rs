@@ -19,6 +19,7 @@ impl DocumentSchema {
     pub(crate) const STABILITY_POINT: Self = Self { name: "cohaptic/stability-point", version: 1 };
     pub(crate) const STABILITY_MAP: Self = Self { name: "cohaptic/stability-map", version: 1 };
     pub(crate) const STABILITY_BOUNDARY: Self = Self { name: "cohaptic/stability-boundary", version: 1 };
+    pub(crate) const STABILITY_LINE: Self = Self { name: "cohaptic/stability-line", version: 1 };
     pub(crate) const STABILITY_REGION: Self = Self { name: "cohaptic/stability-region", version: 1 };
     pub(crate) const ADMITTANCE: Self = Self { name: "cohaptic/admittance", version: 1 };
     pub(crate) const LIVE: Self = Self { name: "cohaptic/live", version: 1 };

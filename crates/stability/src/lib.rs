@@ -70,7 +70,10 @@ pub use matrix::Matrix;
 pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square, mean_square_watched, mean_square_within};
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
-pub use proof::{EveryNumber, Guarantee, MOST_HALVINGS, NumberSpan, ProofError, ProvenBox, ProvenRegion, prove_every_number};
+pub use proof::{
+    EveryNumber, Guarantee, MOST_FOLLOWED, MOST_HALVINGS, NumberSpan, ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch,
+    prove_every_number,
+};
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
 pub use watch::{Limits, Unwatched, Watch};

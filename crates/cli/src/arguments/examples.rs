@@ -63,7 +63,7 @@ pub(super) const POINT: &[&str] = &[
 
 pub(super) const MAP: &[&str] = &[
     "cohaptic stability map scene.toml --x object.mass=0.1..2 --y link.delay=0ms..40ms --grid 40x40",
-    "cohaptic stability map scene.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --prove --out proof",
+    "cohaptic stability map scene.toml --x object.mass=0.1..2 --y object.damping=0..10 --prove",
     "cohaptic stability map - --x link.delay=0ms..40ms --y object.mass=0.1..2 --grid 9x9 --out map",
 ];
 

@@ -188,6 +188,9 @@ pub(crate) struct BoundaryArguments {
     /// How exactly a crossing is found, in the unit of the key [default: a billionth of the range; in the mean square a ten-millionth]
     #[arg(long, value_name = "T", value_parser = real, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
+    /// Prove which stretches are stable and which unstable, and enclose every crossing between them. A key that does nothing but set gains, masses and dampings
+    #[arg(long, conflicts_with = "samples")]
+    pub(crate) prove: bool,
     /// How many values are looked at first, the ends among them [default: 400]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(0, u64::MAX))]
     pub(crate) samples: Option<usize>,

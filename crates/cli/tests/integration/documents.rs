@@ -19,6 +19,7 @@ fn a_document_names_its_schema_and_version_before_all_else() {
         ("stability point two.toml --json", "cohaptic/stability-point"),
         ("stability map two.toml --x coordination.stiffness=1..2 --y coordination.damping=0..1 --grid 2x2 --json", "cohaptic/stability-map"),
         ("stability map two.toml --x coordination.stiffness=1..2 --y coordination.damping=0..1 --prove 1 --json", "cohaptic/stability-region"),
+        ("stability boundary two.toml --along coordination.stiffness=1..2 --prove --json", "cohaptic/stability-line"),
         ("stability boundary two.toml --along coordination.stiffness=1..2 --samples 3 --json", "cohaptic/stability-boundary"),
         ("admittance two.toml --peer left --at 1 --json", "cohaptic/admittance"),
         ("link delay 20ms 2ms --packets 1000 --fates fates.csv --json", "cohaptic/link"),

@@ -32,17 +32,53 @@ pub(super) struct Common<'a> {
 /// More numbers than this that vary are refused: a box has two corners to the power of them.
 const MOST_NUMBERS: u32 = 6;
 
+/// What is computed alike at all points.
+struct Frame {
+    plan: Plan,
+    sampling: Sampling,
+    scale: Scale,
+    tied: bool,
+}
+
+impl Frame {
+    fn of(points: &[Point], common: Common<'_>) -> Result<Self, ProofError> {
+        let all: Vec<Node> = points.iter().flat_map(|point| point.nodes.iter().cloned()).collect();
+        let sampling = Sampling::of(&all);
+        let scale = Scale { time: common.time, compliance: points[0].nodes[0].compliance(common.time) };
+        check_units(points, scale)?;
+        Ok(Self { plan: Plan::of(common.timetable, !sampling.is_silent(scale.time)), sampling, scale, tied: common.tied })
+    }
+
+    fn matrices(&self, point: &Point) -> Vec<StepMatrix> {
+        self.plan.matrices(Numbers { nodes: &point.nodes, weights: &point.weights, sampling: self.sampling, scale: self.scale, tied: self.tied })
+    }
+}
+
 /// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set. Bodies are between those of `ends`, whatever those of
 /// the points are.
 pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
-    let all: Vec<Node> = points.iter().flat_map(|point| point.nodes.iter().cloned()).collect();
-    let sampling = Sampling::of(&all);
-    let scale = Scale { time: common.time, compliance: points[0].nodes[0].compliance(common.time) };
-    check_units(points, scale)?;
-    let plan = Plan::of(common.timetable, !sampling.is_silent(scale.time));
-    let matrices = |point: &Point| plan.matrices(Numbers { nodes: &point.nodes, weights: &point.weights, sampling, scale, tied: common.tied });
-    let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(matrices).collect();
+    let frame = Frame::of(points, common)?;
+    let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(|point| frame.matrices(point)).collect();
     Ok((0..corners[0].len()).map(|step| StepSpan::of(corners.iter().map(|steps| &steps[step]))).collect())
+}
+
+/// The steps of a frame whose numbers grow without a limit, each divided by N/N₀: between `near`, points at N₀, and their limit. Steps are affine in N, T = A + N·B, so that N₀/N·T = N₀/N·A + N₀·B lies between
+/// T(N₀) and N₀·B, which is how far `far` is from there, the same points at 2·N₀.
+pub(super) fn steps_beyond(near: &[Point], far: &[Point], common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
+    let all: Vec<Point> = near.iter().chain(far).cloned().collect();
+    let frame = Frame::of(&all, common)?;
+    let [near, far] = [near, far].map(|points| points.iter().map(|point| frame.matrices(point)).collect::<Vec<_>>());
+    let limit = |near: &StepMatrix, far: &StepMatrix| {
+        let (near_matrix, far_matrix) = (&near.matrix, &far.matrix);
+        let matrix = Matrix::from_fn(near_matrix.rows(), near_matrix.columns(), |i, j| far_matrix[(i, j)] - near_matrix[(i, j)]);
+        // The difference rounds once, within the error of the farther.
+        StepMatrix { matrix, error: near.error + 2.0 * far.error }
+    };
+    let span = |step: usize| {
+        let limits: Vec<StepMatrix> = near.iter().zip(&far).map(|(near, far)| limit(&near[step], &far[step])).collect();
+        StepSpan::of(near.iter().map(|steps| &steps[step]).chain(&limits))
+    };
+    Ok((0..near[0].len()).map(span).collect())
 }
 
 /// The points, each at the lower end of one more number and then each at its upper end.

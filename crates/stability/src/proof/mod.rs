@@ -8,6 +8,8 @@
 mod basis;
 mod corners;
 mod discs;
+mod followed;
+mod line;
 mod number;
 mod region;
 mod span;
@@ -15,7 +17,8 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-pub use number::{EveryNumber, NumberSpan, prove_every_number};
+pub use line::{ProvenLine, ProvenStretch};
+pub use number::{EveryNumber, MOST_FOLLOWED, NumberSpan, prove_every_number};
 pub use region::{MOST_HALVINGS, ProvenBox, ProvenRegion};
 
 use cohaptic_scene::Scene;
@@ -73,6 +76,9 @@ pub enum ProofError {
     /// There are not two keys.
     #[error("expected two open keys for a region")]
     Keys,
+    /// There is not one key.
+    #[error("expected one open key for a line")]
+    OneKey,
     /// A key does more than to set numbers.
     #[error(
         "{key} does more than to set gains, masses and dampings, and between two of its values there is no box: vary it by `--curve`, or ask `stability map` without --prove"

@@ -8,7 +8,7 @@
 
 use cohaptic_scene::Scene;
 
-use super::corners::{Common, Point, doubled, steps};
+use super::corners::{Common, Point, doubled, steps, steps_beyond};
 use super::discs::decide;
 use super::span::StepSpan;
 use super::{Guarantee, ProofError, Proven};
@@ -47,7 +47,7 @@ pub struct EveryNumber {
 /// As good as without end: a weight of 1/(N − 1) is below a rounding.
 const ENDLESS: u64 = 1 << 53;
 /// Where nothing has a limit, numbers are followed up to this.
-const MOST_FOLLOWED: u64 = 100_000;
+pub const MOST_FOLLOWED: u64 = 100_000;
 /// More certificates than this are not looked for.
 const MOST_ATTEMPTS: u64 = 200_000;
 
@@ -105,7 +105,11 @@ pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn
         }
     }
     if without_limit.is_some() {
-        spans.push(NumberSpan { from: end + 1, to: None, guarantee: Guarantee::Undecided });
+        let guarantee = if followed.is_unstable_beyond(end)? { Guarantee::Unstable } else { Guarantee::Undecided };
+        match spans.last_mut() {
+            Some(last) if last.guarantee == guarantee => last.to = None,
+            _ => spans.push(NumberSpan { from: end + 1, to: None, guarantee }),
+        }
     }
     Ok(EveryNumber { growing: followed.growing, spans, without_limit, attempts })
 }
@@ -168,6 +172,20 @@ impl Followed {
         Ok(all)
     }
 
+    /// Whether all numbers of peers from one on are proven unstable, where something grows without a limit.
+    fn is_unstable_beyond(&self, from: u64) -> Result<bool, ProofError> {
+        for motion in &self.motions {
+            let parts =
+                std::iter::once(None).chain((0..motion.structure.classes.len()).filter(|class| motion.structure.apart[*class].is_some()).map(Some));
+            for part in parts {
+                if motion.is_unstable_beyond(from, part)? {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
     /// The number of a node that has no limit as N grows, in words.
     fn without_limit(&self) -> Result<Option<String>, ProofError> {
         for motion in &self.motions {
@@ -208,24 +226,81 @@ impl Motion {
         if column == self.growing { (1.0, 1.0 - others - own) } else { (0.0, count(classes[column].len()) - own) }
     }
 
+    /// The nodes of all classes, or that of one.
+    fn part(&self, number: u64, apart: Option<usize>) -> Vec<Node> {
+        let nodes = self.nodes(number);
+        apart.map_or_else(|| nodes.clone(), |class| vec![nodes[class].clone()])
+    }
+
+    fn weights(&self, nu: f64, apart: Option<usize>) -> Matrix {
+        let classes = if apart.is_some() { 1 } else { self.structure.classes.len() };
+        Matrix::from_fn(classes, classes, |row, column| {
+            let (constant, slope) = if apart.is_some() { (0.0, -1.0) } else { self.weight(row, column) };
+            constant + slope * nu
+        })
+    }
+
+    fn common(&self, apart: Option<usize>, time: f64) -> Common<'_> {
+        let timetable = apart.and_then(|class| self.structure.apart[class].as_ref()).unwrap_or(&self.structure.timetable);
+        Common { timetable, tied: apart.is_some() || self.structure.tied, time }
+    }
+
+    /// Whether all numbers of peers from one on are proven unstable in a part of which either the gains of the law or the effects of a force on the copies grow with N, and nothing else changes but
+    /// towards a limit. A frame divided by N/N₀ a step is one of a box then, and what is unstable in it is so without the division.
+    fn is_unstable_beyond(&self, from: u64, apart: Option<usize>) -> Result<bool, ProofError> {
+        let [near, far, end] = [from, 2 * from, ENDLESS].map(|number| self.part(number, apart));
+        let grows = |of: &dyn Fn(&Node) -> f64| of(&end[0]) > 2.0 * of(&far[0]);
+        let force = |node: &Node| node.object.only_map().map_or(0.0, |map| map.coefficients().1[1]);
+        let (law_grows, mass_vanishes) = (grows(&gain), grows(&force));
+        let free = |nodes: &[Node]| nodes.iter().map(|node| node.object.only_map().map(|map| map.coefficients().0)).collect::<Vec<_>>();
+        let has_limits = free(&near) == free(&far)
+            && free(&far) == free(&end)
+            && (mass_vanishes || near.iter().zip(&end).all(|(near, end)| near.object == end.object));
+        let third = self.part(3 * from, apart);
+        let is_affine = |of: &dyn Fn(&Node) -> f64| (of(&third[0]) - 2.0 * of(&far[0]) + of(&near[0])).abs() <= 1e-12 * of(&third[0]).abs();
+        if law_grows == mass_vanishes || !has_limits || !is_affine(&gain) && law_grows || !is_affine(&force) && mass_vanishes {
+            return Ok(false);
+        }
+        let nu = |number: u64| 1.0 / (count_of(number) - 1.0);
+        let heard = [gain(&near[0]) * nu(from), gain(&end[0]) * nu(ENDLESS)];
+        let points = |at: &[Node]| {
+            let mixed = at.iter().zip(&near).map(|(at, near)| Node {
+                object: if mass_vanishes { at.object } else { near.object },
+                law: if law_grows { at.law.clone() } else { near.law.clone() },
+                ..near.clone()
+            });
+            let mut points = vec![Point { nodes: mixed.collect(), weights: self.weights(0.0, apart) }];
+            let with = |point: &Point, change: &dyn Fn(usize, &Node) -> Node| {
+                let nodes = point.nodes.iter().enumerate().map(|(class, node)| change(class, node)).collect();
+                Point { nodes, ..point.clone() }
+            };
+            if !law_grows && near.iter().zip(&end).any(|(near, end)| near.law != end.law) {
+                points = doubled(&points, |point, upper| {
+                    with(point, &|class, node| Node { law: if upper { end[class].law.clone() } else { node.law.clone() }, ..node.clone() })
+                });
+            }
+            points = doubled(&points, |point, upper| Point {
+                weights: self.weights(heard[usize::from(upper)] / gain(&point.nodes[0]), apart),
+                ..point.clone()
+            });
+            if near.iter().zip(&end).any(|(near, end)| near.coupling != end.coupling) {
+                points = doubled(&points, |point, upper| {
+                    with(point, &|class, node| Node { coupling: if upper { end[class].coupling } else { node.coupling }, ..node.clone() })
+                });
+            }
+            points
+        };
+        let time = self.structure.time(&self.scene, &self.nodes(from));
+        let span = StepSpan::product(&steps_beyond(&points(&near), &points(&far), self.common(apart, time))?);
+        Ok(decide(&span) == Some(Proven::Unstable))
+    }
+
     /// What is proven of the averages of all classes, or of how the members of one differ.
     fn decide(&self, low: u64, high: u64, apart: Option<usize>) -> Result<Option<Proven>, ProofError> {
-        let structure = &self.structure;
         let numbers = if low == high { vec![low] } else { vec![low, high] };
-        let ends: Vec<Vec<Node>> = numbers.iter().map(|number| self.nodes(*number)).collect();
-        let time = structure.time(&self.scene, &ends[0]);
-        let ends: Vec<Vec<Node>> = match apart {
-            Some(class) => ends.iter().map(|nodes| vec![nodes[class].clone()]).collect(),
-            None => ends,
-        };
+        let time = self.structure.time(&self.scene, &self.nodes(low));
+        let ends: Vec<Vec<Node>> = numbers.iter().map(|number| self.part(*number, apart)).collect();
         let (first, last) = (&ends[0], &ends[ends.len() - 1]);
-        let classes = first.len();
-        let weights = |nu: f64| {
-            Matrix::from_fn(classes, classes, |row, column| {
-                let (constant, slope) = if apart.is_some() { (0.0, -1.0) } else { self.weight(row, column) };
-                constant + slope * nu
-            })
-        };
         let nu = |place: usize| 1.0 / (count_of(numbers[place]) - 1.0);
         let at = |upper: bool| if upper { last } else { first };
         let with = |point: &Point, change: &dyn Fn(usize, &Node) -> Node| {
@@ -233,26 +308,21 @@ impl Motion {
             Point { nodes, ..point.clone() }
         };
         let differ = |of: &dyn Fn(&Node, &Node) -> bool| first.iter().zip(last).any(|(first, last)| of(first, last));
-        let mut points = vec![Point { nodes: first.clone(), weights: weights(nu(0)) }];
+        let mut points = vec![Point { nodes: first.clone(), weights: self.weights(nu(0), apart) }];
         if differ(&|first, last| first.law != last.law) {
             points = doubled(&points, |point, upper| with(point, &|class, node| Node { law: at(upper)[class].law.clone(), ..node.clone() }));
         }
-        if numbers.len() > 1 && weights(0.0) != weights(1.0) {
+        if numbers.len() > 1 && self.weights(0.0, apart) != self.weights(1.0, apart) {
             // ν times the gains is a number of its own beside the gains.
             points = doubled(&points, |point, upper| {
                 let ratio = gain(&at(upper)[0]) / gain(&point.nodes[0]);
-                Point { weights: weights(nu(usize::from(upper)) * if ratio.is_finite() { ratio } else { 1.0 }), ..point.clone() }
+                Point { weights: self.weights(nu(usize::from(upper)) * if ratio.is_finite() { ratio } else { 1.0 }, apart), ..point.clone() }
             });
         }
         if differ(&|first, last| first.coupling != last.coupling) {
             points = doubled(&points, |point, upper| with(point, &|class, node| Node { coupling: at(upper)[class].coupling, ..node.clone() }));
         }
-        let timetable = match apart {
-            Some(class) => structure.apart[class].as_ref().unwrap_or(&structure.timetable),
-            None => &structure.timetable,
-        };
-        let common = Common { timetable, tied: apart.is_some() || structure.tied, time };
-        Ok(decide(&StepSpan::product(&steps(&points, &ends, common)?)))
+        Ok(decide(&StepSpan::product(&steps(&points, &ends, self.common(apart, time))?)))
     }
 }
 

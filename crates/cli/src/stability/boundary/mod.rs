@@ -2,6 +2,7 @@
 
 mod answer;
 mod files;
+mod prove;
 
 use std::process::ExitCode;
 
@@ -37,6 +38,9 @@ struct Order {
 /// Finds every crossing along a key.
 pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
     let order = Order::new(arguments)?;
+    if arguments.prove {
+        return prove::prove(&order, arguments);
+    }
     let (rows, known) = match &arguments.out {
         None => (None, Vec::new()),
         Some(folder) => RowsFile::open(folder.join(ROWS), &order.header).map(|(rows, known)| (Some(rows), known))?,

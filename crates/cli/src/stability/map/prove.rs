@@ -123,7 +123,7 @@ fn describe(order: &Order, proofs: &[Proof], wall_s: f64) -> String {
         let _ = writeln!(
             text,
             "  {name}proven stable {stable} of the area, proven unstable {unstable}, undecided {undecided} ({})",
-            Counted(proof.region.boxes.len(), "box")
+            Counted(proof.region.boxes.len(), "piece")
         );
         if number > 0 {
             let first = &proofs[0];

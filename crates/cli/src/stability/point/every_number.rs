@@ -51,7 +51,11 @@ pub(super) fn words(scene: &Scene, every: &EveryNumber) -> String {
         let _ = writeln!(text, "    {:<10}for {numbers}", guarantee.word());
     }
     if let Some(what) = &every.without_limit {
-        let _ = writeln!(text, "  note: as N grows, {what}, so that there is no limit from which all beyond could be judged");
+        let _ = writeln!(
+            text,
+            "  note: as N grows, {what}: numbers were followed to {}, and beyond as multiples of that",
+            cohaptic_stability::MOST_FOLLOWED
+        );
     }
     text
 }

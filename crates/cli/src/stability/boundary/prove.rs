@@ -1,0 +1,78 @@
+//! `cohaptic stability boundary --prove`: stretches that are decided throughout, and between them those that hold every crossing.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use cohaptic_stability::{AnalysisError, BoundaryError, Guarantee, ProofError, ProvenLine, ProvenStretch};
+use cohaptic_units::print::{Counted, csv_field};
+use serde::Serialize;
+
+use super::Order;
+use crate::analysis_watch::Interruptible;
+use crate::arguments::BoundaryArguments;
+use crate::document_schema::{DocumentSchema, document};
+use crate::failure::{Failure, not_analysed};
+use crate::file::write_into;
+use crate::output;
+
+/// Proves the line and shows or writes it.
+pub(super) fn prove(order: &Order, arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
+    let line = ProvenLine::prove(&order.family, order.options.tolerance, &Interruptible).map_err(|error| match error {
+        ProofError::Analysis(AnalysisError::Stopped) => Failure::Interrupted("the proof was ended before all stretches were looked at".to_owned()),
+        ProofError::Analysis(error) => not_analysed(&arguments.scene.scene, &error),
+        ProofError::Family(error) => super::failure(arguments, &order.range, BoundaryError::Radius(error)),
+        error => Failure::Input(format!("--prove: {error}")),
+    })?;
+    let mut files = Vec::new();
+    if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
+        files.push(write_into(folder, "proof.csv", table(order, &line))?);
+    }
+    output::answer(arguments.scene.json, DocumentSchema::STABILITY_LINE, &answer(order, &line, &files), || describe(order, &line), &files)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The answer of `cohaptic stability boundary --prove --json`.
+fn answer(order: &Order, line: &ProvenLine, files: &[String]) -> impl Serialize {
+    let stretches = line.stretches.iter().map(|stretch| document! { low: stretch.low, high: stretch.high, verdict: stretch.guarantee.word() });
+    document! {
+        title: order.title.as_str(),
+        key: order.range.key.as_str(),
+        unit: order.range.unit.as_str(),
+        low: order.range.low,
+        high: order.range.high,
+        // Every crossing lies in one that is undecided.
+        stretches: stretches.collect::<Vec<_>>(),
+        tolerance: order.options.tolerance,
+        certificates: line.attempts,
+        files: files,
+    }
+}
+
+fn describe(order: &Order, line: &ProvenLine) -> String {
+    let range = &order.range;
+    let mut text = format!("{}\n\n", order.title);
+    for (place, ProvenStretch { low, high, guarantee }) in line.stretches.iter().enumerate() {
+        let beside = |other: Option<usize>| other.and_then(|other| line.stretches.get(other)).map(|stretch| stretch.guarantee);
+        let between = [beside(place.checked_sub(1)), beside(Some(place + 1))];
+        let words = match (guarantee, between) {
+            (Guarantee::Undecided, [Some(before), Some(after)]) if before != after => "crossing:",
+            (Guarantee::Undecided, _) => "undecided:",
+            (Guarantee::Stable | Guarantee::Unstable, _) => guarantee.word(),
+        };
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "  {words:<10} from {} to {}", range.text(*low), range.text(*high));
+    }
+    let _ = writeln!(text, "  {} looked at; nothing crosses anywhere else", Counted(line.attempts, "piece"));
+    text
+}
+
+/// One row a stretch.
+fn table(order: &Order, line: &ProvenLine) -> String {
+    let key = csv_field(&order.range.key);
+    let mut text = format!("{key} from,{key} to,verdict\n");
+    for ProvenStretch { low, high, guarantee } in &line.stretches {
+        let _ = writeln!(text, "{low:?},{high:?},{}", guarantee.word());
+    }
+    text
+}

@@ -1,0 +1,75 @@
+//! A line along one key: stretches of which each is proven stable or proven unstable, and between them stretches that hold every crossing.
+
+use rayon::prelude::*;
+
+use super::followed::Followed;
+use super::{Guarantee, ProofError};
+use crate::{AnalysisError, Family, Watch};
+
+/// Values of a key from one to another, and what is known of all scenes with them.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct ProvenStretch {
+    /// The least value.
+    pub low: f64,
+    /// The greatest value.
+    pub high: f64,
+    /// What is known; of [`Guarantee::Undecided`], the boundary may be anywhere within, and it is nowhere else.
+    pub guarantee: Guarantee,
+}
+
+/// A range of a key that is covered by stretches.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ProvenLine {
+    /// From the lowest value on; they meet at their ends, and neighbours differ.
+    pub stretches: Vec<ProvenStretch>,
+    /// How many stretches were looked at.
+    pub attempts: usize,
+}
+
+/// More stretches than this are not kept waiting: where an eigenvalue stays at the unit circle, none is ever decided.
+const MOST_WAITING: usize = 1 << 16;
+
+impl ProvenLine {
+    /// Decides a family with one key over its range: stretches that are not decided are halved until they are no longer than `tolerance`, or have no number within. What comes out does not
+    /// depend on the number of threads.
+    ///
+    /// # Errors
+    ///
+    /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings; for scenes of which nothing can be proven; and if the watch ends it.
+    pub fn prove(family: &Family, tolerance: f64, watch: &dyn Watch) -> Result<Self, ProofError> {
+        let [key] = family.keys() else { return Err(ProofError::OneKey) };
+        let followed = Followed::new(family)?;
+        let mut waiting = vec![[key.low, key.high]];
+        let (mut found, mut attempts) = (Vec::new(), 0);
+        while !waiting.is_empty() {
+            let proven = waiting.par_iter().map(|range| {
+                if watch.stops() {
+                    return Err(ProofError::Analysis(AnalysisError::Stopped));
+                }
+                followed.decide(&[*range])
+            });
+            let proven = proven.collect::<Result<Vec<_>, _>>()?;
+            attempts += proven.len();
+            let last = waiting.len() >= MOST_WAITING;
+            let mut next = Vec::new();
+            for ([low, high], proven) in waiting.into_iter().zip(proven) {
+                let middle = low.midpoint(high);
+                if proven.is_none() && !last && high - low > tolerance && low < middle && middle < high {
+                    next.extend([[low, middle], [middle, high]]);
+                } else {
+                    found.push(ProvenStretch { low, high, guarantee: proven.map_or(Guarantee::Undecided, Guarantee::from) });
+                }
+            }
+            waiting = next;
+        }
+        found.sort_by(|one, other| one.low.total_cmp(&other.low));
+        let mut stretches: Vec<ProvenStretch> = Vec::new();
+        for one in found {
+            match stretches.last_mut() {
+                Some(last) if last.guarantee == one.guarantee => last.high = one.high,
+                _ => stretches.push(one),
+            }
+        }
+        Ok(Self { stretches, attempts })
+    }
+}
