@@ -1,6 +1,6 @@
 //! Coordinates in which a matrix is nearly diagonal; nothing here has to be right, since [`super::discs`] checks what comes of them.
 //!
-//! Eigenvectors of the large eigenvalues, one column each. What is left, samples on their way for the most part, has small eigenvalues that are often defective: its invariant subspace gets coordinates
+//! Eigenvectors of the large eigenvalues, one column each. All others, of samples on their way for the most part, are small eigenvalues that are often defective: their invariant subspace gets coordinates
 //! y = R·x of a quadratic form xᵀRᵀRx that falls as fast as those eigenvalues nearly do, in which every entry of it is small.
 
 use faer::c64;
@@ -52,7 +52,7 @@ impl Basis {
 /// The subspace of the eigenvalues below `large`, of that dimension, as columns in which the matrix shrinks it by `fall`.
 fn rest(matrix: &Matrix, large: f64, fall: f64, dimension: usize) -> Option<Matrix> {
     let size = matrix.rows();
-    // It is what is orthogonal to the left eigenvectors of the others.
+    // It is orthogonal to the left eigenvectors of the others.
     let decomposition = dense(&matrix.transposed()).eigen().ok()?;
     let (values, vectors) = (decomposition.S(), decomposition.U());
     let mut others: Vec<Vec<f64>> = Vec::new();

@@ -1,7 +1,7 @@
 //! Boxes of numbers: lifted systems between whose corners every step matrix is multi-affine.
 //!
-//! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of them is monotone in m and in b, so
-//! that the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box.
+//! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of them is monotone in m and in b. So
+//! the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box.
 
 use cohaptic_peer::StepMap;
 
@@ -32,7 +32,7 @@ pub(super) struct Common<'a> {
 /// More numbers than this that vary are refused: a box has two corners to the power of them.
 const MOST_NUMBERS: u32 = 6;
 
-/// What is computed alike at all points.
+/// Parts of the computation that all points share.
 struct Frame {
     plan: Plan,
     sampling: Sampling,

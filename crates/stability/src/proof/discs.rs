@@ -10,8 +10,7 @@
 //! zero, so that as many eigenvalues lie inside as diagonal entries do. With ρ = 1 and all of them inside, every M(s) is **stable**, and (1) holds for larger |z| too; with ρ ≥ 1 and one of them outside for
 //! all s, every M(s) is **unstable**. So it is if (1) holds on a circle around one diagonal entry that moves along with it, outside of the unit circle and away from the others.
 //!
-//! cᵢ(s) = (WMV)ᵢᵢ goes linearly with s but for a radius, so that how near it comes to the circle is known to first order; what is off the diagonal is of first order and counts by the products of two,
-//! since the dᵢ are chosen as well as can be: those for which the comparison matrix of (1) times d is 1.
+//! cᵢ(s) = (WMV)ᵢᵢ goes linearly with s but for a radius, so that how near it comes to the circle is known to first order; entries off the diagonal are of first order and count by the products of two. For the dᵢ are chosen as well as can be: those for which the comparison matrix of (1) times d is 1.
 
 use faer::c64;
 
@@ -21,7 +20,7 @@ use super::span::{StepSpan, absolute};
 use crate::Matrix;
 use crate::worst_case::rounding::{gamma, outward, real};
 
-/// What is proven of all matrices of a box.
+/// The verdict on all matrices of a box.
 pub(super) fn decide(span: &StepSpan) -> Option<Proven> {
     let near = NearlyDiagonal::of(span)?;
     let reaches: Vec<(f64, f64)> =

@@ -1,4 +1,4 @@
-//! A family of scenes with open keys: what is proven of all of them in a box of values.
+//! A family of scenes with open keys, and the verdict on all of them in a box of values.
 
 use cohaptic_scene::Scene;
 
@@ -70,7 +70,7 @@ impl<'a> Followed<'a> {
 }
 
 impl Motion {
-    /// What is proven of the motion between scenes, the corners of a box.
+    /// The verdict on the motion between scenes, the corners of a box.
     fn decide(&self, scenes: &[&Scene]) -> Result<Option<Proven>, ProofError> {
         let structure = &self.structure;
         let nodes: Vec<_> = scenes.iter().map(|scene| structure.nodes(scene)).collect();

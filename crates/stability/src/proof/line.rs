@@ -6,14 +6,14 @@ use super::followed::Followed;
 use super::{Guarantee, ProofError};
 use crate::{AnalysisError, Family, Watch};
 
-/// Values of a key from one to another, and what is known of all scenes with them.
+/// Values of a key from one to another, and the verdict on all scenes with them.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ProvenStretch {
     /// The least value.
     pub low: f64,
     /// The greatest value.
     pub high: f64,
-    /// What is known; of [`Guarantee::Undecided`], the boundary may be anywhere within, and it is nowhere else.
+    /// The verdict; where it is [`Guarantee::Undecided`], the boundary may be anywhere within, and it is nowhere else.
     pub guarantee: Guarantee,
 }
 

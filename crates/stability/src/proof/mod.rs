@@ -3,7 +3,7 @@
 //! A frame of a lifted system is a product of steps ([`steps`]) whose entries are affine in each gain. Over a box of gains it is a mean, a slope along each of them and a small radius ([`span`]), and its
 //! eigenvalues lie in discs that move along ([`discs`]): all inside the unit circle, or one outside, for the whole box. Boxes of which neither can be shown are split.
 //!
-//! Nothing that is looked for has to be right; what is found is checked with bounds of all rounding errors.
+//! Nothing that is looked for has to be right: each finding is checked with bounds of all rounding errors.
 
 mod basis;
 mod corners;
@@ -25,14 +25,14 @@ use cohaptic_scene::Scene;
 
 use crate::{AnalysisError, FamilyError};
 
-/// What is proven of all frames of a box.
+/// A proven verdict on all frames of a box.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Proven {
     Stable,
     Unstable,
 }
 
-/// What is known of a set of scenes.
+/// The verdict on a set of scenes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Guarantee {
     /// Every one is stable: proven.
@@ -113,7 +113,7 @@ pub enum ProofError {
     /// A law uses the ages of samples.
     #[error("the coordination uses the ages of samples, which are no gains: ask `stability point` for single scenes")]
     Ages,
-    /// What is remembered is measured by gains.
+    /// Numbers that a law remembers are measured by gains.
     #[error("the coordination remembers numbers whose unit is a gain that varies: ask `stability point` for single scenes")]
     Remembered,
     /// A body that is tied to ground varies.

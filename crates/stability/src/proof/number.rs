@@ -20,18 +20,18 @@ use crate::pieces::pieces;
 use crate::structure::{Structure, count};
 use crate::{Matrix, Verdict, Watch};
 
-/// Numbers of peers from one to another, ends included, of which the same is known.
+/// Numbers of peers from one to another, ends included, of which one verdict holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NumberSpan {
     /// The least.
     pub from: u64,
     /// The greatest; `None`: all beyond.
     pub to: Option<u64>,
-    /// What is known.
+    /// The verdict on each.
     pub guarantee: Guarantee,
 }
 
-/// What is proven of every number of equal peers.
+/// The verdicts on all numbers of equal peers.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct EveryNumber {
     /// The first of the equal peers of which there are more and more, by its place in [`Scene::peers`].
@@ -75,7 +75,7 @@ pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn
     };
     let mut spans: Vec<NumberSpan> = Vec::new();
     let mut attempts = 0;
-    // From the least number on: what is not decided is halved, and the far half waits.
+    // From the least number on: an undecided span is halved, and the far half waits.
     let mut waiting = vec![(from, end)];
     while let Some((low, high)) = waiting.pop() {
         if watch.stops() {
@@ -246,7 +246,7 @@ impl Motion {
     }
 
     /// Whether all numbers of peers from one on are proven unstable in a part of which either the gains of the law or the effects of a force on the copies grow with N, and nothing else changes but
-    /// towards a limit. A frame divided by N/N₀ a step is one of a box then, and what is unstable in it is so without the division.
+    /// towards a limit. A frame divided by N/N₀ a step is one of a box then, and an unstable one is so without the division.
     fn is_unstable_beyond(&self, from: u64, apart: Option<usize>) -> Result<bool, ProofError> {
         let [near, far, end] = [from, 2 * from, ENDLESS].map(|number| self.part(number, apart));
         let grows = |of: &dyn Fn(&Node) -> f64| of(&end[0]) > 2.0 * of(&far[0]);
@@ -295,7 +295,7 @@ impl Motion {
         Ok(decide(&span) == Some(Proven::Unstable))
     }
 
-    /// What is proven of the averages of all classes, or of how the members of one differ.
+    /// The verdict on the averages of all classes, or on how the members of one differ.
     fn decide(&self, low: u64, high: u64, apart: Option<usize>) -> Result<Option<Proven>, ProofError> {
         let numbers = if low == high { vec![low] } else { vec![low, high] };
         let time = self.structure.time(&self.scene, &self.nodes(low));

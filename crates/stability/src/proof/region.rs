@@ -6,14 +6,14 @@ use super::followed::Followed;
 use super::{Guarantee, ProofError};
 use crate::{AnalysisError, Family, Watch};
 
-/// A box of two keys, and what is known of all scenes in it.
+/// A box of two keys, and the verdict on all scenes in it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ProvenBox {
     /// From which value of the first key to which.
     pub x: [f64; 2],
     /// From which value of the second key to which.
     pub y: [f64; 2],
-    /// What is known.
+    /// The verdict on each.
     pub guarantee: Guarantee,
 }
 
@@ -64,7 +64,7 @@ impl ProvenRegion {
         Ok(Self { boxes, attempts })
     }
 
-    /// What share of the area of the ranges is known to be so; of [`Guarantee::Undecided`] what is not known.
+    /// The share of the area of the ranges with that verdict.
     #[must_use]
     pub fn share(&self, guarantee: Guarantee) -> f64 {
         let area = |boxes: &mut dyn Iterator<Item = &ProvenBox>| boxes.map(|one| (one.x[1] - one.x[0]) * (one.y[1] - one.y[0])).sum::<f64>();

@@ -26,7 +26,7 @@ struct Tick {
 /// What happens at one instant.
 #[derive(Clone, Debug, Default)]
 struct Step {
-    /// What is sampled before anything moves.
+    /// Samples that are taken before anything moves.
     samples: Vec<SampleName>,
     at: u64,
     ticks: Vec<Tick>,

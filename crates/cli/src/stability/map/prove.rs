@@ -27,7 +27,7 @@ struct Proof {
     file: Option<String>,
 }
 
-/// All that a user wants to know of what is proven, in this order.
+/// The shares that an answer has, in this order.
 const GUARANTEES: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided];
 
 /// Proves the region of each variant and shows or writes it.
@@ -90,7 +90,7 @@ fn answer(order: &Order, proofs: &[Proof], halvings: u32, wall_s: f64, files: &[
             undecided: undecided,
             boxes: proof.region.boxes.len(),
             certificates: proof.region.attempts,
-            // Of the area, what is proven stable here and proven unstable for the first, and the other way round.
+            // The share that is proven stable here and proven unstable for the first, and the other way round.
             stable_alone: both(&proof.region, Guarantee::Stable, &proofs[0].region, Guarantee::Unstable),
             unstable_alone: both(&proof.region, Guarantee::Unstable, &proofs[0].region, Guarantee::Stable),
             #[serde(flatten)]
