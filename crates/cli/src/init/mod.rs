@@ -122,12 +122,10 @@ fn fit_ring(scene: &mut Table, peers: usize) {
         Some(_) if most == 0 => {
             scene.remove("topology");
         }
-        Some(topology) => {
-            if topology.get("neighbours").and_then(Value::as_integer).is_some_and(|neighbours| neighbours > most) {
-                topology.insert("neighbours".to_owned(), Value::Integer(most));
-            }
+        Some(topology) if topology.get("neighbours").and_then(Value::as_integer).is_some_and(|neighbours| neighbours > most) => {
+            topology.insert("neighbours".to_owned(), Value::Integer(most));
         }
-        None => {}
+        Some(_) | None => {}
     }
 }
 

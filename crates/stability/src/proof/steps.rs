@@ -170,8 +170,8 @@ impl Plan {
             }
         }
         for name in after {
-            for channel in 0..channels {
-                let (entries, by) = (&store[name][channel], sampling.translation(channel, scale.time));
+            for (channel, entries) in store[name].iter().enumerate() {
+                let by = sampling.translation(channel, scale.time);
                 (0..columns).for_each(|column| matrix[(next, column)] = entries[column] - moved(by, column));
                 next += 1;
             }

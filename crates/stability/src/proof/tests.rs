@@ -7,6 +7,7 @@ use super::discs::decide;
 use super::span::StepSpan;
 use super::steps::StepMatrix;
 use super::*;
+use crate::structure::count;
 use crate::{Family, KeyRange, Matrix, Method, Unwatched, Verdict, analyse};
 
 const SCENE: &str = r#"
@@ -140,7 +141,7 @@ fn no_box_holds_a_point_that_contradicts_it() {
         let mut decided = 0;
         for (number, one) in region.boxes.iter().enumerate().filter(|(_, one)| one.guarantee != Guarantee::Undecided) {
             // Each box has other points, spread by the golden ratio.
-            let share = |place: usize, irrational: f64| ((number + 1) as f64 * (place as f64 + irrational) * 0.618_033_988_749_894_9).fract();
+            let share = |place: usize, irrational: f64| (count(number + 1) * (count(place) + irrational) * 0.618_033_988_749_894_9).fract();
             let between = |[low, high]: [f64; 2], share: f64| (low + share * (high - low)).clamp(low, high);
             let inside = (0..6).map(|place| [between(one.x, share(place, 0.3)), between(one.y, share(place, 0.7))]);
             let corners = [[one.x[0], one.y[0]], [one.x[1], one.y[0]], [one.x[0], one.y[1]], [one.x[1], one.y[1]]];
@@ -184,7 +185,7 @@ fn a_line_encloses_every_crossing() {
         assert!(open.iter().all(|stretch| stretch.high - stretch.low <= 4e-6), "{set:?} {key}: {line:?}");
         let (first, last) = (line.stretches[0], line.stretches[line.stretches.len() - 1]);
         assert_eq!((first.low, last.high), (range.low, range.high));
-        assert!(line.stretches.windows(2).all(|pair| pair[0].high == pair[1].low && pair[0].guarantee != pair[1].guarantee));
+        assert!(line.stretches.windows(2).all(|pair| pair[0].high.to_bits() == pair[1].low.to_bits() && pair[0].guarantee != pair[1].guarantee));
     }
 }
 
@@ -221,8 +222,9 @@ fn the_product_of_the_steps_is_the_frame() {
         let time = structure.time(&scene, std::slice::from_ref(&node));
         for (weight, tied, timetable) in [(1.0, structure.tied, &structure.timetable), (-1.0, true, structure.apart[0].as_ref().unwrap())] {
             let point = corners::Point { nodes: vec![node.clone()], weights: Matrix::from_fn(1, 1, |_, _| weight) };
-            let product =
-                StepSpan::product(&corners::steps(&[point.clone()], &[point.nodes.clone()], corners::Common { timetable, tied, time }).unwrap());
+            let product = StepSpan::product(
+                &corners::steps(std::slice::from_ref(&point), std::slice::from_ref(&point.nodes), corners::Common { timetable, tied, time }).unwrap(),
+            );
             let sampling = crate::lifted::Sampling::of(&point.nodes);
             let lifted = crate::lifted::Lifted { nodes: &point.nodes, weights: &point.weights, timetable, sampling, time, tied };
             let expected = lifted.frame(&mut crate::lifted::frame::Autonomous).monodromy();
@@ -240,6 +242,14 @@ fn the_product_of_the_steps_is_the_frame() {
             assert!(product.radius.largest() < 1e-9, "{set:?}");
         }
     }
+}
+
+/// Samples that move on and are forgotten: all eigenvalues are zero, with a single eigenvector.
+#[test]
+fn a_matrix_without_eigenvalues_but_zero_is_stable() {
+    let moves_on = Matrix::from_fn(5, 5, |row, column| if column == row + 1 { 3.0 } else { 0.0 });
+    assert_eq!(decide(&StepSpan::of([StepMatrix { matrix: moves_on, error: 1e-14 }].iter())), Some(Proven::Stable));
+    assert_eq!(decide(&StepSpan::of([StepMatrix { matrix: Matrix::zeros(2, 2), error: 0.0 }].iter())), Some(Proven::Stable));
 }
 
 fn matrix(size: usize) -> impl Strategy<Value = Matrix> {

@@ -17,12 +17,7 @@ use crate::output;
 
 /// Proves the line and shows or writes it.
 pub(super) fn prove(order: &Order, arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
-    let line = ProvenLine::prove(&order.family, order.options.tolerance, &Interruptible).map_err(|error| match error {
-        ProofError::Analysis(AnalysisError::Stopped) => Failure::Interrupted("the proof was ended before all stretches were looked at".to_owned()),
-        ProofError::Analysis(error) => not_analysed(&arguments.scene.scene, &error),
-        ProofError::Family(error) => super::failure(arguments, &order.range, BoundaryError::Radius(error)),
-        error => Failure::Input(format!("--prove: {error}")),
-    })?;
+    let line = ProvenLine::prove(&order.family, order.options.tolerance, &Interruptible).map_err(|error| failure(order, arguments, error))?;
     let mut files = Vec::new();
     if let Some(folder) = &arguments.out {
         std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
@@ -30,6 +25,18 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments) -> Result<Exit
     }
     output::answer(arguments.scene.json, DocumentSchema::STABILITY_LINE, &answer(order, &line, &files), || describe(order, &line), &files)?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn failure(order: &Order, arguments: &BoundaryArguments, error: ProofError) -> Failure {
+    if let ProofError::Analysis(error) = &error {
+        let ended = || Failure::Interrupted("the proof was ended before all stretches were looked at".to_owned());
+        return if *error == AnalysisError::Stopped { ended() } else { not_analysed(&arguments.scene.scene, error) };
+    }
+    if let ProofError::Family(error) = error {
+        super::failure(arguments, &order.range, BoundaryError::Radius(error))
+    } else {
+        Failure::Input(format!("--prove: {error}"))
+    }
 }
 
 /// The answer of `cohaptic stability boundary --prove --json`.

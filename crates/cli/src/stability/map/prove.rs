@@ -68,12 +68,11 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
 }
 
 fn failure(order: &Order, arguments: &MapArguments, variant: usize, error: ProofError) -> Failure {
-    match error {
-        ProofError::Analysis(AnalysisError::Stopped) => Failure::Interrupted("the proof was ended before all boxes were looked at".to_owned()),
-        ProofError::Analysis(error) => not_analysed(&arguments.scene.scene, &error),
-        ProofError::Family(error) => order.failure(variant, arguments, error.into()),
-        error => Failure::Input(format!("--prove: {error}")),
+    if let ProofError::Analysis(error) = &error {
+        let ended = || Failure::Interrupted("the proof was ended before all boxes were looked at".to_owned());
+        return if *error == AnalysisError::Stopped { ended() } else { not_analysed(&arguments.scene.scene, error) };
     }
+    if let ProofError::Family(error) = error { order.failure(variant, arguments, error.into()) } else { Failure::Input(format!("--prove: {error}")) }
 }
 
 /// The answer of `cohaptic stability map --prove --json`.

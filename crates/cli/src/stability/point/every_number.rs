@@ -17,10 +17,11 @@ use crate::{input, output};
 /// The proof, if it is asked for.
 pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<EveryNumber>, Failure> {
     let Some((from, to)) = arguments.every_number else { return Ok(None) };
-    prove_every_number(scene, from, to, &Interruptible).map(Some).map_err(|error| match error {
-        ProofError::Analysis(AnalysisError::Stopped) => ended(),
-        ProofError::Analysis(error) => not_analysed(path, &error),
-        error => Failure::Input(format!("{}: --every-number: {error}", output::path(input::named(path)))),
+    prove_every_number(scene, from, to, &Interruptible).map(Some).map_err(|error| {
+        if let ProofError::Analysis(error) = &error {
+            return if *error == AnalysisError::Stopped { ended() } else { not_analysed(path, error) };
+        }
+        Failure::Input(format!("{}: --every-number: {error}", output::path(input::named(path))))
     })
 }
 
