@@ -48,7 +48,7 @@ impl Observer for Frames {
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
-        if row.peer == 0 && row.at.as_nanos() % (FRAME_MS * 1_000_000) == 0 {
+        if row.peer == 0 && row.at.as_nanos().is_multiple_of(FRAME_MS * 1_000_000) {
             let turn = row.turn.unwrap().object;
             let [_, x, y, z] = turn.orientation;
             self.0.push(([x, y, z], turn.rate));
