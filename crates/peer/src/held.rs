@@ -335,7 +335,7 @@ mod tests {
         assert_eq!((*held.mean(), *reversed.mean()), (at(0.1), at(0.1)));
     }
 
-    /// Weights 1 and 3: the mean of 0.5·x and 1.5·y, and so are leads; who is not heard has no place.
+    /// Weights 1 and 3: the mean of 0.5·x and 1.5·y, and so are leads; a peer that is not heard has no place.
     #[test]
     fn a_weighted_mean_is_that_of_what_states_weigh() {
         let mut held = Held::of_some([(2, at(4.0)), (7, at(8.0))], Some(vec![0.5, 1.5]));

@@ -275,7 +275,7 @@ impl Rows {
         let Some(topology) = &scene.topology else { return };
         let model = match topology.kind() {
             TopologyKind::Ring { neighbours } => format!("a ring: each hears {neighbours}, half of them on either side"),
-            TopologyKind::Star { hub } => format!("a star: {} hears all others, who hear it alone", scene.peers[hub].name),
+            TopologyKind::Star { hub } => format!("a star: {} hears all others, and each of these hears it alone", scene.peers[hub].name),
             TopologyKind::Graph => format!("a graph of {} neighbours, with their weights", Counted(topology.links() / 2, "pair")),
         };
         self.model("topology", model, "[topology]: links and samples held are those of neighbours, and no others");

@@ -28,6 +28,8 @@ pub struct ProvenRegion {
 
 /// How finely a region is divided at most: each range into two to the power of this.
 pub const MOST_HALVINGS: u32 = 16;
+/// More boxes than this are not kept waiting, and stay undecided: where an eigenvalue stays at the unit circle, none is ever decided.
+const MOST_WAITING: usize = 1 << 21;
 
 impl ProvenRegion {
     /// Decides a family with two keys over their ranges: boxes that are not decided are divided into four, up to `halvings` times. What comes out does not depend on the number of threads.
@@ -49,10 +51,11 @@ impl ProvenRegion {
             });
             let found = found.collect::<Result<Vec<_>, _>>()?;
             attempts += found.len();
+            let is_last = halved >= halvings.min(MOST_HALVINGS) || 4 * found.len() > MOST_WAITING;
             let mut next = Vec::new();
             for ((x, y), proven) in waiting.into_iter().zip(found) {
                 match proven {
-                    None if halved < halvings.min(MOST_HALVINGS) => {
+                    None if !is_last => {
                         let halves = |[low, high]: [f64; 2]| [[low, low.midpoint(high)], [low.midpoint(high), high]];
                         next.extend(halves(y).into_iter().flat_map(|y| halves(x).map(|x| (x, y))));
                     }

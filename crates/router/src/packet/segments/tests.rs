@@ -179,7 +179,7 @@ proptest! {
             let mut bytes = packet.bytes.clone();
             let place = place % bytes.len();
             bytes[place] ^= bits;
-            // Of what is no packet of this kind any more nothing is said here.
+            // Bytes that are no longer a packet of this kind are the subject of another test.
             let (Ok(headers), Content::Ip { headers: before, .. }) = (Headers::read(&bytes), packet.content) else { continue };
             if headers.length == bytes.len() && headers.transport == before.transport && headers.protocol == before.protocol && headers.covered == before.covered {
                 correct(&mut bytes);
@@ -220,7 +220,7 @@ proptest! {
         prop_assert_eq!(&bytes[..Offload::LENGTH], &[0; Offload::LENGTH]);
     }
 
-    /// Random bytes, and a segment with some bytes changed: what comes of them can be handled, and what is no packet is counted as malformed.
+    /// Random bytes, and a segment with some bytes changed: every packet cut from them can be handled, and all other bytes count as malformed.
     #[test]
     fn hostile_bytes_are_refused(
         mut noise in prop::collection::vec(any::<u8>(), 0..200), wanted in wanted(),
