@@ -252,12 +252,27 @@ fn a_matrix_without_eigenvalues_but_zero_is_stable() {
     assert_eq!(decide(&StepSpan::of([StepMatrix { matrix: Matrix::zeros(2, 2), error: 0.0 }].iter())), Some(Proven::Stable));
 }
 
+/// The diagonal stays and the entries beside it vary, with their sign: [a, s·b; s·c, d] has the eigenvalues (a + d)/2 ± √((a − d)²/4 + s²·b·c).
+#[test]
+fn entries_off_the_diagonal_that_vary_are_counted() {
+    let decided = |a: f64, b: f64, c: f64, d: f64| {
+        let at = |s: f64| StepMatrix { matrix: Matrix::from_fn(2, 2, |i, j| [[a, s * b], [s * c, d]][i][j]), error: 1e-15 };
+        decide(&StepSpan::of([at(-1.0), at(1.0)].iter()))
+    };
+    // 0.9 in the middle and 0.9 ± 0.4 at the ends; ± 0.05 stays within.
+    assert_eq!(decided(0.9, 0.4, 0.4, 0.9), None);
+    assert_eq!(decided(0.9, 0.05, 0.05, 0.9), Some(Proven::Stable));
+    // 1.1 in the middle, and a pair of modulus √0.8 at the ends; 1.1 · 0.5 + 0.01 leaves 1.083 outside.
+    assert_eq!(decided(1.1, 0.5, -0.5, 0.5), None);
+    assert_eq!(decided(1.1, 0.1, -0.1, 0.5), Some(Proven::Unstable));
+}
+
 fn matrix(size: usize) -> impl Strategy<Value = Matrix> {
     proptest::collection::vec(-1.0..1.0_f64, size * size).prop_map(move |entries| Matrix::from_fn(size, size, |i, j| entries[i * size + j]))
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Products over a box enclose the products of what is in it, wherever in the box.
     #[test]
