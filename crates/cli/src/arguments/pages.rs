@@ -17,7 +17,7 @@ pub(crate) struct InitArguments {
     #[arg(long, value_name = "NAME", default_value = "paper/5-1")]
     pub(crate) from: String,
     /// How many peers [default: as many as the scene has]. With another number what the scene expects is left out
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=4096))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub(crate) peers: Option<u32>,
     /// Write over a file that is there
     #[arg(long)]

@@ -160,6 +160,9 @@ pub(crate) struct MapArguments {
     /// nothing but set gains, masses and dampings
     #[arg(long, value_name = "HALVINGS", num_args = 0..=1, default_missing_value = "8", conflicts_with = "grid", value_parser = integer::<u32>(0, cohaptic_stability::MOST_HALVINGS.into()))]
     pub(crate) prove: Option<u32>,
+    /// With --prove, write certificate.json into the folder of --out too, and such a file for each further map: all by which the verdicts can be checked without this program. Some 15 kB a box
+    #[arg(long, requires = "prove", requires = "out")]
+    pub(crate) certificate: bool,
     /// Another map in the same picture, with these keys overridden too, again and again:
     /// --curve scene.count=3,coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE,...")]

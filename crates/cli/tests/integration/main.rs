@@ -50,6 +50,7 @@ mod stability_boundary;
 mod stability_chance;
 mod stability_map;
 mod stability_point;
+mod stability_certificates;
 mod stability_proofs;
 mod standard_input;
 #[cfg(target_os = "linux")]

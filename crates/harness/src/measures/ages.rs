@@ -24,10 +24,8 @@ pub(super) struct Ages {
 /// The samples that a peer holds.
 #[derive(Clone, Debug)]
 struct Receiver {
-    /// When each was sampled, in the order of the first arrivals from their senders.
-    sampled: Vec<Instant>,
-    /// The place in that list of each sender, by its place in the scene.
-    places: Vec<Option<usize>>,
+    /// The senders of which it holds one, in ascending order, and when each was sampled: on a topology these are few of all peers.
+    sampled: Vec<(usize, Instant)>,
     /// Σ of these instants \[ns\].
     nanos: u128,
 }
@@ -45,19 +43,23 @@ impl Accumulator for Ages {
     const ROWS: Rows = Rows { ticks: true, holds: true, ..Rows::NONE };
 
     fn new(asked: &Asked<'_>) -> Self {
-        let peers = asked.scene.peers.len();
-        let receiver = Receiver { sampled: Vec::new(), places: vec![None; peers], nanos: 0 };
-        Self { receivers: vec![receiver; peers], nanos: 0, count: 0, sketch: asked.has(Measure::AgeP99).then(QuantileSketch::default) }
+        let receiver = Receiver { sampled: Vec::new(), nanos: 0 };
+        Self {
+            receivers: vec![receiver; asked.scene.peers.len()],
+            nanos: 0,
+            count: 0,
+            sketch: asked.has(Measure::AgeP99).then(QuantileSketch::default),
+        }
     }
 
     fn on_hold(&mut self, row: &HoldRow) {
-        let Receiver { sampled, places, nanos } = &mut self.receivers[row.to];
-        let place = *places[row.from].get_or_insert_with(|| {
-            sampled.push(Instant::ZERO);
-            sampled.len() - 1
+        let Receiver { sampled, nanos } = &mut self.receivers[row.to];
+        let place = sampled.binary_search_by_key(&row.from, |(from, _)| *from).unwrap_or_else(|place| {
+            sampled.insert(place, (row.from, Instant::ZERO));
+            place
         });
-        *nanos = *nanos + u128::from(row.sampled.as_nanos()) - u128::from(sampled[place].as_nanos());
-        sampled[place] = row.sampled;
+        let before = std::mem::replace(&mut sampled[place].1, row.sampled);
+        *nanos = *nanos + u128::from(row.sampled.as_nanos()) - u128::from(before.as_nanos());
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) {
@@ -66,7 +68,7 @@ impl Accumulator for Ages {
         self.nanos += u128::from(held) * u128::from(row.at.as_nanos()) - nanos;
         self.count += held;
         if let Some(sketch) = &mut self.sketch {
-            for sampled in sampled {
+            for (_, sampled) in sampled {
                 sketch.insert(seconds(row.at.as_nanos() - sampled.as_nanos()));
             }
         }

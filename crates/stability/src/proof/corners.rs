@@ -3,11 +3,11 @@
 //! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of them is monotone in m and in b. So
 //! the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box.
 
-use cohaptic_peer::StepMap;
+use cohaptic_peer::{Gains, StepMap};
 
 use super::ProofError;
 use super::span::StepSpan;
-use super::steps::{Numbers, Plan, StepMatrix};
+use super::steps::{FrameState, Numbers, Plan, StepMatrix};
 use crate::Matrix;
 use crate::lifted::node::{Body, Scale};
 use crate::lifted::{Node, Sampling};
@@ -60,6 +60,25 @@ pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) ->
     let frame = Frame::of(points, common)?;
     let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(|point| frame.matrices(point)).collect();
     Ok((0..corners[0].len()).map(|step| StepSpan::of(corners.iter().map(|steps| &steps[step]))).collect())
+}
+
+/// The states of a frame over the box that points enclose.
+pub(super) fn states(points: &[Point], common: Common<'_>) -> Result<States, ProofError> {
+    let frame = Frame::of(points, common)?;
+    let names = frame.plan.states(&points[0].nodes, frame.sampling.channels(), frame.tied);
+    let heard = match frame.sampling {
+        Sampling::Combined(gains) => Some(gains),
+        Sampling::Whole => None,
+    };
+    Ok(States { names, heard })
+}
+
+/// The states of a frame.
+pub(super) struct States {
+    /// In the order of rows and columns.
+    pub(super) names: Vec<FrameState>,
+    /// The gains by which what is heard of a sample is one number; `None`: position and velocity.
+    pub(super) heard: Option<Gains>,
 }
 
 /// The steps of a frame whose numbers grow without a limit, each divided by N/N₀: between `near`, points at N₀, and their limit. Steps are affine in N, T = A + N·B, so that N₀/N·T = N₀/N·A + N₀·B lies between

@@ -20,20 +20,50 @@ use super::span::{StepSpan, absolute};
 use crate::Matrix;
 use crate::worst_case::rounding::{gamma, outward, real};
 
+/// A verdict on all matrices of a box, and the numbers by which anybody can check it.
+pub(super) struct Decision {
+    pub(super) proven: Proven,
+    pub(super) witness: Witness,
+}
+
+/// By which numbers (1) holds; W is the inverse of V.
+#[derive(Clone, Debug)]
+pub(super) struct Witness {
+    /// V.
+    pub(super) coordinates: faer::Mat<c64>,
+    /// d.
+    pub(super) weights: Vec<f64>,
+    pub(super) circle: FreeCircle,
+}
+
+/// The circle on which no matrix of a box has an eigenvalue.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum FreeCircle {
+    /// Around zero, with that radius.
+    AroundZero(f64),
+    /// Around the diagonal entry of that place, with that radius.
+    AroundEntry(usize, f64),
+}
+
 /// The verdict on all matrices of a box.
-pub(super) fn decide(span: &StepSpan) -> Option<Proven> {
+pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     let near = NearlyDiagonal::of(span)?;
     let reaches: Vec<(f64, f64)> =
         (0..near.size()).map(|place| near.reach(near.mean[(place, place)], |slope| slope[(place, place)], near.wide[(place, place)])).collect();
-    if reaches.iter().all(|(_, high)| *high < 1.0) {
-        return near.is_free_of(1.0, &reaches).then_some(Proven::Stable);
-    }
-    let by_circle = circle(&reaches).is_some_and(|circle| near.is_free_of(circle, &reaches));
-    (by_circle || near.has_one_outside(&reaches)).then_some(Proven::Unstable)
+    let (proven, circle, weights) = if reaches.iter().all(|(_, high)| *high < 1.0) {
+        (Proven::Stable, FreeCircle::AroundZero(1.0), near.free_of(1.0, &reaches)?)
+    } else {
+        let by_circle = circle(&reaches).and_then(|circle| Some((FreeCircle::AroundZero(circle), near.free_of(circle, &reaches)?)));
+        let (circle, weights) = by_circle.or_else(|| near.one_outside(&reaches))?;
+        (Proven::Unstable, circle, weights)
+    };
+    Some(Decision { proven, witness: Witness { coordinates: near.coordinates, weights, circle } })
 }
 
 /// W·M·V over a box, nearly diagonal, and W·V, nearly 1.
 struct NearlyDiagonal {
+    /// V.
+    coordinates: faer::Mat<c64>,
     mean: faer::Mat<c64>,
     slopes: Vec<faer::Mat<c64>>,
     /// How far an entry of W·M·V may be from its mean and slopes.
@@ -61,6 +91,7 @@ impl NearlyDiagonal {
             slopes,
             wide: Matrix::from_fn(size, size, |i, j| outward(outward(radius[(i, j)] + rounding * whole[(i, j)]))),
             off_unit: Matrix::from_fn(size, size, |i, j| outward(modulus(unit[(i, j)] - one(i, j)) + rounding * unit_sizes[(i, j)])),
+            coordinates: v,
         })
     }
 
@@ -88,8 +119,8 @@ impl NearlyDiagonal {
         outward(outward(modulus(self.mean[(i, j)]) + moving + self.wide[(i, j)] + self.off_unit[(i, j)] * largest))
     }
 
-    /// Whether (1) holds on the circle of that radius around zero.
-    fn is_free_of(&self, circle: f64, reaches: &[(f64, f64)]) -> bool {
+    /// A d for which (1) holds on the circle of that radius around zero.
+    fn free_of(&self, circle: f64, reaches: &[(f64, f64)]) -> Option<Vec<f64>> {
         let entry = |i: usize, j: usize| {
             let (low, high) = reaches[i];
             let apart = if high < circle { circle - high } else { low - circle };
@@ -98,11 +129,11 @@ impl NearlyDiagonal {
         dominated(&Matrix::from_fn(self.size(), self.size(), entry))
     }
 
-    /// Whether (1) holds on a circle outside of the unit circle around one diagonal entry, which moves along with it and has no other within.
-    fn has_one_outside(&self, reaches: &[(f64, f64)]) -> bool {
+    /// A circle outside of the unit circle around one diagonal entry, which moves along with it and has no other within, and a d for which (1) holds on it.
+    fn one_outside(&self, reaches: &[(f64, f64)]) -> Option<(FreeCircle, Vec<f64>)> {
         let mut outside: Vec<usize> = (0..self.size()).filter(|place| reaches[*place].0 > 1.0 && self.mean[(*place, *place)].im >= 0.0).collect();
         outside.sort_by(|one, other| reaches[*other].0.total_cmp(&reaches[*one].0));
-        outside.into_iter().take(MOST_TRIED).any(|centre| {
+        outside.into_iter().take(MOST_TRIED).find_map(|centre| {
             let between = |place: usize| {
                 let difference = self.mean[(place, place)] - self.mean[(centre, centre)];
                 let wide = self.wide[(place, place)] + self.wide[(centre, centre)];
@@ -116,7 +147,8 @@ impl NearlyDiagonal {
                 let apart = if i == centre { radius - self.wide[(i, i)] } else { apart[i] - radius };
                 if i == j { apart - outward(self.off_unit[(i, i)] * largest) } else { -self.beside(i, j, largest) }
             };
-            radius > 0.0 && dominated(&Matrix::from_fn(self.size(), self.size(), entry))
+            let weights = if radius > 0.0 { dominated(&Matrix::from_fn(self.size(), self.size(), entry)) } else { None };
+            Some((FreeCircle::AroundEntry(centre, radius), weights?))
         })
     }
 }
@@ -141,16 +173,17 @@ fn circle(reaches: &[(f64, f64)]) -> Option<f64> {
     free.map(|(_, circle)| circle)
 }
 
-/// Whether a matrix with no entry above zero off its diagonal has some d > 0 with C·d > 0, rounding included.
-fn dominated(comparison: &Matrix) -> bool {
+/// For a matrix with no entry above zero off its diagonal some d > 0 with C·d > 0, rounding included; `None` if there is none, or none was found.
+fn dominated(comparison: &Matrix) -> Option<Vec<f64>> {
     let size = comparison.rows();
     if !comparison.is_finite() || (0..size).any(|place| comparison[(place, place)] <= 0.0) {
-        return false;
+        return None;
     }
-    let Some(d) = solved(comparison, &Matrix::from_fn(size, 1, |_, _| 1.0)) else { return false };
+    let d = solved(comparison, &Matrix::from_fn(size, 1, |_, _| 1.0))?;
     let column: Vec<f64> = (0..size).map(|place| d[(place, 0)]).collect();
     let sizes = absolute(comparison).times_column(&column);
     // Written so that NaN fails.
-    column.iter().all(|entry| *entry > 0.0)
-        && comparison.times_column(&column).iter().zip(&sizes).all(|(sum, size_of)| *sum > outward(gamma(size + 2) * size_of))
+    let holds = column.iter().all(|entry| *entry > 0.0)
+        && comparison.times_column(&column).iter().zip(&sizes).all(|(sum, size_of)| *sum > outward(gamma(size + 2) * size_of));
+    holds.then_some(column)
 }

@@ -2,7 +2,8 @@
 
 use cohaptic_scene::Scene;
 
-use super::corners::{Common, Point, steps};
+use super::certificate::{BoxCertificate, PartCertificate};
+use super::corners::{Common, Point, states, steps};
 use super::discs::decide;
 use super::span::StepSpan;
 use super::{ProofError, Proven};
@@ -52,13 +53,29 @@ impl<'a> Followed<'a> {
 
     /// What all scenes of a box have in common, from one value to another of each key, if that is proven.
     pub(super) fn decide(&self, ranges: &[[f64; 2]]) -> Result<Option<Proven>, ProofError> {
+        self.decide_with(ranges, None)
+    }
+
+    /// The verdict on a box with all by which it can be checked; `None` if there is none.
+    pub(super) fn certify(&self, ranges: &[[f64; 2]]) -> Result<Option<BoxCertificate>, ProofError> {
+        let mut parts = Vec::new();
+        let Some(proven) = self.decide_with(ranges, Some(&mut parts))? else { return Ok(None) };
+        if proven == Proven::Unstable {
+            // One part that grows is enough.
+            parts.retain(|(of, _)| *of == proven);
+            parts.truncate(1);
+        }
+        Ok(Some(BoxCertificate { ranges: ranges.to_vec(), guarantee: proven.into(), parts: parts.into_iter().map(|(_, part)| part).collect() }))
+    }
+
+    fn decide_with(&self, ranges: &[[f64; 2]], mut certified: Option<&mut Vec<(Proven, PartCertificate)>>) -> Result<Option<Proven>, ProofError> {
         let corner = |place: usize| ranges.iter().enumerate().map(|(key, range)| range[place >> key & 1]).collect::<Vec<f64>>();
         let scenes = (0..1 << ranges.len()).map(|place| self.family.written(&corner(place))).collect::<Result<Vec<Scene>, FamilyError>>()?;
         let all = scenes.iter().map(|scene| pieces(scene, "a proof")).collect::<Result<Vec<_>, _>>()?;
         let mut proven = Some(Proven::Stable);
         for motion in &self.motions {
             let scenes: Vec<&Scene> = all.iter().filter_map(|pieces| pieces.get(motion.piece)).map(|piece| &*piece.scene).collect();
-            match motion.decide(&scenes)? {
+            match motion.decide(&scenes, certified.as_deref_mut())? {
                 // One motion that grows is enough.
                 Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
                 Some(Proven::Stable) => {}
@@ -70,15 +87,23 @@ impl<'a> Followed<'a> {
 }
 
 impl Motion {
-    /// The verdict on the motion between scenes, the corners of a box.
-    fn decide(&self, scenes: &[&Scene]) -> Result<Option<Proven>, ProofError> {
+    /// The verdict on the motion between scenes, the corners of a box, and the certificates of its parts where they are asked for.
+    fn decide(&self, scenes: &[&Scene], mut certified: Option<&mut Vec<(Proven, PartCertificate)>>) -> Result<Option<Proven>, ProofError> {
         let structure = &self.structure;
         let nodes: Vec<_> = scenes.iter().map(|scene| structure.nodes(scene)).collect();
         let time = structure.time(scenes[0], &nodes[0]);
-        let of = |classes: std::ops::Range<usize>, weights: &Matrix, timetable: &Timetable, tied: bool| {
+        let mut of = |apart: Option<usize>, weights: &Matrix, timetable: &Timetable, tied: bool| {
+            let classes = apart.map_or(0..structure.classes.len(), |class| class..class + 1);
             let ends: Vec<Vec<Node>> = nodes.iter().map(|nodes| nodes[classes.clone()].to_vec()).collect();
             let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone() }).collect();
-            Ok::<_, ProofError>(decide(&StepSpan::product(&steps(&points, &ends, Common { timetable, tied, time })?)))
+            let common = Common { timetable, tied, time };
+            let Some(decision) = decide(&StepSpan::product(&steps(&points, &ends, common)?)) else { return Ok(None) };
+            if let Some(certified) = certified.as_deref_mut() {
+                let members = classes.map(|class| structure.classes[class].clone()).collect();
+                let part = PartCertificate::new(members, apart.is_some(), states(&points, common)?, time, &decision.witness);
+                certified.push((decision.proven, part));
+            }
+            Ok::<_, ProofError>(Some(decision.proven))
         };
         let mut proven = Some(Proven::Stable);
         let mut add = |part: Option<Proven>| {
@@ -91,7 +116,7 @@ impl Motion {
         for class in 0..structure.classes.len() {
             if let Some(timetable) = &structure.apart[class] {
                 let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-                add(of(class..class + 1, &weight, timetable, true)?);
+                add(of(Some(class), &weight, timetable, true)?);
             }
             let radii: Vec<_> = scenes.iter().filter_map(|scene| alone(structure, scene, class, 1)).map(|(part, _)| part.radius).collect();
             if let Some(first) = radii.first() {
@@ -99,7 +124,7 @@ impl Motion {
                 add((is_one && first.verdict() == Verdict::Stable).then_some(Proven::Stable));
             }
         }
-        add(of(0..structure.classes.len(), &structure.weights, &structure.timetable, structure.tied)?);
+        add(of(None, &structure.weights, &structure.timetable, structure.tied)?);
         Ok(proven)
     }
 }

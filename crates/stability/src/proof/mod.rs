@@ -6,6 +6,7 @@
 //! Nothing that is looked for has to be right: each finding is checked with bounds of all rounding errors.
 
 mod basis;
+mod certificate;
 mod corners;
 mod discs;
 mod followed;
@@ -17,9 +18,12 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
+pub use certificate::{BoxCertificate, PartCertificate};
+pub use discs::FreeCircle;
 pub use line::{ProvenLine, ProvenStretch};
 pub use number::{EveryNumber, MOST_FOLLOWED, NumberSpan, prove_every_number};
 pub use region::{MOST_HALVINGS, ProvenBox, ProvenRegion};
+pub use steps::FrameState;
 
 use cohaptic_scene::Scene;
 

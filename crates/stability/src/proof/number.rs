@@ -292,7 +292,7 @@ impl Motion {
         };
         let time = self.structure.time(&self.scene, &self.nodes(from));
         let span = StepSpan::product(&steps_beyond(&points(&near), &points(&far), self.common(apart, time))?);
-        Ok(decide(&span) == Some(Proven::Unstable))
+        Ok(decide(&span).is_some_and(|decision| decision.proven == Proven::Unstable))
     }
 
     /// The verdict on the averages of all classes, or on how the members of one differ.
@@ -322,7 +322,7 @@ impl Motion {
         if differ(&|first, last| first.coupling != last.coupling) {
             points = doubled(&points, |point, upper| with(point, &|class, node| Node { coupling: at(upper)[class].coupling, ..node.clone() }));
         }
-        Ok(decide(&StepSpan::product(&steps(&points, &ends, self.common(apart, time))?)))
+        Ok(decide(&StepSpan::product(&steps(&points, &ends, self.common(apart, time))?)).map(|decision| decision.proven))
     }
 }
 

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::followed::Followed;
-use super::{Guarantee, ProofError};
+use super::{BoxCertificate, Guarantee, ProofError};
 use crate::{AnalysisError, Family, Watch};
 
 /// A box of two keys, and the verdict on all scenes in it.
@@ -65,6 +65,23 @@ impl ProvenRegion {
             waiting = next;
         }
         Ok(Self { boxes, attempts })
+    }
+
+    /// The boxes with all by which they can be checked. Each is decided once more.
+    ///
+    /// # Errors
+    ///
+    /// As [`ProvenRegion::prove`], of the family that was proven.
+    pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
+        let followed = Followed::new(family)?;
+        let certificates = self.boxes.par_iter().map(|ProvenBox { x, y, .. }| {
+            if watch.stops() {
+                return Err(ProofError::Analysis(AnalysisError::Stopped));
+            }
+            let ranges = vec![*x, *y];
+            Ok(followed.certify(&ranges)?.unwrap_or(BoxCertificate { ranges, guarantee: Guarantee::Undecided, parts: Vec::new() }))
+        });
+        certificates.collect()
     }
 
     /// The share of the area of the ranges with that verdict.

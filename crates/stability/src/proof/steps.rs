@@ -57,6 +57,41 @@ pub(super) struct StepMatrix {
     pub(super) error: f64,
 }
 
+/// A state of a frame.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum FrameState {
+    /// Of the device of a class: its position, or its velocity.
+    Device {
+        /// The place of the class.
+        class: usize,
+        /// Whether it is the velocity.
+        velocity: bool,
+    },
+    /// Of the copy of a class: its position, or its velocity.
+    Copy {
+        /// The place of the class.
+        class: usize,
+        /// Whether it is the velocity.
+        velocity: bool,
+    },
+    /// A number of a sample of a class.
+    Sample {
+        /// The place of the class.
+        class: usize,
+        /// The last one before the frame is −1, the one before it −2.
+        number: i64,
+        /// Which of its numbers: position and velocity, or the one that is heard.
+        channel: usize,
+    },
+    /// A force that waits, or a number that a law remembers.
+    Other {
+        /// The place of the class.
+        class: usize,
+        /// Which of the numbers of the class.
+        row: usize,
+    },
+}
+
 /// What the operations of a step round, relative to the largest sum of the sizes of the terms of a row: fifteen operations in a row and the coefficients of the step maps, twice for the
 /// difference from the reference. Half of it is left for coefficients that differ by some roundings from those of the numbers meant.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -103,6 +138,24 @@ impl Plan {
         }
         let live = live(&steps, &timetable.sent);
         Self { steps, live }
+    }
+
+    /// The states of the frame, in the order of its rows and columns.
+    pub(super) fn states(&self, nodes: &[Node], channels: usize, tied: bool) -> Vec<FrameState> {
+        let mut names = Vec::new();
+        for (place, node) in nodes.iter().enumerate() {
+            let rows = node.rows(0);
+            let of = |row: usize| match row {
+                _ if rows.device.is_some_and(|device| row < device + 2) => FrameState::Device { class: place, velocity: row == 1 },
+                _ if row < rows.object + 2 => FrameState::Copy { class: place, velocity: row == rows.object + 1 },
+                _ => FrameState::Other { class: place, row },
+            };
+            let reference = (place == 0 && !tied).then_some(rows.object);
+            names.extend((0..node.states()).filter(|row| Some(*row) != reference).map(of));
+        }
+        let samples = self.live[0].iter();
+        names.extend(samples.flat_map(|(class, number)| (0..channels).map(|channel| FrameState::Sample { class: *class, number: *number, channel })));
+        names
     }
 
     /// The matrices of all steps.

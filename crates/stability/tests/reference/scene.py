@@ -92,7 +92,8 @@ def peer(name, table):
         raise ValueError("only linear contacts")
     device = take(table["device"], "mass", "damping")
     coupling = take(table.get("coupling", {"stiffness": 0.0}), "stiffness", "damping", "scaling")
-    arm = take(table.get("hand", {}), "arm", "force").get("arm")
+    # What a hand does is no part of the motion by itself; the arm that does it is.
+    arm = take(table.get("hand", {}), "arm", "force", "follows").get("arm")
     if arm is not None:
         arm = tuple(float(arm[key]) for key in ("mass", "damping", "stiffness"))
     return Peer(
@@ -131,7 +132,12 @@ def link(table):
 
 def parse(text):
     """The scene that a text describes."""
-    root = take(tomllib.loads(text), "scene", "object", "coordination", "peer", "peers", "link", "links")
+    return read(tomllib.loads(text), text)
+
+
+def read(root, text):
+    """The scene that tables describe."""
+    root = take(root, "scene", "object", "coordination", "peer", "peers", "link", "links", "expect")
     head = take(root["scene"], "title", "duration", "seed", "count")
     thing = take(root["object"], "mass", "damping", "split-mass")
     coordination = take(root["coordination"], "strategy", "stiffness", "damping", "update", "scaling", *LAWS)

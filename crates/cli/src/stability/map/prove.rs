@@ -19,6 +19,8 @@ use crate::file::write_into;
 use crate::output::{self, figure};
 use crate::stability::source::axis_of;
 
+mod certificate;
+
 /// A variant, and its proof.
 struct Proof {
     name: String,
@@ -55,6 +57,9 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
             files.push(path);
         }
         files.extend(pictures(order, &proofs, folder, arguments)?);
+        if arguments.certificate {
+            files.extend(certificate::write(order, arguments, &proofs, folder)?);
+        }
     }
     let wall_s = start.elapsed().as_secs_f64();
     output::answer(

@@ -1,0 +1,113 @@
+//! Certificates of `stability map --prove`, checked by a program that shares no code with this one: `crates/stability/tests/reference/check_certificate.py`.
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use crate::desk::Desk;
+
+const EQUAL: &str = r#"
+scene = { title = "Equal peers", duration = "1s", count = 3 }
+object = { mass = 0.45, damping = 0.2 }
+coordination = { strategy = "proportional-derivative", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+link = { delay = "8ms" }
+"#;
+
+/// One peer on an arm, one that touches, and two that do not.
+const UNEQUAL: &str = r#"
+scene = { title = "Four peers", duration = "1s" }
+object = { mass = 0.45, damping = 0.2 }
+coordination = { strategy = "average-position", stiffness = 300.0, damping = 5.0, update = "8ms", scaling = "inverse-n" }
+peer = { contact = "none", device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+peers = [
+    { name = "arm", contact = "grasp", hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 200.0 }, follows = { sine = { amplitude = 0.04, frequency = 0.25, phase = 0.0 } } } },
+    { name = "touches", contact = "grasp" },
+    { name = "third" },
+    { name = "fourth" },
+]
+link = { delay = "13ms" }
+"#;
+
+fn check(desk: &Desk, file: &str) -> Output {
+    let program = concat!(env!("CARGO_MANIFEST_DIR"), "/../stability/tests/reference/check_certificate.py");
+    Command::new("python3").arg(program).arg(desk.path(file)).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap()
+}
+
+/// Whether there is a Python that can check; says so if there is none.
+fn can_check() -> bool {
+    let can = Command::new("python3").args(["-c", "import tomllib"]).output().is_ok_and(|output| output.status.success());
+    if !can {
+        eprintln!("skipped: no python3 of version 3.11 or later was found");
+    }
+    can
+}
+
+#[test]
+fn certificates_hold_for_a_checker_that_shares_no_code() {
+    if !can_check() {
+        return;
+    }
+    for (scene, options) in [
+        (EQUAL, "--x coordination.stiffness=100..1500 --y peer.coupling.stiffness=500..3500 --prove 3"),
+        (EQUAL, "--x coordination.stiffness=100..6000 --y coordination.damping=0..60 --prove 3 --set coordination.strategy=average-position"),
+        (EQUAL, "--x coordination.stiffness=50..300 --y peer.coupling.damping=0..20 --prove 3 --set coordination.damping=0 --set object.damping=15"),
+        (UNEQUAL, "--x coordination.stiffness=20..400 --y peer.coupling.stiffness=500..2500 --prove 3"),
+        (UNEQUAL, "--x coordination.stiffness=20..3000 --y peer.coupling.stiffness=500..2500 --prove 3"),
+    ] {
+        let desk = Desk::with("scene.toml", scene);
+        let document = desk.json(&format!("stability map scene.toml {options} --certificate --out out --json"));
+        let output = check(&desk, "out/certificate.json");
+        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+        assert!(output.status.success(), "{options}: {refusal}");
+        let region = &document["regions"][0];
+        let share = |key: &str| format!("{key} {:.3} %", 100.0 * region[key].as_f64().unwrap());
+        assert!(["stable", "unstable", "undecided"].iter().all(|key| text.contains(&share(key))), "{text} {region}");
+        assert!(region["undecided"].as_f64().unwrap() < 0.9, "{region}");
+    }
+}
+
+/// What a certificate says must be what its numbers show, for the scene that it holds.
+#[test]
+fn a_certificate_that_says_more_than_it_shows_is_refused() {
+    if !can_check() {
+        return;
+    }
+    let desk = Desk::with("scene.toml", EQUAL);
+    desk.text(
+        "stability map scene.toml --x coordination.stiffness=100..4000 --y peer.coupling.stiffness=500..2500 --prove 3 --certificate --out out",
+    );
+    let whole: Value = serde_json::from_str(&desk.read("out/certificate.json")).unwrap();
+    let boxes = whole["boxes"].as_array().unwrap();
+    let of = |verdict: &str| boxes.iter().position(|one| one["verdict"] == verdict).unwrap();
+    let (stable, unstable, undecided) = (of("stable"), of("unstable"), of("undecided"));
+    let parts = |place: usize| whole["boxes"][place]["parts"].clone();
+    let at = |place: usize, key: &str| format!("/boxes/{place}{key}");
+    let scene = |from: &str, to: &str| ("/scene".to_owned(), Value::from(whole["scene"].as_str().unwrap().replace(from, to)));
+    let mut fewer = boxes.clone();
+    fewer.remove(undecided);
+    let changes = [
+        ((at(stable, "/verdict"), "unstable".into()), "not shown to be outside|no eigenvalue is shown"),
+        ((at(unstable, "/verdict"), "stable".into()), "not all eigenvalues"),
+        ((at(undecided, "/verdict"), "stable".into()), "a part of the scene is missing"),
+        ((at(undecided, "/verdict"), "unstable".into()), "no part that grows"),
+        ((at(stable, "/parts"), Value::from(vec![parts(stable)[0].clone()])), "a part of the scene is missing"),
+        ((at(stable, "/parts/0/circle"), serde_json::json!(["around-zero", 1.5])), "not all eigenvalues"),
+        ((at(stable, "/parts/0/coordinates"), parts(stable)[1]["coordinates"].clone()), "expected|not dominant"),
+        ((at(unstable, "/parts/0/circle"), serde_json::json!(["around-zero", 0.9])), "not dominant|no eigenvalue is shown"),
+        (("/boxes".to_owned(), fewer.into()), "nothing covers"),
+        (("/ranges/0/1".to_owned(), 4001.0.into()), "nothing covers"),
+        (scene("delay = \"8ms\"", "delay = \"40ms\""), "not dominant|sample that is missing"),
+        (scene("count = 3", "count = 30"), "classes of peers"),
+        (scene("damping = 0.2", "damping = 900.0"), "not dominant"),
+        (scene("delay = \"8ms\"", "delay = \"8ms\", loss = \"5%\""), "chance"),
+    ];
+    for ((place, value), words) in changes {
+        let mut changed = whole.clone();
+        *changed.pointer_mut(&place).unwrap() = value;
+        desk.write("changed.json", &changed.to_string());
+        let output = check(&desk, "changed.json");
+        let refusal = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");
+    }
+}

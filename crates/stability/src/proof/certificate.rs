@@ -1,0 +1,64 @@
+//! Certificates: the numbers by which anybody can check a proof without the program that found it.
+//!
+//! A certificate names the states of each part of a scene, and for each box of it the coordinates V, the weights d and the circle of [`super::discs`]. Whoever has the scene can write down its matrices and
+//! check inequality (1) there; `crates/stability/tests/reference/check_certificate.py` does.
+
+use std::fmt::Write as _;
+
+use cohaptic_peer::Gains;
+
+use super::Guarantee;
+use super::corners::States;
+use super::discs::{FreeCircle, Witness};
+use super::steps::FrameState;
+
+/// A box of keys, and the numbers by which its verdict can be checked.
+#[derive(Clone, Debug)]
+pub struct BoxCertificate {
+    /// From which value of each key to which.
+    pub ranges: Vec<[f64; 2]>,
+    /// The verdict on each scene within.
+    pub guarantee: Guarantee,
+    /// Of a stable box all parts of the motion but devices that touch nothing; of an unstable one the part that grows; else none.
+    pub parts: Vec<PartCertificate>,
+}
+
+/// A part of the motion of a scene over a box: the averages of its classes of equal peers, or how the members of one of them differ.
+#[derive(Clone, Debug)]
+pub struct PartCertificate {
+    /// The members of each class, by their places in the scene.
+    pub members: Vec<Vec<usize>>,
+    /// Whether it is how the members of a class differ.
+    pub is_difference: bool,
+    /// The states, in the order of rows of the coordinates. Positions are counted from the first copy where nothing ties the scene to ground, and velocities multiplied by `time`.
+    pub states: Vec<FrameState>,
+    /// The gains K and B by which a sample is the one number (K·x + B·v)/(K + B/time); `None`: its position and its velocity.
+    pub heard: Option<Gains>,
+    /// What velocities are multiplied by \[s\].
+    pub time: f64,
+    /// V, column by column, real and imaginary part of each entry, each as sixteen hexadecimal digits of its IEEE 754 representation.
+    pub coordinates: String,
+    /// d, in such digits too.
+    pub weights: String,
+    /// The circle on which there is no eigenvalue.
+    pub circle: FreeCircle,
+}
+
+impl PartCertificate {
+    pub(super) fn new(members: Vec<Vec<usize>>, is_difference: bool, states: States, time: f64, witness: &Witness) -> Self {
+        let v = &witness.coordinates;
+        let entries = (0..v.ncols()).flat_map(|column| (0..v.nrows()).map(move |row| v[(row, column)]));
+        let coordinates = digits(entries.flat_map(|entry| [entry.re, entry.im]));
+        let weights = digits(witness.weights.iter().copied());
+        Self { members, is_difference, states: states.names, heard: states.heard, time, coordinates, weights, circle: witness.circle }
+    }
+}
+
+fn digits(numbers: impl Iterator<Item = f64>) -> String {
+    let mut text = String::new();
+    for number in numbers {
+        // Writing to a string does not fail.
+        let _ = write!(text, "{:016x}", number.to_bits());
+    }
+    text
+}
