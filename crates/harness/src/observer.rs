@@ -291,71 +291,121 @@ impl Observer for NoObserver {
     type Error = std::convert::Infallible;
 }
 
-/// All of an observer but its error, by an observer in a field.
+/// All of an observer but its error, by an observer in a field; `map` makes of the result of each call what it is here.
 macro_rules! observe_by_field {
     ($field:ident) => {
+        $crate::observer::observe_by_field! { $field, |_: &mut Self, result| result }
+    };
+    ($field:ident, $map:expr) => {
         fn wants_ticks(&self) -> bool {
-            $crate::Observer::wants_ticks(&self.$field)
+            self.$field.wants_ticks()
         }
 
         fn wants_packets(&self) -> bool {
-            $crate::Observer::wants_packets(&self.$field)
+            self.$field.wants_packets()
         }
 
         fn wants_steps(&self) -> bool {
-            $crate::Observer::wants_steps(&self.$field)
+            self.$field.wants_steps()
         }
 
         fn wants_instants(&self) -> bool {
-            $crate::Observer::wants_instants(&self.$field)
+            self.$field.wants_instants()
         }
 
         fn wants_sends(&self) -> bool {
-            $crate::Observer::wants_sends(&self.$field)
+            self.$field.wants_sends()
         }
 
         fn wants_holds(&self) -> bool {
-            $crate::Observer::wants_holds(&self.$field)
+            self.$field.wants_holds()
         }
 
         fn on_tick(&mut self, row: &$crate::TickRow<'_>) -> Result<(), Self::Error> {
-            $crate::Observer::on_tick(&mut self.$field, row)
+            let result = self.$field.on_tick(row);
+            ($map)(self, result)
         }
 
         fn on_packet(&mut self, row: &$crate::PacketRow) -> Result<(), Self::Error> {
-            $crate::Observer::on_packet(&mut self.$field, row)
+            let result = self.$field.on_packet(row);
+            ($map)(self, result)
         }
 
         fn on_step(&mut self, row: &$crate::StepRow<'_>) -> Result<(), Self::Error> {
-            $crate::Observer::on_step(&mut self.$field, row)
+            let result = self.$field.on_step(row);
+            ($map)(self, result)
         }
 
         fn on_instant(&mut self, row: &$crate::InstantRow) -> Result<(), Self::Error> {
-            $crate::Observer::on_instant(&mut self.$field, row)
+            let result = self.$field.on_instant(row);
+            ($map)(self, result)
         }
 
         fn on_send(&mut self, row: &$crate::SendRow) -> Result<(), Self::Error> {
-            $crate::Observer::on_send(&mut self.$field, row)
+            let result = self.$field.on_send(row);
+            ($map)(self, result)
         }
 
         fn on_hold(&mut self, row: &$crate::HoldRow) -> Result<(), Self::Error> {
-            $crate::Observer::on_hold(&mut self.$field, row)
+            let result = self.$field.on_hold(row);
+            ($map)(self, result)
         }
 
         fn on_input(&mut self, row: &$crate::live::InputRow<'_>) -> Result<(), Self::Error> {
-            $crate::Observer::on_input(&mut self.$field, row)
+            let result = self.$field.on_input(row);
+            ($map)(self, result)
         }
 
         fn on_ticks(&mut self, ticks: &$crate::Ticks<'_>) -> Result<(), Self::Error> {
-            $crate::Observer::on_ticks(&mut self.$field, ticks)
+            let result = self.$field.on_ticks(ticks);
+            ($map)(self, result)
         }
 
         fn keep_going(&mut self, now: cohaptic_units::Instant) -> bool {
-            $crate::Observer::keep_going(&mut self.$field, now)
+            self.$field.keep_going(now)
         }
     };
 }
 pub(crate) use observe_by_field;
+
+/// The observer has ended the run; [`Erased`] keeps its error.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Ended;
+
+/// Any observer. The loops of a run are compiled for this one alone: a call through a table for each row costs less than the row.
+pub(crate) type AnyObserver<'o> = dyn Observer<Error = Ended> + 'o;
+
+/// An observer without its error, which is kept.
+pub(crate) struct Erased<'o, O: Observer> {
+    observer: &'o mut O,
+    error: Option<O::Error>,
+}
+
+impl<'o, O: Observer> Erased<'o, O> {
+    /// What `run` gives, or the error with which the observer has ended it.
+    pub(crate) fn run<T>(observer: &'o mut O, run: impl FnOnce(&mut AnyObserver<'_>) -> Result<T, Ended>) -> Result<T, O::Error> {
+        let mut erased = Self { observer, error: None };
+        let result = run(&mut erased);
+        match (result, erased.error) {
+            (Ok(value), _) => Ok(value),
+            (Err(Ended), Some(error)) => Err(error),
+            (Err(Ended), None) => unreachable!("only an error of the observer ends a run"),
+        }
+    }
+
+    fn keep(&mut self, result: Result<(), O::Error>) -> Result<(), Ended> {
+        result.map_err(|error| {
+            self.error = Some(error);
+            Ended
+        })
+    }
+}
+
+impl<O: Observer> Observer for Erased<'_, O> {
+    type Error = Ended;
+
+    observe_by_field! { observer, Self::keep }
+}
 
 /// An observer that may be missing.
 impl<O: Observer> Observer for Option<O> {

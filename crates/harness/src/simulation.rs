@@ -7,7 +7,7 @@ use cohaptic_units::Instant;
 
 use crate::arrays::{self, Onlooker, Shape, Ticks};
 use crate::disturbance::Disturbance;
-use crate::observer::{INSTANTS_BETWEEN_QUESTIONS, InstantRow, Observer};
+use crate::observer::{AnyObserver, Ended, Erased, INSTANTS_BETWEEN_QUESTIONS, InstantRow, Observer};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{NoRemote, Remote, Step, Watch, World};
@@ -63,6 +63,17 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     ///
     /// If the scene needs events and has more than 23,170 peers; see [`crate::too_large`].
     pub fn run<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
+        Erased::run(observer, |observer| {
+            if S::OF_SCENE {
+                let Self { scene, model, disturbance, threads, .. } = *self;
+                run_with_strategies_of_scene(&Simulation { scene, model, disturbance, threads, strategies: FromScene }, observer)
+            } else {
+                self.run_observed(observer)
+            }
+        })
+    }
+
+    fn run_observed(&self, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         let watch = Watch::of(observer);
         if let Some((shape, law)) = self.arrays(&plan, watch) {
@@ -76,7 +87,10 @@ impl<'a, S: Strategies> Simulation<'a, S> {
                 }
                 arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now))
             } else {
-                Watching::run(observer, watch, |onlooker| arrays::run_watched(self.scene, (shape, law), &plan, onlooker))?
+                let mut watching = Watching { observer, watch, result: Ok(()) };
+                let summary = arrays::run_watched(self.scene, (shape, law), &plan, &mut watching);
+                watching.result?;
+                summary
             };
             // The counters of queues that have looked ahead are those of a later instant. Rows have none, and are not given twice.
             let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
@@ -85,7 +99,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         self.run_with_events(&plan, observer)
     }
 
-    fn run_with_events<O: Observer>(&self, plan: &Plan, observer: &mut O) -> Result<Summary, O::Error> {
+    fn run_with_events(&self, plan: &Plan, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
         match plan.axes {
             Axes::One => run_to_end(self.world::<1, _>(plan, NoRemote), observer),
             Axes::Two => run_to_end(self.world::<2, _>(plan, NoRemote), observer),
@@ -104,22 +118,19 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     }
 }
 
-/// An observer of a run in arrays, and its error.
-struct Watching<'o, O: Observer> {
-    observer: &'o mut O,
+/// A run with the strategy that its scene names: compiled here, once for all crates.
+fn run_with_strategies_of_scene(simulation: &Simulation<'_>, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
+    simulation.run_observed(observer)
+}
+
+/// An observer of a run in arrays, and whether it has ended the run.
+struct Watching<'o, 'a> {
+    observer: &'o mut AnyObserver<'a>,
     watch: Watch,
-    result: Result<(), O::Error>,
+    result: Result<(), Ended>,
 }
 
-impl<'o, O: Observer> Watching<'o, O> {
-    fn run(observer: &'o mut O, watch: Watch, run: impl FnOnce(&mut dyn Onlooker) -> Summary) -> Result<Summary, O::Error> {
-        let mut watching = Self { observer, watch, result: Ok(()) };
-        let summary = run(&mut watching);
-        watching.result.map(|()| summary)
-    }
-}
-
-impl<O: Observer> Onlooker for Watching<'_, O> {
+impl Onlooker for Watching<'_, '_> {
     fn on_ticks(&mut self, ticks: &Ticks<'_>) {
         if self.watch.ticks {
             self.result = self.observer.on_ticks(ticks);
@@ -139,17 +150,17 @@ impl<O: Observer> Onlooker for Watching<'_, O> {
 }
 
 /// An observer that has seen everything, and is still asked whether to go on.
-struct Asked<'o, O>(&'o mut O);
+struct Asked<'o, 'a>(&'o mut AnyObserver<'a>);
 
-impl<O: Observer> Observer for Asked<'_, O> {
-    type Error = O::Error;
+impl Observer for Asked<'_, '_> {
+    type Error = Ended;
 
     fn keep_going(&mut self, now: Instant) -> bool {
         self.0.keep_going(now)
     }
 }
 
-fn run_to_end<const A: usize, S: Strategy<A>, O: Observer>(mut world: World<A, S>, observer: &mut O) -> Result<Summary, O::Error> {
+fn run_to_end<const A: usize, S: Strategy<A>>(mut world: World<A, S>, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
     let watch = Watch::of(observer);
     loop {
         for _ in 0..INSTANTS_BETWEEN_QUESTIONS {

@@ -14,6 +14,9 @@ pub trait Strategies {
     /// The strategy for A axes.
     type Strategy<const A: usize>: Strategy<A>;
 
+    /// Whether they are [`FromScene`]: what is compiled for that is not compiled again for each crate that runs scenes.
+    const OF_SCENE: bool = false;
+
     /// Makes the strategy of the peer in that place of [`Scene::peers`].
     fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> Self::Strategy<A>;
 
@@ -30,6 +33,8 @@ pub struct FromScene;
 
 impl Strategies for FromScene {
     type Strategy<const A: usize> = BuiltInStrategy<A>;
+
+    const OF_SCENE: bool = true;
 
     fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> BuiltInStrategy<A> {
         scene.coordination.strategy.in_session(&scene.session_parameters(peer))

@@ -26,6 +26,7 @@ mod local_damping;
 mod local_lag;
 mod paper;
 mod passivity_control;
+mod proofs;
 mod regions;
 mod send_when;
 mod set_position;

@@ -6,7 +6,7 @@
 //! **`region-contains`** ("the AP strategy can keep the distributed three-user haptic cooperation stable for stiffer coordination", Section 5.1; Figs. 3, 4). What is stable with PD
 //! is stable with AP. *Regions*:
 //!
-//! 1. BT = BC = 5 N·s/m, KT from 10 to 1000 N/m, KC from 500 to 6000 N/m, delay to 8 ms, N from 3 to 6, whoever touches, both readings of the mass;
+//! 1. BT = BC = 5 N·s/m, KT from 10 to 1000 N/m, KC from 500 to 6000 N/m, delay to 8 ms, N from 3 to 6, whoever touches, both readings of the mass: proven ([`crate::proofs`]), and searched here;
 //! 2. the same with a delay to 8 ms, all touching, and up to 30 % of samples lost, each by itself;
 //! 3. BT = BC = 0, KT to 1000 N/m, delay to 12 ms, all touching.
 //!

@@ -47,10 +47,10 @@ mod run_page;
 mod running;
 mod scenes;
 mod stability_boundary;
+mod stability_certificates;
 mod stability_chance;
 mod stability_map;
 mod stability_point;
-mod stability_certificates;
 mod stability_proofs;
 mod standard_input;
 #[cfg(target_os = "linux")]

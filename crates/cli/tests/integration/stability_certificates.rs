@@ -105,7 +105,7 @@ fn a_certificate_that_says_more_than_it_shows_is_refused() {
     for ((place, value), words) in changes {
         let mut changed = whole.clone();
         *changed.pointer_mut(&place).unwrap() = value;
-        desk.write("changed.json", &changed.to_string());
+        desk.write("changed.json", changed.to_string());
         let output = check(&desk, "changed.json");
         let refusal = String::from_utf8(output.stderr).unwrap();
         assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");

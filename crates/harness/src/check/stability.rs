@@ -15,7 +15,7 @@ use cohaptic_units::Instant;
 
 use super::Finding;
 use crate::disturbance::Disturbance;
-use crate::observer::NoObserver;
+use crate::observer::{Erased, NoObserver};
 use crate::plan::{Model, Plan};
 use crate::simulation::Simulation;
 use crate::world::{NoRemote, Step, Watch, World};
@@ -92,7 +92,7 @@ fn follow<const A: usize>(
     let (mut early, mut late) = (0.0_f64, 0.0_f64);
     let mut steps = 0_u64;
     loop {
-        let (Ok(one), Ok(other)) = (nominal.step(&mut NoObserver, nothing), disturbed.step(&mut NoObserver, nothing));
+        let Ok((one, other)) = Erased::run(&mut NoObserver, |observer| Ok((nominal.step(observer, nothing)?, disturbed.step(observer, nothing)?)));
         if one == Step::Ticked && other == Step::Ticked {
             let size = relative_displacement(&nominal, &disturbed);
             match quarter(nominal.now()) {

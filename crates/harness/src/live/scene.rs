@@ -14,7 +14,7 @@ use super::device::LiveDevice;
 use super::inputs::{Input, InputRow};
 use super::presence::{RemotePeers, Transmit};
 use super::seat::{Presence, SampleError, SeatStats};
-use crate::observer::{Observer, SendRow};
+use crate::observer::{AnyObserver, Ended, Erased, Observer, SendRow};
 use crate::plan::{Model, Plan};
 use crate::simulation::Simulation;
 use crate::summary::{Ending, Summary};
@@ -118,6 +118,16 @@ impl LiveScene {
         datagram: &[u8],
         observer: &mut O,
     ) -> Result<Result<Instant, SampleError>, O::Error> {
+        Erased::run(observer, |observer| self.take_sample(at, peer, datagram, observer))
+    }
+
+    fn take_sample(
+        &mut self,
+        at: Instant,
+        peer: usize,
+        datagram: &[u8],
+        observer: &mut AnyObserver<'_>,
+    ) -> Result<Result<Instant, SampleError>, Ended> {
         let Some(counts) = self.come_in(at, observer)? else { return Ok(Err(SampleError::Ended)) };
         let session = self.session;
         if let Err(error) = each!(&mut self.world, world => world.take_sample(counts, peer, datagram, session)) {
@@ -154,7 +164,7 @@ impl LiveScene {
         if self.link_stats(from, to).is_none() {
             return Ok(None);
         }
-        let Some(at) = self.come_in(at, observer)? else { return Ok(None) };
+        let Some(at) = Erased::run(observer, |observer| self.come_in(at, observer))? else { return Ok(None) };
         each!(&mut self.world, world => world.take_link(at, from, to, model));
         observer.on_input(&InputRow { at, what: Input::Link { from, to, keys } })?;
         Ok(Some(at))
@@ -166,7 +176,7 @@ impl LiveScene {
     ///
     /// That of the observer.
     pub fn handle_timeout<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
-        self.let_happen(now, observer)?;
+        Erased::run(observer, |observer| self.let_happen(now, observer))?;
         self.open = self.open.max(now.saturating_add(NANOSECOND));
         Ok(())
     }
@@ -253,7 +263,7 @@ impl LiveScene {
     }
 
     /// Lets everything before `at` happen, and gives the instant at which what comes in at `at` counts; `None` if the session has ended by then.
-    fn come_in<O: Observer>(&mut self, at: Instant, observer: &mut O) -> Result<Option<Instant>, O::Error> {
+    fn come_in(&mut self, at: Instant, observer: &mut AnyObserver<'_>) -> Result<Option<Instant>, Ended> {
         let at = at.max(self.open);
         if let Some(before) = at.as_nanos().checked_sub(1) {
             self.let_happen(Instant::from_nanos(before), observer)?;
@@ -263,7 +273,7 @@ impl LiveScene {
         Ok(is_open.then_some(at))
     }
 
-    fn let_happen<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
+    fn let_happen(&mut self, now: Instant, observer: &mut AnyObserver<'_>) -> Result<(), Ended> {
         let watch = Watch::of(observer);
         while let Some(at) = self.next_instant().filter(|at| *at <= now) {
             if let Step::Ended(ending) = each!(&mut self.world, world => world.happen(at, observer, watch))? {

@@ -11,7 +11,7 @@ use crate::datagrams::Handle;
 use crate::live::{
     Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, TurnState, UnsimulatedDevice,
 };
-use crate::observer::Observer;
+use crate::observer::{AnyObserver, Ended};
 use crate::plan::ticking;
 use crate::schedule::Schedule;
 
@@ -73,7 +73,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
     }
 
     /// Everything that happens at [`World::next_instant`], which is `at`.
-    pub(crate) fn happen<O: Observer>(&mut self, at: Instant, observer: &mut O, watch: Watch) -> Result<Step, O::Error> {
+    pub(crate) fn happen(&mut self, at: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<Step, Ended> {
         self.remote.undrained = None;
         self.notice_silence(at);
         if at >= self.end {
@@ -252,14 +252,14 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
         })
     }
 
-    fn attend<S: Strategy<A>, O: Observer>(
+    fn attend<S: Strategy<A>>(
         &mut self,
         now: Instant,
         place: usize,
         peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
         axes: usize,
-        observer: &mut O,
-    ) -> Result<(), O::Error> {
+        observer: &mut AnyObserver<'_>,
+    ) -> Result<(), Ended> {
         if let (Some(device), Some(seat)) = (peer.device_mut().hand_mut(), self.seat_mut(place)) {
             let read = device.read(now);
             observer.on_input(&InputRow { at: now, what: Input::Device { peer: place, state: read.as_ref().map(|state| row(state, axes)) } })?;

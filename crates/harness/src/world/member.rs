@@ -10,7 +10,7 @@ use cohaptic_units::Instant;
 
 use super::row;
 use crate::disturbance::Disturbance;
-use crate::observer::{Observer, StepRow, TurnStepRow};
+use crate::observer::{AnyObserver, Ended, StepRow, TurnStepRow};
 use crate::plan::{DeviceChoice, Plan};
 
 /// A peer with its clock.
@@ -57,14 +57,14 @@ impl<const A: usize, D: Device<A>> Device<A> for DeviceModel<A, D> {
 
 impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
     /// Moves to the next tick, with `commanded` the held part of the coordination force that was computed at this one.
-    pub(super) fn advance_watched<O: Observer>(
+    pub(super) fn advance_watched(
         &mut self,
         now: Instant,
         span: Duration,
         commanded: [f64; A],
         (place, axes): (usize, usize),
-        observer: &mut O,
-    ) -> Result<(), O::Error> {
+        observer: &mut AnyObserver<'_>,
+    ) -> Result<(), Ended> {
         let late = std::mem::replace(&mut self.commanded, commanded);
         let coordination = if self.peer.compute_delay() { late } else { commanded };
         let before = self.moved_by_coordination();

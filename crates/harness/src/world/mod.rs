@@ -20,7 +20,7 @@ use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, 
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, TickRow, TurnRow};
+use crate::observer::{AnyObserver, Ended, HoldRow, InstantRow, SendRow, StateRow, TickRow, TurnRow};
 use crate::plan::Plan;
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
@@ -140,7 +140,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// Everything that happens at the next instant at which a peer ticks, or the end of the scene.
-    pub(crate) fn step<O: Observer>(&mut self, observer: &mut O, watch: Watch) -> Result<Step, O::Error> {
+    pub(crate) fn step(&mut self, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<Step, Ended> {
         let Some(now) = self.schedule.next_instant().filter(|now| *now < self.end) else {
             return self.finish(observer, watch).map(Step::Ended);
         };
@@ -207,7 +207,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// Step 1: those whose time it is send their sample to everybody else, or to their neighbours.
-    fn send<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
+    fn send(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
         if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.remote.lead()].tick < self.earliest_send {
             return Ok(());
         }
@@ -285,7 +285,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// Step 2: whatever has arrived is handed to its receiver.
-    fn deliver<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
+    fn deliver(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
         self.network.handle_timeout(now).expect("instants come in order");
         while let Some(event) = self.network.poll_event() {
             if let Fate::Delivered(_) = event.fate {
@@ -325,7 +325,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// Steps 3 and 4: each peer that ticks computes forces and moves to the next tick.
-    fn compute_and_move<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
+    fn compute_and_move(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
         let lockstep = match &mut self.schedule {
             Schedule::Lockstep { tick, next } => {
                 *next = now.saturating_add(*tick);
@@ -426,7 +426,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// The end of the scene: what has arrived by then is delivered.
-    fn finish<O: Observer>(&mut self, observer: &mut O, watch: Watch) -> Result<Ending, O::Error> {
+    fn finish(&mut self, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<Ending, Ended> {
         self.change(self.end);
         self.deliver(self.end, observer, watch)?;
         Ok(if self.finite { Ending::Complete } else { Ending::Diverged(self.end) })

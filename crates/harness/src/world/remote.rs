@@ -7,7 +7,7 @@ use cohaptic_wan::{Damage, PacketEvent, Path};
 
 use super::DeviceModel;
 use crate::datagrams::Handle;
-use crate::observer::Observer;
+use crate::observer::{AnyObserver, Ended};
 
 /// The peers of a running scene that are remote: in other processes, or with their device in somebody's hand.
 ///
@@ -36,14 +36,14 @@ pub(crate) trait Remote<const A: usize> {
     ) -> Option<Result<Reception, ReceiveError>>;
 
     /// Tells a peer that is about to tick the ages of the remote peers; its own device may be one of them.
-    fn attend<S: Strategy<A>, O: Observer>(
+    fn attend<S: Strategy<A>>(
         &mut self,
         now: Instant,
         place: usize,
         peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
         axes: usize,
-        observer: &mut O,
-    ) -> Result<(), O::Error>;
+        observer: &mut AnyObserver<'_>,
+    ) -> Result<(), Ended>;
 }
 
 /// All peers are local: virtual time.
@@ -80,14 +80,14 @@ impl<const A: usize> Remote<A> for NoRemote {
     }
 
     #[inline(always)]
-    fn attend<S: Strategy<A>, O: Observer>(
+    fn attend<S: Strategy<A>>(
         &mut self,
         _now: Instant,
         _place: usize,
         _peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
         _axes: usize,
-        _observer: &mut O,
-    ) -> Result<(), O::Error> {
+        _observer: &mut AnyObserver<'_>,
+    ) -> Result<(), Ended> {
         Ok(())
     }
 }

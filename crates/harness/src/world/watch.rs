@@ -21,7 +21,7 @@ impl Watch {
         Self { ticks: false, instants: false, ..self } == Self::NOTHING
     }
 
-    pub(crate) fn of(observer: &impl Observer) -> Self {
+    pub(crate) fn of(observer: &(impl Observer + ?Sized)) -> Self {
         Self {
             ticks: observer.wants_ticks(),
             packets: observer.wants_packets(),

@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::followed::Followed;
 use super::{Guarantee, ProofError};
-use crate::{AnalysisError, Family, Watch};
+use crate::worst_case::rounding::real;
+use crate::{Family, Watch};
 
 /// Values of a key from one to another, and the verdict on all scenes with them.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -24,6 +25,8 @@ pub struct ProvenLine {
     pub stretches: Vec<ProvenStretch>,
     /// How many stretches were looked at.
     pub attempts: usize,
+    /// Whether nobody ended the proof; if somebody did, stretches that were not looked at are undecided too.
+    pub is_whole: bool,
 }
 
 /// More stretches than this are not kept waiting: where an eigenvalue stays at the unit circle, none is ever decided.
@@ -31,26 +34,30 @@ const MOST_WAITING: usize = 1 << 16;
 
 impl ProvenLine {
     /// Decides a family with one key over its range: stretches that are not decided are halved until they are no longer than `tolerance`, or have no number within. What comes out does not
-    /// depend on the number of threads.
+    /// depend on the number of threads. A stretch is an operation of the watch, which may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings; for scenes of which nothing can be proven; and if the watch ends it.
+    /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings, and for scenes of which nothing can be proven.
     pub fn prove(family: &Family, tolerance: f64, watch: &dyn Watch) -> Result<Self, ProofError> {
         let [key] = family.keys() else { return Err(ProofError::OneKey) };
         let followed = Followed::new(family)?;
         let mut waiting = vec![[key.low, key.high]];
-        let (mut found, mut attempts) = (Vec::new(), 0);
+        let (mut found, mut attempts, mut is_whole) = (Vec::new(), 0, true);
         while !waiting.is_empty() {
+            watch.expects(real(waiting.len()));
             let proven = waiting.par_iter().map(|range| {
                 if watch.stops() {
-                    return Err(ProofError::Analysis(AnalysisError::Stopped));
+                    return Ok(None);
                 }
-                followed.decide(&[*range])
+                let proven = followed.decide(&[*range])?;
+                watch.done(1.0);
+                Ok::<_, ProofError>(proven)
             });
             let proven = proven.collect::<Result<Vec<_>, _>>()?;
             attempts += proven.len();
-            let last = waiting.len() >= MOST_WAITING;
+            is_whole = is_whole && !watch.stops();
+            let last = !is_whole || waiting.len() >= MOST_WAITING;
             let mut next = Vec::new();
             for ([low, high], proven) in waiting.into_iter().zip(proven) {
                 let middle = low.midpoint(high);
@@ -70,6 +77,6 @@ impl ProvenLine {
                 _ => stretches.push(one),
             }
         }
-        Ok(Self { stretches, attempts })
+        Ok(Self { stretches, attempts, is_whole })
     }
 }

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::followed::Followed;
 use super::{BoxCertificate, Guarantee, ProofError};
+use crate::worst_case::rounding::real;
 use crate::{AnalysisError, Family, Watch};
 
 /// A box of two keys, and the verdict on all scenes in it.
@@ -24,6 +25,8 @@ pub struct ProvenRegion {
     pub boxes: Vec<ProvenBox>,
     /// How many boxes were looked at.
     pub attempts: usize,
+    /// Whether nobody ended the proof; if somebody did, boxes that were not looked at are undecided too.
+    pub is_whole: bool,
 }
 
 /// How finely a region is divided at most: each range into two to the power of this.
@@ -33,25 +36,30 @@ const MOST_WAITING: usize = 1 << 21;
 
 impl ProvenRegion {
     /// Decides a family with two keys over their ranges: boxes that are not decided are divided into four, up to `halvings` times. What comes out does not depend on the number of threads.
+    /// A box is an operation of the watch, which may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if there are not two keys that each do nothing but set gains, masses and dampings; for scenes of which nothing can be proven; and if the watch ends it.
+    /// [`ProofError`] if there are not two keys that each do nothing but set gains, masses and dampings, and for scenes of which nothing can be proven.
     pub fn prove(family: &Family, halvings: u32, watch: &dyn Watch) -> Result<Self, ProofError> {
         let [x, y] = family.keys() else { return Err(ProofError::Keys) };
         let followed = Followed::new(family)?;
         let mut waiting = vec![([x.low, x.high], [y.low, y.high])];
-        let (mut boxes, mut attempts) = (Vec::new(), 0);
+        let (mut boxes, mut attempts, mut is_whole) = (Vec::new(), 0, true);
         for halved in 0..=halvings.min(MOST_HALVINGS) {
+            watch.expects(real(waiting.len()));
             let found = waiting.par_iter().map(|(x, y)| {
                 if watch.stops() {
-                    return Err(ProofError::Analysis(AnalysisError::Stopped));
+                    return Ok(None);
                 }
-                followed.decide(&[*x, *y])
+                let proven = followed.decide(&[*x, *y])?;
+                watch.done(1.0);
+                Ok::<_, ProofError>(proven)
             });
             let found = found.collect::<Result<Vec<_>, _>>()?;
             attempts += found.len();
-            let is_last = halved >= halvings.min(MOST_HALVINGS) || 4 * found.len() > MOST_WAITING;
+            is_whole = is_whole && !watch.stops();
+            let is_last = !is_whole || halved >= halvings.min(MOST_HALVINGS) || 4 * found.len() > MOST_WAITING;
             let mut next = Vec::new();
             for ((x, y), proven) in waiting.into_iter().zip(found) {
                 match proven {
@@ -64,20 +72,22 @@ impl ProvenRegion {
             }
             waiting = next;
         }
-        Ok(Self { boxes, attempts })
+        Ok(Self { boxes, attempts, is_whole })
     }
 
     /// The boxes with all by which they can be checked. Each is decided once more.
     ///
     /// # Errors
     ///
-    /// As [`ProvenRegion::prove`], of the family that was proven.
+    /// As [`ProvenRegion::prove`], of the family that was proven, and if the watch ends it.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
         let followed = Followed::new(family)?;
+        watch.expects(real(self.boxes.len()));
         let certificates = self.boxes.par_iter().map(|ProvenBox { x, y, .. }| {
             if watch.stops() {
                 return Err(ProofError::Analysis(AnalysisError::Stopped));
             }
+            watch.done(1.0);
             let ranges = vec![*x, *y];
             Ok(followed.certify(&ranges)?.unwrap_or(BoxCertificate { ranges, guarantee: Guarantee::Undecided, parts: Vec::new() }))
         });

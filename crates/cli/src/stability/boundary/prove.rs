@@ -3,40 +3,33 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use cohaptic_stability::{AnalysisError, BoundaryError, Guarantee, ProofError, ProvenLine, ProvenStretch};
+use cohaptic_stability::{BoundaryError, Guarantee, ProofError, ProvenLine, ProvenStretch};
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 
 use super::Order;
-use crate::analysis_watch::Interruptible;
 use crate::arguments::BoundaryArguments;
 use crate::document_schema::{DocumentSchema, document};
-use crate::failure::{Failure, not_analysed};
+use crate::failure::Failure;
 use crate::file::write_into;
 use crate::output;
+use crate::stability::guarantee::{self, PieceWatch};
 
 /// Proves the line and shows or writes it.
 pub(super) fn prove(order: &Order, arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
-    let line = ProvenLine::prove(&order.family, order.options.tolerance, &Interruptible).map_err(|error| failure(order, arguments, error))?;
+    let line = ProvenLine::prove(&order.family, order.options.tolerance, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
     let mut files = Vec::new();
     if let Some(folder) = &arguments.out {
         std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
         files.push(write_into(folder, "proof.csv", table(order, &line))?);
     }
     output::answer(arguments.scene.json, DocumentSchema::STABILITY_LINE, &answer(order, &line, &files), || describe(order, &line), &files)?;
-    Ok(ExitCode::SUCCESS)
+    if line.is_whole { Ok(ExitCode::SUCCESS) } else { Err(guarantee::ended()) }
 }
 
 fn failure(order: &Order, arguments: &BoundaryArguments, error: ProofError) -> Failure {
-    if let ProofError::Analysis(error) = &error {
-        let ended = || Failure::Interrupted("the proof was ended before all stretches were looked at".to_owned());
-        return if *error == AnalysisError::Stopped { ended() } else { not_analysed(&arguments.scene.scene, error) };
-    }
-    if let ProofError::Family(error) = error {
-        super::failure(arguments, &order.range, BoundaryError::Radius(error))
-    } else {
-        Failure::Input(format!("--prove: {error}"))
-    }
+    let of_family = |error| super::failure(arguments, &order.range, BoundaryError::Radius(error));
+    guarantee::failure(error, "--prove", &arguments.scene.scene, of_family)
 }
 
 /// The answer of `cohaptic stability boundary --prove --json`.
@@ -52,6 +45,8 @@ fn answer(order: &Order, line: &ProvenLine, files: &[String]) -> impl Serialize 
         stretches: stretches.collect::<Vec<_>>(),
         tolerance: order.options.tolerance,
         certificates: line.attempts,
+        // Whether the proof was ended before it had looked at all stretches.
+        interrupted: !line.is_whole,
         files: files,
     }
 }

@@ -11,17 +11,19 @@ use super::ended;
 use crate::analysis_watch::Interruptible;
 use crate::arguments::PointArguments;
 use crate::document_schema::document;
-use crate::failure::{Failure, not_analysed};
+use crate::failure::Failure;
+use crate::stability::guarantee;
 use crate::{input, output};
 
 /// The proof, if it is asked for.
 pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<EveryNumber>, Failure> {
     let Some((from, to)) = arguments.every_number else { return Ok(None) };
     prove_every_number(scene, from, to, &Interruptible).map(Some).map_err(|error| {
-        if let ProofError::Analysis(error) = &error {
-            return if *error == AnalysisError::Stopped { ended() } else { not_analysed(path, error) };
+        if matches!(error, ProofError::Analysis(AnalysisError::Stopped)) {
+            return ended();
         }
-        Failure::Input(format!("{}: --every-number: {error}", output::path(input::named(path))))
+        let option = format!("{}: --every-number", output::path(input::named(path)));
+        guarantee::failure(error, &option, path, |error| Failure::Input(format!("{option}: {error}")))
     })
 }
 

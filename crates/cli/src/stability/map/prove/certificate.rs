@@ -6,17 +6,18 @@ use cohaptic_stability::{BoxCertificate, FrameState, FreeCircle, PartCertificate
 use serde::Serialize;
 
 use super::{Order, Proof, failure};
-use crate::analysis_watch::Interruptible;
 use crate::arguments::MapArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_into;
+use crate::stability::guarantee::PieceWatch;
 
 /// Writes a certificate for each variant, and gives the names of the files.
 pub(super) fn write(order: &Order, arguments: &MapArguments, proofs: &[Proof], folder: &Path) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
+    let watch = PieceWatch::new();
     for (number, (proof, family)) in proofs.iter().zip(&order.families).enumerate() {
-        let boxes = proof.region.certify(family, &Interruptible).map_err(|error| failure(order, arguments, number, error))?;
+        let boxes = proof.region.certify(family, &watch).map_err(|error| failure(order, arguments, number, error))?;
         let overrides = order.variants[number].on_top_of(&arguments.scene.overrides.set);
         let boxes = boxes.iter().map(of_box).collect::<Vec<_>>();
         let (x, y) = (order.x(), order.y());

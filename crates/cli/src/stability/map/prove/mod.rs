@@ -6,17 +6,17 @@ use std::process::ExitCode;
 use std::time::Instant as Clock;
 
 use cohaptic_picture::{Fill, Panel, Picture, Region};
-use cohaptic_stability::{AnalysisError, Guarantee, ProofError, ProvenBox, ProvenRegion};
+use cohaptic_stability::{Guarantee, ProofError, ProvenBox, ProvenRegion};
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 
 use super::Order;
-use crate::analysis_watch::Interruptible;
 use crate::arguments::MapArguments;
 use crate::document_schema::{DocumentSchema, document};
-use crate::failure::{Failure, not_analysed};
+use crate::failure::Failure;
 use crate::file::write_into;
 use crate::output::{self, figure};
+use crate::stability::guarantee::{self, PieceWatch};
 use crate::stability::source::axis_of;
 
 mod certificate;
@@ -36,12 +36,14 @@ const GUARANTEES: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guar
 pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> Result<ExitCode, Failure> {
     let start = Clock::now();
     let threads = usize::from(arguments.threads.unwrap_or(0));
-    let all = || order.families.iter().map(|family| ProvenRegion::prove(family, halvings, &Interruptible)).collect::<Vec<_>>();
+    let watch = PieceWatch::new();
+    let all = || order.families.iter().map(|family| ProvenRegion::prove(family, halvings, &watch)).collect::<Vec<_>>();
     let regions = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(all),
         // Without threads of its own it uses those that there are.
         Err(_) => all(),
     };
+    drop(watch);
     let mut proofs = Vec::new();
     for (variant, region) in order.variants.iter().zip(regions) {
         let region = region.map_err(|error| failure(order, arguments, proofs.len(), error))?;
@@ -57,7 +59,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
             files.push(path);
         }
         files.extend(pictures(order, &proofs, folder, arguments)?);
-        if arguments.certificate {
+        if arguments.certificate && proofs.iter().all(|proof| proof.region.is_whole) {
             files.extend(certificate::write(order, arguments, &proofs, folder)?);
         }
     }
@@ -69,15 +71,11 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
         || describe(order, &proofs, wall_s),
         &files,
     )?;
-    Ok(ExitCode::SUCCESS)
+    if proofs.iter().all(|proof| proof.region.is_whole) { Ok(ExitCode::SUCCESS) } else { Err(guarantee::ended()) }
 }
 
 fn failure(order: &Order, arguments: &MapArguments, variant: usize, error: ProofError) -> Failure {
-    if let ProofError::Analysis(error) = &error {
-        let ended = || Failure::Interrupted("the proof was ended before all boxes were looked at".to_owned());
-        return if *error == AnalysisError::Stopped { ended() } else { not_analysed(&arguments.scene.scene, error) };
-    }
-    if let ProofError::Family(error) = error { order.failure(variant, arguments, error.into()) } else { Failure::Input(format!("--prove: {error}")) }
+    guarantee::failure(error, "--prove", &arguments.scene.scene, |error| order.failure(variant, arguments, error.into()))
 }
 
 /// The answer of `cohaptic stability map --prove --json`.
@@ -94,6 +92,8 @@ fn answer(order: &Order, proofs: &[Proof], halvings: u32, wall_s: f64, files: &[
             undecided: undecided,
             boxes: proof.region.boxes.len(),
             certificates: proof.region.attempts,
+            // Whether the proof was ended before it had looked at all boxes.
+            interrupted: !proof.region.is_whole,
             // The share that is proven stable here and proven unstable for the first, and the other way round.
             stable_alone: both(&proof.region, Guarantee::Stable, &proofs[0].region, Guarantee::Unstable),
             unstable_alone: both(&proof.region, Guarantee::Unstable, &proofs[0].region, Guarantee::Stable),
