@@ -1,6 +1,7 @@
 //! The test bed: what it is made of, and its run.
 
 mod hitting;
+mod names;
 #[cfg(feature = "strategies")]
 mod network;
 mod running;
@@ -17,6 +18,7 @@ use std::time::Duration;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
 pub(crate) use hitting::{add_all, add_function, add_law, add_words};
+pub(crate) use names::{check_name, name_fault, node, path};
 pub use running::Bed;
 
 use crate::artefacts::Artefacts;
@@ -322,45 +324,6 @@ impl From<LinkFile> for Testbed {
         let links = links.into_iter().map(|((from, to), link)| (Path { from: NodeId::new(from), to: NodeId::new(to) }, link)).collect();
         Self { every, links, changes, seed, ..bed }
     }
-}
-
-/// Checks the name of one more host.
-///
-/// # Panics
-///
-/// If it is none, or one of the others has it.
-pub(crate) fn check_name(others: &[String], name: &str) {
-    let fault = name_fault(name);
-    assert!(fault.is_none(), "{}", fault.unwrap_or_default());
-    assert!(!others.iter().any(|other| other == name), "two hosts are called `{name}`");
-}
-
-/// Why a text is no name of a host; `None` if it is one.
-pub(crate) fn name_fault(name: &str) -> Option<String> {
-    let is_word =
-        !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
-    (!is_word).then(|| format!("`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address"))
-}
-
-/// Which of the hosts is called so.
-///
-/// # Panics
-///
-/// If there is none.
-#[expect(clippy::panic, reason = "a misuse, and the way out")]
-pub(crate) fn node(names: &[String], name: &str) -> NodeId {
-    let index = names.iter().position(|known| known == name);
-    NodeId::new(index.unwrap_or_else(|| panic!("there is no host `{name}`; the hosts are {}", names.join(", "))))
-}
-
-/// The path from one host to another.
-///
-/// # Panics
-///
-/// If there is no such host.
-pub(crate) fn path(names: &[String], from: &str, to: &str) -> Path {
-    let [from, to] = [from, to].map(|name| node(names, name));
-    Path { from, to }
 }
 
 /// Takes what was recorded out of a run that ends, however it ends.
