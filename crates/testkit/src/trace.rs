@@ -51,7 +51,7 @@ pub enum Happening {
     Hit {
         /// The packet.
         packet: PacketName,
-        /// What is to become of it.
+        /// The fate that the law wants.
         verdict: Verdict,
     },
     /// A host crashed.

@@ -92,7 +92,7 @@ impl Artefacts {
         }
     }
 
-    /// Writes what happened, and gives what is to be told.
+    /// Writes the record, and gives the lines of the report.
     pub(crate) fn lines(&self, seed: &Seed, hits: &[HitCount], record: impl FnOnce() -> Record) -> Vec<String> {
         let mut lines = Vec::new();
         if self.is_wanted() {

@@ -62,7 +62,7 @@ impl<F: FnMut(&SentPacket<'_>) -> Verdict> PacketLaw for Function<F> {
     }
 }
 
-/// Locks, also after a panic: what is locked here is whole at every instant.
+/// Locks, also after a panic: a law is whole between two calls.
 fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

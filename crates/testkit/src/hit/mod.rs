@@ -82,7 +82,7 @@ pub(crate) use words::parse;
 #[cfg(feature = "strategies")]
 pub(crate) use words::{Action, Which};
 
-/// What is to become of a packet.
+/// The fate that a law wants for a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 #[non_exhaustive]
 pub enum Verdict {
@@ -97,7 +97,7 @@ pub enum Verdict {
     Duplicate(Duration),
     /// This bit is flipped; 0 is the lowest bit of the first byte. Bits are counted on from the beginning beyond the end.
     Corrupt(u64),
-    /// It arrives a nanosecond behind the last of so many packets of its path that arrive after it; if fewer come, it does not arrive.
+    /// It arrives a nanosecond behind the last of this number of packets of its path that arrive after it; if fewer come, it does not arrive.
     Behind(u32),
 }
 
@@ -122,7 +122,7 @@ pub enum Verdict {
 /// let bed = Testbed::new(["a", "b"]).law("a", "b", LongOnes(0.25));
 /// ```
 pub trait PacketLaw {
-    /// What is to become of this packet.
+    /// The fate of this packet.
     ///
     /// `draws` are random numbers of this packet and this law: they depend on the seed, the path, the number of the packet, and the place of the law among those of the
     /// path, and on nothing else, so that what other packets draw changes none of them.

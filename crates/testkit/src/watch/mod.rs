@@ -1,7 +1,7 @@
 //! What spins is found by the wall clock: a thread looks now and then whether what runs in test beds has returned to them.
 //!
-//! A loop that asks the test bed for nothing cannot be interrupted, and so the process ends, after it was told who loops. Whoever returns is never found here: then
-//! the limits on what is done at one instant count.
+//! A loop that asks the test bed for nothing cannot be interrupted, and so the process ends, after the task was named. A task that returns is never found here: then
+//! the limits on polls and calls at one instant count.
 
 mod guard;
 mod thread;
@@ -24,7 +24,7 @@ pub(crate) use guard::limit;
 /// After which span without a return a process ends, unless another one is said.
 pub(crate) const LIMIT: Duration = Duration::from_secs(60);
 
-/// What runs, for the thread that watches. Whoever runs writes, and the other one only reads.
+/// What runs, for the thread that watches. The thread that runs writes, and the other one only reads.
 #[derive(Debug, Default)]
 pub(crate) struct Pulse {
     /// How often something has begun or returned.

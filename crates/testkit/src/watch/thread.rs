@@ -90,7 +90,7 @@ impl Watched {
     fn complaint(&self, running: usize) -> String {
         let shared = self.shared.get().and_then(Weak::upgrade);
         let name = |host: usize| self.hosts.get(host).map_or("?", |name| name);
-        let who = match (self.kind, self.pulse.runner(running)) {
+        let runner = match (self.kind, self.pulse.runner(running)) {
             (Kind::Nodes, _) => format!("node `{}`", name(running.saturating_sub(1))),
             (_, Some(Runner { host: Some(host), origin })) => format!("the task of host `{}` that was spawned at {origin}", name(host.index())),
             (_, Some(Runner { host: None, origin })) => format!("the task that was spawned at {origin}"),
@@ -106,7 +106,7 @@ impl Watched {
             None => "in a step of the run".to_owned(),
         };
         let mut text = format!(
-            "\ntime stands still: {who} has the thread {now} and has not returned for {} by the wall clock. It loops without an `.await`, blocks, or wakes itself again \
+            "\ntime stands still: {runner} has the thread {now} and has not returned for {} by the wall clock. It loops without an `.await`, blocks, or wakes itself again \
              and again\n",
             Span(self.limit)
         );

@@ -11,12 +11,12 @@ use crate::hit::Verdict;
 /// What comes out of a link. Its copies are counted as the links of a network without access lines count them: 0, 1, 2.
 pub(super) type Out<A> = PacketEvent<Parcel<A>, Path>;
 
-/// What is still to be done to packets that were hit.
+/// The packets that were hit and have not arrived.
 #[derive(Clone)]
 pub(super) struct Exits<A> {
     /// The packets that are in their links, by path and number.
     hit: BTreeMap<(Path, u64), Hit>,
-    /// Those that are to arrive, in the order in which a network lets arrive what is due at one instant: so that a replay of the fates has the same order.
+    /// Those that are to arrive, in the order of a network among packets of one instant: so that a replay of the fates has the same order.
     late: BTreeMap<Key, Out<A>>,
     /// By path, those that wait for others, and for how many.
     behind: BTreeMap<Path, Vec<(u32, Out<A>)>>,
