@@ -29,6 +29,7 @@
 //! | sockets, and the addresses and names of hosts | [`UdpSocket`], [`Addresses`], [`AddressPlan`], [`ToSocketAddrs`] |
 //! | timers to the nanosecond | [`time`], [`Instant`] |
 //! | what a link is: words of `tc-netem`, or a model of the emulator | [`ToLink`], [`wan`] |
+//! | single packets that are dropped, delayed, copied, damaged or held back | [`hit`], [`Testbed::on_packet`], [`Testbed::hit`](Testbed::hit()) |
 //! | programs without sockets: state machines | [`node`] |
 #![cfg_attr(feature = "strategies", doc = "| links and networks at random, which shrink to the least impaired | [`strategies`] |")]
 #![cfg_attr(not(feature = "strategies"), doc = "| links and networks at random, which shrink to the least impaired | feature `strategies` |")]
@@ -56,6 +57,7 @@
 //! | variable | says |
 //! | --- | --- |
 //! | [`COHAPTIC_TEST_SEED`](SEED_VARIABLE) | the seed of every test bed of the process |
+//! | [`COHAPTIC_TEST_STALL`](STALL_VARIABLE) | for how long anything may run without returning to the test bed, by the wall clock |
 //! | [`COHAPTIC_TEST_ARTEFACTS`](ARTEFACTS_VARIABLE) | the folder below which every test that fails writes what happened |
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
@@ -65,6 +67,7 @@ mod bed;
 mod context;
 mod core;
 mod file;
+pub mod hit;
 mod host;
 mod link;
 pub mod node;
@@ -81,6 +84,7 @@ pub mod strategies;
 mod task;
 pub mod time;
 mod trace;
+mod watch;
 mod wire;
 mod words;
 
@@ -104,4 +108,5 @@ pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
+pub use watch::STALL_VARIABLE;
 pub use words::WordsError;

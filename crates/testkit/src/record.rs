@@ -8,7 +8,7 @@ use cohaptic_wan::{FateLog, FateLogError, PacketRecord, Path};
 use crate::bed::path;
 use crate::seed::Seed;
 use crate::trace::Trace;
-use crate::wire::Seen;
+use crate::wire::{HitCount, Recorded, Seen};
 
 /// What was recorded of a run: all that happened, and what became of every packet on its link.
 ///
@@ -16,26 +16,29 @@ use crate::wire::Seen;
 #[derive(Clone, Debug)]
 pub struct Record {
     seed: Seed,
-    trace: Trace,
-    packets: Vec<Seen>,
-    ended: Instant,
+    recorded: Recorded,
 }
 
 impl Record {
-    pub(crate) const fn new(seed: Seed, trace: Trace, packets: Vec<Seen>, ended: Instant) -> Self {
-        Self { seed, trace, packets, ended }
+    pub(crate) const fn new(seed: Seed, recorded: Recorded) -> Self {
+        Self { seed, recorded }
+    }
+
+    /// What each law did.
+    pub(crate) fn hits(&self) -> &[HitCount] {
+        &self.recorded.hits
     }
 
     /// All that happened, in order.
     #[must_use]
     pub const fn trace(&self) -> &Trace {
-        &self.trace
+        &self.recorded.trace
     }
 
     /// When the run ended.
     #[must_use]
     pub const fn ended(&self) -> Instant {
-        self.ended
+        self.recorded.ended
     }
 
     pub(crate) const fn seed(&self) -> &Seed {
@@ -50,17 +53,17 @@ impl Record {
     /// If there is no such host.
     #[must_use]
     pub fn fates(&self, from: &str, to: &str) -> FateLog {
-        self.fates_of(path(self.trace.hosts(), from, to))
+        self.fates_of(path(self.recorded.trace.hosts(), from, to))
     }
 
     /// Every path with a packet on its link.
     pub(crate) fn paths(&self) -> Vec<Path> {
-        let paths: BTreeSet<Path> = self.packets.iter().map(|seen| seen.path).collect();
+        let paths: BTreeSet<Path> = self.recorded.packets.iter().map(|seen| seen.path).collect();
         paths.into_iter().collect()
     }
 
     pub(crate) fn packets_of(&self, path: Path) -> impl Iterator<Item = &Seen> {
-        self.packets.iter().filter(move |seen| seen.path == path)
+        self.recorded.packets.iter().filter(move |seen| seen.path == path)
     }
 
     /// What became of the packets of a path.

@@ -1,5 +1,8 @@
 //! The seed of a test.
 
+use std::any::type_name;
+use std::fmt;
+use std::panic::Location;
 use std::thread;
 
 /// This variable of the environment sets the seed of every test bed of a process, whatever the tests say.
@@ -13,27 +16,71 @@ pub(crate) struct Seed {
 }
 
 impl Seed {
-    /// What the environment says; what the test says; else one that is made of the test's name, so that it is the same in every run, and another for every test.
+    /// What the environment says; what the test says; else one that is made of the place, so that it is the same in every run, and another for every test.
     ///
     /// # Panics
     ///
     /// If what the environment says is no number.
-    pub(crate) fn choose(said: Option<u64>) -> Self {
+    pub(crate) fn choose(said: Option<u64>, place: &Place) -> Self {
         let value = std::env::var(SEED_VARIABLE).ok();
-        Self::of(value.as_deref(), said, thread::current().name().unwrap_or("main"))
+        Self::of(value.as_deref(), said, place, thread::current().name())
     }
 
     #[expect(clippy::panic, reason = "a test that is not run with the seed that was asked for is worse than none")]
-    fn of(environment: Option<&str>, said: Option<u64>, test: &str) -> Self {
+    fn of(environment: Option<&str>, said: Option<u64>, place: &Place, thread: Option<&str>) -> Self {
         let asked =
             environment.map(|text| number(text).unwrap_or_else(|| panic!("{SEED_VARIABLE} is `{text}`; expected a number from 0 to {}", u64::MAX)));
-        Self { value: asked.or(said).unwrap_or_else(|| hash(test.as_bytes())), test: test.to_owned() }
+        // The main thread has the name of no test.
+        let test = thread.filter(|name| *name != "main").unwrap_or(&place.function);
+        Self { value: asked.or(said).unwrap_or_else(|| hash(place.to_string().as_bytes())), test: test.to_owned() }
     }
 
     /// What to do to see it again.
     pub(crate) fn advice(&self) -> String {
         format!("test bed of `{}`: seed {}; {SEED_VARIABLE}={} runs it again", self.test, self.value, self.value)
     }
+}
+
+/// Where a test bed is run: what does not depend on threads, machines, or edits elsewhere.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Place {
+    file: String,
+    /// The function in which the program stands, by its path; or the line and the column.
+    function: String,
+}
+
+impl Place {
+    /// Where the caller runs this program. Lines are left out: an edit above would change the seeds of all tests below.
+    #[track_caller]
+    pub(crate) fn of<P>(_program: &P) -> Self {
+        Self { file: file(Location::caller().file()), function: function(type_name::<P>()).to_owned() }
+    }
+
+    /// Where the caller stands, by line and column: where no program says its function.
+    #[track_caller]
+    pub(crate) fn here() -> Self {
+        let caller = Location::caller();
+        let file = file(caller.file());
+        Self { function: format!("{file}:{}:{}", caller.line(), caller.column()), file }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.file, self.function)
+    }
+}
+
+/// A path of a source file as it is on every machine: with slashes; of one that is not within the workspace, which begins at the machine's root, the name alone.
+fn file(path: &str) -> String {
+    let path = path.replace('\\', "/");
+    let is_absolute = path.starts_with('/') || path.as_bytes().get(1) == Some(&b':');
+    if is_absolute { path.rsplit('/').next().unwrap_or_default().to_owned() } else { path }
+}
+
+/// The function of a type: that in which a closure stands, or the function itself.
+fn function(name: &str) -> &str {
+    name.split("::{{closure}}").next().unwrap_or(name)
 }
 
 /// A seed as it is written: decimal, or hexadecimal after `0x`.
@@ -50,22 +97,40 @@ pub(crate) fn hash(bytes: &[u8]) -> u64 {
 mod tests {
     use super::*;
 
+    fn place() -> Place {
+        Place { file: "tests/x.rs".into(), function: "x::a".into() }
+    }
+
     #[test]
-    fn the_environment_comes_before_the_test_and_the_test_before_its_name() {
-        assert_eq!(Seed::of(Some("7"), Some(8), "a").value, 7);
-        assert_eq!(Seed::of(Some("0xff"), None, "a").value, 255);
-        assert_eq!(Seed::of(None, Some(8), "a").value, 8);
+    fn the_environment_comes_before_the_test_and_the_test_before_its_place() {
+        let seed = |environment, said, thread| Seed::of(environment, said, &place(), thread);
+        assert_eq!(seed(Some("7"), Some(8), None).value, 7);
+        assert_eq!(seed(Some("0xff"), None, None).value, 255);
+        assert_eq!(seed(None, Some(8), None).value, 8);
+        assert_eq!(seed(None, None, Some("b")).value, hash(b"tests/x.rs x::a"));
+        assert_eq!(seed(None, None, Some("main")).value, seed(None, None, Some("b")).value);
         // FNV's own vector.
-        assert_eq!(Seed::of(None, None, "a").value, 0xaf63_dc4c_8601_ec8c);
-        assert_eq!(
-            Seed::of(None, None, "a").advice(),
-            "test bed of `a`: seed 12638187200555641996; COHAPTIC_TEST_SEED=12638187200555641996 runs it again"
-        );
+        assert_eq!(hash(b"a"), 0xaf63_dc4c_8601_ec8c);
+        assert_eq!(seed(None, Some(7), Some("b")).advice(), "test bed of `b`: seed 7; COHAPTIC_TEST_SEED=7 runs it again");
+        assert_eq!(seed(None, Some(7), Some("main")).test, "x::a");
+        assert_eq!(seed(None, Some(7), None).test, "x::a");
     }
 
     #[test]
     #[should_panic(expected = "COHAPTIC_TEST_SEED is `seven`; expected a number")]
     fn a_seed_that_is_none_is_refused() {
-        Seed::of(Some("seven"), None, "a");
+        Seed::of(Some("seven"), None, &place(), None);
+    }
+
+    #[test]
+    fn a_place_is_the_same_on_every_machine_and_wherever_it_stands_in_its_file() {
+        let places = [Place::of(&|| ()), Place::of(&|| 1)];
+        assert_eq!(places[0], places[1]);
+        let function = "cohaptic_testkit::seed::tests::a_place_is_the_same_on_every_machine_and_wherever_it_stands_in_its_file";
+        assert_eq!(places[0].to_string(), format!("crates/testkit/src/seed.rs {function}"));
+        assert_ne!(Place::here(), Place::here());
+        assert_eq!(file(r"crates\x\src\lib.rs"), "crates/x/src/lib.rs");
+        assert_eq!(file("/home/a/.cargo/registry/x-1/src/lib.rs"), "lib.rs");
+        assert_eq!(file(r"C:\x\src\lib.rs"), "lib.rs");
     }
 }

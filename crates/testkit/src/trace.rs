@@ -3,8 +3,10 @@
 use std::fmt;
 
 use cohaptic_units::Instant;
-use cohaptic_units::print::Seconds;
+use cohaptic_units::print::{Seconds, Span};
 use cohaptic_wan::{DropCause, NodeId, Path};
+
+use crate::hit::Verdict;
 
 /// What happened, and when.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -44,6 +46,13 @@ pub enum Happening {
     Copied {
         /// The copy.
         packet: PacketName,
+    },
+    /// A law has hit a packet that is offered to its link.
+    Hit {
+        /// The packet.
+        packet: PacketName,
+        /// The fate that the law wants.
+        verdict: Verdict,
     },
     /// A host crashed.
     Crashed(NodeId),
@@ -104,7 +113,7 @@ impl fmt::Display for Lost {
 }
 
 /// All that happened in a run, in order.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Trace {
     hosts: Vec<String>,
     events: Vec<TraceEvent>,
@@ -222,6 +231,17 @@ impl fmt::Display for Words<'_> {
             Happening::Copied { packet } => {
                 self.packet(f, *packet)?;
                 f.write_str(" copied")
+            }
+            Happening::Hit { packet, verdict } => {
+                self.packet(f, *packet)?;
+                match verdict {
+                    Verdict::Pass => f.write_str(" passed"),
+                    Verdict::Drop => f.write_str(" hit: dropped"),
+                    Verdict::Delay(by) => write!(f, " hit: delayed by {}", Span(*by)),
+                    Verdict::Duplicate(by) => write!(f, " hit: copied, the copy {} later", Span(*by)),
+                    Verdict::Corrupt(bit) => write!(f, " hit: bit {bit} flipped"),
+                    Verdict::Behind(count) => write!(f, " hit: held behind {count} more"),
+                }
             }
             Happening::Crashed(host) => write!(f, "{} crashed", self.name(*host)),
             Happening::Restarted(host) => write!(f, "{} restarted", self.name(*host)),

@@ -8,11 +8,12 @@
 //! client -> server: delay 24ms loss 1%
 //! server -> client: replay fates.csv
 //! client <-> other:
+//! hit client -> server: drop 2nd packet
 //! ```
 //!
 //! After the colon stand words of `tc-netem`, done exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log. `all` is every link that
 //! no other line names, wherever it stands; without it they are ideal. `hosts` names the hosts and their order; without it they are those that lines name, in
-//! the order of the lines. Names are parted from the arrow by blanks.
+//! the order of the lines. Names are parted from the arrow by blanks. `hit` and a path, before the colon, says which of its packets are [hit](crate::hit).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -24,6 +25,7 @@ use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{FateLog, LinkModel};
 
 use crate::bed::name_fault;
+use crate::hit::{self, PathHit};
 
 /// What a text says.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -34,6 +36,8 @@ pub(crate) struct Words {
     pub(crate) every: LinkModel,
     /// By sender, then receiver.
     pub(crate) links: BTreeMap<(usize, usize), LinkModel>,
+    /// Which packets are hit.
+    pub(crate) hits: Vec<PathHit>,
     pub(crate) seed: Option<u64>,
 }
 
@@ -76,7 +80,7 @@ impl fmt::Display for WordsError {
 }
 
 /// A fault in some bytes of a line.
-type Fault = (Range<usize>, String);
+pub(crate) type Fault = (Range<usize>, String);
 
 /// Reads a text. `file` reads the file of a fate log, by the path in the text.
 pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, String>) -> Result<Words, WordsError> {
@@ -91,7 +95,21 @@ pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, Str
         let end = last.1.len()..last.1.len();
         return Err(locate(last.0, last.1, (end, "no line names a host: expected one such as `a -> b: delay 24ms` or `hosts: a b`".to_owned())));
     }
-    Ok(Words { hosts: reader.hosts, every, links: reader.links, seed: reader.seed })
+    Ok(Words { hosts: reader.hosts, every, links: reader.links, hits: reader.hits, seed: reader.seed })
+}
+
+/// Reads lines of hits alone: a path, a colon, and the words.
+pub(crate) fn hits_of(text: &str) -> Result<Vec<PathHit>, WordsError> {
+    let mut reader = Reader::default();
+    for (number, line) in (1..).zip(text.lines()) {
+        reader.hits_alone(line).map_err(|fault| locate(number, line, fault))?;
+    }
+    Ok(reader.hits)
+}
+
+/// Reads the words of hits on one path.
+pub(crate) fn hits_on(words: &str) -> Result<Vec<hit::Hit>, WordsError> {
+    hit::parse(words, 0..words.len()).map_err(|fault| locate(1, words, fault))
 }
 
 fn locate(number: usize, line: &str, (span, message): Fault) -> WordsError {
@@ -107,19 +125,13 @@ struct Reader {
     is_closed: bool,
     every: Option<LinkModel>,
     links: BTreeMap<(usize, usize), LinkModel>,
+    hits: Vec<PathHit>,
     seed: Option<u64>,
 }
 
 impl Reader {
     fn line(&mut self, line: &str, file: &mut impl FnMut(&str) -> Result<String, String>) -> Result<(), Fault> {
-        let said = line.trim();
-        if said.is_empty() || said.starts_with('#') {
-            return Ok(());
-        }
-        let begin = line.len() - line.trim_start().len();
-        let Some(colon) = line.find(':') else {
-            return Err((begin..begin + said.len(), "no colon: expected a line such as `a -> b: delay 24ms loss 1%`".to_owned()));
-        };
+        let Some((begin, colon)) = colon(line, "a -> b: delay 24ms loss 1%")? else { return Ok(()) };
         let (subject, rest) = (tokens(line, begin..colon), tokens(line, colon + 1..line.len()));
         match subject.iter().map(|span| &line[span.clone()]).collect::<Vec<_>>()[..] {
             ["seed"] => self.seed(line, &subject[0], &rest),
@@ -128,19 +140,54 @@ impl Reader {
                 let link = link(line, &rest, file)?;
                 if self.every.replace(link).is_some() { Err(twice(&subject[0], "all")) } else { Ok(()) }
             }
-            [_, arrow @ ("->" | "<->"), _] => {
-                let pair = (self.host(line, &subject[0])?, self.host(line, &subject[2])?);
-                let whole = subject[0].start..subject[2].end;
-                if pair.0 == pair.1 {
-                    return Err((whole, "a host has no link to itself: expected two hosts".to_owned()));
+            ["hit", _, arrow @ ("->" | "<->"), _] => {
+                let (from, to) = self.pair(line, &subject[1..])?;
+                let hits = hit::parse(line, colon + 1..line.len())?;
+                self.hit(from, to, &hits);
+                if arrow == "<->" {
+                    self.hit(to, from, &hits);
                 }
+                Ok(())
+            }
+            [_, arrow @ ("->" | "<->"), _] => {
+                let pair = self.pair(line, &subject)?;
+                let whole = subject[0].start..subject[2].end;
                 let link = link(line, &rest, file)?;
                 let is_known =
                     self.links.insert(pair, link.clone()).is_some() || arrow == "<->" && self.links.insert((pair.1, pair.0), link).is_some();
                 if is_known { Err(twice(&whole, "this link")) } else { Ok(()) }
             }
-            _ => Err((begin..colon.max(begin + 1), "expected `a -> b`, `a <-> b`, `all`, `hosts` or `seed` before the colon".to_owned())),
+            _ => {
+                Err((begin..colon.max(begin + 1), "expected `a -> b`, `a <-> b`, `all`, `hosts`, `hit a -> b` or `seed` before the colon".to_owned()))
+            }
         }
+    }
+
+    fn hits_alone(&mut self, line: &str) -> Result<(), Fault> {
+        let Some((begin, colon)) = colon(line, "a -> b: drop packet 3")? else { return Ok(()) };
+        let subject = tokens(line, begin..colon);
+        let [_, arrow, _] = &subject[..] else { return Err((begin..colon.max(begin + 1), "expected `a -> b` before the colon".to_owned())) };
+        if &line[arrow.clone()] != "->" {
+            return Err((arrow.clone(), "expected `->`".to_owned()));
+        }
+        let (from, to) = self.pair(line, &subject)?;
+        let hits = hit::parse(line, colon + 1..line.len())?;
+        self.hit(from, to, &hits);
+        Ok(())
+    }
+
+    fn hit(&mut self, from: usize, to: usize, hits: &[hit::Hit]) {
+        let [from, to] = [from, to].map(|host| &self.hosts[host]);
+        self.hits.extend(hits.iter().map(|hit| PathHit { from: from.clone(), to: to.clone(), hit: hit.clone() }));
+    }
+
+    /// The hosts of a path: a name, an arrow, and a name.
+    fn pair(&mut self, line: &str, subject: &[Range<usize>]) -> Result<(usize, usize), Fault> {
+        let pair = (self.host(line, &subject[0])?, self.host(line, &subject[2])?);
+        if pair.0 == pair.1 {
+            return Err((subject[0].start..subject[2].end, "a host has no link to itself: expected two hosts".to_owned()));
+        }
+        Ok(pair)
     }
 
     fn seed(&mut self, line: &str, subject: &Range<usize>, rest: &[Range<usize>]) -> Result<(), Fault> {
@@ -185,6 +232,17 @@ impl Reader {
         self.hosts.push(name.to_owned());
         Ok(self.hosts.len() - 1)
     }
+}
+
+/// Where a line begins and has its colon; `None` if it says nothing.
+fn colon(line: &str, example: &str) -> Result<Option<(usize, usize)>, Fault> {
+    let said = line.trim();
+    if said.is_empty() || said.starts_with('#') {
+        return Ok(None);
+    }
+    let begin = line.len() - line.trim_start().len();
+    let colon = line.find(':').ok_or_else(|| (begin..begin + said.len(), format!("no colon: expected a line such as `{example}`")))?;
+    Ok(Some((begin, colon)))
 }
 
 fn twice(span: &Range<usize>, what: &str) -> Fault {
@@ -259,6 +317,14 @@ mod tests {
     }
 
     #[test]
+    fn hits_are_read_with_links() {
+        let words = read("hosts: hit b\nhit hit -> b: drop first packet; corrupt packet 4\nhit -> b: loss 1%\nhit hit <-> b: drop packet 2").unwrap();
+        let hits: Vec<String> = words.hits.iter().map(|PathHit { from, to, hit }| format!("{from} -> {to}: {hit}")).collect();
+        let expected = ["hit -> b: drop first packet", "hit -> b: corrupt packet 4", "hit -> b: drop packet 2", "b -> hit: drop packet 2"];
+        assert_eq!((hits, words.links.len()), (expected.map(String::from).to_vec(), 1));
+    }
+
+    #[test]
     fn hosts_are_those_that_lines_name() {
         let words = read("b -> a: delay 1ms\na -> c: loss 1%").unwrap();
         assert_eq!(words.hosts, ["b", "a", "c"]);
@@ -292,6 +358,9 @@ mod tests {
             ("hosts: a\nhosts: b", "2:1: hosts is said twice"),
             ("a -> [b]:", "1:6: `[b]` is no name of a host"),
             ("10.0.0.1 -> b:", "1:1: `10.0.0.1` is no name of a host"),
+            ("hosts: a b\nhit a -> c: drop packet 1", "2:10: there is no host `c`: expected one of a, b"),
+            ("hit a -> a: drop packet 1", "1:5: a host has no link to itself"),
+            ("hit a -> b: drop packet", "1:24: expected numbers of packets"),
             ("seed: x", "1:7: expected a number"),
             ("seed: 1 2", "1:7: expected one number"),
             ("seed: 1\nseed: 1", "2:1: seed is said twice"),

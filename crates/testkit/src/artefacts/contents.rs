@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{DropCause, Fate, Path};
+use cohaptic_wan::{DropCause, Fate};
 
 use super::folder::{MARK, MARKED};
 use crate::record::Record;
@@ -31,9 +31,16 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
     for event in record.trace().events() {
         let _ = writeln!(trace, "{}", record.trace().words(event));
     }
+    let mut hits = String::new();
+    for count in record.hits() {
+        let _ = writeln!(hits, "  {}", count.words());
+    }
+    if !hits.is_empty() {
+        hits = format!("What was hit; the fates have it:\n\n{hits}\n");
+    }
     let seed = record.seed();
     let summary = format!(
-        "{MARK}: that of `{}`, which ended at {} s.\n\nIts seed was {}: {}={} runs it again.\n\nWhat the links did, of what they took:\n\n{table}\n\
+        "{MARK}: that of `{}`, which ended at {} s.\n\nIts seed was {}: {}={} runs it again.\n\nWhat the links did, of what they took:\n\n{table}\n{hits}\
          trace.txt has all that happened, in order. links.txt replays what the links did:\nTestbed::from_file(\"links.txt\") has these hosts and links.\n",
         seed.test,
         Seconds(record.ended()),
@@ -66,7 +73,7 @@ fn counts(log: &cohaptic_wan::FateLog) -> String {
 }
 
 #[cfg(feature = "pcapng")]
-fn capture(record: &Record, path: Path, from: &str, to: &str) -> Vec<u8> {
+fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> Vec<u8> {
     let write = || -> std::io::Result<Vec<u8>> {
         let mut capture = cohaptic_measure::pcapng::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
         for seen in record.packets_of(path) {

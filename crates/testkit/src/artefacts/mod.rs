@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use crate::record::Record;
 use crate::seed::Seed;
+use crate::wire::HitCount;
 
 /// If this variable of the environment names a folder, every test bed that fails writes what happened into a folder below it that has the name of the test.
 pub const ARTEFACTS_VARIABLE: &str = "COHAPTIC_TEST_ARTEFACTS";
@@ -42,7 +43,7 @@ pub enum WriteError {
 impl Record {
     /// Writes what happened into a folder, for people and for replays:
     ///
-    /// - `summary.txt`: the seed, how to run it again, and what every link did;
+    /// - `summary.txt`: the seed, how to run it again, what every link did, and what every [law](crate::hit) hit;
     /// - `trace.txt`: all that happened, in words;
     /// - `fates-a-to-b.csv`: what became of every packet from `a` to `b` on its link, for every two hosts between which something was sent. It can be
     ///   [read back](cohaptic_wan::FateLog::parse) and [replayed](cohaptic_wan::LinkModel::Replay);
@@ -82,20 +83,32 @@ impl Artefacts {
         !self.folders.is_empty()
     }
 
-    /// Tells on standard error that a run has failed: where what happened is, and how to run it again. Whatever goes wrong is told too, and no more: the
+    /// Tells on standard error that a run has failed: where what happened is, and how to run it again, and which laws hit nothing. Whatever goes wrong is told too, and no more: the
     /// test has failed for another reason.
     #[expect(clippy::print_stderr, reason = "a test that fails says how to see it again")]
-    pub(crate) fn report(&self, seed: &Seed, record: impl FnOnce() -> Record) {
+    pub(crate) fn report(&self, seed: &Seed, hits: &[HitCount], record: impl FnOnce() -> Record) {
+        for line in self.lines(seed, hits, record) {
+            eprintln!("{line}");
+        }
+    }
+
+    /// Writes the record, and gives the lines of the report.
+    pub(crate) fn lines(&self, seed: &Seed, hits: &[HitCount], record: impl FnOnce() -> Record) -> Vec<String> {
+        let mut lines = Vec::new();
         if self.is_wanted() {
             let record = record();
             for folder in &self.folders {
                 match record.write(folder) {
-                    Ok(()) => eprintln!("what happened is in {}", folder.display()),
-                    Err(error) => eprintln!("what happened could not be written: {error}"),
+                    Ok(()) => lines.push(format!("what happened is in {}", folder.display())),
+                    Err(error) => lines.push(format!("what happened could not be written: {error}")),
                 }
             }
         }
-        eprintln!("{}", seed.advice());
+        for nothing in hits.iter().filter(|count| count.hit == 0) {
+            lines.push(format!("note: {}", nothing.words()));
+        }
+        lines.push(seed.advice());
+        lines
     }
 }
 

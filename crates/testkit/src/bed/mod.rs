@@ -1,5 +1,7 @@
 //! The test bed: what it is made of, and its run.
 
+mod hitting;
+mod names;
 #[cfg(feature = "strategies")]
 mod network;
 mod running;
@@ -11,22 +13,26 @@ use std::panic::{AssertUnwindSafe, Location, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
+use std::time::Duration;
 
-use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
+pub(crate) use hitting::{add_all, add_function, add_law, add_words};
+pub(crate) use names::{check_name, name_fault, node, path};
 pub use running::Bed;
 
 use crate::artefacts::Artefacts;
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::file::{LinkChange, LinkFile};
+use crate::hit::Laws;
 use crate::link::ToLink;
 use crate::record::Record;
 use crate::runtime::own::Executor;
-use crate::seed::Seed;
+use crate::seed::{Place, Seed};
 use crate::task::Tasks;
 use crate::trace::Trace;
+use crate::watch::{Kind, LIMIT, Watched};
 use crate::wire::{Recorded, Settings};
 
 /// Hosts, the links between them, and a program that is run on them in virtual time.
@@ -61,6 +67,7 @@ pub struct Testbed {
     #[cfg(feature = "tokio")]
     is_tokio: bool,
     artefacts: Option<PathBuf>,
+    stall_limit: Duration,
 }
 
 /// As Linux gives a socket (`net.core.rmem_default`) \[bytes\].
@@ -88,10 +95,18 @@ impl Testbed {
             links: BTreeMap::new(),
             changes: Vec::new(),
             seed: None,
-            settings: Settings { receive_buffer: RECEIVE_BUFFER, traces: false, digests: true, keeps_packets: false, patience: PATIENCE },
+            settings: Settings {
+                receive_buffer: RECEIVE_BUFFER,
+                traces: false,
+                digests: true,
+                keeps_packets: false,
+                patience: PATIENCE,
+                laws: Laws::default(),
+            },
             #[cfg(feature = "tokio")]
             is_tokio: false,
             artefacts: None,
+            stall_limit: LIMIT,
         }
     }
 
@@ -148,7 +163,8 @@ impl Testbed {
     }
 
     /// The seed of all chance in the links, unless the environment says another one ([`SEED_VARIABLE`](crate::SEED_VARIABLE)). Without it, the seed is made of
-    /// the name of the test, which is that of its thread: with `--test-threads=1` all tests run on the thread `main`, and so have its seed.
+    /// the file in which the bed is run and the function in which the program stands. So it does not depend on threads, and is the same with `--test-threads=1` and with
+    /// nextest; to edit other functions, or to move this one within its file, does not change it, and to rename it does. Two beds of one function have one seed.
     pub const fn seed(mut self, seed: u64) -> Self {
         self.seed = Some(seed);
         self
@@ -163,6 +179,15 @@ impl Testbed {
     /// How often tasks may be polled at one instant before the run is given up, because time does not pass; a million if it is not said.
     pub const fn patience(mut self, polls: u64) -> Self {
         self.settings.patience = polls;
+        self
+    }
+
+    /// For how long by the wall clock a task may run without returning to the executor, a minute if it is not said. Then the process ends, after the task, its host, the
+    /// time of the run and the seed have been told on standard error, and what happened has been written where [`Testbed::artefacts`] says: a loop without an `.await`
+    /// cannot be stopped otherwise. Tasks of tokio's own that wake each other without letting time pass are found too. [`STALL_VARIABLE`](crate::STALL_VARIABLE)
+    /// says it for all tests of a process; [`Duration::MAX`] is never. On Linux a process under a debugger is left alone.
+    pub const fn stall_limit(mut self, limit: Duration) -> Self {
+        self.stall_limit = limit;
         self
     }
 
@@ -209,7 +234,7 @@ impl Testbed {
         F: Future<Output = T> + 'static,
         T: 'static,
     {
-        let seed = Seed::choose(self.seed);
+        let seed = Seed::choose(self.seed, &Place::of(&program));
         self.run_once(&seed, program, Location::caller()).0
     }
 
@@ -226,7 +251,7 @@ impl Testbed {
     {
         self.settings.traces = true;
         self.settings.keeps_packets = true;
-        let seed = Seed::choose(self.seed);
+        let seed = Seed::choose(self.seed, &Place::of(&program));
         self.run_once(&seed, program, Location::caller())
     }
 
@@ -243,7 +268,7 @@ impl Testbed {
         T: 'static,
     {
         self.settings.traces = true;
-        let seed = Seed::choose(self.seed);
+        let seed = Seed::choose(self.seed, &Place::of(&program));
         let (outcome, first) = self.clone().run_once(&seed, &program, Location::caller());
         let (_, second) = self.run_once(&seed, &program, Location::caller());
         if let Some(difference) = first.trace().first_difference(second.trace()) {
@@ -272,16 +297,19 @@ impl Testbed {
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             #[cfg(feature = "tokio")]
             if self.is_tokio {
-                return crate::runtime::on_tokio::run(core, self.names.len(), program, origin, &mut recorded);
+                let watched = Watched::begin(Kind::Tokio, &self.names, self.stall_limit, seed, &artefacts);
+                return crate::runtime::on_tokio::run(core, self.names.len(), program, origin, &watched, &mut recorded);
             }
-            on_own(core, self.names.len(), program, origin, &mut recorded)
+            let watched = Watched::begin(Kind::Own, &self.names, self.stall_limit, seed, &artefacts);
+            on_own(core, self.names.len(), program, origin, &watched, &mut recorded)
         }));
-        let (trace, packets, ended) = recorded.unwrap_or_else(|| (Trace::new(self.names.clone()), Vec::new(), Instant::ZERO));
-        let record = Record::new(seed.clone(), trace, packets, ended);
+        let recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(self.names.clone()), ..Recorded::default() });
+        let record = Record::new(seed.clone(), recorded);
         match outcome {
             Ok(outcome) => (outcome, record),
             Err(panic) => {
-                artefacts.report(seed, || record);
+                let hits = record.hits().to_vec();
+                artefacts.report(seed, &hits, || record);
                 resume_unwind(panic)
             }
         }
@@ -290,50 +318,12 @@ impl Testbed {
 
 impl From<LinkFile> for Testbed {
     fn from(file: LinkFile) -> Self {
-        let LinkFile { hosts, every, links, changes, seed } = file;
-        let bed = Self::new(hosts);
+        let LinkFile { hosts, every, links, changes, hits, seed } = file;
+        let mut bed = Self::new(hosts);
+        add_all(&mut bed.settings.laws, &bed.names, &hits);
         let links = links.into_iter().map(|((from, to), link)| (Path { from: NodeId::new(from), to: NodeId::new(to) }, link)).collect();
         Self { every, links, changes, seed, ..bed }
     }
-}
-
-/// Checks the name of one more host.
-///
-/// # Panics
-///
-/// If it is none, or one of the others has it.
-pub(crate) fn check_name(others: &[String], name: &str) {
-    let fault = name_fault(name);
-    assert!(fault.is_none(), "{}", fault.unwrap_or_default());
-    assert!(!others.iter().any(|other| other == name), "two hosts are called `{name}`");
-}
-
-/// Why a text is no name of a host; `None` if it is one.
-pub(crate) fn name_fault(name: &str) -> Option<String> {
-    let is_word =
-        !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
-    (!is_word).then(|| format!("`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address"))
-}
-
-/// Which of the hosts is called so.
-///
-/// # Panics
-///
-/// If there is none.
-#[expect(clippy::panic, reason = "a misuse, and the way out")]
-pub(crate) fn node(names: &[String], name: &str) -> NodeId {
-    let index = names.iter().position(|known| known == name);
-    NodeId::new(index.unwrap_or_else(|| panic!("there is no host `{name}`; the hosts are {}", names.join(", "))))
-}
-
-/// The path from one host to another.
-///
-/// # Panics
-///
-/// If there is no such host.
-pub(crate) fn path(names: &[String], from: &str, to: &str) -> Path {
-    let [from, to] = [from, to].map(|name| node(names, name));
-    Path { from, to }
 }
 
 /// Takes what was recorded out of a run that ends, however it ends.
@@ -352,14 +342,22 @@ impl Drop for Recorder<'_> {
 }
 
 /// Runs a program on the executor of this crate.
-fn on_own<T, F>(core: Core, hosts: usize, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>, recorded: &mut Option<Recorded>) -> T
+fn on_own<T, F>(
+    core: Core,
+    hosts: usize,
+    program: impl FnOnce(Bed) -> F,
+    origin: &'static Location<'static>,
+    watched: &Watched,
+    recorded: &mut Option<Recorded>,
+) -> T
 where
     F: Future<Output = T> + 'static,
     T: 'static,
 {
     let shared = Arc::new(Shared::new(core, Clock::Own));
     let executor = Executor::default();
-    let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts));
+    let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
+    watched.is_of(&shared);
     let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let outcome = Rc::new(RefCell::new(None));

@@ -141,6 +141,17 @@ impl Bed {
         self.shared.lock().wire.link_stats(path).unwrap_or_else(|| unreachable_link(from))
     }
 
+    /// How many packets from one host to another were [hit](crate::hit) so far.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host.
+    #[must_use]
+    pub fn hits(&self, from: &str, to: &str) -> u64 {
+        let path = path(&self.names(), from, to);
+        self.shared.lock().wire.hits(path)
+    }
+
     /// Notes something in the trace: what a program computes, say, so that two runs are compared by it too.
     pub fn note(&self, text: impl fmt::Display) {
         let text = text.to_string();

@@ -6,7 +6,7 @@ mod passing;
 mod sockets;
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use std::task::Waker;
 
 use cohaptic_units::Instant;
@@ -16,7 +16,7 @@ use cohaptic_wan::{LinkModel, NodeId, Path};
 use crate::address::{self, AddressPlan};
 use crate::file::LinkChange;
 use crate::trace::Happening;
-use crate::wire::{self, Settings, Wire};
+use crate::wire::{self, Recorded, Settings, Wire};
 use sockets::Sockets;
 
 pub(crate) use passing::Outgoing;
@@ -168,6 +168,24 @@ pub(crate) enum Clock {
 impl Shared {
     pub(crate) const fn new(core: Core, clock: Clock) -> Self {
         Self { core: Mutex::new(core), clock }
+    }
+
+    /// The time, unless the state is held: for a look from another thread.
+    pub(crate) fn try_now(&self) -> Option<Instant> {
+        self.try_core().map(|core| core.now())
+    }
+
+    /// What was recorded so far, unless the state is held.
+    pub(crate) fn try_recorded(&self) -> Option<Recorded> {
+        self.try_core().map(|core| core.wire.recorded())
+    }
+
+    fn try_core(&self) -> Option<MutexGuard<'_, Core>> {
+        match self.core.try_lock() {
+            Ok(core) => Some(core),
+            Err(TryLockError::Poisoned(held)) => Some(held.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        }
     }
 
     /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.

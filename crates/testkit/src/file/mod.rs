@@ -13,6 +13,7 @@ use cohaptic_files::read_text;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
+use crate::hit::PathHit;
 use crate::words::{self, WordsError};
 
 /// Hosts and the links between them, read from a file.
@@ -30,10 +31,12 @@ use crate::words::{self, WordsError};
 /// client -> server: delay 24ms loss 1%
 /// server -> client: replay fates-server-to-client.csv
 /// client <-> other:
+/// hit client -> server: drop 2nd packet
 /// ```
 ///
 /// After the colon stand words of `tc-netem`, done exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log, beside the file itself. `all`
-/// is every link that no other line names; without it they are ideal. Without `hosts` those take part whom lines name, in the order of the lines.
+/// is every link that no other line names; without it they are ideal. Without `hosts` those take part whom lines name, in the order of the lines. `hit` and a path says which of
+/// its packets are [hit](crate::hit).
 ///
 /// Relative paths begin in the folder in which the test runs, which `cargo test` makes that of the package.
 #[derive(Clone, PartialEq, Debug)]
@@ -45,6 +48,8 @@ pub struct LinkFile {
     pub(crate) links: BTreeMap<(usize, usize), LinkModel>,
     /// In order of time.
     pub(crate) changes: Vec<LinkChange>,
+    /// Which packets are hit.
+    pub(crate) hits: Vec<PathHit>,
     pub(crate) seed: Option<u64>,
 }
 
@@ -136,8 +141,8 @@ impl LinkFile {
     }
 
     fn parse_with(text: &str, file: impl FnMut(&str) -> Result<String, String>) -> Result<Self, WordsError> {
-        let words::Words { hosts, every, links, seed } = words::parse(text, file)?;
-        Ok(Self { hosts, every, links, changes: Vec::new(), seed })
+        let words::Words { hosts, every, links, hits, seed } = words::parse(text, file)?;
+        Ok(Self { hosts, every, links, changes: Vec::new(), hits, seed })
     }
 
     #[cfg(not(feature = "files"))]

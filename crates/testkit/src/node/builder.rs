@@ -8,11 +8,13 @@ use std::time::Duration;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
 use super::{Node, NodeRun};
-use crate::bed::{check_name, node, path};
+use crate::bed::{add_all, check_name, node, path};
 use crate::file::{LinkChange, LinkFile};
+use crate::hit::Laws;
 use crate::link::ToLink;
 use crate::record::Record;
-use crate::seed::Seed;
+use crate::seed::{Place, Seed};
+use crate::watch::LIMIT;
 use crate::wire::Settings;
 
 /// State machines, and the links between them.
@@ -28,6 +30,7 @@ pub struct Nodes {
     pub(super) settings: Settings,
     pub(super) time_limit: Duration,
     pub(super) artefacts: Option<PathBuf>,
+    pub(super) stall_limit: Duration,
 }
 
 /// A million packets and timers at one instant take about a tenth of a second.
@@ -52,9 +55,10 @@ impl Nodes {
             links: BTreeMap::new(),
             changes: Vec::new(),
             seed: None,
-            settings: Settings { receive_buffer: 0, traces: false, keeps_packets: false, patience: PATIENCE, digests: true },
+            settings: Settings { receive_buffer: 0, traces: false, keeps_packets: false, patience: PATIENCE, digests: true, laws: Laws::default() },
             time_limit: TIME_LIMIT,
             artefacts: None,
+            stall_limit: LIMIT,
         }
     }
 
@@ -109,11 +113,12 @@ impl Nodes {
     /// If the file cannot be read or makes no sense, with the path, the place and the line; if one of its hosts is no node.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
     #[track_caller]
-    pub fn links_from_file(self, path: impl AsRef<std::path::Path>) -> Self {
-        let LinkFile { hosts, every, links, changes, seed } = match LinkFile::read(path) {
+    pub fn links_from_file(mut self, path: impl AsRef<std::path::Path>) -> Self {
+        let LinkFile { hosts, every, links, changes, hits, seed } = match LinkFile::read(path) {
             Ok(file) => file,
             Err(error) => panic!("{error}"),
         };
+        add_all(&mut self.settings.laws, &self.names, &hits);
         let nodes: Vec<NodeId> = hosts.iter().map(|host| node(&self.names, host)).collect();
         let links = links.into_iter().map(|((from, to), link)| (Path { from: nodes[from], to: nodes[to] }, link)).collect();
         let changes =
@@ -122,7 +127,7 @@ impl Nodes {
     }
 
     /// The seed of all chance in the links, unless the environment says another one ([`SEED_VARIABLE`](crate::SEED_VARIABLE)). Without it, the seed is made of
-    /// the name of the test. Nodes of the same names on the same links with the same seed meet what the hosts of a [`Testbed`](crate::Testbed) meet.
+    /// the file, the line and the column of the call of [`Nodes::start`], or as that of a [test bed](crate::Testbed::seed) in [`Nodes::run_twice`]. Nodes of the same names on the same links with the same seed meet what the hosts of a [`Testbed`](crate::Testbed) meet.
     pub const fn seed(mut self, seed: u64) -> Self {
         self.seed = Some(seed);
         self
@@ -132,6 +137,12 @@ impl Nodes {
     /// not said.
     pub const fn patience(mut self, events: u64) -> Self {
         self.settings.patience = events;
+        self
+    }
+
+    /// For how long by the wall clock a node may run without returning: see [`Testbed::stall_limit`](crate::Testbed::stall_limit).
+    pub const fn stall_limit(mut self, limit: Duration) -> Self {
+        self.stall_limit = limit;
         self
     }
 
@@ -160,9 +171,14 @@ impl Nodes {
     ///
     /// If there is no node; if what the environment says of the seed is no number; if a node never ends to send.
     #[must_use]
+    #[track_caller]
     pub fn start(self) -> NodeRun {
+        self.start_at(&Place::here())
+    }
+
+    fn start_at(self, place: &Place) -> NodeRun {
         assert!(!self.names.is_empty(), "a run without nodes; `add` one before `start`");
-        let seed = Seed::choose(self.seed);
+        let seed = Seed::choose(self.seed, place);
         let (every, links) = (self.every.clone(), self.links.clone());
         NodeRun::new(self, seed, |from, to| links.get(&Path { from, to }).unwrap_or(&every).clone())
     }
@@ -174,9 +190,11 @@ impl Nodes {
     ///
     /// If the two runs differ, with the first difference and its time.
     #[expect(clippy::panic, reason = "what it was asked to find out")]
+    #[track_caller]
     pub fn run_twice<T>(build: impl Fn() -> Self, program: impl Fn(&mut NodeRun) -> T) -> T {
+        let place = Place::of(&program);
         let run = || -> (T, Record) {
-            let mut run = build().recorded().start();
+            let mut run = build().recorded().start_at(&place);
             (program(&mut run), run.record())
         };
         let ((outcome, first), (_, second)) = (run(), run());

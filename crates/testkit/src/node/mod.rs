@@ -43,6 +43,7 @@ mod address;
 mod builder;
 mod deadlines;
 mod faults;
+mod hitting;
 mod passing;
 mod run;
 

@@ -38,6 +38,7 @@ impl NodeRun {
             self.count(Does::Wakes, id);
             self.counts[due].timeouts += 1;
             if let Some(node) = &mut self.nodes[due] {
+                self.watched.pulse.begins(due + 1);
                 node.handle_timeout(now);
             }
             self.ask(id, Does::Wakes);
@@ -49,6 +50,8 @@ impl NodeRun {
     pub(super) fn ask(&mut self, id: NodeId, because: Does) {
         let Some(mut node) = self.nodes[id.index()].take() else { return self.deadlines.set(id.index(), None) };
         let mut sent = 0;
+        // The nodes are numbered in their order.
+        self.watched.pulse.begins(id.index() + 1);
         while let Some(transmit) = node.poll_transmit(self.now()) {
             sent += 1;
             // A node that sends one packet for each that comes answers; one that, asked once, sends more than half of all events of this instant never ends to send.
@@ -59,6 +62,7 @@ impl NodeRun {
         let deadline = node.poll_timeout().map(|deadline| deadline.max(self.now()));
         self.deadlines.set(id.index(), deadline);
         self.nodes[id.index()] = Some(node);
+        self.watched.pulse.returns();
     }
 
     fn send(&mut self, from: NodeId, transmit: Transmit) {
@@ -118,6 +122,7 @@ impl NodeRun {
             self.count(Does::Receives, to);
             self.counts[to.index()].arrived += 1;
             if let Some(node) = &mut self.nodes[to.index()] {
+                self.watched.pulse.begins(to.index() + 1);
                 node.handle_packet(self.wire.now(), packet);
             }
             self.ask(to, Does::Receives);

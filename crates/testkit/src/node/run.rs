@@ -3,6 +3,7 @@
 use std::any::{Any, type_name};
 use std::collections::VecDeque;
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_units::Instant;
@@ -16,6 +17,7 @@ use crate::artefacts::Artefacts;
 use crate::bed::{node, path};
 use crate::record::Record;
 use crate::seed::Seed;
+use crate::watch::{Kind, Watched};
 use crate::wire::Wire;
 
 /// Nodes that run.
@@ -41,6 +43,7 @@ pub struct NodeRun {
     time_limit: Duration,
     seed: Seed,
     artefacts: Artefacts,
+    pub(super) watched: Arc<Watched>,
 }
 
 /// The ports of a packet.
@@ -72,11 +75,12 @@ pub struct NodeCounts {
 
 impl NodeRun {
     pub(super) fn new(nodes: Nodes, seed: Seed, link: impl FnMut(NodeId, NodeId) -> LinkModel) -> Self {
-        let Nodes { names, nodes, changes, mut settings, time_limit, artefacts, .. } = nodes;
+        let Nodes { names, nodes, changes, mut settings, time_limit, artefacts, stall_limit, .. } = nodes;
         let artefacts = Artefacts::new(artefacts, &seed);
         settings.traces |= artefacts.is_wanted();
         settings.keeps_packets |= artefacts.is_wanted();
         let count = names.len();
+        let watched = Watched::begin(Kind::Nodes, &names, stall_limit, &seed, &artefacts);
         let mut run = Self {
             nodes: nodes.into_iter().map(Some).collect(),
             wire: Wire::new(&names, seed.value, &settings, changes, link),
@@ -90,6 +94,7 @@ impl NodeRun {
             time_limit,
             seed,
             artefacts,
+            watched,
             names,
         };
         run.ask_touched();
@@ -237,8 +242,7 @@ impl NodeRun {
     #[must_use]
     pub fn record(&self) -> Record {
         assert!(self.wire.recording().traces, "nothing was recorded; `Nodes::recorded` asks for it");
-        let (trace, packets, ended) = self.wire.recorded();
-        Record::new(self.seed.clone(), trace, packets, ended)
+        Record::new(self.seed.clone(), self.wire.recorded())
     }
 
     fn is_late(&self) -> bool {
@@ -282,7 +286,7 @@ pub(super) fn is_another<T>(name: &str) -> ! {
 impl Drop for NodeRun {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            self.artefacts.report(&self.seed, || self.record());
+            self.artefacts.report(&self.seed, &self.wire.hit_counts(), || self.record());
         }
     }
 }

@@ -31,6 +31,7 @@ use crate::bed::{Bed, Recorder};
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::task::{Spawner, Task, Tasks};
+use crate::watch::Watched;
 use crate::wire::Recorded;
 
 /// A millisecond \[ns\]: what tokio's timers are counted in.
@@ -143,6 +144,7 @@ pub(crate) fn run<T, F>(
     hosts: usize,
     program: impl FnOnce(Bed) -> F,
     origin: &'static Location<'static>,
+    watched: &Watched,
     recorded: &mut Option<Recorded>,
 ) -> T
 where
@@ -157,11 +159,12 @@ where
     }
     let idle = Arc::new(Idle::default());
     let known: Arc<OnceLock<Arc<Shared>>> = Arc::default();
-    let (hook_idle, hook_known) = (Arc::clone(&idle), Arc::clone(&known));
+    let (hook_idle, hook_known, pulse) = (Arc::clone(&idle), Arc::clone(&known), Arc::clone(&watched.pulse));
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_time()
         .start_paused(true)
         .on_thread_park(move || {
+            pulse.turns();
             if let Some(shared) = hook_known.get() {
                 hook_idle.notice(shared);
             }
@@ -173,9 +176,14 @@ where
     let origin_of_time = tokio::time::Instant::now();
     let shared = Arc::new(Shared::new(core, Clock::Tokio { origin: origin_of_time }));
     drop(guard);
+    watched.is_of(&shared);
     let panic = Rc::new(RefCell::new(Panic::default()));
     let set = Rc::new(LocalSet::new());
-    let tasks = Rc::new(Tasks::new(Box::new(Local { shared: Arc::clone(&shared), set: Rc::clone(&set), panic: Rc::clone(&panic) }), hosts));
+    let tasks = Rc::new(Tasks::new(
+        Box::new(Local { shared: Arc::clone(&shared), set: Rc::clone(&set), panic: Rc::clone(&panic) }),
+        hosts,
+        Arc::clone(&watched.pulse),
+    ));
     let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let _ = known.set(Arc::clone(&shared));

@@ -79,6 +79,7 @@ impl Executor {
         let patience = shared.lock().settings.patience;
         let (mut polls, mut woken) = (0, Vec::new());
         while !is_over() {
+            tasks.turns();
             if self.poll_one() {
                 polls += 1;
                 if polls > patience {

@@ -1,6 +1,6 @@
 //! Strategies of proptest: links and networks that shrink to the least impaired one on which a test still fails.
 //!
-//! [`any_link`] and [`any_network`] draw any, [`links_like`] and [`networks_like`] those within [`LinkBounds`]. What a failing test prints can be pasted back:
+//! [`any_hits`] draws packets that are [hit](crate::hit). [`any_link`] and [`any_network`] draw any, [`links_like`] and [`networks_like`] those within [`LinkBounds`]. What a failing test prints can be pasted back:
 //! an [`ImpairedLink`] is shown as the words of `tc-netem`, an [`ImpairedNetwork`] as such words for each link that is not ideal.
 //!
 //! ```
@@ -61,6 +61,7 @@ mod bounds_error;
 mod draw;
 mod forms;
 mod grid;
+mod hits;
 mod link;
 mod network;
 mod numbers;
@@ -73,6 +74,7 @@ mod stage;
 pub use any::{Links, Networks, any_link, any_network, links_like, networks_like};
 pub use bounds::{LinkBounds, LossModel};
 pub use bounds_error::BoundsError;
+pub use hits::{PacketSets, any_hits};
 pub use link::{ImpairedLink, LinkError};
 pub use network::{ImpairedNetwork, NetworkTextError};
 pub use stage::Stage;

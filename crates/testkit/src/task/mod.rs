@@ -8,6 +8,7 @@ use std::future::Future;
 use std::panic::Location;
 use std::pin::Pin;
 use std::rc::{Rc, Weak};
+use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
 
 pub(crate) use join::joined;
@@ -16,6 +17,7 @@ pub use join::{JoinHandle, TaskStopped};
 use cohaptic_wan::NodeId;
 
 use crate::context;
+use crate::watch::{Pulse, Runner};
 
 /// What a task runs.
 pub(crate) type Program = Pin<Box<dyn Future<Output = ()>>>;
@@ -24,6 +26,9 @@ pub(crate) type Program = Pin<Box<dyn Future<Output = ()>>>;
 pub(crate) struct Task {
     host: Option<NodeId>,
     origin: &'static Location<'static>,
+    pulse: Arc<Pulse>,
+    /// What the pulse knows it by.
+    number: usize,
     program: RefCell<Option<Program>>,
     /// It was stopped while it was polled.
     is_doomed: Cell<bool>,
@@ -32,8 +37,17 @@ pub(crate) struct Task {
 }
 
 impl Task {
-    fn new(host: Option<NodeId>, origin: &'static Location<'static>, program: Program) -> Rc<Self> {
-        Rc::new(Self { host, origin, program: RefCell::new(Some(program)), is_doomed: Cell::new(false), waker: RefCell::new(None) })
+    fn new(host: Option<NodeId>, origin: &'static Location<'static>, program: Program, pulse: &Arc<Pulse>) -> Rc<Self> {
+        let number = pulse.number(Runner { host, origin });
+        Rc::new(Self {
+            host,
+            origin,
+            pulse: Arc::clone(pulse),
+            number,
+            program: RefCell::new(Some(program)),
+            is_doomed: Cell::new(false),
+            waker: RefCell::new(None),
+        })
     }
 
     /// Polls the program; ready when it is over, or was stopped.
@@ -46,7 +60,9 @@ impl Task {
         }
         let mut program = self.program.borrow_mut();
         let Some(future) = program.as_mut() else { return Poll::Ready(()) };
+        self.pulse.begins(self.number);
         let polled = context::on_host(self.host, || future.as_mut().poll(cx));
+        self.pulse.returns();
         if polled.is_ready() || self.is_doomed.get() {
             let over = program.take();
             drop(program);
@@ -101,6 +117,7 @@ type Factory = Rc<dyn Fn() -> Program>;
 
 /// All tasks of a test bed.
 pub(crate) struct Tasks {
+    pulse: Arc<Pulse>,
     spawner: Box<dyn Spawner>,
     known: RefCell<Vec<Weak<Task>>>,
     /// By host: its program, and where it was given.
@@ -108,8 +125,8 @@ pub(crate) struct Tasks {
 }
 
 impl Tasks {
-    pub(crate) fn new(spawner: Box<dyn Spawner>, hosts: usize) -> Self {
-        Self { spawner, known: RefCell::new(Vec::new()), factories: RefCell::new(vec![None; hosts]) }
+    pub(crate) fn new(spawner: Box<dyn Spawner>, hosts: usize, pulse: Arc<Pulse>) -> Self {
+        Self { pulse, spawner, known: RefCell::new(Vec::new()), factories: RefCell::new(vec![None; hosts]) }
     }
 
     /// Starts a task on a host.
@@ -124,7 +141,7 @@ impl Tasks {
     }
 
     fn start(&self, host: Option<NodeId>, origin: &'static Location<'static>, program: Program) -> Rc<Task> {
-        let task = Task::new(host, origin, program);
+        let task = Task::new(host, origin, program, &self.pulse);
         let mut known = self.known.borrow_mut();
         // Now and then those that are over are forgotten: so that they are never more than twice those that run.
         if known.len() == known.capacity() {
@@ -167,6 +184,12 @@ impl Tasks {
             }
             all.iter().for_each(|task| task.stop());
         }
+    }
+
+    /// The executor does something else: it does not stand.
+    #[inline]
+    pub(crate) fn turns(&self) {
+        self.pulse.turns();
     }
 
     /// The tasks that are not over.

@@ -3,6 +3,8 @@
 //! Sockets ([`core`](crate::core)) and state machines ([`node`](crate::node)) hand packets in with [`Wire::offer`] and take those that arrive with
 //! [`Wire::poll`], until it gives `None`, after each packet and whenever time has passed.
 
+mod exits;
+mod hitting;
 mod recording;
 
 use std::collections::VecDeque;
@@ -11,9 +13,13 @@ use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketInfo, Path};
 
+use exits::{Out, counted};
+pub(crate) use hitting::HitCount;
+use hitting::Hitting;
 pub(crate) use recording::{Recorded, Recording, Seen};
 
 use crate::file::LinkChange;
+use crate::hit::{Laws, Verdict};
 use crate::seed::hash;
 use crate::trace::{Happening, Lost, PacketName};
 
@@ -30,6 +36,8 @@ pub(crate) struct Settings {
     pub(crate) keeps_packets: bool,
     /// How often tasks may be polled, or packets and timers handled, at one instant.
     pub(crate) patience: u64,
+    /// Which packets are hit.
+    pub(crate) laws: Laws,
 }
 
 /// What travels: bytes, and the addresses that their owner writes on them.
@@ -64,10 +72,12 @@ pub(crate) struct Wire<A> {
     cut: Vec<bool>,
     /// By sender, then receiver: how many packets were offered.
     offered: Vec<u64>,
+    /// Where packets are hit.
+    hitting: Option<Box<Hitting<A>>>,
     recording: Recording,
 }
 
-impl<A: Clone> Wire<A> {
+impl<A: Clone + Send + Sync + 'static> Wire<A> {
     pub(crate) fn new(
         names: &[String],
         seed: u64,
@@ -76,17 +86,21 @@ impl<A: Clone> Wire<A> {
         link: impl FnMut(NodeId, NodeId) -> LinkModel,
     ) -> Self {
         let config = NetworkConfig { seed, nodes: names.to_vec(), general: false };
+        let (hitting, network) = Hitting::new(&settings.laws, names, seed, Network::new(config, link));
         Self {
             now: Instant::ZERO,
             hosts: names.len(),
-            network: Network::new(config, link),
+            network,
+            hitting,
             changes: changes.into(),
             cut: vec![false; names.len() * names.len()],
             offered: vec![0; names.len() * names.len()],
             recording: Recording::new(names.to_vec(), settings),
         }
     }
+}
 
+impl<A: Clone> Wire<A> {
     #[inline]
     pub(crate) const fn now(&self) -> Instant {
         self.now
@@ -102,7 +116,8 @@ impl<A: Clone> Wire<A> {
     /// When the network must be woken, or a link changes.
     pub(crate) fn next(&self) -> Option<Instant> {
         let change = self.changes.front().map(|change| change.at);
-        [self.network.poll_timeout(), change].into_iter().flatten().min()
+        let late = self.hitting.as_ref().and_then(|hitting| hitting.exits.next());
+        [self.network.poll_timeout(), change, late].into_iter().flatten().min()
     }
 
     /// Changes the next link that is to change by now, and says whether there was one.
@@ -122,7 +137,7 @@ impl<A: Clone> Wire<A> {
             let passed = self.network.handle_timeout(self.now);
             debug_assert_eq!(passed, Ok(()), "time does not go back");
         }
-        is_due
+        is_due || self.hitting.as_ref().and_then(|hitting| hitting.exits.next()).is_some_and(|at| at <= self.now)
     }
 
     /// Hands a packet to its link. Fails with the packet's name if the way is cut.
@@ -141,6 +156,12 @@ impl<A: Clone> Wire<A> {
         }
         self.offered[pair] += 1;
         let info = PacketInfo { size: cohaptic_units::Bytes::new(len as u64), ecn_capable: parcel.ecn_capable };
+        if let Some(hitting) = &mut self.hitting {
+            let verdict = hitting.judge(packet, self.now, &parcel.bytes);
+            if verdict != Verdict::Pass {
+                self.note(Happening::Hit { packet, verdict });
+            }
+        }
         let offered = self.network.handle_packet(self.now, path.from, path.to, info, parcel);
         debug_assert_eq!(offered, Ok(()), "hosts are checked, and time does not go back");
         Ok(())
@@ -149,11 +170,14 @@ impl<A: Clone> Wire<A> {
     /// The next packet that has arrived. What becomes of it is told by [`Wire::ends`].
     pub(crate) fn poll(&mut self) -> Option<Arrival<A>> {
         loop {
-            let event = self.network.poll_event()?;
-            let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy >> 1 };
+            let event = self.poll_out()?;
+            let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy };
             self.recording.keep(&event);
             match event.fate {
                 Fate::Delivered(at) => {
+                    if let Some(hitting) = &mut self.hitting {
+                        hitting.exits.arrived(event.path, at);
+                    }
                     let (marked, is_cut) = (event.marked, self.cut[self.pair(event.path)]);
                     let mut parcel = event.payload;
                     if let Some(damage) = &event.damage {
@@ -168,6 +192,13 @@ impl<A: Clone> Wire<A> {
                 Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
             }
         }
+    }
+
+    /// What comes out next of the links, and of what was kept behind them.
+    #[inline]
+    fn poll_out(&mut self) -> Option<Out<A>> {
+        let Some(hitting) = &mut self.hitting else { return self.network.poll_event().map(counted) };
+        hitting.exits.poll_with(&mut self.network, self.now)
     }
 
     /// Notes whether a packet that its link has delivered has reached a program.
@@ -213,9 +244,21 @@ impl<A: Clone> Wire<A> {
         &self.recording
     }
 
+    /// How many packets of a path were hit.
+    pub(crate) fn hits(&self, path: Path) -> u64 {
+        self.hitting.as_ref().map_or(0, |hitting| hitting.hits(path))
+    }
+
     /// What was recorded so far. Packets that are on their way are followed to their end, in the fates alone, as if nothing more were sent.
     pub(crate) fn recorded(&self) -> Recorded {
-        self.recording.followed_through(&self.network, self.now)
+        let exits = self.hitting.as_ref().map(|hitting| hitting.exits.clone()).unwrap_or_default();
+        let (packets, ended) = (self.recording.followed_through(&self.network, exits, self.now), self.now);
+        Recorded { trace: self.recording.trace().clone(), packets, ended, hits: self.hit_counts() }
+    }
+
+    /// What each law did.
+    pub(crate) fn hit_counts(&self) -> Vec<HitCount> {
+        self.hitting.as_ref().map(|hitting| hitting.counts()).unwrap_or_default()
     }
 
     const fn pair(&self, path: Path) -> usize {

@@ -2,9 +2,10 @@
 
 use bytes::Bytes;
 use cohaptic_units::Instant;
-use cohaptic_wan::{Network, PacketEvent, PacketRecord, Path};
+use cohaptic_wan::{Fate, Network, PacketEvent, Path};
 
-use super::{Parcel, Settings};
+use super::exits::{Exits, Out};
+use super::{HitCount, Parcel, Settings};
 use crate::trace::{Happening, Trace};
 
 /// The record of a run, as far as it is asked for.
@@ -20,8 +21,16 @@ pub(crate) struct Recording {
 /// What became of a packet on its link, with its bytes.
 pub(crate) type Seen = PacketEvent<Bytes, Path>;
 
-/// What was recorded of a run, and when it ended.
-pub(crate) type Recorded = (Trace, Vec<Seen>, Instant);
+/// What was recorded of a run.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Recorded {
+    pub(crate) trace: Trace,
+    pub(crate) packets: Vec<Seen>,
+    /// When the run ended.
+    pub(crate) ended: Instant,
+    /// What each law did.
+    pub(crate) hits: Vec<HitCount>,
+}
 
 /// No link holds a packet for longer than this many of its events.
 const MOST_EVENTS: u32 = 10_000_000;
@@ -40,7 +49,7 @@ impl Recording {
     }
 
     #[inline]
-    pub(super) fn keep<A>(&mut self, event: &PacketEvent<Parcel<A>, Path>) {
+    pub(super) fn keep<A>(&mut self, event: &Out<A>) {
         if self.keeps_packets {
             self.packets.push(seen(event));
         }
@@ -51,24 +60,32 @@ impl Recording {
         &self.trace
     }
 
-    /// What has been recorded until `now`, and the ends of the packets that are in this network.
-    pub(super) fn followed_through<A: Clone>(&self, network: &Network<Parcel<A>>, now: Instant) -> Recorded {
+    /// The packets that have been recorded, and the ends of those that are in this network and behind it, from `now` on.
+    pub(super) fn followed_through<A: Clone>(&self, network: &Network<Parcel<A>>, mut exits: Exits<A>, mut now: Instant) -> Vec<Seen> {
         let mut packets = self.packets.clone();
-        let mut network = self.keeps_packets.then(|| network.clone());
+        if !self.keeps_packets {
+            return packets;
+        }
+        let mut network = network.clone();
         for _ in 0..MOST_EVENTS {
-            let Some(network) = &mut network else { break };
-            packets.extend(std::iter::from_fn(|| network.poll_event()).map(|event| seen(&event)));
-            let Some(next) = network.poll_timeout() else { break };
+            while let Some(out) = exits.poll_with(&mut network, now) {
+                if let Fate::Delivered(at) = out.fate {
+                    exits.arrived(out.path, at);
+                }
+                packets.push(seen(&out));
+            }
+            let Some(next) = [network.poll_timeout(), exits.next()].into_iter().flatten().min() else { break };
+            now = next;
             if network.handle_timeout(next).is_err() {
                 break;
             }
         }
-        (self.trace.clone(), packets, now)
+        packets.extend(exits.abandon(now).map(|out| seen(&out)));
+        packets
     }
 }
 
-/// What a link says of a packet, as the row of its log. Without access lines the only copy is that of the link, whose number in a network is 2.
-fn seen<A>(event: &PacketEvent<Parcel<A>, Path>) -> Seen {
-    let record = PacketRecord { copy: event.copy >> 1, ..event.record };
-    PacketEvent { record, payload: event.payload.bytes.clone(), damage: event.damage.clone() }
+/// What a link says of a packet, as the row of its log.
+fn seen<A>(out: &Out<A>) -> Seen {
+    PacketEvent { record: out.record, payload: out.payload.bytes.clone(), damage: out.damage.clone() }
 }

@@ -220,9 +220,12 @@ fn the_environment_asks_for_the_artefacts_of_every_test_that_fails_and_sets_its_
         .unwrap();
     assert!(!output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
-    // With one test thread a test has no name but `main`.
+    // With one test thread it is named by its function.
     let [name] = &names(&base.path().join("all"))[..] else { panic!("one folder is expected") };
-    assert!(name == "artefacts__fails_in_a_child_of_this_process_only" || name == "main", "{name}");
+    assert!(
+        name == "artefacts__fails_in_a_child_of_this_process_only" || name == "integration__artefacts__fails_in_a_child_of_this_process_only",
+        "{name}"
+    );
     let folder = base.path().join("all").join(name);
     assert!(
         said.contains(&format!("what happened is in {}\n", folder.display())) && said.contains("seed 77; COHAPTIC_TEST_SEED=77 runs it again"),

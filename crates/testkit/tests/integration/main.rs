@@ -6,12 +6,15 @@ mod artefacts;
 mod chapter;
 mod equivalence;
 mod faults;
+mod hits;
 mod like_tokio;
 mod link_files;
 mod misuse;
 mod nodes;
 #[cfg(feature = "quinn")]
 mod quic;
+mod seeds;
 mod sockets;
+mod stall;
 #[cfg(feature = "strategies")]
 mod strategies;

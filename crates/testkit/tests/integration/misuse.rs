@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
+use cohaptic_testkit::hit::{Hits, Verdict};
 use cohaptic_testkit::{Bed, Testbed, UdpSocket, time};
 
 fn bed() -> Testbed {
@@ -107,6 +108,14 @@ fn a_test_bed_that_is_none_is_refused_where_it_is_said() {
     says(|| drop(bed().link("a", "c", "delay 1ms")), &["there is no host `c`; the hosts are a, b"]);
     says(|| drop(bed().link("a", "a", "delay 1ms")), &["host `a` has no link to itself"]);
     says(|| drop(bed().links("delay 24ms loss 250%")), &["this is no link", "^^^^ expected a percentage from 0 to 100"]);
+    says(|| drop(bed().hit("a", "c", "drop packet 1")), &["there is no host `c`; the hosts are a, b"]);
+    says(|| drop(bed().hit("a", "a", "drop packet 1")), &["host `a` has no link to itself"]);
+    says(
+        || drop(bed().hit("a", "b", "drop third packet")),
+        &["these are no words of hits: 1:6: unknown word \"third\": expected `packet 3`", "^^^^^"],
+    );
+    says(|| drop(bed().on_packet("c", "b", |_| Verdict::Drop)), &["there is no host `c`"]);
+    says(|| drop(bed().hits(&Hits::words("a -> x: drop packet 1"))), &["there is no host `x`"]);
     says(|| bed().run(|bed| async move { drop(bed.host("c")) }), &["there is no host `c`"]);
     says(|| bed().run(|bed| async move { assert_eq!(bed.link_stats("a", "a").offered(), 0) }), &["no link to itself"]);
     let spawned_on_the_dead = |bed: Bed| async move {

@@ -5,8 +5,9 @@ use std::net::IpAddr;
 use std::rc::Rc;
 use std::time::Duration;
 
+use cohaptic_testkit::hit::Verdict;
 use cohaptic_testkit::proptest::prelude::*;
-use cohaptic_testkit::strategies::{ImpairedNetwork, LinkBounds, Stage, links_like};
+use cohaptic_testkit::strategies::{ImpairedNetwork, LinkBounds, Stage, any_hits, links_like};
 use cohaptic_testkit::{Instant, Testbed, UdpSocket, time};
 
 use super::message_of;
@@ -175,10 +176,39 @@ fn difference(test: &str) -> String {
 
 #[test]
 fn a_program_that_differs_is_told_so() {
-    super::assert_shown(&difference("main"));
+    super::assert_shown(&difference("differs"));
 }
 
 #[test]
 fn the_seed_is_told_with_the_name_of_the_test() {
     super::assert_shown(difference("lossy").lines().last().unwrap());
+}
+
+/// When the client, which asks every 100 ms, has its answer.
+fn answered(bed: Testbed) -> u64 {
+    bed.links("delay 10ms").run(|bed| async move {
+        bed.host("server").spawn(echo());
+        let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+        loop {
+            client.send_to(b"there?", "server:7").await.unwrap();
+            if time::timeout(Duration::from_millis(100), client.recv(&mut [0; 10])).await.is_ok() {
+                return time::now().as_nanos() / 1_000_000;
+            }
+        }
+    })
+}
+
+#[test]
+fn a_question_or_its_answer_is_lost() {
+    let bed = || Testbed::new(["client", "server"]);
+    assert_eq!(answered(bed().hit("client", "server", "drop packet 0")), 120);
+    assert_eq!(answered(bed().hit("server", "client", "delay 95ms first packet with \"there\"")), 115);
+    assert_eq!(answered(bed().on_packet("server", "client", |packet| if packet.number < 2 { Verdict::Drop } else { Verdict::Pass })), 220);
+}
+
+proptest! {
+    #[test]
+    fn each_lost_packet_costs_100_ms_at_most(hits in any_hits(["client", "server"], 2, ["drop"])) {
+        prop_assert!(answered(Testbed::new(["client", "server"]).hits(&hits)) <= 420);
+    }
 }

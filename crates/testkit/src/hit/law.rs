@@ -1,0 +1,62 @@
+//! Words as a law.
+
+use cohaptic_wan::random::Draws;
+
+use super::words::{Action, Hit, Kind, Which};
+use super::{PacketLaw, SentPacket, Verdict};
+
+/// A law that words say.
+#[derive(Clone, Debug)]
+pub(crate) struct WordsLaw {
+    hit: Hit,
+    /// How many of the kind there were.
+    met: u64,
+}
+
+impl WordsLaw {
+    pub(crate) const fn new(hit: Hit) -> Self {
+        Self { hit, met: 0 }
+    }
+
+    fn is_meant(&mut self, packet: &SentPacket<'_>) -> bool {
+        match &self.hit.which {
+            Which::Numbers(numbers) => numbers.iter().any(|range| range.contains(&packet.number)),
+            Which::Nth { nth, kind, with } => {
+                if !is_of(packet, *kind) || !holds(packet.bytes, with) {
+                    return false;
+                }
+                self.met += 1;
+                nth.is_none_or(|nth| nth == self.met)
+            }
+        }
+    }
+}
+
+impl PacketLaw for WordsLaw {
+    fn judge(&mut self, packet: &SentPacket<'_>, draws: &mut Draws) -> Verdict {
+        if !self.is_meant(packet) {
+            return Verdict::Pass;
+        }
+        match self.hit.action {
+            Action::Drop => Verdict::Drop,
+            Action::Delay(time) => Verdict::Delay(time),
+            Action::Duplicate(time) => Verdict::Duplicate(time),
+            Action::Corrupt => Verdict::Corrupt(draws.next_word()),
+            Action::Behind(count) => Verdict::Behind(count),
+        }
+    }
+}
+
+fn is_of(packet: &SentPacket<'_>, kind: Kind) -> bool {
+    match kind {
+        Kind::Packet => true,
+        Kind::Segment => packet.tcp().is_some_and(|segment| !segment.payload.is_empty()),
+        Kind::Retransmission => packet.is_retransmission,
+        Kind::Flag(flag) => packet.tcp().is_some_and(|segment| segment.flags.has(flag)),
+    }
+}
+
+/// Whether the bytes stand somewhere in the others.
+fn holds(all: &[u8], bytes: &[u8]) -> bool {
+    bytes.is_empty() || all.windows(bytes.len()).any(|window| window == bytes)
+}

@@ -1,0 +1,68 @@
+//! The laws of a test bed, from which each run gets its own.
+
+use std::fmt;
+use std::panic::{RefUnwindSafe, UnwindSafe};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use cohaptic_wan::Path;
+use cohaptic_wan::random::Draws;
+
+use super::{PacketLaw, SentPacket, Verdict};
+
+/// The laws of a test bed, in the order in which they were given.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Laws(Vec<Given>);
+
+/// A law, and for which path.
+#[derive(Clone)]
+pub(crate) struct Given {
+    pub(crate) path: Path,
+    /// Its words, or where it was given.
+    pub(crate) name: String,
+    fresh: Arc<Fresh>,
+}
+
+type Fresh = dyn Fn() -> Box<dyn PacketLaw + Send> + Send + Sync + UnwindSafe + RefUnwindSafe;
+
+impl Laws {
+    pub(crate) fn add(&mut self, path: Path, name: String, law: impl PacketLaw + Clone + Send + 'static) {
+        let law = Mutex::new(law);
+        self.0.push(Given { path, name, fresh: Arc::new(move || Box::new(lock(&law).clone())) });
+    }
+
+    /// A function as a law.
+    pub(crate) fn add_function(&mut self, path: Path, name: String, judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static) {
+        self.add(path, name, Function(judge));
+    }
+
+    pub(crate) fn iter(&self) -> std::slice::Iter<'_, Given> {
+        self.0.iter()
+    }
+}
+
+impl Given {
+    /// The law as it begins.
+    pub(crate) fn fresh(&self) -> Box<dyn PacketLaw + Send> {
+        (self.fresh)()
+    }
+}
+
+impl fmt::Debug for Given {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Given").field("path", &self.path).field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+#[derive(Clone)]
+struct Function<F>(F);
+
+impl<F: FnMut(&SentPacket<'_>) -> Verdict> PacketLaw for Function<F> {
+    fn judge(&mut self, packet: &SentPacket<'_>, _draws: &mut Draws) -> Verdict {
+        (self.0)(packet)
+    }
+}
+
+/// Locks, also after a panic: a law is whole between two calls.
+fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

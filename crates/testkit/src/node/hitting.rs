@@ -1,0 +1,51 @@
+//! Packets that are hit between nodes.
+
+use super::Nodes;
+use crate::bed::{add_all, add_function, add_law, add_words};
+use crate::hit::{Hits, PacketLaw, SentPacket, Verdict};
+
+impl Nodes {
+    /// Asks a function what becomes of every packet that is offered to the link from one node to another: see [`hit`](crate::hit). Every run begins with a clone of it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such node yet, or both are the same.
+    #[track_caller]
+    pub fn on_packet(mut self, from: &str, to: &str, judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static) -> Self {
+        add_function(&mut self.settings.laws, &self.names, [from, to], judge);
+        self
+    }
+
+    /// Asks a law what becomes of every packet that is offered to the link from one node to another: see [`PacketLaw`].
+    ///
+    /// # Panics
+    ///
+    /// As [`Nodes::on_packet`].
+    #[track_caller]
+    pub fn law(mut self, from: &str, to: &str, law: impl PacketLaw + Clone + Send + 'static) -> Self {
+        add_law(&mut self.settings.laws, &self.names, [from, to], law);
+        self
+    }
+
+    /// Hits packets from one node to another, in [words](crate::hit).
+    ///
+    /// # Panics
+    ///
+    /// As [`Nodes::on_packet`]; if the words make no sense, with the place.
+    #[track_caller]
+    pub fn hit(mut self, from: &str, to: &str, words: &str) -> Self {
+        add_words(&mut self.settings.laws, &self.names, [from, to], words);
+        self
+    }
+
+    /// Hits packets as a value says that a strategy has drawn, or that was pasted back.
+    ///
+    /// # Panics
+    ///
+    /// If it names a node that there is not.
+    #[track_caller]
+    pub fn hits(mut self, hits: &Hits) -> Self {
+        add_all(&mut self.settings.laws, &self.names, &hits.all);
+        self
+    }
+}

@@ -1,0 +1,71 @@
+//! When a run is watched, and how long it may stand.
+
+use std::time::Duration;
+
+use cohaptic_units::parse;
+
+/// This variable of the environment says for how long anything in a test bed may run without returning to it, whatever the tests say: a span such as `10min`, or `off`.
+pub const STALL_VARIABLE: &str = "COHAPTIC_TEST_STALL";
+
+/// What the environment says; else what the test says.
+///
+/// # Panics
+///
+/// If what the environment says is no span.
+pub(crate) fn limit(said: Duration) -> Duration {
+    of(std::env::var(STALL_VARIABLE).ok().as_deref(), said)
+}
+
+#[expect(clippy::panic, reason = "a test that is not watched as was asked for is worse than none")]
+fn of(environment: Option<&str>, said: Duration) -> Duration {
+    match environment {
+        None => said,
+        Some("off") => Duration::MAX,
+        Some(text) => match parse::duration(text) {
+            Ok(span) if !span.is_zero() => span,
+            Ok(_) => panic!("{STALL_VARIABLE} is `{text}`; expected a span such as `10min`, or `off`"),
+            Err(error) => panic!("{STALL_VARIABLE}: {error}, or `off`"),
+        },
+    }
+}
+
+/// Whether a debugger holds this process: somebody may look at it for hours. Known on Linux.
+pub(super) fn is_debugged() -> bool {
+    std::fs::read_to_string("/proc/self/status").is_ok_and(|status| is_traced(&status))
+}
+
+fn is_traced(status: &str) -> bool {
+    status.lines().filter_map(|line| line.strip_prefix("TracerPid:")).any(|id| id.trim() != "0")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_environment_comes_before_the_test() {
+        let second = Duration::from_secs(1);
+        assert_eq!(of(None, second), second);
+        assert_eq!(of(Some("10min"), second), Duration::from_secs(600));
+        assert_eq!(of(Some("off"), second), Duration::MAX);
+    }
+
+    #[test]
+    #[should_panic(expected = "COHAPTIC_TEST_STALL is `0s`; expected a span such as `10min`, or `off`")]
+    fn no_span_at_all_is_refused() {
+        of(Some("0s"), Duration::MAX);
+    }
+
+    #[test]
+    #[should_panic(expected = "COHAPTIC_TEST_STALL: no unit in \"60\": expected a duration")]
+    fn a_span_without_a_unit_is_refused() {
+        of(Some("60"), Duration::MAX);
+    }
+
+    #[test]
+    fn a_debugger_is_known() {
+        assert!(is_traced("Name:\tx\nTracerPid:\t123\nUid:\t0"));
+        assert!(!is_traced("Name:\tx\nTracerPid:\t0\nUid:\t0"));
+        assert!(!is_traced(""));
+    }
+}

@@ -1,0 +1,129 @@
+//! The thread that watches, one for all test beds of a process.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::process::abort;
+use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
+use std::thread;
+use std::time::Duration;
+
+use cohaptic_units::print::{Seconds, Span};
+
+use super::guard::is_debugged;
+use super::{Kind, Runner, STALL_VARIABLE, Watched};
+
+/// How often it looks at most.
+const SHORTEST: Duration = Duration::from_millis(5);
+/// How often it looks at least.
+const LONGEST: Duration = Duration::from_millis(250);
+
+struct Watch {
+    runs: Vec<Seen>,
+    has_thread: bool,
+}
+
+/// A run as it was last looked at.
+struct Seen {
+    run: Weak<Watched>,
+    turns: u64,
+    /// For how long it has stood. It is the sum of the spans between looks, and not the difference of two times: while the machine sleeps, or the process is
+    /// stopped, nobody looks.
+    stood: Duration,
+}
+
+static WATCH: Mutex<Watch> = Mutex::new(Watch { runs: Vec::new(), has_thread: false });
+static CHANGED: Condvar = Condvar::new();
+
+/// Watches a run until it is dropped.
+pub(super) fn watch(run: &Arc<Watched>) {
+    let mut watch = WATCH.lock().unwrap_or_else(PoisonError::into_inner);
+    watch.runs.push(Seen { run: Arc::downgrade(run), turns: 0, stood: Duration::ZERO });
+    if !watch.has_thread {
+        // A system without threads has nobody who watches.
+        watch.has_thread = thread::Builder::new().name("cohaptic-watch".to_owned()).spawn(look).is_ok();
+    }
+    if watch.runs.len() == 1 {
+        CHANGED.notify_one();
+    }
+}
+
+/// Looks at all runs, for ever.
+fn look() {
+    let mut watch = WATCH.lock().unwrap_or_else(PoisonError::into_inner);
+    loop {
+        watch.runs.retain(|seen| seen.run.strong_count() > 0);
+        let Some(shortest) = watch.runs.iter().filter_map(|seen| Some(seen.run.upgrade()?.limit)).min() else {
+            watch = CHANGED.wait(watch).unwrap_or_else(PoisonError::into_inner);
+            continue;
+        };
+        let span = (shortest / 8).clamp(SHORTEST, LONGEST);
+        let (held, waited) = CHANGED.wait_timeout(watch, span).unwrap_or_else(PoisonError::into_inner);
+        watch = held;
+        if !waited.timed_out() {
+            continue;
+        }
+        for seen in &mut watch.runs {
+            let Some(run) = seen.run.upgrade() else { continue };
+            let (turns, running) = run.pulse.now();
+            let is_at_rest = turns != seen.turns || running == 0 && run.kind == Kind::Nodes;
+            seen.turns = turns;
+            seen.stood = if is_at_rest { Duration::ZERO } else { seen.stood + span };
+            if seen.stood >= run.limit {
+                seen.stood = Duration::ZERO;
+                if !is_debugged() {
+                    end(&run, running);
+                }
+            }
+        }
+    }
+}
+
+/// Tells who has not returned, and ends the process.
+fn end(run: &Watched, running: usize) -> ! {
+    let text = run.complaint(running);
+    // What `eprintln` writes may be kept by the test that this thread was started by, and would be lost with it. Nothing can be done if it cannot be written.
+    let _ = std::io::stderr().write_all(text.as_bytes());
+    abort()
+}
+
+impl Watched {
+    fn complaint(&self, running: usize) -> String {
+        let shared = self.shared.get().and_then(Weak::upgrade);
+        let name = |host: usize| self.hosts.get(host).map_or("?", |name| name);
+        let runner = match (self.kind, self.pulse.runner(running)) {
+            (Kind::Nodes, _) => format!("node `{}`", name(running.saturating_sub(1))),
+            (_, Some(Runner { host: Some(host), origin })) => format!("the task of host `{}` that was spawned at {origin}", name(host.index())),
+            (_, Some(Runner { host: None, origin })) => format!("the task that was spawned at {origin}"),
+            (Kind::Own, None) => "the function that makes the program, or a waker,".to_owned(),
+            #[cfg(feature = "tokio")]
+            (Kind::Tokio, None) => {
+                "no task of the test bed, but one of `tokio::spawn` or `spawn_local`, or the function that makes the program,".to_owned()
+            }
+        };
+        let now = match shared.as_ref().map(|shared| shared.try_now()) {
+            Some(Some(now)) => format!("at {} s of the run", Seconds(now)),
+            Some(None) => "within a call of the test bed, such as one of a packet law,".to_owned(),
+            None => "in a step of the run".to_owned(),
+        };
+        let mut text = format!(
+            "\ntime stands still: {runner} has the thread {now} and has not returned for {} by the wall clock. It loops without an `.await`, blocks, or wakes itself again \
+             and again\n",
+            Span(self.limit)
+        );
+        let record = shared.and_then(|shared| shared.try_recorded());
+        if let Some(record) = record {
+            for line in self.artefacts.lines(&self.seed, &record.hits.clone(), || crate::record::Record::new(self.seed.clone(), record)) {
+                // Writing to a `String` cannot fail.
+                let _ = writeln!(text, "{line}");
+            }
+        } else {
+            let _ = writeln!(text, "{}", self.seed.advice());
+        }
+        let _ = writeln!(
+            text,
+            "The process ends here, since a thread cannot be stopped. `stall_limit` of the test bed, or {STALL_VARIABLE}=10min, gives it longer, {STALL_VARIABLE}=off for \
+             ever; under a debugger nothing is ended."
+        );
+        text
+    }
+}

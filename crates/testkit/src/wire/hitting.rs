@@ -1,0 +1,148 @@
+//! Packets that laws hit, in a run.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use cohaptic_units::Instant;
+use cohaptic_units::print::Counted;
+use cohaptic_wan::random::{Purpose, Stream};
+use cohaptic_wan::{Network, Path};
+
+use super::Parcel;
+use super::exits::Exits;
+use crate::hit::{Laws, PacketLaw, Seen, Segment, SentPacket, Verdict};
+use crate::trace::PacketName;
+
+/// The laws of a run, and what they do.
+pub(super) struct Hitting<A> {
+    paths: BTreeMap<Path, OnPath>,
+    pub(super) exits: Exits<A>,
+    /// Whether the packet that is offered is to be dropped: what the filters of the links ask.
+    drops: Arc<AtomicBool>,
+}
+
+/// The laws of a path.
+struct OnPath {
+    from: String,
+    to: String,
+    laws: Vec<Running>,
+    seen: Seen,
+    /// How many packets were judged.
+    judged: u64,
+    /// How many of them were hit.
+    hit: u64,
+}
+
+struct Running {
+    name: String,
+    law: Box<dyn PacketLaw + Send>,
+    stream: Stream,
+    hit: u64,
+}
+
+/// What a law did in a run.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct HitCount {
+    pub(crate) from: String,
+    pub(crate) to: String,
+    /// The law: its words, or where it was given.
+    pub(crate) name: String,
+    pub(crate) hit: u64,
+    /// How many packets it was asked about.
+    pub(crate) judged: u64,
+}
+
+impl HitCount {
+    /// In words: `client -> server: drop first SYN: hit 1 of 12 packets`.
+    pub(crate) fn words(&self) -> String {
+        let Self { from, to, name, hit, judged } = self;
+        let hit = if *hit == 0 { "nothing".to_owned() } else { hit.to_string() };
+        format!("{from} -> {to}: {name}: hit {hit} of {}", Counted(*judged, "packet"))
+    }
+}
+
+impl<A: Clone + Send + Sync + 'static> Hitting<A> {
+    /// The laws as they begin, and the network with them; `None` if there are none.
+    pub(super) fn new(laws: &Laws, names: &[String], seed: u64, network: Network<Parcel<A>>) -> (Option<Box<Self>>, Network<Parcel<A>>) {
+        let mut hitting = Self { paths: BTreeMap::new(), exits: Exits::default(), drops: Arc::default() };
+        let mut network = network;
+        for given in laws.iter() {
+            let Path { from, to } = given.path;
+            if !hitting.paths.contains_key(&given.path) {
+                let drops = Arc::clone(&hitting.drops);
+                network = network.with_filter(from, to, move |_| drops.load(Ordering::Relaxed)).expect("the hosts of laws are checked");
+            }
+            let on_path = hitting.paths.entry(given.path).or_insert_with(|| {
+                let [from, to] = [from, to].map(|host| names[host.index()].clone());
+                OnPath { from, to, laws: Vec::new(), seen: Seen::default(), judged: 0, hit: 0 }
+            });
+            // Names of links have no blanks, and so no such label.
+            let label = format!("law {} of {}->{}", on_path.laws.len(), on_path.from, on_path.to);
+            let stream = Stream::new(seed, label.as_bytes());
+            on_path.laws.push(Running { name: given.name.clone(), law: given.fresh(), stream, hit: 0 });
+        }
+        ((!hitting.paths.is_empty()).then(|| Box::new(hitting)), network)
+    }
+}
+
+impl<A: Clone> Hitting<A> {
+    /// Asks the laws about a packet before it is offered to its link.
+    pub(super) fn judge(&mut self, packet: PacketName, at: Instant, bytes: &[u8]) -> Verdict {
+        let Some(on_path) = self.paths.get_mut(&packet.path) else { return Verdict::Pass };
+        let segment = Segment::parse(bytes).ok();
+        let sent = SentPacket {
+            path: packet.path,
+            from: &on_path.from,
+            to: &on_path.to,
+            number: packet.sequence,
+            at,
+            bytes,
+            is_retransmission: on_path.seen.note(bytes, segment.as_ref()),
+            segment: segment.as_ref(),
+        };
+        let mut verdict = Verdict::Pass;
+        on_path.judged += 1;
+        // All are asked, so that each that counts has met every packet.
+        for running in &mut on_path.laws {
+            let said = running.law.judge(&sent, &mut running.stream.packet(packet.sequence).draws(Purpose::Loss));
+            if said != Verdict::Pass && verdict == Verdict::Pass {
+                verdict = said;
+                running.hit += 1;
+            }
+        }
+        on_path.hit += u64::from(verdict != Verdict::Pass);
+        self.drops.store(verdict == Verdict::Drop, Ordering::Relaxed);
+        if !matches!(verdict, Verdict::Pass | Verdict::Drop) {
+            self.exits.expect(packet.path, packet.sequence, verdict);
+        }
+        verdict
+    }
+
+    /// How many packets of a path were hit.
+    pub(super) fn hits(&self, path: Path) -> u64 {
+        self.paths.get(&path).map_or(0, |on_path| on_path.hit)
+    }
+
+    /// What each law did.
+    pub(super) fn counts(&self) -> Vec<HitCount> {
+        let of = |(path, on_path): (&Path, &OnPath)| {
+            let mut waiting = String::new();
+            for (number, left) in self.exits.waiting(*path) {
+                // Writing to a `String` cannot fail.
+                let _ = write!(waiting, " (packet {number} waits for {left} more)");
+            }
+            let OnPath { from, to, judged, .. } = on_path;
+            let count = |law: &Running| HitCount {
+                from: from.clone(),
+                to: to.clone(),
+                name: format!("{}{waiting}", law.name),
+                hit: law.hit,
+                judged: *judged,
+            };
+            on_path.laws.iter().map(count).collect::<Vec<_>>()
+        };
+        self.paths.iter().flat_map(of).collect()
+    }
+}
