@@ -1,8 +1,8 @@
 //! Tests of networked programs over emulated bad links, in virtual time, the same way every time.
 //!
-//! You need it if you test a program that sends datagrams, and want every failure again from its seed.
+//! You need it if you test a program that talks over TCP, UDP or QUIC, and want every failure again from its seed.
 //!
-//! A [`Testbed`] is hosts and the [links](wan) between them. A program that is run on it has [UDP sockets](UdpSocket) with the methods of tokio's,
+//! A [`Testbed`] is hosts and the [links](wan) between them. A program that is run on it has sockets with the methods of tokio's,
 //! [timers](time), and hosts that crash, come back, and lose sight of each other. Nothing waits in real time: the clock jumps to the next event.
 //!
 //! ```
@@ -26,7 +26,12 @@
 //! | --- | --- |
 //! | hosts and links, and how a program is run: once, twice, recorded, on tokio | [`Testbed`] |
 //! | while it runs: hosts, links, cuts, notes | [`Bed`], [`Host`], [`JoinHandle`] |
-//! | sockets, and the addresses and names of hosts | [`UdpSocket`], [`Addresses`], [`AddressPlan`], [`ToSocketAddrs`] |
+//! | datagrams, and the addresses and names of hosts | [`UdpSocket`], [`Addresses`], [`AddressPlan`], [`ToSocketAddrs`] |
+#![cfg_attr(
+    feature = "tcp",
+    doc = "| streams, as Linux does TCP, and every constant of it | [`TcpListener`], [`TcpStream`], [`TcpSocket`], [`TcpConfig`], [`tcp`], [`net`] |"
+)]
+#![cfg_attr(not(feature = "tcp"), doc = "| streams, as Linux does TCP | feature `tcp` |")]
 //! | timers to the nanosecond | [`time`], [`Instant`] |
 //! | what a link is: words of `tc-netem`, or a model of the emulator | [`ToLink`], [`wan`] |
 //! | programs without sockets: state machines | [`node`] |
@@ -45,7 +50,8 @@
 //! | feature | on by default | brings |
 //! | --- | --- | --- |
 //! | `strategies` | yes | strategies of proptest for links and networks, and `proptest` itself |
-//! | `tokio` | yes | `Testbed::on_tokio`, for programs that use tokio's timers and tasks, and the methods of sockets whose arguments are of tokio's types |
+//! | `tcp` | yes | TCP, by `cohaptic-tcp` |
+//! | `tokio` | yes | `Testbed::on_tokio`, for programs that use tokio's timers and tasks, and the traits and methods of sockets that are of tokio's types |
 //! | `pcapng` | yes | captures among what a failed test leaves behind |
 //! | `files` | | relay files (TOML) as hosts and links; files of plain words need no feature |
 //! | `scenes` | | scene files as hosts and links and as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
@@ -67,6 +73,8 @@ mod core;
 mod file;
 mod host;
 mod link;
+#[cfg(feature = "tcp")]
+pub mod net;
 pub mod node;
 #[cfg(feature = "quinn")]
 pub mod quinn;
@@ -79,6 +87,8 @@ mod socket;
 #[cfg(feature = "strategies")]
 pub mod strategies;
 mod task;
+#[cfg(feature = "tcp")]
+pub mod tcp;
 pub mod time;
 mod trace;
 mod wire;
@@ -103,5 +113,7 @@ pub use scenes::{check_scene, check_scenes};
 pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
+#[cfg(feature = "tcp")]
+pub use tcp::{TcpConfig, TcpListener, TcpSocket, TcpStream};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use words::WordsError;

@@ -26,6 +26,8 @@ use crate::record::Record;
 use crate::runtime::own::Executor;
 use crate::seed::Seed;
 use crate::task::Tasks;
+#[cfg(feature = "tcp")]
+use crate::tcp::TcpConfig;
 use crate::trace::Trace;
 use crate::wire::{Recorded, Settings};
 
@@ -58,6 +60,9 @@ pub struct Testbed {
     changes: Vec<LinkChange>,
     seed: Option<u64>,
     settings: Settings,
+    /// By host, where they are not Linux's.
+    #[cfg(feature = "tcp")]
+    tcp: BTreeMap<NodeId, TcpConfig>,
     #[cfg(feature = "tokio")]
     is_tokio: bool,
     artefacts: Option<PathBuf>,
@@ -89,6 +94,8 @@ impl Testbed {
             changes: Vec::new(),
             seed: None,
             settings: Settings { receive_buffer: RECEIVE_BUFFER, traces: false, digests: true, keeps_packets: false, patience: PATIENCE },
+            #[cfg(feature = "tcp")]
+            tcp: BTreeMap::new(),
             #[cfg(feature = "tokio")]
             is_tokio: false,
             artefacts: None,
@@ -157,6 +164,30 @@ impl Testbed {
     /// How many bytes of datagrams a socket holds that nobody has read; what comes beyond is lost. 212,992 if it is not said, as with Linux.
     pub const fn receive_buffer(mut self, bytes: usize) -> Self {
         self.settings.receive_buffer = bytes;
+        self
+    }
+
+    /// The constants of TCP on all hosts. If it is not said they are those of Linux: [`TcpConfig::default`].
+    ///
+    /// # Panics
+    ///
+    /// If they cannot be.
+    #[cfg(feature = "tcp")]
+    pub fn tcp(mut self, config: TcpConfig) -> Self {
+        check_tcp(&config);
+        self.tcp = (0..self.names.len()).map(|host| (NodeId::new(host), config.clone())).collect();
+        self
+    }
+
+    /// The constants of TCP on one host, after [`Testbed::tcp`].
+    ///
+    /// # Panics
+    ///
+    /// If they cannot be, or there is no such host.
+    #[cfg(feature = "tcp")]
+    pub fn tcp_of(mut self, host: &str, config: TcpConfig) -> Self {
+        check_tcp(&config);
+        self.tcp.insert(node(&self.names, host), config);
         self
     }
 
@@ -267,7 +298,10 @@ impl Testbed {
         settings.traces |= artefacts.is_wanted();
         let (every, links) = (&self.every, &self.links);
         let link = |from, to| links.get(&Path { from, to }).unwrap_or(every).clone();
-        let core = Core::new(&self.names, seed.value, settings, self.changes.clone(), link);
+        #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only TCP has constants"))]
+        let mut core = Core::new(&self.names, seed.value, settings, self.changes.clone(), link);
+        #[cfg(feature = "tcp")]
+        self.tcp.iter().for_each(|(host, config)| core.set_tcp(*host, config.clone()));
         let mut recorded = None;
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             #[cfg(feature = "tokio")]
@@ -313,6 +347,17 @@ pub(crate) fn name_fault(name: &str) -> Option<String> {
     let is_word =
         !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
     (!is_word).then(|| format!("`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address"))
+}
+
+/// # Panics
+///
+/// If a connection cannot have these constants.
+#[cfg(feature = "tcp")]
+#[expect(clippy::panic, reason = "a misuse, and the way out")]
+fn check_tcp(config: &TcpConfig) {
+    if let Err(error) = config.check() {
+        panic!("these constants of TCP cannot be: {error}");
+    }
 }
 
 /// Which of the hosts is called so.
