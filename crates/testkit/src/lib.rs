@@ -39,6 +39,8 @@
 #![cfg_attr(not(feature = "strategies"), doc = "| links and networks at random, which shrink to the least impaired | feature `strategies` |")]
 #![cfg_attr(feature = "quinn", doc = "| unmodified QUIC endpoints | [`quinn`](mod@quinn) |")]
 #![cfg_attr(not(feature = "quinn"), doc = "| unmodified QUIC endpoints | feature `quinn` |")]
+#![cfg_attr(feature = "hyper", doc = "| unmodified programs of hyper and axum | [`hyper`](mod@hyper), feature `axum` |")]
+#![cfg_attr(not(feature = "hyper"), doc = "| unmodified programs of hyper, axum and tonic | features `hyper`, `axum`, `tonic` |")]
 //! | hosts and links from a file | [`Testbed::from_file`], [`LinkFile`] |
 #![cfg_attr(feature = "scenes", doc = "| scene files as tests, and scenes at random | [`check_scene`], [`check_scenes`], [`strategies::scene`] |")]
 #![cfg_attr(not(feature = "scenes"), doc = "| scene files as tests, and scenes at random | feature `scenes` |")]
@@ -55,6 +57,9 @@
 //! | `pcapng` | yes | captures among what a failed test leaves behind |
 //! | `files` | | relay files (TOML) as hosts and links; files of plain words need no feature |
 //! | `scenes` | | scene files as hosts and links and as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
+//! | `hyper` | | connectors and executors for hyper and hyper-util |
+//! | `axum` | | `TcpListener` as a listener of `axum::serve` |
+//! | `tonic` | | `TcpStream` as a connection of a tonic server |
 //! | `quinn` | | QUIC by quinn, and `quinn` itself |
 //!
 //! # Variables of the environment
@@ -67,11 +72,15 @@
 
 mod address;
 mod artefacts;
+#[cfg(feature = "axum")]
+pub mod axum;
 mod bed;
 mod context;
 mod core;
 mod file;
 mod host;
+#[cfg(feature = "hyper")]
+pub mod hyper;
 mod link;
 #[cfg(feature = "tcp")]
 pub mod net;
@@ -90,6 +99,8 @@ mod task;
 #[cfg(feature = "tcp")]
 pub mod tcp;
 pub mod time;
+#[cfg(feature = "tonic")]
+mod tonic;
 mod trace;
 mod wire;
 mod words;

@@ -3,6 +3,8 @@
 #[cfg(feature = "strategies")]
 mod network;
 mod running;
+#[cfg(feature = "tcp")]
+mod tcp;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -167,30 +169,6 @@ impl Testbed {
         self
     }
 
-    /// The constants of TCP on all hosts. If it is not said they are those of Linux: [`TcpConfig::default`].
-    ///
-    /// # Panics
-    ///
-    /// If they cannot be.
-    #[cfg(feature = "tcp")]
-    pub fn tcp(mut self, config: TcpConfig) -> Self {
-        check_tcp(&config);
-        self.tcp = (0..self.names.len()).map(|host| (NodeId::new(host), config.clone())).collect();
-        self
-    }
-
-    /// The constants of TCP on one host, after [`Testbed::tcp`].
-    ///
-    /// # Panics
-    ///
-    /// If they cannot be, or there is no such host.
-    #[cfg(feature = "tcp")]
-    pub fn tcp_of(mut self, host: &str, config: TcpConfig) -> Self {
-        check_tcp(&config);
-        self.tcp.insert(node(&self.names, host), config);
-        self
-    }
-
     /// How often tasks may be polled at one instant before the run is given up, because time does not pass; a million if it is not said.
     pub const fn patience(mut self, polls: u64) -> Self {
         self.settings.patience = polls;
@@ -347,17 +325,6 @@ pub(crate) fn name_fault(name: &str) -> Option<String> {
     let is_word =
         !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
     (!is_word).then(|| format!("`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address"))
-}
-
-/// # Panics
-///
-/// If a connection cannot have these constants.
-#[cfg(feature = "tcp")]
-#[expect(clippy::panic, reason = "a misuse, and the way out")]
-fn check_tcp(config: &TcpConfig) {
-    if let Err(error) = config.check() {
-        panic!("these constants of TCP cannot be: {error}");
-    }
 }
 
 /// Which of the hosts is called so.

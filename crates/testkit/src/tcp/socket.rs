@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use cohaptic_wan::NodeId;
 
-use super::{Keepalive, TcpConfig, TcpListener, TcpStream};
+use super::{TcpConfig, TcpListener, TcpStream};
 use crate::context;
 use crate::core::{HoldId, Shared};
 
@@ -126,13 +126,16 @@ impl TcpSocket {
     ///
     /// [`io::ErrorKind::AddrInUse`] if another socket listens at that address.
     pub fn listen(self, backlog: u32) -> io::Result<TcpListener> {
-        if self.settings().bound.is_none() {
-            let any = if self.is_six { SocketAddr::from(([0; 16], 0)) } else { SocketAddr::from(([0; 4], 0)) };
-            self.bind(any)?;
-        }
         let mut settings = self.settings();
+        let held = match settings.bound.take() {
+            Some(held) => held,
+            None => {
+                let mut core = self.shared.lock();
+                core.check_up(self.host)?;
+                core.hold_port(self.host, self.any(), settings.is_shared)?
+            }
+        };
         let inherited = (settings.config.clone(), settings.linger);
-        let held = settings.bound.take().expect("it is bound");
         TcpListener::listen(Arc::clone(&self.shared), self.host, held, usize::try_from(backlog).unwrap_or(usize::MAX), inherited)
     }
 
@@ -142,8 +145,12 @@ impl TcpSocket {
     ///
     /// None.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        let unbound = if self.is_six { SocketAddr::from(([0; 16], 0)) } else { SocketAddr::from(([0; 4], 0)) };
-        Ok(self.settings().bound.map_or(unbound, |(_, address)| address))
+        Ok(self.settings().bound.map_or_else(|| self.any(), |(_, address)| address))
+    }
+
+    /// The address of a socket that is not bound.
+    fn any(&self) -> SocketAddr {
+        if self.is_six { SocketAddr::from(([0; 16], 0)) } else { SocketAddr::from(([0; 4], 0)) }
     }
 
     /// The error of the socket: there is none before it is connected.
@@ -189,7 +196,7 @@ impl TcpSocket {
         bool,
         "Whether an idle connection is probed, at the times of Linux.",
         |settings| settings.config.keepalive.is_some(),
-        |to, on| to.config.keepalive = on.then(|| to.config.keepalive.unwrap_or_else(Keepalive::default))
+        |to, on| to.config.keepalive = on.then(|| to.config.keepalive.unwrap_or_default())
     );
     option!(
         reuseaddr,

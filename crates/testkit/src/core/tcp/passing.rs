@@ -120,15 +120,13 @@ impl Core {
             self.tcp.time_waits.push_back((ends, id));
         }
         self.tcp.set_timer(id, due);
-        match listener {
-            Some(listener) if state.is_synchronised() => self.wait_to_be_taken(listener, id),
-            Some(listener) if state == State::Closed => {
+        if let Some(listener) = listener {
+            if state.is_synchronised() {
+                self.wait_to_be_taken(listener, id);
+            } else if state == State::Closed && self.tcp.listeners.get_mut(listener.0).half_open.remove(&id) {
                 // A handshake that has failed is nobody's; what waits to be taken can be taken still.
-                if self.tcp.listeners.get_mut(listener.0).half_open.remove(&id) {
-                    self.tcp.end_mut(id).listener = None;
-                }
+                self.tcp.end_mut(id).listener = None;
             }
-            _ => {}
         }
         self.forget_if_over(id);
     }

@@ -70,7 +70,7 @@ impl Ports {
     }
 
     /// The ports from which one is chosen, those given longest ago first.
-    fn turn(&mut self, host: NodeId) -> impl Iterator<Item = u16> + use<> {
+    fn turn(&self, host: NodeId) -> impl Iterator<Item = u16> + use<> {
         let first = self.next[host.index()];
         (0..COUNT).map(move |step| FIRST_DYNAMIC + (first + step) % COUNT)
     }
@@ -131,8 +131,7 @@ impl Core {
         let is_free = |port: &u16| {
             self.tcp.ports.at(host, from, *port).is_empty() && !self.tcp.routes.contains_key(&route(host, SocketAddr::new(from, *port), remote))
         };
-        let first = self.tcp.ports.next[host.index()];
-        let port = (0..COUNT).map(|step| FIRST_DYNAMIC + (first + step) % COUNT).find(is_free);
+        let port = self.tcp.ports.turn(host).find(is_free);
         let port = port.ok_or_else(|| self.no_port(host, io::ErrorKind::AddrNotAvailable))?;
         self.tcp.ports.given(host, port);
         Ok(port)
