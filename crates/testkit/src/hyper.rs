@@ -43,7 +43,7 @@ impl tower_service::Service<Uri> for Connector {
         let host = self.0.clone();
         Box::pin(async move {
             let name = uri.host().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, format!("`{uri}` names no host")))?;
-            let port = uri.port_u16().unwrap_or(if uri.scheme_str() == Some("https") { 443 } else { 80 });
+            let port = uri.port_u16().unwrap_or_else(|| if uri.scheme_str() == Some("https") { 443 } else { 80 });
             host.connect(format!("{name}:{port}")).await.map(TokioIo::new)
         })
     }

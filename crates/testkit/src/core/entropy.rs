@@ -20,7 +20,7 @@ impl Entropy {
         Self::labelled(seed, LABEL)
     }
 
-    /// A stream of its own: what is drawn from it moves no draw of another one.
+    /// A stream of its own: its draws move no draw of another one.
     pub(super) fn labelled(seed: u64, label: &[u8]) -> Self {
         Self { stream: Stream::new(seed, label), asked: 0 }
     }

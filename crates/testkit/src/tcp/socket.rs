@@ -246,7 +246,7 @@ impl TcpSocket {
         linger,
         set_linger,
         Option<Duration>,
-        "What is done with unsent data when the stream is dropped: see [`TcpStream::set_linger`].",
+        "The time to linger when the stream is dropped: see [`TcpStream::set_linger`].",
         |settings| settings.linger,
         |to, linger| to.linger = linger.map(|linger| Duration::from_secs(linger.as_secs()))
     );

@@ -12,7 +12,7 @@ use cohaptic_wan::NodeId;
 use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener};
 use crate::trace::Lost;
 
-/// What connections inherit of their listener: the constants, and what is done when they are dropped.
+/// What connections inherit of their listener: the constants, and the time to linger when they are dropped.
 pub(crate) type Inherited = (TcpConfig, Option<Duration>);
 
 fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {

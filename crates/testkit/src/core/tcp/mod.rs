@@ -63,7 +63,7 @@ pub(super) struct Tcp {
     loopback: VecDeque<(NodeId, Bytes)>,
     /// What the trace must know of each direction: its first sequence number and the shift of its windows.
     flows: BTreeMap<(SocketAddr, SocketAddr), (u32, Option<u8>)>,
-    /// How often programs have called: what is known of windows counts until the next call.
+    /// How often programs have called: an answer about a window counts until the next call.
     calls: u64,
 }
 

@@ -42,7 +42,8 @@ impl Core {
         let mut is_stuck = true;
         for (at, _, id) in &*timers {
             let end = connections.get_mut(id.0);
-            let is_answered = end.machine.is_held_by_window() || end.machine.is_only_kept_alive();
+            // What no program holds is given up by itself.
+            let is_answered = end.is_held && (end.machine.is_held_by_window() || end.machine.is_only_kept_alive());
             if !is_answered || end.looked_at.0 != calls {
                 end.looked_at = (calls, Some(*at));
             }
@@ -57,7 +58,7 @@ impl Core {
     /// The timers that are due go off, in the order of hosts and connections.
     pub(in crate::core) fn fire_tcp_timers(&mut self) {
         let now = self.now();
-        // Tokio's clock may have jumped to a timer of its own: what is stuck stays so until a program calls.
+        // Tokio's clock may have jumped to a timer of its own: connections that are stuck stay so until a program calls.
         if self.wire.next().is_none() && self.timers.next().is_none() && self.is_stuck() {
             return;
         }
