@@ -5,6 +5,12 @@ mod axum;
 mod hyper;
 #[cfg(feature = "strategies")]
 mod phone;
+mod redis;
+#[cfg(feature = "quinn")]
+mod rustls;
+#[cfg(feature = "tonic")]
+mod tonic;
+mod websocket;
 
 use cohaptic_testkit::{Bed, Testbed};
 
