@@ -61,7 +61,8 @@ fn a_client_of_redis() {
             let mut other = connection.clone();
             let (long, short) = (octets(10_000), octets(20));
             let (one, two) = tokio::join!(connection.set("one", &long[..]), other.set("two", &short[..]));
-            (one.unwrap(), two.unwrap());
+            one.unwrap();
+            two.unwrap();
             let read: Option<Vec<u8>> = redis::cmd("GET").arg("one").query_async(&mut connection).await.unwrap();
             assert_eq!(read.unwrap(), octets(10_000));
         },

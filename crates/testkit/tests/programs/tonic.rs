@@ -73,7 +73,7 @@ impl tower_service::Service<Request<Body>> for Backwards {
     }
     fn call(&mut self, request: Request<Body>) -> Self::Future {
         Box::pin(async {
-            let mut response = tonic::server::Grpc::new(Raw).unary(Backwards, request).await;
+            let mut response = tonic::server::Grpc::new(Raw).unary(Self, request).await;
             // hyper sets the time of day where there is no date.
             response.headers_mut().insert("date", HeaderValue::from_static("Fri, 01 Jan 2027 00:00:00 GMT"));
             Ok(response)

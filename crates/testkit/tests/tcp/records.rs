@@ -117,7 +117,7 @@ fn what_each_socket_waits_for_is_told() {
             drop(bed.host("b").spawn(async move { listener.accept().await.map(|_| server) }));
             let socket = bed.host("a").bind("0.0.0.0:1").unwrap();
             drop(bed.host("a").spawn(async move { socket.recv(&mut [0; 1]).await }));
-            client.read(&mut [0; 1]).await.unwrap();
+            client.read_exact(&mut [0; 1]).await.unwrap();
         });
         says(
             &text,
@@ -160,7 +160,7 @@ fn idle_connections_that_are_kept_alive_are_stuck_too() {
             for stream in [&client, &server] {
                 stream.set_keepalive_times(Some(Keepalive::default())).unwrap();
             }
-            client.read(&mut [0; 1]).await.unwrap();
+            client.read_exact(&mut [0; 1]).await.unwrap();
         });
         says(&text, &["nothing will ever happen after ", "waits to read"]);
     }

@@ -101,10 +101,9 @@ fn small_writes_wait_for_an_answer_unless_the_stream_has_no_delay() {
                 server.read_exact(&mut [0; 10]).await.unwrap();
                 assert_eq!(bed.now(), if nodelay { millis(550) } else { millis(650) });
                 let trace = bed.trace();
-                let octets = trace.events().iter().filter_map(|event| match event.what {
-                    Happening::Segment { octets, .. } if octets > 0 => Some(octets),
-                    _ => None,
-                });
+                let octets =
+                    trace.events().iter().filter_map(|event| if let Happening::Segment { octets, .. } = event.what { Some(octets) } else { None });
+                let octets = octets.filter(|octets| *octets > 0);
                 octets.collect::<Vec<_>>()
             });
             assert_eq!(sizes, expected);
