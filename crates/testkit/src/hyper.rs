@@ -1,6 +1,6 @@
 //! Unmodified clients and servers of hyper, HTTP/1 and HTTP/2.
 //!
-//! A stream in [`TokioIo`](hyper_util::rt::TokioIo) is what hyper takes on both sides. [`Connector`] opens the connections of the client of `hyper-util`, [`Executor`]
+//! A stream in [`TokioIo`] is what hyper takes on both sides. [`Connector`] opens the connections of the client of `hyper-util`, [`Executor`]
 //! runs what hyper spawns as tasks of a host, on both runtimes.
 //!
 //! A server of HTTP/1 or 2 adds a `Date` header, which reads the time of day: two runs differ by it. Turn it off (`auto_date_header(false)`), or set the header: a

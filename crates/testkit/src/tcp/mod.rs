@@ -1,6 +1,6 @@
 //! TCP: halves of streams, and what connections are made of.
 //!
-//! [`TcpListener`](crate::TcpListener), [`TcpStream`](crate::TcpStream) and [`TcpSocket`](crate::TcpSocket) have the methods of tokio's on a real TCP
+//! [`TcpListener`], [`TcpStream`] and [`TcpSocket`] have the methods of tokio's on a real TCP
 //! ([`cohaptic_tcp`]), whose segments are packets on the emulated links. On its link a packet counts with its whole length, headers of IP and TCP included; a datagram
 //! of UDP counts with what it carries. The module [`net`](crate::net) has the names of `tokio::net`, so that one changed import makes a program run here.
 
