@@ -86,6 +86,20 @@ pub(crate) fn host() -> Option<NodeId> {
     HOST.get()
 }
 
+/// The running test bed, and the host on which the task lives that is being polled. `what` such a task may do, and `how` others may.
+///
+/// # Errors
+///
+/// [`io::ErrorKind::NotFound`] if there is none.
+pub(crate) fn here(outside_of: &str, what: &str, how: &str) -> io::Result<(Arc<Shared>, NodeId)> {
+    let shared = shared().ok_or_else(|| outside(outside_of))?;
+    let host = host().ok_or_else(|| {
+        let text = format!("this task lives on no host, so it is not clear where to {what}; spawn it with `Host::spawn`, or {how}");
+        io::Error::new(io::ErrorKind::NotFound, text)
+    })?;
+    Ok((shared, host))
+}
+
 /// Does something as a task of that host.
 pub(crate) fn on_host<T>(host: Option<NodeId>, act: impl FnOnce() -> T) -> T {
     struct Back(Option<NodeId>);

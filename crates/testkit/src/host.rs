@@ -1,10 +1,11 @@
 //! A host of a running test bed.
 
 use std::fmt;
-use std::future::Future;
+use std::future::{Future, poll_fn};
 use std::io;
 use std::net::IpAddr;
 use std::panic::Location;
+use std::pin::pin;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -96,6 +97,38 @@ impl Host {
         UdpSocket::bind_on(Arc::clone(&self.shared), self.node, address)
     }
 
+    /// Listens on this host.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpListener::bind`](crate::TcpListener::bind); [`io::ErrorKind::NetworkDown`] if the host is down.
+    #[cfg(feature = "tcp")]
+    pub fn listen(&self, address: impl ToSocketAddrs) -> io::Result<crate::TcpListener> {
+        crate::TcpListener::bind_on(Arc::clone(&self.shared), self.node, address)
+    }
+
+    /// Opens a connection from this host, and waits until it is there.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::connect`](crate::TcpStream::connect); [`io::ErrorKind::NetworkDown`] if the host is down.
+    #[cfg(feature = "tcp")]
+    pub async fn connect(&self, address: impl ToSocketAddrs) -> io::Result<crate::TcpStream> {
+        let address = address.to_socket_addr()?;
+        let config = self.shared.lock().tcp_config(self.node).clone();
+        crate::TcpStream::connect_on(Arc::clone(&self.shared), self.node, None, address, config)?.established().await
+    }
+
+    /// Runs a future as a task of this host does: what it binds and connects, it does here. For tasks that `tokio::spawn` has started, which live on no host.
+    /// A crash does not drop them.
+    pub fn scope<F: Future>(&self, future: F) -> impl Future<Output = F::Output> + use<F> {
+        let node = self.node;
+        async move {
+            let mut future = pin!(future);
+            poll_fn(|cx| context::on_host(Some(node), || future.as_mut().poll(cx))).await
+        }
+    }
+
     /// The host is gone, at once: its tasks are dropped where they wait, its sockets closed. Packets that it has sent are on their way still, those sent to it are
     /// lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (by `tokio::spawn`, say) go on, and their sockets give errors.
     ///
@@ -109,20 +142,30 @@ impl Host {
         running.tasks.stop_all_of(self.node);
     }
 
-    /// The host is back, with the program of [`Host::start`] begun anew if it has one. Nothing happens to a host that is up.
+    /// The program of the host is gone, at once, and the host is not, as when a process is killed: its tasks are dropped where they wait, and its sockets are closed
+    /// as if the program had dropped them, so that peers hear of it. [`Host::restart`] begins the program anew. Nothing happens to a host that is down.
+    ///
+    /// # Panics
+    ///
+    /// Outside the run.
+    pub fn kill(&self) {
+        let running = context::expect_running("programs are killed");
+        if self.is_up() {
+            // First the tasks, which drop what they hold; then what others hold of this host's.
+            running.tasks.stop_all_of(self.node);
+            self.shared.lock().kill(self.node);
+        }
+    }
+
+    /// The host is back, with the program of [`Host::start`] begun anew if it has one. Nothing happens to a host that is up, unless its program was killed.
     ///
     /// # Panics
     ///
     /// Outside the run.
     pub fn restart(&self) {
         let running = context::expect_running("hosts restart");
-        let was_down = {
-            let mut core = self.shared.lock();
-            let was_down = !core.is_up(self.node);
-            core.restart(self.node);
-            was_down
-        };
-        if was_down {
+        let begins = self.shared.lock().restart(self.node);
+        if begins {
             running.tasks.restart(self.node);
         }
     }

@@ -1,8 +1,8 @@
 //! Tests of networked programs over emulated bad links, in virtual time, the same way every time.
 //!
-//! You need it if you test a program that sends datagrams, and want every failure again from its seed.
+//! You need it if you test a program that talks over TCP, UDP or QUIC, and want every failure again from its seed.
 //!
-//! A [`Testbed`] is hosts and the [links](wan) between them. A program that is run on it has [UDP sockets](UdpSocket) with the methods of tokio's,
+//! A [`Testbed`] is hosts and the [links](wan) between them. A program that is run on it has sockets with the methods of tokio's,
 //! [timers](time), and hosts that crash, come back, and lose sight of each other. Nothing waits in real time: the clock jumps to the next event.
 //!
 //! ```
@@ -26,7 +26,12 @@
 //! | --- | --- |
 //! | hosts and links, and how a program is run: once, twice, recorded, on tokio | [`Testbed`] |
 //! | while it runs: hosts, links, cuts, notes | [`Bed`], [`Host`], [`JoinHandle`] |
-//! | sockets, and the addresses and names of hosts | [`UdpSocket`], [`Addresses`], [`AddressPlan`], [`ToSocketAddrs`] |
+//! | datagrams, and the addresses and names of hosts | [`UdpSocket`], [`Addresses`], [`AddressPlan`], [`ToSocketAddrs`] |
+#![cfg_attr(
+    feature = "tcp",
+    doc = "| streams, as Linux does TCP, and every constant of it | [`TcpListener`], [`TcpStream`], [`TcpSocket`], [`TcpConfig`], [`tcp`], [`net`] |"
+)]
+#![cfg_attr(not(feature = "tcp"), doc = "| streams, as Linux does TCP | feature `tcp` |")]
 //! | timers to the nanosecond | [`time`], [`Instant`] |
 //! | what a link is: words of `tc-netem`, or a model of the emulator | [`ToLink`], [`wan`] |
 //! | single packets that are dropped, delayed, copied, damaged or held back | [`hit`], [`Testbed::on_packet`], [`Testbed::hit`](Testbed::hit()) |
@@ -35,6 +40,8 @@
 #![cfg_attr(not(feature = "strategies"), doc = "| links and networks at random, which shrink to the least impaired | feature `strategies` |")]
 #![cfg_attr(feature = "quinn", doc = "| unmodified QUIC endpoints | [`quinn`](mod@quinn) |")]
 #![cfg_attr(not(feature = "quinn"), doc = "| unmodified QUIC endpoints | feature `quinn` |")]
+#![cfg_attr(feature = "hyper", doc = "| unmodified programs of hyper and axum | [`hyper`](mod@hyper), feature `axum` |")]
+#![cfg_attr(not(feature = "hyper"), doc = "| unmodified programs of hyper, axum and tonic | features `hyper`, `axum`, `tonic` |")]
 //! | hosts and links from a file | [`Testbed::from_file`], [`LinkFile`] |
 #![cfg_attr(feature = "scenes", doc = "| scene files as tests, and scenes at random | [`check_scene`], [`check_scenes`], [`strategies::scene`] |")]
 #![cfg_attr(not(feature = "scenes"), doc = "| scene files as tests, and scenes at random | feature `scenes` |")]
@@ -46,10 +53,14 @@
 //! | feature | on by default | brings |
 //! | --- | --- | --- |
 //! | `strategies` | yes | strategies of proptest for links and networks, and `proptest` itself |
-//! | `tokio` | yes | `Testbed::on_tokio`, for programs that use tokio's timers and tasks, and the methods of sockets whose arguments are of tokio's types |
+//! | `tcp` | yes | TCP, by `cohaptic-tcp` |
+//! | `tokio` | yes | `Testbed::on_tokio`, for programs that use tokio's timers and tasks, and the traits and methods of sockets that are of tokio's types |
 //! | `pcapng` | yes | captures among what a failed test leaves behind |
 //! | `files` | | relay files (TOML) as hosts and links; files of plain words need no feature |
 //! | `scenes` | | scene files as hosts and links and as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
+//! | `hyper` | | connectors and executors for hyper and hyper-util |
+//! | `axum` | | `TcpListener` as a listener of `axum::serve` |
+//! | `tonic` | | `TcpStream` as a connection of a tonic server |
 //! | `quinn` | | QUIC by quinn, and `quinn` itself |
 //!
 //! # Variables of the environment
@@ -63,13 +74,19 @@
 
 mod address;
 mod artefacts;
+#[cfg(feature = "axum")]
+pub mod axum;
 mod bed;
 mod context;
 mod core;
 mod file;
 pub mod hit;
 mod host;
+#[cfg(feature = "hyper")]
+pub mod hyper;
 mod link;
+#[cfg(feature = "tcp")]
+pub mod net;
 pub mod node;
 #[cfg(feature = "quinn")]
 pub mod quinn;
@@ -82,7 +99,11 @@ mod socket;
 #[cfg(feature = "strategies")]
 pub mod strategies;
 mod task;
+#[cfg(feature = "tcp")]
+pub mod tcp;
 pub mod time;
+#[cfg(feature = "tonic")]
+mod tonic;
 mod trace;
 mod watch;
 mod wire;
@@ -107,6 +128,8 @@ pub use scenes::{check_scene, check_scenes};
 pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
+#[cfg(feature = "tcp")]
+pub use tcp::{TcpConfig, TcpListener, TcpSocket, TcpStream};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use watch::STALL_VARIABLE;
 pub use words::WordsError;

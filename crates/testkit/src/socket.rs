@@ -43,21 +43,14 @@ impl UdpSocket {
     /// As tokio's: the address is taken, or is not the host's. [`io::ErrorKind::NotFound`] if the task lives on no host.
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn bind(address: impl ToSocketAddrs) -> io::Result<Self> {
-        let shared = context::shared().ok_or_else(|| context::outside("a socket can be bound"))?;
-        let Some(host) = context::host() else {
-            let text = "this task lives on no host, so it is not clear where to bind; spawn it with `Host::spawn`, or bind with `Host::bind`";
-            return Err(io::Error::new(io::ErrorKind::NotFound, text));
-        };
+        let (shared, host) = context::here("a socket can be bound", "bind", "bind with `Host::bind`")?;
         Self::bind_on(shared, host, address)
     }
 
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
         let address = address.to_socket_addr()?;
         let mut core = shared.lock();
-        if !core.is_up(host) {
-            let text = format!("host `{}` is down; `Host::restart` brings it back", core.plan.names()[host.index()]);
-            return Err(io::Error::new(io::ErrorKind::NetworkDown, text));
-        }
+        core.check_up(host)?;
         let id = core.bind(host, address)?;
         drop(core);
         Ok(Self { shared, id, options: options::Options::default() })

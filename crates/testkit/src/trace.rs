@@ -30,6 +30,24 @@ pub enum Happening {
         /// FNV-1a of them, 64 bits; 0 with [`Testbed::without_digests`](crate::Testbed::without_digests).
         digest: u64,
     },
+    /// The packet of the event before carries a segment of TCP.
+    #[cfg(feature = "tcp")]
+    Segment {
+        /// Which packet.
+        packet: PacketName,
+        /// From which port to which.
+        ports: [u16; 2],
+        /// The flags.
+        flags: cohaptic_tcp::Flags,
+        /// The sequence number, counted from that of the SYN.
+        sequence: u32,
+        /// How many octets of data it carries.
+        octets: u32,
+        /// The octet that its sender expects next, if it says so, counted from the SYN of the peer.
+        acknowledges: Option<u32>,
+        /// The window \[byte\].
+        window: u32,
+    },
     /// A packet lies in the buffer of a socket.
     Arrived {
         /// Which one.
@@ -56,6 +74,8 @@ pub enum Happening {
     },
     /// A host crashed.
     Crashed(NodeId),
+    /// The program of a host was killed.
+    Killed(NodeId),
     /// A host was restarted.
     Restarted(NodeId),
     /// A host has new addresses.
@@ -97,6 +117,10 @@ pub enum Lost {
     NoSocket,
     /// The buffer of the socket was full.
     BufferFull,
+    /// A link has damaged it, and a checksum of TCP or IP shows it.
+    Checksum,
+    /// As many connections as the listener lets wait were waiting.
+    BacklogFull,
 }
 
 impl fmt::Display for Lost {
@@ -108,6 +132,8 @@ impl fmt::Display for Lost {
             Self::NoSuchAddress => "the host has another address",
             Self::NoSocket => "no socket at that port",
             Self::BufferFull => "the socket's buffer is full",
+            Self::Checksum => "a checksum is wrong",
+            Self::BacklogFull => "the listener's queue is full",
         })
     }
 }
@@ -220,6 +246,15 @@ impl fmt::Display for Words<'_> {
                 write!(f, " sent, {len} bytes")?;
                 if *digest == 0 { Ok(()) } else { write!(f, ", digest {digest:016x}") }
             }
+            #[cfg(feature = "tcp")]
+            Happening::Segment { packet, ports: [from, to], flags, sequence, octets, acknowledges, window } => {
+                self.packet(f, *packet)?;
+                write!(f, " is {flags} {from} > {to}, sequence {sequence}, {octets} octets")?;
+                if let Some(acknowledges) = acknowledges {
+                    write!(f, ", acknowledges {acknowledges}")?;
+                }
+                write!(f, ", window {window}")
+            }
             Happening::Arrived { packet } => {
                 self.packet(f, *packet)?;
                 f.write_str(" arrived")
@@ -244,6 +279,7 @@ impl fmt::Display for Words<'_> {
                 }
             }
             Happening::Crashed(host) => write!(f, "{} crashed", self.name(*host)),
+            Happening::Killed(host) => write!(f, "the program of {} was killed", self.name(*host)),
             Happening::Restarted(host) => write!(f, "{} restarted", self.name(*host)),
             Happening::Readdressed(host) => write!(f, "{} has new addresses", self.name(*host)),
             Happening::Cut(path) => {

@@ -10,7 +10,7 @@ use crate::metadata::{list, metadata, text};
 use crate::{files, name, root};
 
 /// Licences that ask for no more than that they are named. `MIT-0` and `CC0-1.0` do not even ask for that, and only tests and build scripts have them.
-const ACCEPTED: [&str; 12] = [
+const ACCEPTED: [&str; 13] = [
     "MIT",
     "MIT-0",
     "Apache-2.0",
@@ -21,6 +21,7 @@ const ACCEPTED: [&str; 12] = [
     "Zlib",
     "Unicode-3.0",
     "0BSD",
+    "BSL-1.0",
     "CC0-1.0",
     "Unlicense",
 ];

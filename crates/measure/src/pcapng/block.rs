@@ -1,5 +1,7 @@
 //! The three blocks of a capture, little-endian (draft-ietf-opsawg-pcapng, sections 4.1 to 4.3), and the UDP datagram in IPv4 around a payload (RFC 791, RFC 768).
 
+use std::borrow::Cow;
+
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 const INTERFACE_DESCRIPTION: u32 = 1;
 const ENHANCED_PACKET: u32 = 6;
@@ -42,14 +44,14 @@ pub(super) fn interface_description(name: &str) -> Vec<u8> {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the two halves of a 64-bit count")]
-pub(super) fn enhanced_packet(to: &mut Vec<u8>, nanos: u64, datagram: &Datagram, comment: &str) {
+pub(super) fn enhanced_packet(to: &mut Vec<u8>, nanos: u64, frame: &Frame<'_>, comment: &str) {
     block(to, ENHANCED_PACKET, |to| {
         word(to, 0);
         word(to, (nanos >> 32) as u32);
         word(to, nanos as u32);
-        word(to, length(datagram.captured.len()));
-        word(to, length(datagram.length));
-        padded(to, &datagram.captured);
+        word(to, length(frame.captured.len()));
+        word(to, length(frame.length));
+        padded(to, &frame.captured);
         option(to, OPTION_COMMENT, comment.as_bytes());
         end_of_options(to);
     });
@@ -114,14 +116,14 @@ const UDP: u8 = 17;
 /// RFC 3168: congestion experienced.
 const CONGESTION_EXPERIENCED: u8 = 0b11;
 
-/// A datagram, or its beginning.
-pub(super) struct Datagram {
-    pub(super) captured: Vec<u8>,
+/// A packet, or its beginning.
+pub(super) struct Frame<'a> {
+    pub(super) captured: Cow<'a, [u8]>,
     /// Its length when it was sent \[byte\].
     pub(super) length: usize,
 }
 
-pub(super) fn build(sequence: u64, marked: bool, payload: &[u8], size: usize) -> Datagram {
+pub(super) fn build(sequence: u64, marked: bool, payload: &[u8], size: usize) -> Frame<'static> {
     let payload_length = size.max(payload.len()).min(LONGEST_PAYLOAD);
     let payload = &payload[..payload.len().min(LONGEST_PAYLOAD)];
     let [ip_length, udp_length] = [IP_HEADER + UDP_HEADER + payload_length, UDP_HEADER + payload_length].map(sixteen_bits);
@@ -148,7 +150,7 @@ pub(super) fn build(sequence: u64, marked: bool, payload: &[u8], size: usize) ->
         // Zero means "none"; the other zero of ones' complement stands for it.
         udp[6..8].copy_from_slice(&if checksum == 0 { u16::MAX } else { checksum }.to_be_bytes());
     }
-    Datagram { captured: [&ip[..], &udp, payload].concat(), length: IP_HEADER + UDP_HEADER + payload_length }
+    Frame { captured: [&ip[..], &udp, payload].concat().into(), length: IP_HEADER + UDP_HEADER + payload_length }
 }
 
 fn sixteen_bits(length: usize) -> [u8; 2] {
@@ -172,7 +174,7 @@ mod tests {
     fn no_payload_has_the_checksum_that_means_none() {
         let mut other_zero = 0;
         for payload in 0..=u16::MAX {
-            let Datagram { captured, .. } = build(1, false, &payload.to_be_bytes(), 2);
+            let Frame { captured, .. } = build(1, false, &payload.to_be_bytes(), 2);
             assert_ne!(captured[26..28], [0, 0]);
             other_zero += u32::from(captured[26..28] == [0xff, 0xff]);
         }

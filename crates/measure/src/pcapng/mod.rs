@@ -10,7 +10,8 @@
 //!
 //! so that in an analyser `frame.comment contains "dropped"` shows what was lost. The frames are raw IPv4 (`LINKTYPE_RAW`) with UDP, both checksums
 //! right, from 192.0.2.1:49152 to 192.0.2.2:49153 (RFC 5737: addresses of documentation), and the number of the packet, modulo 2¹⁶, as IP
-//! identification. A mark of congestion is the CE codepoint. Time zero is 1970-01-01 00:00 UTC, timestamps count nanoseconds.
+//! identification. A mark of congestion is the CE codepoint. Packets whose headers are known are written as they are
+//! ([`CaptureWriter::write_packet`]). Time zero is 1970-01-01 00:00 UTC, timestamps count nanoseconds.
 
 mod block;
 
@@ -41,6 +42,15 @@ impl<W: Write> CaptureWriter<W> {
         Ok(Self { to, block: Vec::new() })
     }
 
+    /// Writes one frame whose packet is known: IPv4 or IPv6 from its first octet on, as it was sent.
+    ///
+    /// # Errors
+    ///
+    /// Those of the writer.
+    pub fn write_packet(&mut self, record: &PacketRecord, packet: &[u8]) -> io::Result<()> {
+        self.write_frame(record, &block::Frame { captured: packet.into(), length: packet.len() })
+    }
+
     /// Writes one frame. `payload` is what the packet carried, as far as it is known: if it is shorter than [`PacketRecord::size`], the frame
     /// is marked as cut off after it and has no UDP checksum. A UDP payload has at most 65 507 bytes; the rest of a larger packet is not written.
     ///
@@ -50,8 +60,12 @@ impl<W: Write> CaptureWriter<W> {
     pub fn write(&mut self, record: &PacketRecord, payload: &[u8]) -> io::Result<()> {
         let size = usize::try_from(record.size.get()).unwrap_or(usize::MAX);
         let datagram = block::build(record.sequence, record.marked, payload, size);
+        self.write_frame(record, &datagram)
+    }
+
+    fn write_frame(&mut self, record: &PacketRecord, frame: &block::Frame<'_>) -> io::Result<()> {
         self.block.clear();
-        block::enhanced_packet(&mut self.block, record.at.as_nanos(), &datagram, &Comment(record).to_string());
+        block::enhanced_packet(&mut self.block, record.at.as_nanos(), frame, &Comment(record).to_string());
         self.to.write_all(&self.block)
     }
 

@@ -146,3 +146,14 @@ proptest! {
         prop_assert_eq!(usize::from(u16::from_be_bytes([data[24], data[25]])), payload.len() + 8);
     }
 }
+
+#[test]
+fn a_packet_that_is_known_is_written_as_it_is() {
+    let record = PacketRecord { marked: true, ..delivered(3, 9, 44) };
+    let packet: Vec<u8> = (0..44).map(|octet| if octet == 0 { 0x45 } else { octet }).collect();
+    let mut writer = CaptureWriter::new(Vec::new(), "left->right").unwrap();
+    writer.write_packet(&record, &packet).unwrap();
+    let frames = frames_by_library(&writer.finish().unwrap());
+    let comment = Comment(&record).to_string();
+    assert_eq!(frames, [Frame { nanos: 9, original: 44, data: packet, comment }]);
+}

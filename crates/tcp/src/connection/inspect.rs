@@ -13,6 +13,13 @@ impl Connection {
         is_answered && self.send.board.is_empty() && self.send.has_new() && !self.is_window_open()
     }
 
+    /// Whether nothing is left to do but to ask an idle peer whether it is there, and no such probe is unanswered.
+    #[must_use]
+    pub const fn is_only_kept_alive(&self) -> bool {
+        let is_idle = self.timer.is_none() && self.receive.ack_at.is_none() && self.linger_until.is_none();
+        is_idle && self.keepalive_at.is_some() && self.counters.probes == 0
+    }
+
     /// Figures, as of Linux's `TCP_INFO`.
     #[must_use]
     pub fn info(&self) -> Info {

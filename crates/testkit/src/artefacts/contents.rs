@@ -74,15 +74,28 @@ fn counts(log: &cohaptic_wan::FateLog) -> String {
 
 #[cfg(feature = "pcapng")]
 fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> Vec<u8> {
+    let segments = segments(record, path);
     let write = || -> std::io::Result<Vec<u8>> {
         let mut capture = cohaptic_measure::pcapng::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
         for seen in record.packets_of(path) {
-            capture.write(&seen.without_path(), &seen.payload)?;
+            let packet = seen.without_path();
+            if segments.contains(&packet.sequence) { capture.write_packet(&packet, &seen.payload)? } else { capture.write(&packet, &seen.payload)? }
         }
         capture.finish()
     };
     // Writing to memory cannot fail.
     write().unwrap_or_default()
+}
+
+/// The numbers of the packets of a path that are whole IP packets, as those of TCP are.
+#[cfg(feature = "pcapng")]
+fn segments(record: &Record, path: cohaptic_wan::Path) -> std::collections::BTreeSet<u64> {
+    let number = |event: &crate::TraceEvent| match event.what {
+        #[cfg(feature = "tcp")]
+        crate::Happening::Segment { packet, .. } if packet.path == path => Some(packet.sequence),
+        _ => None,
+    };
+    record.trace().events().iter().filter_map(number).collect()
 }
 
 /// The longest name of a host within that of a file.

@@ -5,6 +5,8 @@ mod names;
 #[cfg(feature = "strategies")]
 mod network;
 mod running;
+#[cfg(feature = "tcp")]
+mod tcp;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -31,6 +33,8 @@ use crate::record::Record;
 use crate::runtime::own::Executor;
 use crate::seed::{Place, Seed};
 use crate::task::Tasks;
+#[cfg(feature = "tcp")]
+use crate::tcp::TcpConfig;
 use crate::trace::Trace;
 use crate::watch::{Kind, LIMIT, Watched};
 use crate::wire::{Recorded, Settings};
@@ -64,6 +68,9 @@ pub struct Testbed {
     changes: Vec<LinkChange>,
     seed: Option<u64>,
     settings: Settings,
+    /// By host, where they are not Linux's.
+    #[cfg(feature = "tcp")]
+    tcp: BTreeMap<NodeId, TcpConfig>,
     #[cfg(feature = "tokio")]
     is_tokio: bool,
     artefacts: Option<PathBuf>,
@@ -103,6 +110,8 @@ impl Testbed {
                 patience: PATIENCE,
                 laws: Laws::default(),
             },
+            #[cfg(feature = "tcp")]
+            tcp: BTreeMap::new(),
             #[cfg(feature = "tokio")]
             is_tokio: false,
             artefacts: None,
@@ -292,7 +301,10 @@ impl Testbed {
         settings.traces |= artefacts.is_wanted();
         let (every, links) = (&self.every, &self.links);
         let link = |from, to| links.get(&Path { from, to }).unwrap_or(every).clone();
-        let core = Core::new(&self.names, seed.value, settings, self.changes.clone(), link);
+        #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only TCP has constants"))]
+        let mut core = Core::new(&self.names, seed.value, settings, self.changes.clone(), link);
+        #[cfg(feature = "tcp")]
+        self.tcp.iter().for_each(|(host, config)| core.set_tcp(*host, config.clone()));
         let mut recorded = None;
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             #[cfg(feature = "tokio")]

@@ -152,6 +152,21 @@ impl Bed {
         self.shared.lock().wire.hits(path)
     }
 
+    /// All ends of TCP connections that are not over, those that no program holds any more included, in the order of hosts, ports and peers.
+    #[cfg(feature = "tcp")]
+    #[must_use]
+    pub fn connections(&self) -> Vec<crate::tcp::ConnectionInfo> {
+        let core = self.shared.lock();
+        let names = core.plan.names();
+        let end = |(host, connection): (NodeId, &cohaptic_tcp::Connection)| crate::tcp::ConnectionInfo {
+            host: names[host.index()].clone(),
+            local: connection.local_addr(),
+            peer: connection.peer_addr(),
+            info: connection.info(),
+        };
+        core.connections().map(end).collect()
+    }
+
     /// Notes something in the trace: what a program computes, say, so that two runs are compared by it too.
     pub fn note(&self, text: impl fmt::Display) {
         let text = text.to_string();

@@ -2,7 +2,8 @@
 
 use cohaptic_wan::random::{Purpose, Stream};
 
-/// The label of the stream. Links have labels of their own: see [`cohaptic_wan::LinkName`].
+/// The label of the stream of programs. Links have labels of their own: see [`cohaptic_wan::LinkName`].
+#[cfg(any(test, feature = "quinn"))]
 const LABEL: &[u8] = b"entropy of the programs of a test bed";
 
 /// Where the random bytes of programs come from.
@@ -14,8 +15,14 @@ pub(crate) struct Entropy {
 }
 
 impl Entropy {
+    #[cfg(any(test, feature = "quinn"))]
     pub(super) fn new(seed: u64) -> Self {
-        Self { stream: Stream::new(seed, LABEL), asked: 0 }
+        Self::labelled(seed, LABEL)
+    }
+
+    /// A stream of its own: its draws move no draw of another one.
+    pub(super) fn labelled(seed: u64, label: &[u8]) -> Self {
+        Self { stream: Stream::new(seed, label), asked: 0 }
     }
 
     /// Fills a buffer.

@@ -1,9 +1,11 @@
 //! The hosts, their sockets and the network between them, as one state machine: it is told the time.
 
-#[cfg(feature = "quinn")]
+#[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
 mod passing;
 mod sockets;
+#[cfg(feature = "tcp")]
+mod tcp;
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
@@ -21,6 +23,8 @@ use sockets::Sockets;
 
 pub(crate) use passing::Outgoing;
 pub(crate) use sockets::{Datagram, SocketId};
+#[cfg(feature = "tcp")]
+pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
 
 pub(crate) struct Core {
     pub(crate) plan: AddressPlan,
@@ -31,6 +35,8 @@ pub(crate) struct Core {
     pub(crate) entropy: entropy::Entropy,
     hosts: Vec<HostState>,
     sockets: Sockets,
+    #[cfg(feature = "tcp")]
+    tcp: tcp::Tcp,
     /// To be woken when the state is not held any more.
     pub(crate) woken: Vec<Waker>,
     /// How often the program has called without waiting since time last passed.
@@ -56,6 +62,9 @@ enum Kind {
     Datagram,
     /// "There is no socket at that port", which IP tells a sender.
     Unreachable,
+    /// A segment of TCP: the bytes are the whole IP packet.
+    #[cfg(feature = "tcp")]
+    Segment,
 }
 
 impl Core {
@@ -75,6 +84,8 @@ impl Core {
             entropy: entropy::Entropy::new(seed),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
+            #[cfg(feature = "tcp")]
+            tcp: tcp::Tcp::new(seed, names.len()),
             woken: Vec::new(),
             calls: 0,
             #[cfg(feature = "tokio")]
@@ -83,8 +94,11 @@ impl Core {
     }
 
     /// When the network or a timer wants to be woken.
-    pub(crate) fn next_event(&self) -> Option<Instant> {
-        [self.wire.next(), self.timers.next()].into_iter().flatten().min()
+    pub(crate) fn next_event(&mut self) -> Option<Instant> {
+        let next = [self.wire.next(), self.timers.next()].into_iter().flatten().min();
+        #[cfg(feature = "tcp")]
+        let next = self.with_tcp_timers(next);
+        next
     }
 
     #[inline]
@@ -107,7 +121,18 @@ impl Core {
         if self.wire.pass() {
             self.take_arrivals();
         }
+        #[cfg(feature = "tcp")]
+        self.fire_tcp_timers();
         self.timers.fire(self.wire.now(), &mut self.woken);
+    }
+
+    /// Lets time pass until then, event by event: tokio's clock may have jumped over some.
+    #[cfg(feature = "tokio")]
+    fn pass_until(&mut self, now: Instant) {
+        while let Some(next) = self.next_event().filter(|next| *next < now) {
+            self.pass(next);
+        }
+        self.pass(now);
     }
 
     /// The program asks for something that takes no time.
@@ -200,7 +225,7 @@ impl Shared {
                 if tokio::runtime::Handle::try_current().is_ok() {
                     let now = Instant::ZERO + origin.elapsed();
                     if now > core.now() {
-                        core.pass(now);
+                        core.pass_until(now);
                     }
                 }
             }
@@ -286,6 +311,8 @@ impl Timers {
 #[derive(Debug, Default)]
 struct HostState {
     is_down: bool,
+    /// Its program was killed, and not begun again.
+    is_idle: bool,
     /// The sockets of a port, by version (6 or not) and port.
     ports: BTreeMap<(bool, u16), Vec<SocketId>>,
     /// The port that is given next to a socket that asks for none.
@@ -295,6 +322,15 @@ struct HostState {
 impl Core {
     pub(crate) fn is_up(&self, host: NodeId) -> bool {
         !self.hosts[host.index()].is_down
+    }
+
+    /// Fails if the host is down, so that nothing can be bound there.
+    pub(crate) fn check_up(&self, host: NodeId) -> std::io::Result<()> {
+        if self.is_up(host) {
+            return Ok(());
+        }
+        let text = format!("host `{}` is down; `Host::restart` brings it back", self.plan.names()[host.index()]);
+        Err(std::io::Error::new(std::io::ErrorKind::NetworkDown, text))
     }
 
     /// The host is gone with all its sockets. What it has sent is on its way still.
@@ -308,13 +344,36 @@ impl Core {
         for socket in self.sockets.all_of(host) {
             socket.die(now, &mut self.woken);
         }
+        #[cfg(feature = "tcp")]
+        self.crash_tcp(host);
         self.wire.note(Happening::Crashed(host));
     }
 
-    pub(crate) fn restart(&mut self, host: NodeId) {
-        if std::mem::replace(&mut self.hosts[host.index()].is_down, false) {
+    /// The program of the host is gone, and the host is not: its sockets are closed, as when the program drops them.
+    pub(crate) fn kill(&mut self, host: NodeId) {
+        if !self.is_up(host) {
+            return;
+        }
+        self.wire.note(Happening::Killed(host));
+        let state = &mut self.hosts[host.index()];
+        state.is_idle = true;
+        state.ports.clear();
+        let now = self.now();
+        for socket in self.sockets.all_of(host) {
+            socket.die(now, &mut self.woken);
+        }
+        #[cfg(feature = "tcp")]
+        self.kill_tcp(host);
+    }
+
+    /// The host is up again; says whether its program is to begin anew.
+    pub(crate) fn restart(&mut self, host: NodeId) -> bool {
+        let state = &mut self.hosts[host.index()];
+        let (was_down, was_idle) = (std::mem::take(&mut state.is_down), std::mem::take(&mut state.is_idle));
+        if was_down {
             self.wire.note(Happening::Restarted(host));
         }
+        was_down || was_idle
     }
 
     /// The host has other addresses from now on.

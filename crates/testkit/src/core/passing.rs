@@ -82,7 +82,7 @@ impl Core {
     }
 
     /// The address from which a socket that is bound to `bound` reaches `to`.
-    fn source(&self, host: NodeId, bound: IpAddr, to: IpAddr) -> io::Result<IpAddr> {
+    pub(super) fn source(&self, host: NodeId, bound: IpAddr, to: IpAddr) -> io::Result<IpAddr> {
         let addresses = self.plan.of(host);
         if bound.is_unspecified() {
             return Ok(if to.is_loopback() { to } else { addresses.like(to) });
@@ -109,10 +109,17 @@ impl Core {
 impl Core {
     /// Deals with what has come out of the links.
     pub(super) fn take_arrivals(&mut self) {
-        while let Some(Arrival { packet, at, parcel, marked, is_cut }) = self.wire.poll() {
-            let Path { from, to } = packet.path;
-            let end = if is_cut { Err(Lost::Cut) } else { self.arrive(to, at, parcel, marked, from) };
-            self.wire.ends(packet, at, end);
+        loop {
+            while let Some(Arrival { packet, at, parcel, marked, is_cut }) = self.wire.poll() {
+                let Path { from, to } = packet.path;
+                let end = if is_cut { Err(Lost::Cut) } else { self.arrive(to, at, parcel, marked, from) };
+                self.wire.ends(packet, at, end);
+            }
+            #[cfg(feature = "tcp")]
+            if self.take_from_loopback() {
+                continue;
+            }
+            return;
         }
     }
 
@@ -123,6 +130,10 @@ impl Core {
     }
 
     fn arrive(&mut self, host: NodeId, at: cohaptic_units::Instant, parcel: Parcel, marked: bool, from: NodeId) -> Result<(), Lost> {
+        #[cfg(feature = "tcp")]
+        if parcel.addresses.kind == Kind::Segment {
+            return self.arrive_segment(host, &parcel.bytes, marked);
+        }
         let state = &self.hosts[host.index()];
         if state.is_down {
             return Err(Lost::HostDown);
@@ -140,6 +151,8 @@ impl Core {
         };
         let socket = self.sockets.get_mut(id);
         match parcel.addresses.kind {
+            #[cfg(feature = "tcp")]
+            Kind::Segment => {}
             // Only a connected socket is told, as with Linux: another one could not know of whom it speaks.
             Kind::Unreachable => {
                 if socket.peer == Some(parcel.addresses.from) {

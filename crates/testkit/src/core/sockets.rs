@@ -90,16 +90,13 @@ impl Sockets {
 }
 
 /// The first of the ports that are given to sockets that ask for none (RFC 6335).
-const FIRST_DYNAMIC: u16 = 49_152;
+pub(super) const FIRST_DYNAMIC: u16 = 49_152;
 
 impl Core {
     /// Binds a socket of a host that is up.
     pub(crate) fn bind(&mut self, host: NodeId, wanted: SocketAddr) -> io::Result<SocketId> {
         let (ip, six) = (wanted.ip(), wanted.is_ipv6());
-        if !ip.is_unspecified() && !ip.is_loopback() && !self.plan.of(host).has(ip) {
-            let text = format!("{ip} is no address of host `{}`, which has {}", self.plan.names()[host.index()], self.plan.of(host).like(ip));
-            return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
-        }
+        self.check_owned(host, ip)?;
         let port = match wanted.port() {
             0 => self.free_port(host, ip)?,
             port if self.is_taken(host, ip, port) => {
@@ -114,6 +111,15 @@ impl Core {
         let id = self.sockets.insert(state);
         self.hosts[host.index()].ports.entry((six, port)).or_default().push(id);
         Ok(id)
+    }
+
+    /// Fails if a socket of the host cannot be bound to that address.
+    pub(super) fn check_owned(&self, host: NodeId, ip: IpAddr) -> io::Result<()> {
+        if !ip.is_unspecified() && !ip.is_loopback() && !self.plan.of(host).has(ip) {
+            let text = format!("{ip} is no address of host `{}`, which has {}", self.plan.names()[host.index()], self.plan.of(host).like(ip));
+            return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
+        }
+        Ok(())
     }
 
     fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {
@@ -184,6 +190,15 @@ impl Core {
         }
         self.sockets.get_mut(id).peer = Some(peer);
         Ok(())
+    }
+
+    /// A line for each socket that a task waits for.
+    pub(crate) fn waits(&self) -> Vec<String> {
+        let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty());
+        let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local));
+        #[cfg(feature = "tcp")]
+        let lines = lines.chain(self.tcp_waits());
+        lines.collect()
     }
 
     pub(crate) fn may_broadcast(&mut self, id: SocketId) -> &mut bool {

@@ -62,7 +62,7 @@ impl Idle {
     /// Tokio is about to park its thread: all wait.
     fn notice(&self, shared: &Shared) {
         let (now, next) = {
-            let core = shared.lock();
+            let mut core = shared.lock();
             (core.now(), core.next_event())
         };
         let mut state = self.lock();
@@ -223,7 +223,7 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
     poll_fn(|cx| {
         loop {
             let (now, next) = {
-                let core = shared.lock();
+                let mut core = shared.lock();
                 (core.now(), core.next_event())
             };
             if next.is_some_and(|next| next <= now) {

@@ -154,9 +154,9 @@ pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>
 #[expect(clippy::panic, reason = "the program waits for ever; says who does, and the way out")]
 pub(crate) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
     const SHOWN: usize = 8;
-    let (now, hosts) = {
+    let (now, hosts, sockets) = {
         let core = shared.lock();
-        (core.now(), core.plan.names().to_vec())
+        (core.now(), core.plan.names().to_vec(), core.waits())
     };
     let waiting = tasks.waiting();
     let mut text = String::new();
@@ -165,6 +165,12 @@ pub(crate) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
     }
     if waiting.len() > SHOWN {
         let _ = write!(text, "\n  and {} more", waiting.len() - SHOWN);
+    }
+    for socket in sockets.iter().take(SHOWN) {
+        let _ = write!(text, "\n  {socket}");
+    }
+    if sockets.len() > SHOWN {
+        let _ = write!(text, "\n  and {} more sockets", sockets.len() - SHOWN);
     }
     panic!(
         "nothing will ever happen after {} s: no packet is on its way, no timer is set, and these wait for what never comes. A lost packet needs a `timeout`:{text}",

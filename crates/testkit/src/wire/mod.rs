@@ -140,6 +140,12 @@ impl<A: Clone> Wire<A> {
         is_due || self.hitting.as_ref().and_then(|hitting| hitting.exits.next()).is_some_and(|at| at <= self.now)
     }
 
+    /// The name of the next packet that is offered to a link.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn next_packet(&self, path: Path) -> PacketName {
+        PacketName { path, sequence: self.offered[self.pair(path)], copy: 0 }
+    }
+
     /// Hands a packet to its link. Fails with the packet's name if the way is cut.
     pub(crate) fn offer(&mut self, path: Path, parcel: Parcel<A>) -> Result<(), Lost> {
         let pair = self.pair(path);

@@ -12,8 +12,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 const CHAPTER: &str = include_str!("../../../../../docs/testing.md");
 
 /// The code in which the blocks must stand as they are. What needs the feature `scenes` is among the tests across crates, which always have it.
-const CODE: [&str; 4] =
-    [include_str!("programs.rs"), include_str!("files.rs"), include_str!("nodes.rs"), include_str!("../../../../../tests/tests/testkit/chapter.rs")];
+const CODE: [&str; 5] = [
+    include_str!("programs.rs"),
+    include_str!("files.rs"),
+    include_str!("nodes.rs"),
+    include_str!("../../programs/phone.rs"),
+    include_str!("../../../../../tests/tests/testkit/chapter.rs"),
+];
 
 /// The test that the page begins with.
 const FIRST_TEST: &str = include_str!("../../../../../docs/examples/first-test/src/lib.rs");

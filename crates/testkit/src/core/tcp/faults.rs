@@ -1,0 +1,79 @@
+//! Hosts that crash, and programs that are killed.
+
+use cohaptic_tcp::Connection;
+use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
+
+use super::{ConnId, Core, Gone, ListenId};
+
+impl Core {
+    fn connections_of(&self, host: NodeId) -> Vec<ConnId> {
+        self.tcp.connections.iter().filter(|(_, end)| end.host == host).map(|(place, _)| ConnId(place)).collect()
+    }
+
+    fn listeners_of(&self, host: NodeId) -> Vec<ListenId> {
+        self.tcp.listeners.iter().filter(|(_, listener)| listener.host == host).map(|(place, _)| ListenId(place)).collect()
+    }
+
+    /// The host is gone with all that it knows: no segment tells of it.
+    pub(in crate::core) fn crash_tcp(&mut self, host: NodeId) {
+        let gone = Gone { at: self.now(), is_killed: false };
+        for id in self.listeners_of(host) {
+            let listener = self.tcp.listeners.get_mut(id.0);
+            (listener.half_open, listener.waiting, listener.gone) = Default::default();
+            listener.gone = Some(gone);
+            self.woken.append(&mut listener.wakers);
+            let hold = listener.hold;
+            self.tcp.ports.release(hold);
+        }
+        for id in self.connections_of(host) {
+            let end = self.tcp.end_mut(id);
+            end.gone.get_or_insert(gone);
+            end.listener = None;
+            silence(&mut end.machine, gone.at);
+            let hold = end.hold.take();
+            let (mut readers, mut writers) = (std::mem::take(&mut end.readers), std::mem::take(&mut end.writers));
+            self.woken.append(&mut readers);
+            self.woken.append(&mut writers);
+            self.tcp.set_timer(id, None);
+            self.tcp.unroute(id);
+            hold.into_iter().for_each(|hold| self.tcp.ports.release(hold));
+            if !self.tcp.end(id).is_held {
+                self.tcp.remove(id);
+            }
+        }
+        self.tcp.loopback.retain(|(of, _)| *of != host);
+    }
+
+    /// The program of the host is gone: what it held is closed, as when it is dropped.
+    pub(in crate::core) fn kill_tcp(&mut self, host: NodeId) {
+        let gone = Gone { at: self.now(), is_killed: true };
+        for id in self.listeners_of(host) {
+            let listener = self.tcp.listeners.get_mut(id.0);
+            if listener.gone.replace(gone).is_none() {
+                let mut wakers = std::mem::take(&mut listener.wakers);
+                self.woken.append(&mut wakers);
+                self.stop_listening(id);
+            }
+        }
+        for id in self.connections_of(host) {
+            let end = self.tcp.end_mut(id);
+            if !end.is_held || end.gone.is_some() {
+                continue;
+            }
+            end.gone = Some(gone);
+            let (mut readers, mut writers) = (std::mem::take(&mut end.readers), std::mem::take(&mut end.writers));
+            end.machine.close(gone.at);
+            self.woken.append(&mut readers);
+            self.woken.append(&mut writers);
+            self.after_call(id);
+        }
+    }
+}
+
+/// Ends a connection without a word.
+fn silence(machine: &mut Connection, now: Instant) {
+    machine.close(now);
+    machine.abort();
+    while machine.poll_transmit(now).is_some() {}
+}

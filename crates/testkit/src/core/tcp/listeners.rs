@@ -1,0 +1,190 @@
+//! Connections are opened and taken.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::task::Waker;
+use std::time::Duration;
+
+use cohaptic_tcp::{Connection, Segment, TcpConfig};
+use cohaptic_wan::NodeId;
+
+use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener};
+use crate::trace::Lost;
+
+/// What connections inherit of their listener: the constants, and the time to linger when they are dropped.
+pub(crate) type Inherited = (TcpConfig, Option<Duration>);
+
+fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
+    Err(io::Error::new(kind, text))
+}
+
+impl Core {
+    /// Listens at a port that is held. `backlog`: one connection more than that may wait.
+    pub(crate) fn listen(
+        &mut self,
+        host: NodeId,
+        (hold, local): (HoldId, SocketAddr),
+        backlog: usize,
+        (config, linger): Inherited,
+    ) -> io::Result<ListenId> {
+        self.check_alone(host, local, hold)?;
+        let id = ListenId(self.tcp.listeners.insert(Listener {
+            host,
+            local,
+            config,
+            linger,
+            backlog,
+            half_open: BTreeSet::new(),
+            waiting: VecDeque::new(),
+            wakers: Vec::new(),
+            hold,
+            gone: None,
+        }));
+        self.listen_at(hold, id);
+        Ok(id)
+    }
+
+    /// A SYN leaves. `bound`: the port that is held, and the address of that socket. On failure it is held still.
+    pub(crate) fn connect_tcp(
+        &mut self,
+        host: NodeId,
+        bound: Option<(HoldId, SocketAddr)>,
+        mut remote: SocketAddr,
+        mut config: TcpConfig,
+    ) -> io::Result<ConnId> {
+        self.note_call();
+        self.forget_old();
+        let local = bound.map(|(_, local)| local);
+        if let Some(local) = local.filter(|local| local.is_ipv6() != remote.is_ipv6()) {
+            let text = format!("a socket at {local} cannot reach {remote}, which is of the other version of IP");
+            return refuse(io::ErrorKind::InvalidInput, text);
+        }
+        if remote.port() == 0 {
+            return refuse(io::ErrorKind::InvalidInput, format!("nothing can be sent to port 0 ({remote})"));
+        }
+        if remote.ip().is_multicast() || remote.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
+            return refuse(io::ErrorKind::Unsupported, format!("{remote} is an address of several hosts, and a connection has two ends"));
+        }
+        let loopback: IpAddr = if remote.is_ipv6() { Ipv6Addr::LOCALHOST.into() } else { Ipv4Addr::LOCALHOST.into() };
+        if remote.ip().is_unspecified() {
+            remote.set_ip(loopback);
+        }
+        let any = if remote.is_ipv6() { Ipv6Addr::UNSPECIFIED.into() } else { Ipv4Addr::UNSPECIFIED.into() };
+        let from = self.source(host, local.map_or(any, |local| local.ip()), remote.ip())?;
+        if !remote.ip().is_loopback() && self.plan.owner_node(remote.ip()).is_none() && !self.plan.was_given(remote.ip()) {
+            return refuse(io::ErrorKind::HostUnreachable, format!("no host has the address {}; the hosts are\n{}", remote.ip(), self.plan));
+        }
+        let port = match local {
+            Some(local) => local.port(),
+            None => self.port_to(host, from, remote)?,
+        };
+        let local = SocketAddr::new(from, port);
+        if self.tcp.routes.contains_key(&super::route(host, local, remote)) {
+            let text = format!("host `{}` has a connection from {local} to {remote} already", self.plan.names()[host.index()]);
+            return refuse(io::ErrorKind::AddrNotAvailable, text);
+        }
+        if self.is_own(host, remote.ip()) {
+            config.mtu = LOOPBACK_MTU;
+        }
+        let (now, sequence) = (self.now(), self.tcp.initial_sequence());
+        let machine =
+            Connection::connect(now, config, local, remote, sequence).map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
+        let id = self.tcp.insert(host, machine);
+        let end = self.tcp.end_mut(id);
+        (end.is_held, end.hold) = (true, bound.map(|(hold, _)| hold));
+        self.after_call(id);
+        Ok(id)
+    }
+
+    /// Whether an address is one of the host's own, loopback included.
+    pub(super) fn is_own(&self, host: NodeId, ip: IpAddr) -> bool {
+        ip.is_loopback() || self.plan.of(host).has(ip)
+    }
+
+    /// Fails if more connections wait than the backlog says: Linux drops a SYN then, and the ACK that would end a handshake.
+    pub(super) fn check_backlog(&self, id: ListenId) -> Result<(), Lost> {
+        let listener = self.tcp.listeners.get(id.0);
+        if listener.waiting.len() > listener.backlog { Err(Lost::BacklogFull) } else { Ok(()) }
+    }
+
+    /// A SYN has come to a listener.
+    pub(super) fn take_syn(&mut self, id: ListenId, syn: &Segment<'_>) -> Result<(), Lost> {
+        self.check_backlog(id)?;
+        let listener = self.tcp.listeners.get(id.0);
+        let (host, mut config, linger) = (listener.host, listener.config.clone(), listener.linger);
+        if self.is_own(host, syn.source.ip()) {
+            config.mtu = LOOPBACK_MTU;
+        }
+        let (now, sequence) = (self.now(), self.tcp.initial_sequence());
+        let machine = Connection::accept(now, config, syn, sequence).expect("the constants were checked when they were set");
+        let conn = self.tcp.insert(host, machine);
+        let end = self.tcp.end_mut(conn);
+        (end.listener, end.linger) = (Some(id), linger);
+        self.tcp.listeners.get_mut(id.0).half_open.insert(conn);
+        self.settle(conn);
+        Ok(())
+    }
+
+    /// A connection has come through the handshake: it can be taken.
+    pub(super) fn wait_to_be_taken(&mut self, id: ListenId, conn: ConnId) {
+        let listener = self.tcp.listeners.get_mut(id.0);
+        if listener.half_open.remove(&conn) {
+            listener.waiting.push_back(conn);
+            self.woken.append(&mut listener.wakers);
+        }
+    }
+
+    /// Takes the connection that has waited longest.
+    pub(crate) fn accept(&mut self, id: ListenId) -> io::Result<Option<(ConnId, SocketAddr)>> {
+        self.note_call();
+        self.check_listener(id)?;
+        let Some(conn) = self.tcp.listeners.get_mut(id.0).waiting.pop_front() else { return Ok(None) };
+        self.tcp.calls += 1;
+        let end = self.tcp.end_mut(conn);
+        (end.is_held, end.listener) = (true, None);
+        Ok(Some((conn, end.machine.peer_addr())))
+    }
+
+    /// A task wants to be woken when there is a connection to take.
+    pub(crate) fn wait_to_accept(&mut self, id: ListenId, waker: &Waker) {
+        super::program::wait(&mut self.tcp.listeners.get_mut(id.0).wakers, waker);
+    }
+
+    pub(crate) fn listener_address(&self, id: ListenId) -> SocketAddr {
+        self.tcp.listeners.get(id.0).local
+    }
+
+    /// The constants of the connections that a listener takes.
+    pub(crate) fn listener_config(&mut self, id: ListenId) -> &mut TcpConfig {
+        &mut self.tcp.listeners.get_mut(id.0).config
+    }
+
+    pub(crate) fn check_listener(&self, id: ListenId) -> io::Result<()> {
+        let listener = self.tcp.listeners.get(id.0);
+        self.check_gone(listener.gone, listener.host, listener.local)
+    }
+
+    /// The listener is dropped.
+    pub(crate) fn close_listener(&mut self, id: ListenId) {
+        self.stop_listening(id);
+        self.tcp.listeners.remove(id.0);
+    }
+
+    /// No connection is taken any more: those that wait are reset, and those whose handshake is not over are forgotten, so that their next segment is refused.
+    pub(super) fn stop_listening(&mut self, id: ListenId) {
+        let listener = self.tcp.listeners.get_mut(id.0);
+        let (half_open, waiting) = (std::mem::take(&mut listener.half_open), std::mem::take(&mut listener.waiting));
+        self.tcp.ports.release(listener.hold);
+        for conn in half_open {
+            self.tcp.remove(conn);
+        }
+        for conn in waiting {
+            let end = self.tcp.end_mut(conn);
+            end.listener = None;
+            end.machine.abort();
+            self.settle(conn);
+        }
+        self.take_arrivals();
+    }
+}

@@ -1,0 +1,147 @@
+//! The way of a segment.
+
+use bytes::Bytes;
+use cohaptic_tcp::{Ecn, Flags, Segment, State};
+use cohaptic_wan::{NodeId, Path};
+
+use super::{ConnId, Core};
+use crate::core::{Addresses, Kind, Parcel};
+use crate::trace::{Happening, Lost, PacketName};
+
+impl Core {
+    /// A packet has come to a host.
+    pub(in crate::core) fn arrive_segment(&mut self, host: NodeId, packet: &Bytes, marked: bool) -> Result<(), Lost> {
+        if !self.is_up(host) {
+            return Err(Lost::HostDown);
+        }
+        let mut segment = Segment::parse(packet).map_err(|_| Lost::Checksum)?;
+        if !self.is_own(host, segment.destination.ip()) {
+            return Err(Lost::NoSuchAddress);
+        }
+        if marked && segment.ecn != Ecn::NotCapable {
+            segment.ecn = Ecn::Congestion;
+        }
+        self.forget_old();
+        let listener = if is_first(&segment) { self.listener_at(host, segment.destination) } else { None };
+        let route = super::route(host, segment.destination, segment.source);
+        if let Some(id) = self.tcp.routes.get(&route).copied() {
+            let (now, end) = (self.now(), self.tcp.end(id));
+            if let (Some(waited_at), State::SynReceived, false) = (end.listener, end.machine.state(), segment.flags.has(Flags::RST)) {
+                self.check_backlog(waited_at)?;
+            }
+            let machine = &mut self.tcp.end_mut(id).machine;
+            if listener.is_none() || !machine.gives_way_to(&segment) {
+                machine.handle_segment(now, &segment);
+                self.settle(id);
+                return Ok(());
+            }
+            self.tcp.unroute(id);
+            self.settle(id);
+        }
+        if let Some(listener) = listener {
+            return self.take_syn(listener, &segment);
+        }
+        if let Some(reset) = segment.refusal(self.tcp_config(host).ttl) {
+            self.emit(host, &reset);
+        }
+        Err(Lost::NoSocket)
+    }
+
+    /// A segment leaves. It arrives when [`Core::take_arrivals`] is next called, however short its way.
+    fn emit(&mut self, host: NodeId, segment: &Segment<'_>) {
+        let (from, to) = (segment.source.ip(), segment.destination.ip());
+        if self.is_own(host, to) {
+            self.tcp.loopback.push_back((host, segment.to_packet().into()));
+            return;
+        }
+        // From an address that the host does not have any more, or to one that nobody has any more, nothing gets through.
+        let Some(receiver) = self.plan.owner_node(to).filter(|_| self.plan.of(host).has(from)) else { return };
+        let path = Path { from: host, to: receiver };
+        let packet = self.wire.next_packet(path);
+        let addresses = Addresses { from: segment.source, to: segment.destination, kind: Kind::Segment };
+        let parcel = Parcel { addresses, bytes: segment.to_packet().into(), ecn_capable: segment.ecn != Ecn::NotCapable };
+        // Over a way that is cut it is lost, as others are.
+        let _ = self.wire.offer(path, parcel);
+        if self.wire.recording().traces {
+            self.note_segment(packet, segment);
+        }
+    }
+
+    /// Notes a segment with numbers that count from its SYN.
+    fn note_segment(&mut self, packet: PacketName, segment: &Segment<'_>) {
+        let (there, back) = ((segment.source, segment.destination), (segment.destination, segment.source));
+        let is_syn = segment.flags.has(Flags::SYN);
+        if is_syn {
+            self.tcp.flows.insert(there, (segment.sequence, segment.options.window_scale));
+        }
+        let (first, scale) = self.tcp.flows.get(&there).copied().unwrap_or_default();
+        let (peers_first, peers_scale) = self.tcp.flows.get(&back).copied().unwrap_or_default();
+        // Windows are scaled if both have said so, and never on a SYN (RFC 7323, section 2.2).
+        let shift = scale.filter(|_| peers_scale.is_some() && !is_syn).unwrap_or(0);
+        self.wire.note(Happening::Segment {
+            packet,
+            ports: [segment.source.port(), segment.destination.port()],
+            flags: segment.flags,
+            sequence: segment.sequence.wrapping_sub(first),
+            octets: u32::try_from(segment.payload.len()).unwrap_or(u32::MAX),
+            acknowledges: segment.flags.has(Flags::ACK).then(|| segment.acknowledgement.wrapping_sub(peers_first)),
+            window: u32::from(segment.window) << shift.min(14),
+        });
+    }
+
+    /// Hands over the next packet that does not leave its host; says whether there was one.
+    pub(in crate::core) fn take_from_loopback(&mut self) -> bool {
+        let Some((host, packet)) = self.tcp.loopback.pop_front() else { return false };
+        // Loopback tells of no end: it is not the network.
+        let _ = self.arrive_segment(host, &packet, false);
+        true
+    }
+
+    /// After anything that has happened to a connection: what may leave leaves, tasks that can go on are woken, and its timer is set.
+    pub(super) fn settle(&mut self, id: ConnId) {
+        let now = self.now();
+        let host = self.tcp.end(id).host;
+        while let Some(segment) = self.tcp.end_mut(id).machine.poll_transmit(now) {
+            self.emit(host, &segment);
+        }
+        let end = self.tcp.connections.get_mut(id.0);
+        if !end.readers.is_empty() && end.machine.is_readable() {
+            self.woken.append(&mut end.readers);
+        }
+        if end.is_write_blocked && end.machine.is_writable() {
+            end.is_write_blocked = false;
+            self.woken.append(&mut end.writers);
+        }
+        let (state, listener) = (end.machine.state(), end.listener);
+        let due = if state == State::TimeWait { None } else { end.machine.poll_timeout() };
+        if state == State::TimeWait && !end.is_in_time_wait {
+            end.is_in_time_wait = true;
+            let ends = end.machine.time_wait_ends().unwrap_or(now);
+            self.tcp.time_waits.push_back((ends, id));
+        }
+        self.tcp.set_timer(id, due);
+        if let Some(listener) = listener {
+            if state.is_synchronised() {
+                self.wait_to_be_taken(listener, id);
+            } else if state == State::Closed && self.tcp.listeners.get_mut(listener.0).half_open.remove(&id) {
+                // A handshake that has failed is nobody's; what waits to be taken can be taken still.
+                self.tcp.end_mut(id).listener = None;
+            }
+        }
+        self.forget_if_over(id);
+    }
+
+    /// A connection that is over is not found by packets any more, and forgotten when nobody holds it.
+    pub(super) fn forget_if_over(&mut self, id: ConnId) {
+        let end = self.tcp.end(id);
+        if !end.machine.is_finished() {
+            return;
+        }
+        if end.is_held || end.listener.is_some() { self.tcp.unroute(id) } else { self.tcp.remove(id) }
+    }
+}
+
+/// Whether a segment opens a connection.
+fn is_first(segment: &Segment<'_>) -> bool {
+    segment.flags.has(Flags::SYN) && !segment.flags.has(Flags::ACK) && !segment.flags.has(Flags::RST)
+}

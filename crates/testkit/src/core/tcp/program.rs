@@ -1,0 +1,183 @@
+//! What programs ask of a connection.
+
+use std::io::{self, IoSlice, IoSliceMut};
+use std::net::SocketAddr;
+use std::task::Waker;
+
+use cohaptic_tcp::{Connection, Error, State};
+use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
+use cohaptic_wan::NodeId;
+
+use super::{ConnId, Core, End, Gone};
+
+/// Adds a task to those that wait, once.
+pub(super) fn wait(wakers: &mut Vec<Waker>, waker: &Waker) {
+    if !wakers.iter().any(|known| known.will_wake(waker)) {
+        wakers.push(waker.clone());
+    }
+}
+
+impl End {
+    /// An error as programs see it.
+    fn explain(&self, error: Error) -> io::Error {
+        let kind = match error {
+            Error::WouldBlock => return io::ErrorKind::WouldBlock.into(),
+            Error::ConnectionRefused => io::ErrorKind::ConnectionRefused,
+            Error::ConnectionReset => io::ErrorKind::ConnectionReset,
+            Error::TimedOut => io::ErrorKind::TimedOut,
+            Error::BrokenPipe => io::ErrorKind::BrokenPipe,
+            Error::NotConnected => io::ErrorKind::NotConnected,
+            _ => io::ErrorKind::Other,
+        };
+        io::Error::new(kind, format!("{error} ({} to {})", self.machine.local_addr(), self.machine.peer_addr()))
+    }
+}
+
+impl Core {
+    /// Fails if the socket went with its host, or with the program of it.
+    pub(super) fn check_gone(&self, gone: Option<Gone>, host: NodeId, local: SocketAddr) -> io::Result<()> {
+        let Some(Gone { at, is_killed }) = gone else { return Ok(()) };
+        let name = &self.plan.names()[host.index()];
+        let (what, after) = if is_killed { ("the program of host", " was killed") } else { ("host", " crashed") };
+        let text = format!("{what} `{name}`{after} at {} s, and this socket ({local}) with it; after `Host::restart`, bind a new one", Seconds(at));
+        Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
+    }
+
+    pub(crate) fn check_connection(&self, id: ConnId) -> io::Result<()> {
+        let end = self.tcp.end(id);
+        self.check_gone(end.gone, end.host, end.machine.local_addr())
+    }
+
+    /// The state machine of a connection.
+    pub(crate) fn connection(&self, id: ConnId) -> &Connection {
+        &self.tcp.end(id).machine
+    }
+
+    /// Changes a connection, and sees to what follows.
+    pub(crate) fn change_connection<T>(&mut self, id: ConnId, change: impl FnOnce(Instant, &mut Connection) -> T) -> io::Result<T> {
+        self.check_connection(id)?;
+        let now = self.now();
+        let value = change(now, &mut self.tcp.end_mut(id).machine);
+        self.after_call(id);
+        Ok(value)
+    }
+
+    /// After a program has called: what may leave leaves, and what arrives at once arrives.
+    pub(super) fn after_call(&mut self, id: ConnId) {
+        self.tcp.calls += 1;
+        self.settle(id);
+        self.take_arrivals();
+    }
+
+    /// Whether the handshake is over, and how.
+    pub(crate) fn is_settled(&mut self, id: ConnId) -> Option<io::Result<()>> {
+        if let Err(gone) = self.check_connection(id) {
+            return Some(Err(gone));
+        }
+        let end = self.tcp.connections.get_mut(id.0);
+        match end.machine.state() {
+            State::SynSent | State::SynReceived => None,
+            State::Closed => Some(Err(end.machine.take_error().map_or_else(|| io::ErrorKind::NotConnected.into(), |error| end.explain(error)))),
+            State::Established | State::FinWait1 | State::FinWait2 | State::CloseWait | State::Closing | State::LastAck | State::TimeWait => {
+                Some(Ok(()))
+            }
+        }
+    }
+
+    /// Reads what has arrived, into one buffer after the other.
+    pub(crate) fn read(&mut self, id: ConnId, to: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
+        self.note_call();
+        self.check_connection(id)?;
+        let machine = &mut self.tcp.end_mut(id).machine;
+        let mut count = 0;
+        let mut outcome = Ok(0);
+        for buffer in to.iter_mut().filter(|buffer| !buffer.is_empty()) {
+            if count > 0 && machine.info().unread == 0 {
+                break;
+            }
+            outcome = machine.read(buffer).inspect(|read| count += read);
+            if outcome != Ok(buffer.len()) {
+                break;
+            }
+        }
+        self.after_call(id);
+        outcome.map(|_| count).map_err(|error| self.tcp.end(id).explain(error))
+    }
+
+    /// Reads without taking.
+    pub(crate) fn peek_connection(&mut self, id: ConnId, to: &mut [u8]) -> io::Result<usize> {
+        self.note_call();
+        self.check_connection(id)?;
+        let end = self.tcp.end_mut(id);
+        end.machine.peek(to).map_err(|error| end.explain(error))
+    }
+
+    /// Writes one buffer after the other, as much as the send buffer takes.
+    pub(crate) fn write(&mut self, id: ConnId, from: &[IoSlice<'_>]) -> io::Result<usize> {
+        self.note_call();
+        self.check_connection(id)?;
+        let end = self.tcp.end_mut(id);
+        let mut count = 0;
+        let mut outcome = Ok(0);
+        for buffer in from {
+            outcome = end.machine.write(buffer).inspect(|written| count += written);
+            if outcome != Ok(buffer.len()) {
+                break;
+            }
+        }
+        end.is_write_blocked |= outcome == Err(Error::WouldBlock);
+        self.after_call(id);
+        match outcome {
+            Err(error) if count == 0 => Err(self.tcp.end(id).explain(error)),
+            _ => Ok(count),
+        }
+    }
+
+    /// Whether [`Core::read`] and [`Core::write`] have something to say.
+    pub(crate) fn is_ready(&self, id: ConnId) -> [bool; 2] {
+        let end = self.tcp.end(id);
+        if end.gone.is_some() { [true; 2] } else { [end.machine.is_readable(), !end.is_write_blocked] }
+    }
+
+    /// A task wants to be woken when the connection can be read.
+    pub(crate) fn wait_to_read_from(&mut self, id: ConnId, waker: &Waker) {
+        wait(&mut self.tcp.end_mut(id).readers, waker);
+    }
+
+    /// A task wants to be woken when the connection can be written, or is established.
+    pub(crate) fn wait_to_write_to(&mut self, id: ConnId, waker: &Waker) {
+        wait(&mut self.tcp.end_mut(id).writers, waker);
+    }
+
+    /// The error that the next call would give otherwise.
+    pub(crate) fn take_error_of(&mut self, id: ConnId) -> io::Result<Option<io::Error>> {
+        self.check_connection(id)?;
+        let end = self.tcp.end_mut(id);
+        let error = end.machine.take_error();
+        Ok(error.map(|error| end.explain(error)))
+    }
+
+    /// How long a program would wait for data to leave when it drops the stream, of which only zero acts.
+    pub(crate) fn linger(&mut self, id: ConnId) -> &mut Option<std::time::Duration> {
+        &mut self.tcp.end_mut(id).linger
+    }
+
+    /// The stream is dropped.
+    pub(crate) fn drop_connection(&mut self, id: ConnId) {
+        let now = self.now();
+        let end = self.tcp.end_mut(id);
+        end.is_held = false;
+        end.readers.clear();
+        end.writers.clear();
+        if end.gone.is_some_and(|gone| !gone.is_killed) {
+            self.tcp.remove(id);
+            return;
+        }
+        if end.linger.is_some_and(|linger| linger.is_zero()) {
+            end.machine.abort();
+        }
+        end.machine.close(now);
+        self.after_call(id);
+    }
+}

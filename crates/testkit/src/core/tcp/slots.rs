@@ -1,0 +1,51 @@
+//! Places that are used again.
+
+/// Values at places, whose numbers stay as long as the value is there.
+#[derive(Debug)]
+pub(super) struct Slots<T> {
+    places: Vec<Option<T>>,
+    free: Vec<usize>,
+}
+
+impl<T> Default for Slots<T> {
+    fn default() -> Self {
+        Self { places: Vec::new(), free: Vec::new() }
+    }
+}
+
+impl<T> Slots<T> {
+    pub(super) fn insert(&mut self, value: T) -> usize {
+        if let Some(place) = self.free.pop() {
+            self.places[place] = Some(value);
+            return place;
+        }
+        self.places.push(Some(value));
+        self.places.len() - 1
+    }
+
+    pub(super) fn get(&self, place: usize) -> &T {
+        self.places[place].as_ref().expect("a value is there as long as its number is held")
+    }
+
+    pub(super) fn get_mut(&mut self, place: usize) -> &mut T {
+        self.places[place].as_mut().expect("a value is there as long as its number is held")
+    }
+
+    /// What may have been removed.
+    pub(super) fn find(&self, place: usize) -> Option<&T> {
+        self.places.get(place)?.as_ref()
+    }
+
+    pub(super) fn remove(&mut self, place: usize) -> Option<T> {
+        let value = self.places[place].take();
+        if value.is_some() {
+            self.free.push(place);
+        }
+        value
+    }
+
+    /// The places that are taken, in their order.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &T)> {
+        self.places.iter().enumerate().filter_map(|(place, value)| Some((place, value.as_ref()?)))
+    }
+}

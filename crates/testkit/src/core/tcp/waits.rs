@@ -1,0 +1,39 @@
+//! What sockets wait for, in words: for programs that wait for ever.
+
+use cohaptic_tcp::State;
+
+use super::Core;
+
+impl Core {
+    /// A line for each socket of TCP that a task waits for, or whose data waits for the program of the peer.
+    pub(in crate::core) fn tcp_waits(&self) -> impl Iterator<Item = String> {
+        let names = self.plan.names();
+        let listeners = self.tcp.listeners.iter().map(|(_, listener)| listener).filter(|listener| !listener.wakers.is_empty());
+        let listeners = listeners
+            .map(|listener| format!("host `{}`: the TCP listener at {} waits for a connection", names[listener.host.index()], listener.local));
+        let connections = self.tcp.connections.iter().filter_map(|(_, end)| {
+            let is_held_back = end.machine.is_held_by_window();
+            let waits = match (end.readers.is_empty(), end.writers.is_empty()) {
+                (true, true) if !is_held_back => return None,
+                (true, true) => "holds data",
+                (false, true) => "waits to read",
+                (true, false) if matches!(end.machine.state(), State::SynSent | State::SynReceived) => "waits for the handshake",
+                (true, false) => "waits to write",
+                (false, false) => "waits to read and to write",
+            };
+            let info = end.machine.info();
+            let (local, peer) = (end.machine.local_addr(), end.machine.peer_addr());
+            let mut text = format!("host `{}`: TCP {local} to {peer} ({:?}) {waits}", names[end.host.index()], info.state);
+            if is_held_back {
+                let reader = if peer.ip().is_loopback() { Some(end.host) } else { self.plan.owner_node(peer.ip()) };
+                let reader = reader.map_or("?", |host| &names[host.index()]);
+                text.push_str(&format!("; {} octets wait, since the program of host `{reader}` does not read", info.unacknowledged));
+            }
+            if info.unread > 0 {
+                text.push_str(&format!("; {} octets are there to be read", info.unread));
+            }
+            Some(text)
+        });
+        listeners.chain(connections)
+    }
+}

@@ -1,0 +1,80 @@
+//! Unmodified clients and servers of hyper, HTTP/1 and HTTP/2.
+//!
+//! A stream in [`TokioIo`] is what hyper takes on both sides. [`Connector`] opens the connections of the client of `hyper-util`, [`Executor`]
+//! runs what hyper spawns as tasks of a host, on both runtimes.
+//!
+//! A server of HTTP/1 or 2 adds a `Date` header, which reads the time of day: two runs differ by it. Turn it off (`auto_date_header(false)`), or set the header: a
+//! response that has one keeps it.
+
+use std::future::Future;
+use std::io;
+use std::pin::Pin;
+use std::task::{Context, Poll};
+
+use hyper::Uri;
+use hyper_util::client::legacy::connect::{Connected, Connection};
+use hyper_util::rt::TokioIo;
+
+use crate::{Host, TcpStream};
+
+/// Opens connections from a host, to the authorities of URIs: names of hosts, or addresses. Without a port it is 443 for `https`, and 80 otherwise; encryption is
+/// left to a connector around this one.
+#[derive(Clone, Debug)]
+pub struct Connector(Host);
+
+impl Connector {
+    /// Connections come from that host.
+    #[must_use]
+    pub fn new(host: &Host) -> Self {
+        Self(host.clone())
+    }
+}
+
+impl tower_service::Service<Uri> for Connector {
+    type Response = TokioIo<TcpStream>;
+    type Error = io::Error;
+    type Future = Pin<Box<dyn Future<Output = io::Result<Self::Response>> + Send>>;
+
+    fn poll_ready(&mut self, _cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+
+    fn call(&mut self, uri: Uri) -> Self::Future {
+        let host = self.0.clone();
+        Box::pin(async move {
+            let name = uri.host().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, format!("`{uri}` names no host")))?;
+            let port = uri.port_u16().unwrap_or_else(|| if uri.scheme_str() == Some("https") { 443 } else { 80 });
+            host.connect(format!("{name}:{port}")).await.map(TokioIo::new)
+        })
+    }
+}
+
+impl Connection for TcpStream {
+    fn connected(&self) -> Connected {
+        Connected::new()
+    }
+}
+
+/// Runs futures as tasks of a host. Those given to it while the host is down are dropped.
+#[derive(Clone, Debug)]
+pub struct Executor(Host);
+
+impl Executor {
+    /// Tasks live on that host.
+    #[must_use]
+    pub fn new(host: &Host) -> Self {
+        Self(host.clone())
+    }
+}
+
+impl<F> hyper::rt::Executor<F> for Executor
+where
+    F: Future + 'static,
+    F::Output: 'static,
+{
+    fn execute(&self, future: F) {
+        if self.0.is_up() {
+            drop(self.0.spawn(future));
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! The virtual listener.
+
+use std::fmt;
+use std::future::poll_fn;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use cohaptic_wan::NodeId;
+
+use super::TcpStream;
+use crate::address::ToSocketAddrs;
+use crate::context;
+use crate::core::{HoldId, Inherited, ListenId, Shared};
+
+/// How many connections may wait at a listener that does not say it; Linux lets one more wait.
+const BACKLOG: usize = 128;
+
+/// A TCP listener of a host of the running test bed: the methods of tokio's, with the same meaning.
+///
+/// What differs, or is worth knowing:
+///
+/// - It is bound on the host of the task that binds it; [`Host::listen`](crate::Host::listen) names another one.
+/// - 129 connections wait to be accepted ([`TcpSocket::listen`](super::TcpSocket::listen) has another number). A SYN beyond that is dropped without an answer, as
+///   Linux does it, so that its sender tries again after 1, 3, 7 … s.
+/// - A connection that is reset while it waits is accepted all the same, and reading from it fails.
+/// - A listener at `[::]` hears IPv6 only.
+/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
+pub struct TcpListener {
+    shared: Arc<Shared>,
+    id: ListenId,
+}
+
+impl TcpListener {
+    /// Listens on the host of the task that is running. `0.0.0.0` and `[::]` hear all addresses of the host, port 0 is given a free one: from 49152 on, in turn.
+    ///
+    /// # Errors
+    ///
+    /// As tokio's: the address is taken by another listener, or is not the host's. [`io::ErrorKind::NotFound`] if the task lives on no host.
+    #[expect(clippy::unused_async, reason = "as tokio's")]
+    pub async fn bind(address: impl ToSocketAddrs) -> io::Result<Self> {
+        let (shared, host) = context::here("a socket can be bound", "listen", "listen with `Host::listen`")?;
+        Self::bind_on(shared, host, address)
+    }
+
+    pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
+        let address = address.to_socket_addr()?;
+        let mut core = shared.lock();
+        core.check_up(host)?;
+        let held = core.hold_port(host, address, true)?;
+        let config = core.tcp_config(host).clone();
+        drop(core);
+        Self::listen(shared, host, held, BACKLOG, (config, None))
+    }
+
+    /// Listens at a port that is held, and releases it if that fails.
+    pub(super) fn listen(shared: Arc<Shared>, host: NodeId, held: (HoldId, SocketAddr), backlog: usize, inherited: Inherited) -> io::Result<Self> {
+        let mut core = shared.lock();
+        let listening = core.listen(host, held, backlog, inherited);
+        if listening.is_err() {
+            core.release_port(held.0);
+        }
+        drop(core);
+        Ok(Self { id: listening?, shared })
+    }
+
+    /// Waits for a connection; gives it and the address of its other end.
+    ///
+    /// # Errors
+    ///
+    /// If its host has crashed.
+    pub async fn accept(&self) -> io::Result<(TcpStream, SocketAddr)> {
+        poll_fn(|cx| self.poll_accept(cx)).await
+    }
+
+    /// Takes a connection, or sees to it that the task is woken when there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpListener::accept`].
+    pub fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(TcpStream, SocketAddr)>> {
+        let mut core = self.shared.lock();
+        match core.accept(self.id) {
+            Ok(Some((id, peer))) => {
+                drop(core);
+                Poll::Ready(Ok((TcpStream::new(Arc::clone(&self.shared), id), peer)))
+            }
+            Ok(None) => {
+                core.wait_to_accept(self.id, cx.waker());
+                Poll::Pending
+            }
+            Err(error) => Poll::Ready(Err(error)),
+        }
+    }
+
+    /// The address at which it listens.
+    ///
+    /// # Errors
+    ///
+    /// If its host has crashed.
+    pub fn local_addr(&self) -> io::Result<SocketAddr> {
+        let core = self.shared.lock();
+        core.check_listener(self.id)?;
+        Ok(core.listener_address(self.id))
+    }
+
+    /// The time to live of packets of the connections that it takes, which nothing counts down here: there are no routers.
+    ///
+    /// # Errors
+    ///
+    /// If its host has crashed.
+    pub fn ttl(&self) -> io::Result<u32> {
+        let mut core = self.shared.lock();
+        core.check_listener(self.id)?;
+        Ok(core.listener_config(self.id).ttl.into())
+    }
+
+    /// Sets that time to live, from 1 to 255.
+    ///
+    /// # Errors
+    ///
+    /// If it is none, or its host has crashed.
+    pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
+        let mut core = self.shared.lock();
+        core.check_listener(self.id)?;
+        core.listener_config(self.id).ttl = super::options::ttl(ttl)?;
+        Ok(())
+    }
+}
+
+impl Drop for TcpListener {
+    fn drop(&mut self) {
+        self.shared.lock().close_listener(self.id);
+    }
+}
+
+impl fmt::Debug for TcpListener {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TcpListener").field("local", &self.shared.lock().listener_address(self.id)).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,114 @@
+//! Halves with a life of their own.
+
+use std::fmt;
+use std::io::{self, IoSlice, IoSliceMut};
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use bytes::BufMut;
+use tokio::io::{Interest, ReadBuf, Ready};
+
+use super::TcpStream;
+use super::split::{both, reading, writing};
+
+/// The half of a stream that reads: see [`TcpStream::into_split`].
+#[derive(Debug)]
+pub struct OwnedReadHalf(Arc<TcpStream>);
+
+/// The half of a stream that writes: see [`TcpStream::into_split`]. Dropped, it shuts its direction.
+#[derive(Debug)]
+pub struct OwnedWriteHalf {
+    stream: Arc<TcpStream>,
+    shuts_when_dropped: bool,
+}
+
+pub(super) fn split(stream: TcpStream) -> (OwnedReadHalf, OwnedWriteHalf) {
+    let stream = Arc::new(stream);
+    (OwnedReadHalf(Arc::clone(&stream)), OwnedWriteHalf { stream, shuts_when_dropped: true })
+}
+
+fn reunite(read: OwnedReadHalf, write: OwnedWriteHalf) -> Result<TcpStream, ReuniteError> {
+    if !Arc::ptr_eq(&read.0, &write.stream) {
+        return Err(ReuniteError(read, write));
+    }
+    write.forget();
+    Ok(Arc::into_inner(read.0).expect("a stream has two halves, and one is gone"))
+}
+
+/// The two halves are not of one stream.
+#[derive(Debug)]
+pub struct ReuniteError(pub OwnedReadHalf, pub OwnedWriteHalf);
+
+impl fmt::Display for ReuniteError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("tried to reunite halves that are not from the same socket")
+    }
+}
+
+impl std::error::Error for ReuniteError {}
+
+impl OwnedReadHalf {
+    /// Makes a stream of both halves again.
+    ///
+    /// # Errors
+    ///
+    /// Both halves, if they are not of one stream.
+    pub fn reunite(self, other: OwnedWriteHalf) -> Result<TcpStream, ReuniteError> {
+        reunite(self, other)
+    }
+
+    pub(super) fn stream(&self) -> &TcpStream {
+        &self.0
+    }
+    both!();
+    reading!();
+}
+
+impl OwnedWriteHalf {
+    /// Makes a stream of both halves again.
+    ///
+    /// # Errors
+    ///
+    /// Both halves, if they are not of one stream.
+    pub fn reunite(self, other: OwnedReadHalf) -> Result<TcpStream, ReuniteError> {
+        reunite(other, self)
+    }
+
+    /// Drops it without shutting its direction.
+    pub fn forget(mut self) {
+        self.shuts_when_dropped = false;
+        drop(self);
+    }
+
+    pub(super) const fn has_shut(&mut self) {
+        self.shuts_when_dropped = false;
+    }
+
+    pub(super) fn stream(&self) -> &TcpStream {
+        &self.stream
+    }
+    both!();
+    writing!();
+}
+
+impl Drop for OwnedWriteHalf {
+    fn drop(&mut self) {
+        if self.shuts_when_dropped {
+            // A connection that went with its host has nothing to shut.
+            let _ = self.stream.shut_write_half();
+        }
+    }
+}
+
+impl AsRef<TcpStream> for OwnedReadHalf {
+    fn as_ref(&self) -> &TcpStream {
+        &self.0
+    }
+}
+
+impl AsRef<TcpStream> for OwnedWriteHalf {
+    fn as_ref(&self) -> &TcpStream {
+        &self.stream
+    }
+}

@@ -1,0 +1,187 @@
+//! The ways of tokio's that wait for readiness, and those that do not wait.
+
+use std::future::poll_fn;
+use std::io::{self, IoSlice, IoSliceMut};
+use std::task::{Context, Poll};
+
+use bytes::BufMut;
+
+use super::TcpStream;
+
+impl TcpStream {
+    /// Waits until something can be read, or the connection is over.
+    ///
+    /// # Errors
+    ///
+    /// None: an error of the connection is given by the next call.
+    pub async fn readable(&self) -> io::Result<()> {
+        poll_fn(|cx| self.poll_read_ready(cx)).await
+    }
+
+    /// Ready when something can be read, or the connection is over.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::readable`].
+    pub fn poll_read_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let mut core = self.shared.lock();
+        if core.is_ready(self.id)[0] {
+            return Poll::Ready(Ok(()));
+        }
+        core.wait_to_read_from(self.id, cx.waker());
+        Poll::Pending
+    }
+
+    /// Waits until something can be written, or the connection is over.
+    ///
+    /// # Errors
+    ///
+    /// None: an error of the connection is given by the next call.
+    pub async fn writable(&self) -> io::Result<()> {
+        poll_fn(|cx| self.poll_write_ready(cx)).await
+    }
+
+    /// Ready when something can be written, or the connection is over.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::writable`].
+    pub fn poll_write_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let mut core = self.shared.lock();
+        if core.is_ready(self.id)[1] {
+            return Poll::Ready(Ok(()));
+        }
+        core.wait_to_write_to(self.id, cx.waker());
+        Poll::Pending
+    }
+
+    /// Reads what has arrived.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::WouldBlock`] if nothing has; why the connection is gone.
+    pub fn try_read(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.try_read_vectored(&mut [IoSliceMut::new(buffer)])
+    }
+
+    /// Reads what has arrived, into one buffer after the other.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::try_read`].
+    pub fn try_read_vectored(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
+        self.shared.lock().read(self.id, buffers)
+    }
+
+    /// Reads what has arrived into the free room of a buffer.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::try_read`].
+    pub fn try_read_buf<B: BufMut>(&self, buffer: &mut B) -> io::Result<usize> {
+        // As much as a buffer that grows would be given by tokio.
+        let room = buffer.chunk_mut().len().min(buffer.remaining_mut());
+        let mut read = vec![0; room.min(self.info().unread.max(1))];
+        let count = self.try_read(&mut read)?;
+        buffer.put_slice(&read[..count]);
+        Ok(count)
+    }
+
+    /// Writes as much as the send buffer takes.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::WouldBlock`] if that is nothing; why the connection is gone.
+    pub fn try_write(&self, buffer: &[u8]) -> io::Result<usize> {
+        self.try_write_vectored(&[IoSlice::new(buffer)])
+    }
+
+    /// Writes one buffer after the other, as much as the send buffer takes.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::try_write`].
+    pub fn try_write_vectored(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize> {
+        self.shared.lock().write(self.id, buffers)
+    }
+
+    /// Waits until it can do one of these.
+    ///
+    /// # Errors
+    ///
+    /// None: an error of the connection is given by the next call.
+    #[cfg(feature = "tokio")]
+    pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
+        poll_fn(|cx| {
+            let ready = self.readiness(interest);
+            if !ready.is_empty() {
+                return Poll::Ready(Ok(ready));
+            }
+            let mut core = self.shared.lock();
+            if interest.is_readable() {
+                core.wait_to_read_from(self.id, cx.waker());
+            }
+            if interest.is_writable() {
+                core.wait_to_write_to(self.id, cx.waker());
+            }
+            Poll::Pending
+        })
+        .await
+    }
+
+    /// What of these it can do now.
+    #[cfg(feature = "tokio")]
+    fn readiness(&self, interest: tokio::io::Interest) -> tokio::io::Ready {
+        use tokio::io::Ready;
+        let core = self.shared.lock();
+        let [can_read, can_write] = core.is_ready(self.id);
+        let connection = core.connection(self.id);
+        let flag = |is_set: bool, flag| if is_set { flag } else { Ready::EMPTY };
+        let readable = flag(can_read, Ready::READABLE) | flag(connection.is_read_closed(), Ready::READ_CLOSED);
+        let writable = flag(can_write, Ready::WRITABLE) | flag(connection.is_write_closed() && can_write, Ready::WRITE_CLOSED);
+        flag(interest.is_readable(), readable) | flag(interest.is_writable(), writable)
+    }
+
+    /// Tries an operation of one's own, such as [`TcpStream::try_read`].
+    ///
+    /// # Errors
+    ///
+    /// Those of the operation; [`io::ErrorKind::WouldBlock`] if it can do none of these now.
+    #[cfg(feature = "tokio")]
+    pub fn try_io<R>(&self, interest: tokio::io::Interest, operation: impl FnOnce() -> io::Result<R>) -> io::Result<R> {
+        if self.readiness(interest).is_empty() {
+            return Err(io::ErrorKind::WouldBlock.into());
+        }
+        operation()
+    }
+
+    /// Does an operation of one's own, again whenever it would have blocked and one of these can be done.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operation, but for [`io::ErrorKind::WouldBlock`].
+    #[cfg(feature = "tokio")]
+    pub async fn async_io<R>(&self, interest: tokio::io::Interest, mut operation: impl FnMut() -> io::Result<R>) -> io::Result<R> {
+        loop {
+            self.ready(interest).await?;
+            match operation() {
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                outcome => return outcome,
+            }
+        }
+    }
+
+    /// Reads without taking, or sees to it that the task is woken when there is something; gives how much.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::peek`].
+    #[cfg(feature = "tokio")]
+    pub fn poll_peek(&self, cx: &mut Context<'_>, buffer: &mut tokio::io::ReadBuf<'_>) -> Poll<io::Result<usize>> {
+        let polled = self.poll_peek_into(cx, buffer.initialize_unfilled());
+        if let Poll::Ready(Ok(count)) = polled {
+            buffer.advance(count);
+        }
+        polled
+    }
+}

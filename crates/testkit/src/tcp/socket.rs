@@ -1,0 +1,277 @@
+//! The virtual socket that is not connected yet.
+
+use std::fmt;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use cohaptic_wan::NodeId;
+
+use super::{TcpConfig, TcpListener, TcpStream};
+use crate::context;
+use crate::core::{HoldId, Shared};
+
+/// A TCP socket that is neither connected nor listening: the methods of tokio's, with the same meaning.
+///
+/// It belongs to the host of the task that makes it. `from_std_stream` and the methods with devices are missing. `SO_REUSEPORT` is stored: connections are not
+/// distributed to listeners of one port.
+pub struct TcpSocket {
+    shared: Arc<Shared>,
+    host: NodeId,
+    is_six: bool,
+    settings: Mutex<Settings>,
+}
+
+#[derive(Clone, Debug)]
+struct Settings {
+    config: TcpConfig,
+    bound: Option<(HoldId, SocketAddr)>,
+    is_shared: bool,
+    is_port_shared: bool,
+    linger: Option<Duration>,
+    type_of_service: u32,
+}
+
+/// Twice the least that Linux gives to a buffer \[byte\].
+const LEAST_BUFFER: u32 = 4608;
+/// Twice `net.core.rmem_max` and `wmem_max` \[byte\].
+const GREATEST_BUFFER: u32 = 425_984;
+
+fn doubled(size: u32) -> usize {
+    // Linux counts its own overhead as another half, and tells it.
+    size.saturating_mul(2).clamp(LEAST_BUFFER, GREATEST_BUFFER) as usize
+}
+
+fn told(size: usize) -> u32 {
+    u32::try_from(size).unwrap_or(u32::MAX)
+}
+
+impl TcpSocket {
+    /// A socket of version 4 on the host of the task that is running.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::NotFound`] if the task lives on no host, [`io::ErrorKind::NetworkDown`] if that is down.
+    pub fn new_v4() -> io::Result<Self> {
+        Self::new(false)
+    }
+
+    /// A socket of version 6 on the host of the task that is running.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpSocket::new_v4`].
+    pub fn new_v6() -> io::Result<Self> {
+        Self::new(true)
+    }
+
+    fn new(is_six: bool) -> io::Result<Self> {
+        let (shared, host) = context::here("a socket can be made", "make a socket", "wrap it in `Host::scope`")?;
+        let core = shared.lock();
+        core.check_up(host)?;
+        let config = core.tcp_config(host).clone();
+        drop(core);
+        let settings = Settings { config, bound: None, is_shared: false, is_port_shared: false, linger: None, type_of_service: 0 };
+        Ok(Self { shared, host, is_six, settings: Mutex::new(settings) })
+    }
+
+    fn settings(&self) -> MutexGuard<'_, Settings> {
+        self.settings.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Binds it. Port 0 is given a free one.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::AddrInUse`] if another socket has the port and not both are [shared](TcpSocket::set_reuseaddr), or another one listens there;
+    /// [`io::ErrorKind::AddrNotAvailable`] if the address is not the host's; [`io::ErrorKind::InvalidInput`] if it is bound already, or the address is of the other
+    /// version.
+    pub fn bind(&self, address: SocketAddr) -> io::Result<()> {
+        let mut settings = self.settings();
+        if settings.bound.is_some() || address.is_ipv6() != self.is_six {
+            let text =
+                if settings.bound.is_some() { "the socket is bound already".to_owned() } else { format!("{address} is of the other version of IP") };
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
+        }
+        let mut core = self.shared.lock();
+        core.check_up(self.host)?;
+        settings.bound = Some(core.hold_port(self.host, address, settings.is_shared)?);
+        Ok(())
+    }
+
+    /// Opens a connection, and waits until it is there.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::connect`]; [`io::ErrorKind::InvalidInput`] if the address is of the other version.
+    pub async fn connect(self, address: SocketAddr) -> io::Result<TcpStream> {
+        if address.is_ipv6() != self.is_six {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("{address} is of the other version of IP")));
+        }
+        let stream = {
+            let mut settings = self.settings();
+            let stream = TcpStream::connect_on(Arc::clone(&self.shared), self.host, settings.bound, address, settings.config.clone())?;
+            // The port is the connection's now.
+            settings.bound = None;
+            stream.set_linger(settings.linger)?;
+            stream
+        };
+        stream.established().await
+    }
+
+    /// Listens. `backlog`: one connection more than that may wait to be accepted, as with Linux. A socket that is not bound is given a free port.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::AddrInUse`] if another socket listens at that address.
+    pub fn listen(self, backlog: u32) -> io::Result<TcpListener> {
+        let mut settings = self.settings();
+        let held = match settings.bound.take() {
+            Some(held) => held,
+            None => {
+                let mut core = self.shared.lock();
+                core.check_up(self.host)?;
+                core.hold_port(self.host, self.any(), settings.is_shared)?
+            }
+        };
+        let inherited = (settings.config.clone(), settings.linger);
+        TcpListener::listen(Arc::clone(&self.shared), self.host, held, usize::try_from(backlog).unwrap_or(usize::MAX), inherited)
+    }
+
+    /// The address at which it is bound; one of zeros if it is not.
+    ///
+    /// # Errors
+    ///
+    /// None.
+    pub fn local_addr(&self) -> io::Result<SocketAddr> {
+        Ok(self.settings().bound.map_or_else(|| self.any(), |(_, address)| address))
+    }
+
+    /// The address of a socket that is not bound.
+    fn any(&self) -> SocketAddr {
+        if self.is_six { SocketAddr::from(([0; 16], 0)) } else { SocketAddr::from(([0; 4], 0)) }
+    }
+
+    /// The error of the socket: there is none before it is connected.
+    ///
+    /// # Errors
+    ///
+    /// None.
+    pub const fn take_error(&self) -> io::Result<Option<io::Error>> {
+        Ok(None)
+    }
+}
+
+/// An option that is stored: its getter and its setter.
+macro_rules! option {
+    ($get:ident, $set:ident, $kind:ty, $what:literal, |$settings:ident| $read:expr, |$to:ident, $value:ident| $write:expr) => {
+        #[doc = $what]
+        ///
+        /// # Errors
+        ///
+        /// None.
+        pub fn $get(&self) -> io::Result<$kind> {
+            let $settings = self.settings();
+            Ok($read)
+        }
+
+        #[doc = concat!("Sets this: ", $what)]
+        ///
+        /// # Errors
+        ///
+        /// None.
+        pub fn $set(&self, $value: $kind) -> io::Result<()> {
+            let $to = &mut *self.settings();
+            $write;
+            Ok(())
+        }
+    };
+}
+
+impl TcpSocket {
+    option!(
+        keepalive,
+        set_keepalive,
+        bool,
+        "Whether an idle connection is probed, at the times of Linux.",
+        |settings| settings.config.keepalive.is_some(),
+        |to, on| to.config.keepalive = on.then(|| to.config.keepalive.unwrap_or_default())
+    );
+    option!(
+        reuseaddr,
+        set_reuseaddr,
+        bool,
+        "Whether it shares its port with others that do (`SO_REUSEADDR`), also while connections of it linger.",
+        |settings| settings.is_shared,
+        |to, on| to.is_shared = on
+    );
+    option!(
+        reuseport,
+        set_reuseport,
+        bool,
+        "Whether listeners share its port, which nothing does here.",
+        |settings| settings.is_port_shared,
+        |to, on| to.is_port_shared = on
+    );
+    option!(nodelay, set_nodelay, bool, "Whether small segments leave while others are unanswered.", |settings| settings.config.nodelay, |to, on| {
+        to.config.nodelay = on
+    });
+    option!(tos_v4, set_tos_v4, u32, "The type of service of IPv4, which is stored.", |settings| settings.type_of_service, |to, tos| to
+        .type_of_service =
+        tos & 0xfc);
+    option!(tclass_v6, set_tclass_v6, u32, "The traffic class of IPv6, which is stored.", |settings| settings.type_of_service, |to, class| to
+        .type_of_service =
+        class & 0xfc);
+    option!(
+        send_buffer_size,
+        set_send_buffer_size,
+        u32,
+        "The size of the send buffer \\[byte\\]: as with Linux, twice the size that was set.",
+        |settings| told(settings.config.least_send_buffer),
+        |to, size| {
+            to.config.send_buffer = doubled(size);
+            to.config.least_send_buffer = doubled(size);
+        }
+    );
+    option!(
+        recv_buffer_size,
+        set_recv_buffer_size,
+        u32,
+        "The size of the receive buffer \\[byte\\]: as with Linux, twice the size that was set.",
+        |settings| told(settings.config.receive_buffer),
+        |to, size| to.config.receive_buffer = doubled(size)
+    );
+    option!(
+        linger,
+        set_linger,
+        Option<Duration>,
+        "The time to linger when the stream is dropped: see [`TcpStream::set_linger`].",
+        |settings| settings.linger,
+        |to, linger| to.linger = linger.map(|linger| Duration::from_secs(linger.as_secs()))
+    );
+
+    /// Lets the connection be reset when the stream is dropped.
+    ///
+    /// # Errors
+    ///
+    /// None.
+    pub fn set_zero_linger(&self) -> io::Result<()> {
+        self.set_linger(Some(Duration::ZERO))
+    }
+}
+
+impl Drop for TcpSocket {
+    fn drop(&mut self) {
+        let bound = self.settings().bound.take();
+        if let Some((hold, _)) = bound {
+            self.shared.lock().release_port(hold);
+        }
+    }
+}
+
+impl fmt::Debug for TcpSocket {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TcpSocket").field("settings", &*self.settings()).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,171 @@
+//! Halves that borrow a stream.
+
+use std::io::{self, IoSlice, IoSliceMut};
+use std::net::SocketAddr;
+use std::task::{Context, Poll};
+
+use bytes::BufMut;
+use tokio::io::{Interest, ReadBuf, Ready};
+
+use super::TcpStream;
+
+/// What both kinds of halves that read have.
+macro_rules! reading {
+    () => {
+        /// As [`TcpStream::peek`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub async fn peek(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            self.stream().peek(buffer).await
+        }
+
+        /// As [`TcpStream::poll_peek`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub fn poll_peek(&mut self, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<usize>> {
+            self.stream().poll_peek(cx, buffer)
+        }
+
+        /// As [`TcpStream::readable`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub async fn readable(&self) -> io::Result<()> {
+            self.stream().readable().await
+        }
+
+        /// As [`TcpStream::try_read`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub fn try_read(&self, buffer: &mut [u8]) -> io::Result<usize> {
+            self.stream().try_read(buffer)
+        }
+
+        /// As [`TcpStream::try_read_vectored`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub fn try_read_vectored(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
+            self.stream().try_read_vectored(buffers)
+        }
+
+        /// As [`TcpStream::try_read_buf`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub fn try_read_buf<B: BufMut>(&self, buffer: &mut B) -> io::Result<usize> {
+            self.stream().try_read_buf(buffer)
+        }
+    };
+}
+
+/// What both kinds of halves that write have.
+macro_rules! writing {
+    () => {
+        /// As [`TcpStream::writable`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub async fn writable(&self) -> io::Result<()> {
+            self.stream().writable().await
+        }
+
+        /// As [`TcpStream::try_write`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub fn try_write(&self, buffer: &[u8]) -> io::Result<usize> {
+            self.stream().try_write(buffer)
+        }
+
+        /// As [`TcpStream::try_write_vectored`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub fn try_write_vectored(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize> {
+            self.stream().try_write_vectored(buffers)
+        }
+    };
+}
+
+/// What all halves have.
+macro_rules! both {
+    () => {
+        /// As [`TcpStream::ready`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub async fn ready(&self, interest: Interest) -> io::Result<Ready> {
+            self.stream().ready(interest).await
+        }
+
+        /// The address of the other end: as [`TcpStream::peer_addr`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub fn peer_addr(&self) -> io::Result<SocketAddr> {
+            self.stream().peer_addr()
+        }
+
+        /// The address of this end: as [`TcpStream::local_addr`].
+        ///
+        /// # Errors
+        ///
+        /// As there.
+        pub fn local_addr(&self) -> io::Result<SocketAddr> {
+            self.stream().local_addr()
+        }
+    };
+}
+
+pub(super) use {both, reading, writing};
+
+/// The half of a stream that reads: see [`TcpStream::split`].
+#[derive(Debug)]
+pub struct ReadHalf<'a>(pub(super) &'a TcpStream);
+
+/// The half of a stream that writes: see [`TcpStream::split`]. Dropped, it shuts nothing.
+#[derive(Debug)]
+pub struct WriteHalf<'a>(pub(super) &'a TcpStream);
+
+impl ReadHalf<'_> {
+    const fn stream(&self) -> &TcpStream {
+        self.0
+    }
+    both!();
+    reading!();
+}
+
+impl WriteHalf<'_> {
+    const fn stream(&self) -> &TcpStream {
+        self.0
+    }
+    both!();
+    writing!();
+}
+
+impl AsRef<TcpStream> for ReadHalf<'_> {
+    fn as_ref(&self) -> &TcpStream {
+        self.0
+    }
+}
+
+impl AsRef<TcpStream> for WriteHalf<'_> {
+    fn as_ref(&self) -> &TcpStream {
+        self.0
+    }
+}

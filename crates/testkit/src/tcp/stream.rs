@@ -1,0 +1,200 @@
+//! The virtual stream.
+
+use std::fmt;
+use std::future::poll_fn;
+use std::io::{self, IoSlice, IoSliceMut};
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use cohaptic_tcp::State;
+use cohaptic_wan::NodeId;
+
+use super::{Info, TcpConfig};
+use crate::address::ToSocketAddrs;
+use crate::context;
+use crate::core::{ConnId, HoldId, Shared};
+
+/// A TCP connection of a host of the running test bed: the methods of tokio's, with the same meaning.
+///
+/// What differs, or is worth knowing:
+///
+/// - It is opened from the host of the task that connects; [`Host::connect`](crate::Host::connect) names another one. Ports are counted from 49152 on, apart from
+///   those of UDP.
+/// - Dropped, it sends what was written, then FIN. If octets were not read, or after [`TcpStream::set_zero_linger`], it sends RST in place of that.
+/// - An error of the connection is told once, after all that had arrived was read; then reads give 0 and writes [`io::ErrorKind::BrokenPipe`], as with Linux.
+/// - A host that crashes tells nobody. Its peers hear of it when they write: after [`TcpConfig::retries`] if it stays away (15 minutes), or by a RST if it is back.
+/// - A host with new addresses loses its connections: both ends are silent, and time out when they write.
+/// - [`TcpStream::set_linger`] acts with zero only: to drop a stream takes no time.
+/// - `from_std`, `into_std` and `AsFd` are missing: there is no socket of the system.
+/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
+pub struct TcpStream {
+    pub(super) shared: Arc<Shared>,
+    pub(super) id: ConnId,
+}
+
+impl TcpStream {
+    pub(super) const fn new(shared: Arc<Shared>, id: ConnId) -> Self {
+        Self { shared, id }
+    }
+
+    /// Opens a connection from the host of the task that is running, and waits until it is there.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::ConnectionRefused`] if nobody listens there, a round trip later; [`io::ErrorKind::TimedOut`] after 127 s without an answer;
+    /// [`io::ErrorKind::HostUnreachable`] if no host ever had that address; [`io::ErrorKind::NotFound`] if the task lives on no host.
+    pub async fn connect(address: impl ToSocketAddrs) -> io::Result<Self> {
+        let how = "wrap it in `Host::scope`; `Host::connect` and, for hyper, `Connector` name the host";
+        let (shared, host) = context::here("a connection can be opened", "connect from", how)?;
+        let address = address.to_socket_addr()?;
+        let config = shared.lock().tcp_config(host).clone();
+        Self::connect_on(shared, host, None, address, config)?.established().await
+    }
+
+    /// Sends the SYN. `bound`: the port that is held, and the address of that socket.
+    pub(crate) fn connect_on(
+        shared: Arc<Shared>,
+        host: NodeId,
+        bound: Option<(HoldId, SocketAddr)>,
+        to: SocketAddr,
+        config: TcpConfig,
+    ) -> io::Result<Self> {
+        let mut core = shared.lock();
+        core.check_up(host)?;
+        let id = core.connect_tcp(host, bound, to, config)?;
+        drop(core);
+        Ok(Self { shared, id })
+    }
+
+    /// Waits until the handshake is over.
+    pub(crate) async fn established(self) -> io::Result<Self> {
+        poll_fn(|cx| {
+            let mut core = self.shared.lock();
+            core.is_settled(self.id).map_or_else(
+                || {
+                    core.wait_to_write_to(self.id, cx.waker());
+                    Poll::Pending
+                },
+                Poll::Ready,
+            )
+        })
+        .await?;
+        Ok(self)
+    }
+
+    /// The address of this end.
+    ///
+    /// # Errors
+    ///
+    /// If its host has crashed.
+    pub fn local_addr(&self) -> io::Result<SocketAddr> {
+        let core = self.shared.lock();
+        core.check_connection(self.id)?;
+        Ok(core.connection(self.id).local_addr())
+    }
+
+    /// The address of the other end.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::NotConnected`] once the connection is gone.
+    pub fn peer_addr(&self) -> io::Result<SocketAddr> {
+        let core = self.shared.lock();
+        core.check_connection(self.id)?;
+        let connection = core.connection(self.id);
+        match connection.state() {
+            State::SynSent | State::Closed | State::TimeWait => Err(io::ErrorKind::NotConnected.into()),
+            State::SynReceived | State::Established | State::FinWait1 | State::FinWait2 | State::CloseWait | State::Closing | State::LastAck => {
+                Ok(connection.peer_addr())
+            }
+        }
+    }
+
+    /// Figures of the connection: its state, round trips, timeout, congestion window and retransmissions.
+    #[must_use]
+    pub fn info(&self) -> Info {
+        self.shared.lock().connection(self.id).info()
+    }
+
+    /// Takes out the error that the next call would give otherwise.
+    ///
+    /// # Errors
+    ///
+    /// If its host has crashed.
+    pub fn take_error(&self) -> io::Result<Option<io::Error>> {
+        self.shared.lock().take_error_of(self.id)
+    }
+
+    /// Reads what has arrived and leaves it; waits until something has.
+    ///
+    /// # Errors
+    ///
+    /// Why the connection is gone.
+    pub async fn peek(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        poll_fn(|cx| self.poll_peek_into(cx, buffer)).await
+    }
+
+    pub(super) fn poll_peek_into(&self, cx: &Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
+        let mut core = self.shared.lock();
+        match core.peek_connection(self.id, buffer) {
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                core.wait_to_read_from(self.id, cx.waker());
+                Poll::Pending
+            }
+            outcome => Poll::Ready(outcome),
+        }
+    }
+
+    #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
+    pub(super) fn poll_read_into(&self, cx: &Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
+        let mut core = self.shared.lock();
+        match core.read(self.id, &mut [IoSliceMut::new(buffer)]) {
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                core.wait_to_read_from(self.id, cx.waker());
+                Poll::Pending
+            }
+            outcome => Poll::Ready(outcome),
+        }
+    }
+
+    #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
+    pub(super) fn poll_write_from(&self, cx: &Context<'_>, buffers: &[IoSlice<'_>]) -> Poll<io::Result<usize>> {
+        let mut core = self.shared.lock();
+        match core.write(self.id, buffers) {
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                core.wait_to_write_to(self.id, cx.waker());
+                Poll::Pending
+            }
+            outcome => Poll::Ready(outcome),
+        }
+    }
+
+    /// A FIN follows what was written. On a connection that is gone it does nothing, as tokio's.
+    #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
+    pub(super) fn shut_write_half(&self) -> io::Result<()> {
+        self.shared.lock().change_connection(self.id, |_, connection| connection.shutdown())
+    }
+}
+
+impl Drop for TcpStream {
+    fn drop(&mut self) {
+        self.shared.lock().drop_connection(self.id);
+    }
+}
+
+impl fmt::Debug for TcpStream {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let core = self.shared.lock();
+        let connection = core.connection(self.id);
+        let (local, peer, state) = (connection.local_addr(), connection.peer_addr(), connection.state());
+        drop(core);
+        f.debug_struct("TcpStream").field("local", &local).field("peer", &peer).field("state", &state).finish_non_exhaustive()
+    }
+}
+
+impl AsRef<Self> for TcpStream {
+    fn as_ref(&self) -> &Self {
+        self
+    }
+}

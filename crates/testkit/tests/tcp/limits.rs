@@ -1,0 +1,95 @@
+//! What cannot be is refused, in the words of UDP's.
+
+use std::io::{self, ErrorKind};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use cohaptic_testkit::tcp::TcpConfig;
+use cohaptic_testkit::{Bed, TcpListener, TcpSocket, TcpStream, Testbed, time};
+
+use crate::beds;
+
+/// An error, in words.
+fn said<T>(outcome: io::Result<T>) -> String {
+    let error = outcome.map(drop).unwrap_err();
+    format!("{:?}: {error}", error.kind())
+}
+
+#[test]
+fn bad_input_is_an_error_that_says_what_is_wrong() {
+    for bed in beds() {
+        bed.run_twice(|bed| async move {
+            let (a, b) = (bed.host("a"), bed.host("b"));
+            let udp = a.bind("0.0.0.0:0").unwrap();
+            for to in ["b:0", "10.0.0.77:5", "c:5", "nonsense"] {
+                assert_eq!(said(a.connect(to).await), said(udp.send_to(b"x", to).await), "{to}");
+            }
+            assert_eq!(said(a.listen((b.ip(), 80))), said(a.bind((b.ip(), 80))));
+            assert_eq!(said(a.connect("224.0.0.1:5").await).split(':').next(), Some("Unsupported"));
+            let of_other = a
+                .scope(async {
+                    let socket = TcpSocket::new_v4().unwrap();
+                    said(socket.connect("[fd00::2]:5".parse().unwrap()).await)
+                })
+                .await;
+            assert_eq!(of_other, "InvalidInput: [fd00::2]:5 is of the other version of IP");
+        });
+    }
+}
+
+#[test]
+fn a_task_that_lives_on_no_host_is_told_the_way_out() {
+    for bed in beds() {
+        bed.run(|bed| async move {
+            let _listener = bed.host("b").listen("0.0.0.0:80").unwrap();
+            let error = said(TcpStream::connect("b:80").await);
+            assert!(["no host", "`Host::scope`", "`Host::connect`", "`Connector`"].iter().all(|part| error.contains(part)), "{error}");
+            assert!(said(TcpListener::bind("0.0.0.0:80").await).contains("listen with `Host::listen`"));
+            assert!(said(TcpSocket::new_v4()).contains("wrap it in `Host::scope`"));
+            let stream = bed.host("a").scope(TcpStream::connect("b:80")).await.unwrap();
+            assert_eq!(stream.local_addr().unwrap().ip(), bed.host("a").ip());
+        });
+    }
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    let error = runtime.block_on(TcpStream::connect("10.0.0.1:80")).unwrap_err().to_string();
+    assert_eq!(error, "only inside a running test bed a connection can be opened: call it within `Testbed::run`, on its thread");
+}
+
+#[test]
+fn constants_that_cannot_be_are_refused_where_they_are_said() {
+    let text = |act: &dyn Fn()| *catch_unwind(AssertUnwindSafe(act)).unwrap_err().downcast::<String>().unwrap();
+    let bad = TcpConfig { mtu: 5, ..TcpConfig::default() };
+    assert_eq!(text(&|| drop(Testbed::new(["a"]).tcp(bad.clone()))), "these constants of TCP cannot be: the MTU 5 is below 128 bytes");
+    assert!(text(&|| drop(Testbed::new(["a"]).tcp_of("b", TcpConfig::default()))).contains("there is no host `b`"));
+}
+
+#[test]
+fn all_dynamic_ports_can_be_used_at_once_and_one_more_is_refused() {
+    let bed = Testbed::new(["a", "b"]);
+    bed.run(|bed| async move {
+        let listener = bed.host("b").listen("0.0.0.0:80").unwrap();
+        let mut streams = Vec::new();
+        for _ in 0..16_384 {
+            streams.push((bed.host("a").connect("b:80").await.unwrap(), listener.accept().await.unwrap()));
+        }
+        let error = bed.host("a").connect("b:80").await.unwrap_err();
+        assert_eq!((error.kind(), error.to_string()), (ErrorKind::AddrNotAvailable, "all 16384 dynamic ports of host `a` are taken".into()));
+        // Another peer is another connection.
+        let _other = bed.host("b").listen("0.0.0.0:81").unwrap();
+        bed.host("a").connect("b:81").await.unwrap();
+    });
+}
+
+#[test]
+fn a_loop_that_reads_the_end_again_and_again_is_found() {
+    for bed in beds() {
+        let program = |bed: Bed| async move {
+            let listener = bed.host("b").listen("0.0.0.0:80").unwrap();
+            let client = bed.host("a").connect("b:80").await.unwrap();
+            drop(listener.accept().await.unwrap());
+            time::sleep(crate::R).await;
+            while client.try_read(&mut [0; 8]).is_ok() {}
+        };
+        let panic = catch_unwind(AssertUnwindSafe(|| bed.patience(1000).run(program))).unwrap_err();
+        assert!(panic.downcast_ref::<String>().unwrap().contains("time stands still at 0.25 s"), "{panic:?}");
+    }
+}

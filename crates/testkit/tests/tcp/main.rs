@@ -1,0 +1,49 @@
+//! Tests of streams and listeners.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::cast_possible_truncation, reason = "tests")]
+
+mod ends;
+mod faults;
+mod handshake;
+mod like_tokio;
+mod limits;
+mod records;
+mod traps;
+
+use std::time::Duration;
+
+use cohaptic_testkit::{Instant, Testbed};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+
+/// The same hosts on both runtimes. A round trip takes 100 ms.
+fn beds() -> [Testbed; 2] {
+    let bed = Testbed::new(["a", "b"]).links("delay 50ms").seed(1);
+    [bed.clone(), bed.on_tokio()]
+}
+
+const R: Duration = Duration::from_millis(100);
+
+const fn millis(milliseconds: u64) -> Instant {
+    Instant::from_nanos(milliseconds * 1_000_000)
+}
+
+/// The octet at a place of any stream, so that what was lost, doubled or invented is seen.
+fn octet(at: usize) -> u8 {
+    ((at * 31 + at / 251) % 251) as u8
+}
+
+fn octets(count: usize) -> Vec<u8> {
+    (0..count).map(octet).collect()
+}
+
+/// Writes all octets and shuts the direction.
+async fn send_all(stream: &mut (impl AsyncWriteExt + Unpin), count: usize) {
+    stream.write_all(&octets(count)).await.unwrap();
+    stream.shutdown().await.unwrap();
+}
+
+/// Reads to the end and checks every octet.
+async fn read_all(stream: &mut (impl AsyncReadExt + Unpin), count: usize) {
+    let mut read = Vec::new();
+    stream.read_to_end(&mut read).await.unwrap();
+    assert!(read == octets(count), "{} octets of {count}, or wrong ones", read.len());
+}
