@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use cohaptic_benches::effort::Effort;
 use cohaptic_benches::machine::{medians_in_turn, peak_memory, time};
+use cohaptic_benches::scaling::{THREADS, Window};
 use cohaptic_benches::watched::{Onlooker, with_all_measures};
 use cohaptic_benches::{Mesh, bare};
 use cohaptic_harness::measures::Measures;
@@ -60,6 +61,7 @@ fn main() -> Result<(), String> {
     let memory = memory(work);
     one_run(work);
     many_runs(work);
+    threads(work);
     measured_runs(work);
     strategies(work);
     print_memory(&memory);
@@ -140,6 +142,36 @@ fn many_runs(work: Work) {
 const ASKED_OF_MEASURES: f64 = 2.0;
 
 /// Runs with all measures beside runs that are watched.
+/// One scene on two threads, and on as many as this machine has not.
+fn threads(work: Work) {
+    println!("## One scene on many threads\n");
+    println!(
+        "The mesh with jitter and loss on one thread and on two, by the wall clock, the least of {} rounds; beyond two by a model (`benches/src/scaling.rs`): work",
+        work.rounds
+    );
+    println!(
+        "of a window of 8 ms, shared out by registers of eight peers; a meeting, which grows with the threads; and samples that each thread takes of all."
+    );
+    println!(
+        "A thread has eight peers at least, so that gains beyond N/8 threads are left out. *Binds* is what most of the time goes to with most threads.\n"
+    );
+    let titles: Vec<String> = THREADS[1..].iter().map(|threads| if *threads == 2 { "2, measured".to_owned() } else { threads.to_string() }).collect();
+    println!("| peers | window \\[µs\\] | traffic \\[kB\\] | meeting \\[µs\\] | {} | binds |", titles.join(" | "));
+    println!("| ---: | ---: | ---: | ---: |{} --- |", " ---: |".repeat(titles.len()));
+    for peers in [50, 200, 1000] {
+        let mesh = Mesh { peers, impaired: true };
+        let windows = (work.seconds(mesh) * 1000 / 8).min(20_000 / peers as u64).max(4) as u32;
+        let window = Window::measure(|windows| mesh.scene(u64::from(windows) * 8, 1), windows, work.rounds);
+        let pays = |threads: usize| threads == 2 || threads * 8 <= peers;
+        let gains: Vec<String> =
+            THREADS[1..].iter().map(|threads| if pays(*threads) { format!("{:.2}×", window.gain(*threads).0) } else { String::new() }).collect();
+        let (work_of, meeting) = (1e6 * window.work().as_secs_f64(), 1e6 * window.meeting().as_secs_f64());
+        let binds = THREADS.iter().rfind(|threads| pays(**threads)).map_or("", |most| window.gain(*most).1);
+        println!("| {peers} | {work_of:.1} | {:.1} | {meeting:.2} | {} | {binds} |", window.traffic() as f64 / 1e3, gains.join(" | "));
+    }
+    println!();
+}
+
 fn measured_runs(work: Work) {
     println!("## Measures\n");
     println!(

@@ -14,7 +14,7 @@ pub trait Strategies {
     /// The strategy for A axes.
     type Strategy<const A: usize>: Strategy<A>;
 
-    /// Whether they are [`FromScene`]: what is compiled for that is not compiled again for each crate that runs scenes.
+    /// Whether they are [`FromScene`], for which the loops of a run are compiled once, and not again for each crate that runs scenes.
     const OF_SCENE: bool = false;
 
     /// Makes the strategy of the peer in that place of [`Scene::peers`].

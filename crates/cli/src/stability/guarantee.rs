@@ -48,7 +48,7 @@ pub(super) fn failure(error: ProofError, option: &str, scene: &Path, family: imp
     if let ProofError::Family(error) = error { family(error) } else { Failure::Input(format!("{option}: {error}")) }
 }
 
-/// What is said of a proof that was ended: what stands there holds, but it is not all.
+/// The words about a proof that was ended: its verdicts hold, but they are not all.
 pub(super) fn ended() -> Failure {
     Failure::Interrupted("the proof was ended; pieces that it had not looked at are undecided, all others hold".to_owned())
 }

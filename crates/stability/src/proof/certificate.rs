@@ -1,6 +1,6 @@
 //! Certificates: the numbers by which anybody can check a proof without the program that found it.
 //!
-//! A certificate names the states of each part of a scene, and for each box of it the coordinates V, the weights d and the circle of [`super::discs`]. Whoever has the scene can write down its matrices and
+//! A certificate names the states of each part of a scene, and for each box of it the coordinates V, the weights d and the circle of [`super::discs`]. A reader with the scene can write down its matrices and
 //! check inequality (1) there; `crates/stability/tests/reference/check_certificate.py` does.
 
 use std::fmt::Write as _;

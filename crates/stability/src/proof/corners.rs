@@ -77,7 +77,7 @@ pub(super) fn states(points: &[Point], common: Common<'_>) -> Result<States, Pro
 pub(super) struct States {
     /// In the order of rows and columns.
     pub(super) names: Vec<FrameState>,
-    /// The gains by which what is heard of a sample is one number; `None`: position and velocity.
+    /// The gains with which a sample is one number for those that hear it; `None`: position and velocity.
     pub(super) heard: Option<Gains>,
 }
 
