@@ -108,9 +108,7 @@ fn connections(effort: Effort, idle: Option<f64>) {
         println!("| {subject} | {time:.2} | {asked} |");
     }
     if let Some(idle) = idle {
-        println!(
-            "\nFor each end of a connection that is open and idle the resident memory of the process grows by {idle:.0} bytes, records included; asked for"
-        );
+        println!("\nFor each end of a connection that is open and idle the resident memory of the process grows by {idle:.0} bytes; asked for");
         println!("are {ASKED_IDLE} at most.");
     }
 }
@@ -122,7 +120,7 @@ fn closed_forms(effort: Effort) {
     println!("- slow start: the last of N octets comes at R·(1 + ⌈log₂(N/(10·MSS) + 1)⌉);");
     println!("- Reno, where every *n*-th packet is lost: MSS/R·√(3·*n*/2) (Mathis, Semke, Mahdavi & Ott, 1997);");
     println!("- CUBIC there: MSS/R·(0.4·3.7/1.2)^¼·(R·*n*)^¾ (RFC 9438, section 5.2).\n");
-    println!("Both of the latter are means of a sawtooth, measured over the last 60 octets in 100.\n");
+    println!("Both of the latter are means of a sawtooth, measured over the last 60 % of the octets.\n");
     println!("| | closed form | seen | seen / closed form |");
     println!("| --- | ---: | ---: | ---: |");
     for octets in [100_000, 1_000_000] {
