@@ -1,9 +1,12 @@
-//! Writes `docs/measured-testkit.md`: `cargo run --release > ../../docs/measured-testkit.md` in `benches/peers`. Takes about a minute.
+//! Writes `docs/measured-testkit.md`: `cargo run --release > ../../docs/measured-testkit.md` in `benches/peers`. Takes some minutes.
+//!
+//! `--smoke` runs every row once with the least work: its figures say nothing. `udp` and `tcp` print the tables of one of them only.
 
 mod on_testkit;
 mod on_turmoil;
 mod program;
 mod seldom;
+mod tcp;
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -14,6 +17,20 @@ use program::{DELAY, Errors, SIZE, Stream};
 
 /// Rounds of which the median is taken.
 const ROUNDS: usize = 5;
+
+/// How much work is done.
+#[derive(Clone, Copy)]
+struct Effort {
+    rounds: usize,
+    divisor: u32,
+}
+
+impl Effort {
+    /// A part of so many; 1 at least.
+    fn part_of(self, count: u32) -> u32 {
+        (count / self.divisor).max(1)
+    }
+}
 
 /// What the issue of the test kit asks for.
 const ASKED_RATIO: f64 = 10.0;
@@ -67,21 +84,34 @@ impl Subject {
 }
 
 fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let is_given = |word: &str| arguments.iter().any(|argument| argument == word);
+    let effort = if is_given("--smoke") { Effort { rounds: 1, divisor: 100 } } else { Effort { rounds: ROUNDS, divisor: 1 } };
+    let idle = tcp::idle(effort);
+    head();
+    if !is_given("tcp") {
+        steady(effort);
+        seldom(effort);
+        pairs(effort);
+    }
+    if !is_given("udp") {
+        tcp::print(effort, idle);
+    }
+}
+
+fn head() {
     println!("# The test kit: how fast and how exact\n");
     println!("Compared with [turmoil](https://docs.rs/turmoil) 0.7.2 (MIT), on the same programs, in one run. This page is written by\n");
     println!("    cd benches/peers && cargo run --release > ../../docs/measured-testkit.md\n");
     println!("and measured on: {}. Each figure is the median of {ROUNDS} rounds in which all alternate, in seconds of processor time.", machine());
     println!("How a program is tested with it: [testing.md](testing.md).\n");
-    steady();
-    seldom();
-    pairs();
 }
 
 /// One round after the other, each with all subjects; gives the times of each.
-fn rounds<T>(mut measure: impl FnMut(Subject) -> T) -> Vec<Vec<(f64, T)>> {
-    let mut results: Vec<Vec<(f64, T)>> = SUBJECTS.iter().map(|_| Vec::new()).collect();
-    for _ in 0..ROUNDS {
-        for (subject, times) in SUBJECTS.iter().zip(&mut results) {
+fn rounds<S: Copy, T>(effort: Effort, subjects: &[S], mut measure: impl FnMut(S) -> T) -> Vec<Vec<(f64, T)>> {
+    let mut results: Vec<Vec<(f64, T)>> = subjects.iter().map(|_| Vec::new()).collect();
+    for _ in 0..effort.rounds {
+        for (subject, times) in subjects.iter().zip(&mut results) {
             let begin = processor_time();
             let outcome = measure(*subject);
             times.push(((processor_time() - begin).as_secs_f64(), outcome));
@@ -94,7 +124,7 @@ fn micros(time: Duration) -> String {
     if time.is_zero() { "0".into() } else { format!("{:.1}", time.as_secs_f64() * 1e6) }
 }
 
-fn steady() {
+fn steady(effort: Effort) {
     println!("## Datagrams all the time\n");
     println!(
         "Each host sends {SIZE} bytes to each other one, 97,531 ns after the host before it, over links of {} ms; the program",
@@ -112,8 +142,8 @@ fn steady() {
     );
     println!("| ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |");
     for (hosts, period, count) in [(2, 1, 20_000), (10, 1, 2_000), (2, 8, 2_500), (3, 8, 2_500)] {
-        let stream = Stream { period: Duration::from_millis(period), count };
-        let results = rounds(|subject| subject.steady(hosts, stream));
+        let stream = Stream { period: Duration::from_millis(period), count: effort.part_of(count) };
+        let results = rounds(effort, &SUBJECTS, |subject| subject.steady(hosts, stream));
         let speeds: Vec<f64> =
             results.iter().map(|times| stream.length().as_secs_f64() / median(times.iter().map(|(time, _)| *time).collect())).collect();
         for ((subject, times), speed) in SUBJECTS.iter().zip(&results).zip(&speeds) {
@@ -140,7 +170,7 @@ fn steady() {
     println!("and its own count of time is a tenth of what its hosts see.\n");
 }
 
-fn seldom() {
+fn seldom(effort: Effort) {
     println!("## A question now and then\n");
     println!(
         "A client asks, a server answers over links of {} ms, and the client waits so long before it asks again. Asked for: {ASKED_RATIO}× turmoil.\n",
@@ -149,9 +179,9 @@ fn seldom() {
     println!("| wait | | simulated s per s | against turmoil |");
     println!("| ---: | --- | ---: | ---: |");
     for (wait, count) in [(0, 2000), (100, 1000), (1000, 200)] {
-        let wait = Duration::from_millis(wait);
+        let (wait, count) = (Duration::from_millis(wait), effort.part_of(count));
         let simulated = ((DELAY * 2 + wait) * count).as_secs_f64();
-        let results = rounds(|subject| subject.seldom(wait, count));
+        let results = rounds(effort, &SUBJECTS, |subject| subject.seldom(wait, count));
         let speeds: Vec<f64> = results.iter().map(|times| simulated / median(times.iter().map(|(time, ())| *time).collect())).collect();
         for (subject, speed) in SUBJECTS.iter().zip(&speeds) {
             println!("| {} ms | {} | {speed:.0} | {:.1}× |", wait.as_millis(), subject.name(), speed / speeds[3]);
@@ -160,7 +190,7 @@ fn seldom() {
     println!();
 }
 
-fn pairs() {
+fn pairs(effort: Effort) {
     println!("## Ten thousand datagrams through a pair of sockets\n");
     println!("One every 10 µs, over a link of {} ms. Asked for: less than {ASKED_PAIR} ms.\n", DELAY.as_millis());
     println!("| | \\[ms\\] |");
@@ -168,9 +198,10 @@ fn pairs() {
     for kind in [Kind::Own, Kind::Tokio] {
         let measure = |_| {
             let begin = processor_time();
-            black_box(on_testkit::pair(kind, 10_000));
+            black_box(on_testkit::pair(kind, effort.part_of(10_000)));
             (processor_time() - begin).as_secs_f64() * 1e3
         };
-        println!("| {} | {:.1} |", Subject::Kit(kind).name(), median((0..9).map(measure).collect()));
+        println!("| {} | {:.1} |", Subject::Kit(kind).name(), median((0..effort.rounds).map(measure).collect()));
     }
+    println!();
 }

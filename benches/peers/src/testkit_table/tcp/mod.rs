@@ -1,0 +1,145 @@
+//! The tables of connections.
+
+mod on_testkit;
+mod on_turmoil;
+mod on_turmoil_net;
+mod program;
+
+use cohaptic_benches_peers::{median, version};
+use cohaptic_testkit::TcpConfig;
+use cohaptic_testkit::tcp::CongestionControl;
+
+use super::{Effort, rounds};
+use crate::program::DELAY;
+use program::SIZE;
+
+/// The octets of a full segment.
+const MSS: f64 = 1448.0;
+/// The link of the gigabyte.
+const GIGABIT: &str = "delay 1ms rate 1gbit limit 1000";
+
+/// What an idle connection may keep \[byte an end\].
+const ASKED_IDLE: f64 = 4096.0;
+
+/// The subjects.
+const OWN: &str = "testkit";
+const TOKIO: &str = "testkit on tokio";
+const TURMOIL: &str = "turmoil, ticks of 1 ms";
+const TURMOIL_NET: &str = "turmoil-net, ticks of 1 ms";
+
+/// A subject, what is asked of it, and its work.
+type Row<'a, T> = (&'a str, &'a str, &'a dyn Fn() -> T);
+
+/// The median time of each row \[s\].
+fn times<T>(effort: Effort, rows: &[Row<'_, T>]) -> Vec<f64> {
+    let results = rounds(effort, rows, |(_, _, work)| work());
+    results.iter().map(|times| median(times.iter().map(|(time, _)| *time).collect())).collect()
+}
+
+/// What an idle connection keeps \[byte an end\]. To be measured before anything else: freed memory stays with the process, and would be taken again.
+pub fn idle(effort: Effort) -> Option<f64> {
+    on_testkit::idle(effort.part_of(10_000))
+}
+
+/// Prints all tables.
+pub fn print(effort: Effort, idle: Option<f64>) {
+    println!("## TCP: a gigabyte\n");
+    gigabyte(effort);
+    println!("\n## TCP: a question after each answer\n");
+    questions(effort);
+    println!("\n## TCP: ten thousand connections\n");
+    connections(effort, idle);
+    println!("\n## TCP: closed forms\n");
+    closed_forms(effort);
+}
+
+fn gigabyte(effort: Effort) {
+    println!("A server writes 10⁹ octets on one connection over `{GIGABIT}`. turmoil's links have no rates.\n");
+    println!("| | \\[s\\] | asked for | µs a full segment |");
+    println!("| --- | ---: | ---: | ---: |");
+    let octets = 1_000_000 * effort.part_of(1000);
+    let work = |on_tokio| on_testkit::bulk(on_tokio, GIGABIT, octets as usize);
+    let rows: [Row<'_, _>; 2] = [(OWN, "≤ 2", &|| work(false)), (TOKIO, "≤ 3", &|| work(true))];
+    for ((subject, asked, _), time) in rows.iter().zip(times(effort, &rows)) {
+        println!("| {subject} | {time:.2} | {asked} | {:.2} |", time * 1e6 * MSS / f64::from(octets));
+    }
+}
+
+fn questions(effort: Effort) {
+    println!(
+        "A client asks {SIZE} octets over links of {} ms, a server answers with as many, and the client asks again on the same connection.",
+        DELAY.as_millis()
+    );
+    println!(
+        "[turmoil-net](https://docs.rs/turmoil-net) {} (MIT) repeats a segment after so many ticks without an answer, here 1000.\n",
+        version("turmoil-net")
+    );
+    println!("| | simulated s per s | asked for | against turmoil |");
+    println!("| --- | ---: | ---: | ---: |");
+    let count = effort.part_of(2000);
+    // The handshake is a round trip more.
+    let simulated = (DELAY * 2 * (count + 1)).as_secs_f64();
+    let rows: [Row<'_, _>; 4] = [
+        (OWN, "≥ 20000", &|| on_testkit::questions(false, count)),
+        (TOKIO, "≥ 5000", &|| on_testkit::questions(true, count)),
+        (TURMOIL, "", &|| on_turmoil::questions(count)),
+        (TURMOIL_NET, "", &|| on_turmoil_net::questions(count)),
+    ];
+    let speeds: Vec<f64> = times(effort, &rows).into_iter().map(|time| simulated / time).collect();
+    for ((subject, asked, _), speed) in rows.iter().zip(&speeds) {
+        println!("| {subject} | {speed:.0} | {asked} | {:.1}× |", speed / speeds[2]);
+    }
+}
+
+fn connections(effort: Effort, idle: Option<f64>) {
+    println!(
+        "10,000 clients on one host each open a connection over links of {} ms, 10 µs after the one before, and ask five times.\n",
+        DELAY.as_millis()
+    );
+    println!("| | \\[s\\] | asked for |");
+    println!("| --- | ---: | ---: |");
+    let count = effort.part_of(10_000);
+    let rows: [Row<'_, _>; 3] = [
+        (OWN, "≤ 1", &|| on_testkit::connections(false, count, 5)),
+        (TOKIO, "≤ 1", &|| on_testkit::connections(true, count, 5)),
+        (TURMOIL, "", &|| on_turmoil::connections(count, 5)),
+    ];
+    for ((subject, asked, _), time) in rows.iter().zip(times(effort, &rows)) {
+        println!("| {subject} | {time:.2} | {asked} |");
+    }
+    if let Some(idle) = idle {
+        println!("\nFor each end of a connection that is open and idle the resident memory of the process grows by {idle:.0} bytes; asked for");
+        println!("are {ASKED_IDLE} at most.");
+    }
+}
+
+fn closed_forms(effort: Effort) {
+    println!(
+        "The test kit beside what books say. With R the round trip, MSS = {MSS} octets and *n* how many packets there are for one that is lost:\n"
+    );
+    println!("- slow start: the last of N octets comes at R·(1 + ⌈log₂(N/(10·MSS) + 1)⌉);");
+    println!("- Reno, where every *n*-th packet is lost: MSS/R·√(3·*n*/2) (Mathis, Semke, Mahdavi & Ott, 1997);");
+    println!("- CUBIC there: MSS/R·(0.4·3.7/1.2)^¼·(R·*n*)^¾ (RFC 9438, section 5.2).\n");
+    println!("Both of the latter are means of a sawtooth, measured over the last 60 % of the octets.\n");
+    println!("| | closed form | seen | seen / closed form |");
+    println!("| --- | ---: | ---: | ---: |");
+    for octets in [100_000, 1_000_000] {
+        let expected = 0.2 * (1.0 + (f64::from(octets) / (10.0 * MSS) + 1.0).log2().ceil());
+        let seen = on_testkit::bulk(false, "delay 100ms", octets as usize)[1].as_secs_f64();
+        println!("| slow start, {} kB, R = 200 ms | {expected:.3} s | {seen:.9} s | {:.4} |", octets / 1000, seen / expected);
+    }
+    let reno = |every: f64, round_trip: f64| MSS * 8.0 / round_trip * (1.5 * every).sqrt();
+    let cubic = |every: f64, round_trip: f64| MSS * 8.0 / round_trip * (0.4f64 * 3.7 / 1.2).powf(0.25) * (round_trip * every).powf(0.75);
+    let laws = [
+        ("Reno", CongestionControl::Reno, 400, 50, reno(400.0, 0.1)),
+        ("Reno", CongestionControl::Reno, 1600, 10, reno(1600.0, 0.02)),
+        ("CUBIC", CongestionControl::Cubic, 1000, 100, cubic(1000.0, 0.2)),
+    ];
+    for (name, congestion, every, delay, expected) in laws {
+        let config = TcpConfig { congestion, ..TcpConfig::default() };
+        let octets = effort.part_of(every * 60_000);
+        let [middle, end] = on_testkit::sawtooth(config, &format!("delay {delay}ms"), u64::from(every), octets as usize);
+        let seen = f64::from(octets) * 0.6 * 8.0 / (end - middle).as_secs_f64();
+        println!("| {name}, n = {every}, R = {} ms | {:.2} Mbit/s | {:.2} Mbit/s | {:.2} |", 2 * delay, expected / 1e6, seen / 1e6, seen / expected);
+    }
+}

@@ -1,0 +1,77 @@
+//! The programs on turmoil.
+
+use std::io;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use turmoil::Sim;
+use turmoil::net::{TcpListener, TcpStream};
+
+use super::program::{Net, PORT, answer, ask, crowd};
+use crate::program::DELAY;
+
+/// The host that runs.
+#[derive(Clone)]
+struct Here;
+
+impl Net for Here {
+    type Stream = TcpStream;
+    type Listener = TcpListener;
+
+    async fn listen(&self) -> io::Result<TcpListener> {
+        TcpListener::bind(("0.0.0.0", PORT)).await
+    }
+
+    async fn accept(listener: &TcpListener) -> io::Result<TcpStream> {
+        listener.accept().await.map(|(stream, _)| stream)
+    }
+
+    async fn connect(server: SocketAddr) -> io::Result<TcpStream> {
+        TcpStream::connect(server).await
+    }
+
+    async fn sleep(span: Duration) {
+        tokio::time::sleep(span).await;
+    }
+
+    fn spawn(&self, task: impl Future<Output = io::Result<()>> + 'static) -> impl Future<Output = io::Result<()>> + 'static {
+        let task = tokio::task::spawn_local(task);
+        async { task.await? }
+    }
+}
+
+/// Asks so often on one connection.
+///
+/// # Panics
+///
+/// If turmoil gives an error.
+pub fn questions(count: u32) {
+    let (mut sim, server) = simulation(DELAY * 4 * count);
+    sim.client("client", async move { Ok(ask::<Here>(server, count).await?) });
+    sim.run().expect("the program ends");
+}
+
+/// Asks so often on each of so many connections.
+///
+/// # Panics
+///
+/// If turmoil gives an error.
+pub fn connections(count: u32, questions: u32) {
+    let (mut sim, server) = simulation(DELAY * 4 * questions);
+    sim.client("client", async move { Ok(crowd(Here, server, count, questions).await?) });
+    sim.run().expect("the program ends");
+}
+
+/// Links of the same delay always, queues that do not fill, and the server.
+fn simulation<'a>(longest: Duration) -> (Sim<'a>, SocketAddr) {
+    let mut sim = turmoil::Builder::new()
+        .min_message_latency(DELAY)
+        .max_message_latency(DELAY)
+        .tcp_capacity(1024)
+        .rng_seed(1)
+        .simulation_duration(longest + Duration::from_secs(1))
+        .build();
+    let server = (sim.lookup("server"), PORT).into();
+    sim.host("server", || async { Ok(answer(Here).await?) });
+    (sim, server)
+}
