@@ -35,26 +35,18 @@ pub struct Window {
 }
 
 impl Window {
-    /// Measures a scene of N peers that all send at the same instants; `scene` gives it with a number of windows. Two runs of different lengths tell the windows from what comes before them.
+    /// Measures a scene of N peers that all send at the same instants, of that number of windows, which must be many beside what comes before them.
     #[must_use]
-    pub fn measure(scene: impl Fn(u32) -> Scene, windows: u32, rounds: usize) -> Self {
-        let scenes = [scene(windows), scene(2 * windows)];
-        let wall = |scene: &Scene, threads: usize| {
+    pub fn measure(scene: &Scene, windows: u32, rounds: usize) -> Self {
+        let wall = |threads: usize| {
             let start = Instant::now();
             let Ok(_) = Simulation::new(scene, Model::Least).on_threads(threads).run(black_box(&mut NoObserver));
             start.elapsed()
         };
-        let mut least = [[Duration::MAX; 2]; 2];
-        for _ in 0..rounds.max(1) {
-            // All alternate; the least of each is what nobody else has disturbed.
-            for (of_length, scene) in least.iter_mut().zip(&scenes) {
-                for (least, threads) in of_length.iter_mut().zip([1, 2]) {
-                    *least = (*least).min(wall(scene, threads));
-                }
-            }
-        }
-        let of_window = |threads: usize| least[1][threads].saturating_sub(least[0][threads]).max(Duration::from_nanos(1)) / windows;
-        Self { peers: scenes[0].peers.len(), work: of_window(0), on_two: of_window(1), copy: copy_of_a_sample() }
+        // Both alternate; the least of each is the one that nobody else has disturbed.
+        let least = (0..rounds.max(1)).map(|_| [wall(1), wall(2)]).reduce(|[a, b], [c, d]| [a.min(c), b.min(d)]);
+        let [one, two] = least.unwrap_or_default();
+        Self { peers: scene.peers.len(), work: one / windows, on_two: two / windows, copy: copy_of_a_sample() }
     }
 
     /// The work of a window on one thread.
