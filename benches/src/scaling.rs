@@ -35,7 +35,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// Measures a scene of N peers that all send at the same instants, of that number of windows, which must be many beside what comes before them.
+    /// Measures a scene of N peers that all send at the same instants, of that number of windows, which must take much longer than what comes before them.
     #[must_use]
     pub fn measure(scene: &Scene, windows: u32, rounds: usize) -> Self {
         let wall = |threads: usize| {

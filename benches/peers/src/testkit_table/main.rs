@@ -26,7 +26,7 @@ struct Effort {
 }
 
 impl Effort {
-    /// A part of so many; 1 at least.
+    /// A number divided by that of the effort; 1 at least.
     fn part_of(self, count: u32) -> u32 {
         (count / self.divisor).max(1)
     }

@@ -27,7 +27,7 @@ const TOKIO: &str = "testkit on tokio";
 const TURMOIL: &str = "turmoil, ticks of 1 ms";
 const TURMOIL_NET: &str = "turmoil-net, ticks of 1 ms";
 
-/// A subject, what is asked of it, and its work.
+/// A subject, the figure that is asked for, and its work.
 type Row<'a, T> = (&'a str, &'a str, &'a dyn Fn() -> T);
 
 /// The median time of each row \[s\].
@@ -71,7 +71,7 @@ fn questions(effort: Effort) {
         DELAY.as_millis()
     );
     println!(
-        "[turmoil-net](https://docs.rs/turmoil-net) {} (MIT) repeats a segment after so many ticks without an answer, here 1000.\n",
+        "[turmoil-net](https://docs.rs/turmoil-net) {} (MIT) repeats a segment after a number of ticks without an answer, here 1000.\n",
         version("turmoil-net")
     );
     println!("| | simulated s per s | asked for | against turmoil |");
@@ -115,7 +115,7 @@ fn connections(effort: Effort, idle: Option<f64>) {
 
 fn closed_forms(effort: Effort) {
     println!(
-        "The test kit beside what books say. With R the round trip, MSS = {MSS} octets and *n* how many packets there are for one that is lost:\n"
+        "The test kit compared with closed forms. With R the round trip, MSS = {MSS} octets and *n* how many packets there are for one that is lost:\n"
     );
     println!("- slow start: the last of N octets comes at R·(1 + ⌈log₂(N/(10·MSS) + 1)⌉);");
     println!("- Reno, where every *n*-th packet is lost: MSS/R·√(3·*n*/2) (Mathis, Semke, Mahdavi & Ott, 1997);");

@@ -60,7 +60,7 @@ pub fn questions(on_tokio: bool, count: u32) {
     });
 }
 
-/// Asks so often on each of so many connections.
+/// Asks a number of times on each of a number of connections.
 ///
 /// # Panics
 ///
@@ -106,7 +106,7 @@ fn taken(bed: Testbed, octets: usize) -> [Instant; 2] {
     })
 }
 
-/// By how much the memory of this process grows for each end of so many idle connections \[byte\]; `None` where the system does not say it.
+/// By how much the memory of this process grows for each end of a number of idle connections \[byte\]; `None` where the system does not say it.
 ///
 /// # Panics
 ///

@@ -51,7 +51,7 @@ pub fn questions(count: u32) {
     sim.run().expect("the program ends");
 }
 
-/// Asks so often on each of so many connections.
+/// Asks a number of times on each of a number of connections.
 ///
 /// # Panics
 ///

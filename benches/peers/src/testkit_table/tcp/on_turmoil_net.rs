@@ -13,7 +13,7 @@ use crate::program::DELAY;
 ///
 /// If the connection gives an error.
 pub fn questions(count: u32) {
-    // It repeats what nobody answered for so many ticks of a millisecond, three if it is not said, whatever a round trip takes.
+    // It repeats a segment that nobody answered for a number of ticks of a millisecond, three if it is not said, whatever a round trip takes.
     let bed = ClientServer::with_config(KernelConfig::default().retx_threshold(1000)).server("server", async {
         let listener = TcpListener::bind(("0.0.0.0", PORT)).await.expect("free");
         let (stream, _) = listener.accept().await.expect("it lives");

@@ -13,7 +13,7 @@ pub const SIZE: usize = 100;
 pub const PORT: u16 = 7000;
 /// The time between the begins of two clients: no listener has more at one instant than may wait there.
 const OFFSET: Duration = Duration::from_micros(10);
-/// What is written at once.
+/// The octets of one call of `write`.
 const CHUNK: usize = 65_536;
 
 /// What a program asks of its runtime, on one host.
@@ -84,7 +84,7 @@ pub async fn asking(mut stream: impl AsyncRead + AsyncWrite + Unpin, questions: 
     Ok(())
 }
 
-/// Asks so often on each of so many connections.
+/// Asks a number of times on each of a number of connections.
 ///
 /// # Errors
 ///
@@ -97,7 +97,7 @@ pub async fn crowd<N: Net>(net: N, server: SocketAddr, connections: u32, questio
     future::try_join_all((0..connections).map(|number| net.spawn(client(number)))).await.map(drop)
 }
 
-/// Writes so many octets on the first connection, and waits until the other end is shut.
+/// Writes a number of octets on the first connection, and waits until the other end is shut.
 ///
 /// # Errors
 ///
@@ -113,7 +113,7 @@ pub async fn give<N: Net>(net: N, octets: usize) -> io::Result<()> {
     stream.read(&mut [0]).await.map(drop)
 }
 
-/// Reads so many octets.
+/// Reads a number of octets.
 ///
 /// # Errors
 ///
