@@ -41,6 +41,7 @@ mod error;
 mod folder;
 mod plan;
 mod report;
+mod spread;
 mod table;
 mod vary;
 mod verdicts;
@@ -51,6 +52,7 @@ pub use compare::{Cell, Comparison, Estimate, Figures, MOST_NUMBERS_COMPARED, Me
 pub use error::CampaignError;
 pub use plan::{CampaignPlan, MOST_COMBINATIONS, MOST_RUNS, PlanSpec, Refused};
 pub use report::{CombinationReport, MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles, Report};
-pub use table::{Column, Format, Kind, Value};
+pub use spread::SpreadCampaign;
+pub use table::{Column, Format, Kind, Row, Value};
 pub use vary::{MOST_VALUES, Variation, VaryError, split_at_commas};
 pub use verdicts::{Judge, Judgement, Verdict};

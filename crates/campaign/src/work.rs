@@ -35,12 +35,12 @@ pub(crate) struct Work<'a> {
 
 /// Some runs of a part.
 #[derive(Clone, Copy, Debug)]
-struct Chunk {
-    part: u64,
+pub(crate) struct Chunk {
+    pub(crate) part: u64,
     /// Its place in the part.
-    place: usize,
-    start: u64,
-    end: u64,
+    pub(crate) place: usize,
+    pub(crate) start: u64,
+    pub(crate) end: u64,
 }
 
 /// A part some chunks of which are done.
@@ -51,7 +51,7 @@ struct Open {
 
 /// Scenes of the combinations that were last asked for.
 #[derive(Default)]
-struct Scenes(Mutex<BTreeMap<u64, Arc<Scene>>>);
+pub(crate) struct Scenes(Mutex<BTreeMap<u64, Arc<Scene>>>);
 
 impl Work<'_> {
     /// Does the missing parts, on all threads of the pool that it is called in, until all are done or the watch ends it; parts that are not whole are then
@@ -93,7 +93,7 @@ impl Work<'_> {
     }
 
     /// Runs a chunk.
-    fn rows(&self, chunk: Chunk, known: &Scenes) -> Result<Vec<Row>, CampaignError> {
+    pub(crate) fn rows(&self, chunk: Chunk, known: &Scenes) -> Result<Vec<Row>, CampaignError> {
         let runs = chunk.start..chunk.end;
         let scenes = runs.clone().map(|run| self.scene(run, known)).collect::<Result<Vec<Scene>, CampaignError>>()?;
         let outcomes: Vec<(Summary, Vec<MeasuredValue>)> = if scenes.iter().all(|scene| scene.measure.is_none()) {

@@ -1,14 +1,10 @@
 //! Progress of an analysis on the terminal, and its end when the user asks for it.
 
+pub(crate) use cohaptic_answers::OPERATIONS_A_SECOND;
 use cohaptic_stability::Watch;
 
 use crate::interrupt;
 use crate::progress::Progress;
-
-/// How many operations, as the analysis estimates them, this program does in a second and on one thread: measured on a shared core of a server, 0.5
-/// billion of a mean square with bursts on six links, 1.7 of an admittance, 5 of the eigenvalues of 400 rows. It tells seconds from hours, and nothing
-/// finer.
-pub(crate) const OPERATIONS_A_SECOND: f64 = 1e9;
 
 /// What takes fewer seconds than this has no bar.
 const SHORT: f64 = 1.0;

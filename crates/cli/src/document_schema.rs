@@ -1,5 +1,6 @@
 //! The kinds of JSON documents, each of which says of which kind and version it is, before all else; and how a document is made.
 
+pub(crate) use cohaptic_answers::document;
 use serde::Serialize;
 
 /// A kind of JSON document: its name, which never changes, and its version, which counts up where a key vanishes or changes its meaning; new keys do not
@@ -50,15 +51,3 @@ pub(crate) struct Versioned<'a, D: Serialize> {
     #[serde(flatten)]
     document: &'a D,
 }
-
-/// A JSON document, or a part of one: keys and values, in this order. Attributes are those of serde; a part that may be absent is a flattened `Option`.
-macro_rules! document {
-    ($($(#[$attribute:meta])* $key:ident: $value:expr),* $(,)?) => {{
-        #[derive(serde::Serialize)]
-        struct Document<$($key),*> {
-            $($(#[$attribute])* $key: $key),*
-        }
-        Document { $($key: $value),* }
-    }};
-}
-pub(crate) use document;

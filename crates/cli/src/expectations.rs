@@ -1,47 +1,20 @@
-//! Expectations of scenes and what came out: as JSON and as a table on a page.
+//! Expectations of scenes and what came out, as a table on a page.
 
-use cohaptic_harness::check::Outcome;
+use cohaptic_answers::OutcomeDocument;
 use cohaptic_picture::Gauge;
 use cohaptic_picture::page::{Html, Mark, Table};
 use cohaptic_units::print::Number;
-use serde::Serialize;
 
 use crate::output::six_digits;
 
-/// One expectation and what came out.
-#[derive(Clone, Serialize)]
-pub(crate) struct OutcomeDocument {
-    expectation: &'static str,
-    name: String,
-    unit: &'static str,
-    low: Option<f64>,
-    high: Option<f64>,
-    measured: Option<f64>,
-    passed: bool,
-    expected: String,
-    found: String,
-}
-
-impl OutcomeDocument {
-    pub(crate) fn new(outcome: &Outcome) -> Self {
-        let Outcome { key, name, unit, low, high, measured, passed, expected, found, .. } = outcome.clone();
-        Self { expectation: key, name, unit, low, high, measured, passed, expected, found }
-    }
-
-    pub(crate) const fn passed(&self) -> bool {
-        self.passed
-    }
-
-    /// The cells of a row: verdict, expectation, what was expected, what came out, and both as a bar.
-    pub(crate) fn cells(&self) -> [Html; 5] {
-        let Self { name, low, high, measured, passed, expected, found, .. } = self;
-        let gauge = Gauge { low: *low, high: *high, measured: *measured, passed: *passed };
-        let bar = if low.is_some() || high.is_some() { Html::gauge(&gauge) } else { Html::text("no number") };
-        // A table of a page has no room for all digits, which are in the JSON.
-        let found =
-            measured.map_or_else(|| found.clone(), |measured| found.replacen(&measured.to_string(), &Number(six_digits(measured)).to_string(), 1));
-        [verdict(*passed), name.as_str().into(), expected.as_str().into(), found.into(), bar]
-    }
+/// The cells of a row: verdict, expectation, what was expected, what came out, and both as a bar.
+pub(crate) fn cells(outcome: &OutcomeDocument) -> [Html; 5] {
+    let OutcomeDocument { name, low, high, measured, passed, expected, found, .. } = outcome;
+    let gauge = Gauge { low: *low, high: *high, measured: *measured, passed: *passed };
+    let bar = if low.is_some() || high.is_some() { Html::gauge(&gauge) } else { Html::text("no number") };
+    // A table of a page has no room for all digits, which are in the JSON.
+    let found = measured.map_or_else(|| found.clone(), |measured| found.replacen(&measured.to_string(), &Number(six_digits(measured)).to_string(), 1));
+    [verdict(*passed), name.as_str().into(), expected.as_str().into(), found.into(), bar]
 }
 
 /// A verdict that is read without colours too.
@@ -49,7 +22,7 @@ pub(crate) fn verdict(passed: bool) -> Html {
     if passed { Html::mark(Mark::Good, "✓ passed") } else { Html::mark(Mark::Bad, "✗ FAILED") }
 }
 
-/// The columns of [`OutcomeDocument::cells`].
+/// The columns of [`cells`].
 pub(crate) fn columns() -> Table {
     Table::new().column("verdict").column("expectation").column("expected").column("came out").column("limits and value")
 }

@@ -5,10 +5,9 @@ use std::process::ExitCode;
 
 use cohaptic_harness::explain::{self as harness, Explanation};
 use cohaptic_scene::Scene;
-use serde::Serialize;
 
 use crate::arguments::ExplainArguments;
-use crate::document_schema::{DocumentSchema, document};
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::{input, output};
 
@@ -19,27 +18,11 @@ pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure>
     output::answer(
         arguments.scene.json,
         DocumentSchema::EXPLAIN,
-        &document(&scene, &explanation),
+        &cohaptic_answers::explanation(&scene, &explanation),
         || describe(&scene, &explanation),
         output::NO_FILES,
     )?;
     Ok(ExitCode::SUCCESS)
-}
-
-fn document(scene: &Scene, explanation: &Explanation) -> impl Serialize {
-    let Explanation { models, left_out, dimensions, cost } = explanation;
-    document! {
-        title: scene.title.as_str(),
-        models: models.iter().map(|row| document! { part: &*row.part, model: &*row.model, reason: &*row.reason }).collect::<Vec<_>>(),
-        left_out: left_out.as_slice(),
-        dimensions: document! { plant: dimensions.plant, held: dimensions.held, in_flight: dimensions.in_flight },
-        cost: document! {
-            peer_ticks_per_s: cost.peer_ticks_per_s,
-            packets_per_s: cost.packets_per_s,
-            realtime_factor: cost.realtime_factor,
-            record_bytes_per_s: cost.record_bytes_per_s,
-        },
-    }
 }
 
 fn describe(scene: &Scene, explanation: &Explanation) -> String {

@@ -36,7 +36,6 @@ mod measures;
 mod output;
 mod paper;
 mod progress;
-mod quick_verdict;
 #[cfg(target_os = "linux")]
 mod realtime;
 #[cfg(target_os = "linux")]

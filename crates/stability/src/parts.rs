@@ -50,6 +50,29 @@ pub enum PartKind {
     },
 }
 
+impl PartKind {
+    /// The word in JSON.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Whole => "whole",
+            Self::Together => "together",
+            Self::Apart { .. } => "apart",
+            Self::Mode { .. } => "mode",
+            Self::LooseDevice { .. } => "loose-device",
+        }
+    }
+
+    /// The first peer that the part is about, by its place in [`Scene::peers`]; `None` where it is about all of them.
+    #[must_use]
+    pub const fn peer(self) -> Option<usize> {
+        match self {
+            Self::Whole | Self::Together | Self::Mode { .. } => None,
+            Self::Apart { peer } | Self::LooseDevice { peer } => Some(peer),
+        }
+    }
+}
+
 impl Part {
     pub(crate) const fn whole(radius: Radius, size: usize) -> Self {
         Self { kind: PartKind::Whole, size, copies: 1, radius, method: Method::Full }

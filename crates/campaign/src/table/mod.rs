@@ -50,4 +50,4 @@ pub struct Column {
 }
 
 /// One value for each column.
-pub(crate) type Row = Vec<Value>;
+pub type Row = Vec<Value>;

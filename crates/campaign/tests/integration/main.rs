@@ -6,5 +6,6 @@ mod bench;
 mod compare;
 mod folders;
 mod resume;
+mod spread;
 mod tables;
 mod verdicts;

@@ -2,26 +2,22 @@
 
 mod page;
 
-use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use cohaptic_harness::check::{Finding, Judged};
-use cohaptic_harness::{Model, check as harness};
+use cohaptic_answers::{Answered, OutcomeDocument, check as check_scene};
+use cohaptic_harness::Model;
 use cohaptic_scene::{Scene, SceneError, scene_files};
-use cohaptic_stability::Verdict;
-use cohaptic_units::print::Number;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::analysis_watch::Interruptible;
 use crate::arguments::CheckArguments;
 use crate::document_schema::{DocumentSchema, document};
-use crate::expectations::OutcomeDocument;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
 use crate::file::write_file;
 use crate::progress::Progress;
-use crate::quick_verdict::{Quick, quick_verdict};
 use crate::{input, interrupt, output};
 
 #[derive(Clone, Serialize)]
@@ -119,45 +115,16 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
             if let Some(error) = failure::too_large(&scene, overrides, model, true) {
                 return Checked { expects: scene.expect.is_some(), ..Checked::unreadable(file, &error) };
             }
-            let notes = RefCell::new(Vec::new());
-            let judged = |scene: &Scene, stable: bool| judged(scene, stable, |note| notes.borrow_mut().push(note));
-            let checked = harness::check_with(&scene, model, judged, || !interrupt::requested());
-            let failures = checked.failures();
+            let Answered { failures, expectations, notes } = check_scene(&scene, model, &Interruptible);
             if !failures.is_empty() && interrupt::requested() {
                 // What failed may have failed by the interruption alone.
                 return Checked { expects: scene.expect.is_some(), ..Checked::interrupted(file) };
             }
-            let expectations = checked.outcomes.iter().map(OutcomeDocument::new).collect();
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
             let (file, expects) = (output::path(input::named(file)), scene.expect.is_some());
-            Checked { file, passed: failures.is_empty(), failures, expectations, notes: notes.into_inner(), expects, status }
+            Checked { file, passed: failures.is_empty(), failures, expectations, notes, expects, status }
         }
     }
-}
-
-/// How long the second moment of a scene may take, by the estimate \[s\]; what takes longer is left to a simulation.
-const QUICK: f64 = 10.0;
-
-/// Whether a scene is as stable as it is expected to be, by analysis. One that is not linear, that changes on its way, or whose chance has no second
-/// moment that can be followed in seconds, is left to a simulation; of the last it is noted.
-fn judged(scene: &Scene, stable: bool, note: impl FnOnce(String)) -> Judged {
-    let judgement = match quick_verdict(scene, QUICK) {
-        Quick::Known(judgement) => judgement,
-        Quick::Stopped => return Judged::Found(Finding { passed: false, found: "the analysis was interrupted".to_owned(), radius: None }),
-        Quick::Simulate(refused) => {
-            if let Some(refused) = refused {
-                note(format!("stable: told by a simulation with the seed of the scene, not in the mean square: {refused}"));
-            }
-            return Judged::Unknown;
-        }
-    };
-    let (radius, what) = match &judgement.mean_square {
-        Some(mean_square) => (mean_square.radius, "mean-square radius"),
-        None => (judgement.analysis.radius, "spectral radius"),
-    };
-    let expected = if stable { Verdict::Stable } else { Verdict::Unstable };
-    let found = format!("it is {}: the {what} is {} within {:.1e}", judgement.verdict.word(), Number(radius.value), radius.error);
-    Judged::Found(Finding { passed: judgement.verdict == expected, found, radius: Some(radius.value).filter(|value| value.is_finite()) })
 }
 
 impl Checked {

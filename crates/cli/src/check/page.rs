@@ -3,13 +3,13 @@
 use cohaptic_picture::page::{Html, Mark, Page};
 
 use super::Checked;
-use crate::expectations::{BARS, columns, verdict};
+use crate::expectations::{BARS, cells, columns, verdict};
 
 /// The page: a list of the scenes, then each with a row for each expectation.
 pub(super) fn html(scenes: &[Checked], overrides: &[String]) -> String {
     let failed = scenes.iter().filter(|scene| !scene.passed).count();
     let outcomes = || scenes.iter().flat_map(|scene| &scene.expectations);
-    let missed = outcomes().filter(|outcome| !outcome.passed()).count();
+    let missed = outcomes().filter(|outcome| !outcome.passed).count();
     let sum = format!("{} passed, {failed} failed. Of {} expectations {missed} are not met.", scenes.len() - failed, outcomes().count());
     let mut page = Page::new("Scenes against their expectations").with(Html::paragraph(sum));
     if !overrides.is_empty() {
@@ -39,7 +39,7 @@ fn section(scene: &Checked) -> Html {
         content = content.and(Html::paragraph("The scene has no [expect]."));
     }
     if !scene.expectations.is_empty() {
-        content = content.and(Html::table(&scene.expectations.iter().fold(columns(), |table, outcome| table.row(outcome.cells()))));
+        content = content.and(Html::table(&scene.expectations.iter().fold(columns(), |table, outcome| table.row(cells(outcome)))));
     }
     // Lines of a place in a file are set below each other.
     for failure in &scene.failures {

@@ -1,13 +1,14 @@
 //! Whether a combination is stable: by analysis where that takes less than a second, else by two runs, of which one begins with a small disturbance.
 
+use cohaptic_answers::{Quick, quick_verdict};
 use cohaptic_campaign::{Judge, Judgement, Verdict};
 use cohaptic_harness::Model;
 use cohaptic_harness::check::{Stability, stability};
 use cohaptic_scene::Scene;
 use cohaptic_stability::Criterion;
 
+use crate::analysis_watch::Interruptible;
 use crate::interrupt;
-use crate::quick_verdict::{Quick, quick_verdict};
 use crate::stability::source;
 
 /// Two runs judge where the analysis takes longer than this, by its estimate \[s\].
@@ -23,7 +24,7 @@ pub(super) struct ByAnalysisOrRuns;
 
 impl Judge for ByAnalysisOrRuns {
     fn judge(&self, scene: &Scene) -> Option<Judgement> {
-        match quick_verdict(scene, QUICK) {
+        match quick_verdict(scene, QUICK, &Interruptible) {
             Quick::Known(judgement) => {
                 let (criterion, radius) = match &judgement.mean_square {
                     Some(mean_square) => (Criterion::MeanSquare, mean_square.radius),

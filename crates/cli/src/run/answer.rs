@@ -9,32 +9,16 @@ use serde::Serialize;
 
 use super::Run;
 use crate::document_schema::document;
-use crate::documents::{MOST_LINKS, access_line, ending_name, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
+use crate::documents::MOST_LINKS;
 use crate::measures::measured_lines;
 use crate::{output, terminal_plot};
 
 /// The answer of `cohaptic run --json`. `otherwise`: the differences of the scene from that of the session that is replayed. `against`: the document of the
 /// variant.
 pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option<impl Serialize>) -> impl Serialize {
-    let summary = &run.summary;
-    let duration_s = summary.duration.as_secs_f64();
     document! {
-        title: scene.title.as_str(),
-        duration_s: duration_s,
-        ticks: summary.ticks,
-        ending: ending_name(summary.ending),
-        wall_s: run.wall_s,
-        realtime_factor: duration_s / run.wall_s,
-        peers: summary.peers.iter().map(peer).collect::<Vec<_>>(),
-        link_totals: link_totals(summary),
-        link_quantiles: link_quantiles(summary),
-        links: peer_links(scene, summary),
-        access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
-        max_discrepancy_m: summary.max_discrepancy,
         #[serde(flatten)]
-        rotation: rotation(summary),
-        #[serde(flatten)]
-        measures: measures_of(scene, &run.measured),
+        run: cohaptic_answers::run(scene, &run.summary, &run.measured, Some(run.wall_s)),
         files: run.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
         #[serde(flatten)]
         otherwise: (!otherwise.is_empty()).then(|| document! { replayed_otherwise: otherwise }),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use cohaptic_answers::OutcomeDocument;
 use cohaptic_harness::check::Outcome;
 use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::record::SANE_POSITION;
@@ -14,7 +15,7 @@ use cohaptic_wan::{DropCause, LinkName, LinkStats};
 use super::answer::{angle_text, length, packets};
 use super::command_line;
 use crate::arguments::RunArguments;
-use crate::expectations::{BARS, OutcomeDocument, columns};
+use crate::expectations::{BARS, cells, columns};
 use crate::failure::Failure;
 use crate::output::six_digits;
 use crate::{input, output};
@@ -83,7 +84,7 @@ fn expectations(scene: &Scene, outcomes: &[Outcome]) -> Html {
     let Some(expect) = &scene.expect else { return Html::default() };
     let mut content = Html::heading(2, "Expectations");
     if !outcomes.is_empty() {
-        let table = outcomes.iter().fold(columns(), |table, outcome| table.row(OutcomeDocument::new(outcome).cells()));
+        let table = outcomes.iter().fold(columns(), |table, outcome| table.row(cells(&OutcomeDocument::new(outcome))));
         content = content.and(Html::paragraph(BARS)).and(Html::table(&table));
     }
     if let Some(stable) = expect.stable {

@@ -37,6 +37,12 @@ impl BoundaryOptions {
     pub fn of(range: &KeyRange) -> Self {
         Self { samples: 400, tolerance: 1e-9 * (range.high - range.low), most: 100_000 }
     }
+
+    /// The same for mean-square radii, whose bounds are wider: 10⁻⁷ of the range.
+    #[must_use]
+    pub fn of_mean_square(range: &KeyRange) -> Self {
+        Self { tolerance: 1e-7 * (range.high - range.low), ..Self::of(range) }
+    }
 }
 
 /// A value at which the verdict changes.

@@ -3,6 +3,7 @@
 mod contour;
 #[cfg(test)]
 mod tests;
+mod verdicts;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};

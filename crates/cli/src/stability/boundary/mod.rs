@@ -22,9 +22,6 @@ use crate::{input, interrupt, output};
 /// The file in which values looked at are kept.
 const ROWS: &str = "boundary.rows.partial";
 
-/// How exactly a crossing in the mean square is found if nothing is said, as a share of the range: its bounds are wider than those of a spectral radius.
-const TOLERANCE_OF_SQUARES: f64 = 1e-7;
-
 /// Everything that is asked for, checked: nothing is written before there is one.
 struct Order {
     title: String,
@@ -90,7 +87,7 @@ impl Order {
         let refused = |error| failure(arguments, &range, BoundaryError::Radius(error));
         let family = Family::new(&text, file, set, vec![range.clone()]).map_err(refused)?;
         if let (Criterion::MeanSquare, None) = (family.criterion(), arguments.tolerance) {
-            options.tolerance = TOLERANCE_OF_SQUARES * (range.high - range.low);
+            options.tolerance = BoundaryOptions::of_mean_square(&range).tolerance;
         }
         let title = source::at_low(&family).map_err(refused)?.title;
         let header = vec![

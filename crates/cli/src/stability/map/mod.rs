@@ -9,8 +9,7 @@ mod prove;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_stability::{Criterion, Family, FamilyError, FamilyScratch, Grid, KeyRange, Map, MapError, Radius, Verdict};
-use rayon::prelude::*;
+use cohaptic_stability::{Criterion, Family, Grid, KeyRange, Map, MapError, Verdict};
 
 use super::source::{self, Said};
 use crate::arguments::MapArguments;
@@ -67,7 +66,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let Filled { maps, cells, rows } = filling::fill(&order, arguments)?;
     let named = maps.into_iter().enumerate().map(|(number, map)| {
         let Variant { name, overrides, .. } = &order.variants[number];
-        let verdicts = verdicts(&order.families[number], &map).map_err(|error| order.failure(number, arguments, error.into()))?;
+        let verdicts = map.verdicts(&order.families[number]).map_err(|error| order.failure(number, arguments, error.into()))?;
         Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), criterion: order.families[number].criterion(), map, verdicts, file: None })
     });
     let mut maps = named.collect::<Result<Vec<VariantMap>, Failure>>()?;
@@ -148,23 +147,4 @@ impl VariantMap {
 #[expect(clippy::cast_precision_loss, reason = "far fewer cells than 2^52")]
 fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole.max(1) as f64
-}
-
-/// A spectral radius this close to 1 is computed again: far more than any radius of a scene that can be run is off.
-const NEAR: f64 = 1e-3;
-/// A mean-square radius this close to 1 is computed again, which takes a thousand times as long: a hundred times as far as those were seen off that are
-/// computed without a bound (`crates/stability/src/mean_square/tests.rs`).
-const NEAR_OF_SQUARES: f64 = 1e-7;
-
-/// The verdict on every cell. A map has radii without bounds of their errors, which is enough far from 1; near it they are computed again, with one.
-fn verdicts(family: &Family, map: &Map) -> Result<Vec<Vec<Verdict>>, FamilyError> {
-    let near = if family.criterion() == Criterion::MeanSquare { NEAR_OF_SQUARES } else { NEAR };
-    let verdict = |x: f64, y: f64, value: f64, scratch: &mut FamilyScratch| {
-        let is_near = (value - 1.0).abs() < near;
-        let radius = if is_near { family.bounded_radius(&[x, y], scratch)?.radius } else { Radius { value, error: 0.0 } };
-        Ok(radius.verdict())
-    };
-    let rows = map.y.par_iter().zip(&map.radius);
-    rows.map_init(FamilyScratch::default, |scratch, (y, row)| map.x.iter().zip(row).map(|(x, value)| verdict(*x, *y, *value, scratch)).collect())
-        .collect()
 }

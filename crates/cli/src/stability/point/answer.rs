@@ -1,5 +1,6 @@
 //! A verdict as a JSON document and in words.
 
+use cohaptic_answers::notes;
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Analysis, ContactMode, EveryNumber, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
 use cohaptic_units::print::Span;
@@ -57,18 +58,11 @@ pub(super) fn of(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorst
 
 fn parts(scene: &Scene, mode: &ContactMode) -> Vec<impl Serialize + use<>> {
     let parts = mode.parts.iter().map(|part| {
-        let (kind, peer) = match part.kind {
-            PartKind::Whole => ("whole", None),
-            PartKind::Together => ("together", None),
-            PartKind::Apart { peer } => ("apart", Some(peer)),
-            PartKind::Mode { .. } => ("mode", None),
-            PartKind::LooseDevice { peer } => ("loose-device", Some(peer)),
-        };
         document! {
-            kind: kind,
+            kind: part.kind.word(),
             // The first peer that it is about; absent where it is about all peers.
             #[serde(flatten)]
-            peer: peer.map(|peer| document! { peer: scene.peers[peer].name.clone() }),
+            peer: part.kind.peer().map(|peer| document! { peer: scene.peers[peer].name.clone() }),
             dimension: part.size,
             multiplicity: part.copies,
             spectral_radius: part.radius.value,
@@ -76,20 +70,6 @@ fn parts(scene: &Scene, mode: &ContactMode) -> Vec<impl Serialize + use<>> {
         }
     });
     parts.collect()
-}
-
-/// The simplifications of the analysis and of the mean square, each once. Where there are both figures, a note says which of them it is about.
-pub(super) fn notes(judgement: &Judgement) -> Vec<String> {
-    let Some(mean_square) = &judgement.mean_square else {
-        return judgement.analysis.notes.clone();
-    };
-    let nominal = &judgement.analysis.notes;
-    let of_nominal = nominal.iter().map(|note| match mean_square.notes.contains(note) {
-        true => format!("both radii: {note}"),
-        false => format!("the spectral radius, with nothing left to chance: {note}"),
-    });
-    let of_mean_square = mean_square.notes.iter().filter(|note| !nominal.contains(note)).map(|note| format!("the mean-square radius: {note}"));
-    of_nominal.chain(of_mean_square).collect()
 }
 
 /// The mode of contact with the largest radius.

@@ -1,0 +1,42 @@
+//! What runs, checks, explanations and verdicts of scenes answer, as values and as JSON documents.
+//!
+//! You need it if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
+//!
+//! [`run`] is a run, [`explanation`] what a scene makes the program model, [`check`] a scene and its expectations, where [`quick_verdict`] tells first whether the
+//! scene is stable. [`document!`] makes a document.
+//!
+//! Nothing here reads a clock or prints.
+//!
+//! ```
+//! use cohaptic_answers::run;
+//! use cohaptic_harness::{Model, NoObserver, Simulation};
+//! use cohaptic_scene::Scene;
+//!
+//! let text = r#"
+//!     scene = { duration = "1s", count = 2 }
+//!     object = { mass = 0.45 }
+//!     coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+//!     peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+//! "#;
+//! let scene = Scene::parse(text, "two.toml".as_ref(), &[])?;
+//! let summary = Simulation::new(&scene, Model::Least).run(&mut NoObserver)?;
+//! let document = serde_json::to_value(run(&scene, &summary, &[], None))?;
+//! assert_eq!(document["ticks"], 1000);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
+
+mod check;
+mod document;
+mod explanation;
+mod notes;
+mod parts;
+mod quick_verdict;
+mod run;
+
+pub use check::{Answered, OutcomeDocument, check};
+pub use explanation::explanation;
+pub use notes::notes;
+pub use parts::{MOST_LINKS, access_line, ending_name, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
+pub use quick_verdict::{OPERATIONS_A_SECOND, Quick, quick_verdict};
+pub use run::run;

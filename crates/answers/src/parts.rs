@@ -1,0 +1,123 @@
+//! Parts of documents.
+
+use std::collections::BTreeMap;
+
+use cohaptic_harness::measures::MeasuredValue;
+use cohaptic_harness::{AccessSummary, Ending, LinkQuantiles, PeerSummary, Summary};
+use cohaptic_scene::Scene;
+use cohaptic_wan::{DropCause, LinkStats};
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::document;
+
+/// A number in a scene of one axis, a list with more.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Components {
+    One(f64),
+    More(Vec<f64>),
+}
+
+/// A peer at the end of a run.
+pub fn peer(peer: &PeerSummary) -> impl Serialize {
+    document! {
+        name: peer.name.as_str(),
+        position_m: Components::new(&peer.position),
+        velocity_m_s: Components::new(&peer.velocity),
+        #[serde(flatten)]
+        attitude: peer.attitude.map(|attitude| document! { orientation: attitude.orientation, angular_velocity_rad_s: attitude.rate }),
+        stale_samples: peer.stale_samples,
+        refused_samples: peer.refused_samples,
+    }
+}
+
+impl Components {
+    fn new(values: &[f64]) -> Self {
+        match values {
+            [value] => Self::One(*value),
+            values => Self::More(values.to_vec()),
+        }
+    }
+}
+
+/// The largest angle between two copies; nothing where the object does not turn.
+pub fn rotation(summary: &Summary) -> Option<impl Serialize + use<>> {
+    summary.max_rotation_discrepancy.map(|angle| document! { max_rotation_discrepancy_rad: angle })
+}
+
+/// More links than these are not listed one by one.
+pub const MOST_LINKS: u64 = 1000;
+
+/// Each link between two peers at the end of a run, if they are listed.
+pub fn peer_links(scene: &Scene, summary: &Summary) -> Option<Vec<impl Serialize + use<>>> {
+    let name = |peer: usize| scene.peers[peer].name.clone();
+    let links = || summary.links.iter().map(|link| self::link(name(link.from), name(link.to), &link.stats));
+    (summary.links.len() <= MOST_LINKS).then(|| links().collect())
+}
+
+/// What all links between peers did together.
+pub fn link_totals(summary: &Summary) -> impl Serialize + use<> {
+    document! {
+        links: summary.links.len(),
+        #[serde(flatten)]
+        counters: counters(&summary.links.total()),
+    }
+}
+
+/// How the links between peers differ.
+pub fn link_quantiles(summary: &Summary) -> impl Serialize + use<> {
+    let of = |quantiles: Option<LinkQuantiles>| {
+        quantiles.map(|LinkQuantiles { min, p01, p50, p99, max }| document! { min: min, p01: p01, p50: p50, p99: p99, max: max })
+    };
+    document! { delivered_fraction: of(summary.links.delivered_fraction()), mean_delay_s: of(summary.links.mean_delay()) }
+}
+
+/// A link with its ends.
+pub fn link(from: String, to: String, stats: &LinkStats) -> impl Serialize + use<> {
+    document! {
+        from: from,
+        to: to,
+        #[serde(flatten)]
+        counters: counters(stats),
+    }
+}
+
+/// An access line at the end of a run.
+pub fn access_line(scene: &Scene, line: &AccessSummary) -> impl Serialize + use<> {
+    document! {
+        peer: scene.peers[line.peer].name.clone(),
+        line: if line.uplink { "uplink" } else { "downlink" },
+        #[serde(flatten)]
+        counters: counters(&line.stats),
+    }
+}
+
+/// What a link or an access line did.
+fn counters(stats: &LinkStats) -> impl Serialize + use<> {
+    document! {
+        offered: stats.offered(),
+        duplicated: stats.duplicated(),
+        delivered: stats.delivered(),
+        dropped: DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause))).collect::<BTreeMap<_, _>>(),
+        in_flight: stats.in_flight(),
+        marked: stats.marked(),
+        damaged: stats.damaged(),
+        mean_delay_s: stats.mean_delay().map(|delay| delay.as_secs_f64()),
+    }
+}
+
+/// The measures of a run by their names; `None` if nothing is measured.
+pub fn measures_of(scene: &Scene, measured: &[MeasuredValue]) -> Option<impl Serialize + use<>> {
+    let named: Map<String, Value> = measured.iter().map(|measured| (measured.name.text(scene), Value::from(measured.value))).collect();
+    (!named.is_empty()).then(|| document! { measures: named })
+}
+
+/// How a run ended, in one word.
+pub const fn ending_name(ending: Ending) -> &'static str {
+    match ending {
+        Ending::Complete => "complete",
+        Ending::Diverged(_) => "diverged",
+        Ending::Interrupted(_) => "interrupted",
+    }
+}

@@ -1,0 +1,129 @@
+//! The pictures of a run.
+
+use std::convert::Infallible;
+
+use cohaptic_picture::{Axis, Size};
+use cohaptic_scene::Scene;
+
+use super::SANE_POSITION;
+use super::band::Bands;
+use super::network::Network;
+use super::plot::{Panel, Plot};
+use super::views::Views;
+use crate::{Observer, PacketRow, TickRow};
+
+/// The name of a file, and the picture in it as SVG.
+pub type RecordedPicture = (&'static str, String);
+
+/// Sees a run and draws it, without a file. Memory is bounded: curves keep the least and the greatest value of each span of time.
+#[derive(Debug)]
+pub struct Pictures {
+    title: String,
+    names: Vec<String>,
+    /// Curves are ordered by axis, then peer.
+    positions: Bands,
+    forces: Bands,
+    network: Network,
+    /// The rotation vectors of the copies and their lengths, if the object turns.
+    orientations: Option<Bands>,
+    /// Their poses, if it turns.
+    views: Option<Views>,
+}
+
+/// The spans of time of a plot, and the most numbers that all curves of a plot may hold together.
+const SPANS: usize = 1000;
+const MOST_NUMBERS: usize = 200_000;
+
+/// No desktop device and no person at it gives more force \[N\].
+const SANE_FORCE: f64 = 1000.0;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// The components of a rotation vector, in world axes, and its length.
+const TURNS: [&str; 4] = ["about x", "about y", "about z", "angle"];
+
+impl Pictures {
+    /// Before the run.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
+        let curves = names.len() * scene.axes.count();
+        let spans = SPANS.min(MOST_NUMBERS / curves).max(50);
+        let bands = |curves| Bands::new(scene.duration, spans, curves);
+        Self {
+            title: scene.title.clone(),
+            positions: bands(curves),
+            forces: bands(curves),
+            network: Network::new(scene, spans),
+            orientations: scene.rotation.is_some().then(|| bands(4 * names.len())),
+            views: Views::new(scene, spans),
+            names,
+        }
+    }
+
+    /// The pictures under the names of their files.
+    #[must_use]
+    pub fn drawn(&self, size: Size) -> Vec<RecordedPicture> {
+        let Self { title, names, positions, forces, network, orientations, views } = self;
+        let mut pictures = Vec::new();
+        let mut drawn = vec![
+            ("positions.svg", positions, "position of each copy", Axis::new("Position").symbol("x_O").unit("cm"), 100.0, SANE_POSITION),
+            ("forces.svg", forces, "coordination force on each copy", Axis::new("Coordination force").symbol("F_T").unit("N"), 1.0, SANE_FORCE),
+        ];
+        if let Some(orientations) = orientations {
+            let (axis, sane) = (Axis::new("Turn").unit("°"), 2.0 * std::f64::consts::PI);
+            drawn.push(("orientations.svg", orientations, "orientation of each copy", axis, 180.0 / std::f64::consts::PI, sane));
+        }
+        for (file, bands, what, axis, scale, sane) in drawn {
+            let by_axis = bands.split(bands.curves() / names.len());
+            let heading = |along: usize| match (file, by_axis.len()) {
+                ("orientations.svg", _) => TURNS[along].to_owned(),
+                (_, 1) => String::new(),
+                _ => format!("along {}", AXES[along]),
+            };
+            let panel = |(along, bands)| Panel { title: heading(along), axis: axis.clone(), names, bands, scale, sane };
+            let panels: Vec<Panel<'_>> = by_axis.iter().enumerate().map(panel).collect();
+            let plot = Plot { title: format!("{title}: {what}"), panels };
+            pictures.push((file, plot.picture().size(size).svg()));
+        }
+        if let Some(views) = views {
+            pictures.push(("views.svg", views.picture(title, names, positions).size(size).svg()));
+        }
+        pictures.push(("network.svg", network.picture(title, names).size(size).svg()));
+        pictures
+    }
+}
+
+impl Observer for Pictures {
+    type Error = Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn wants_packets(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        for axis in 0..row.coupling_force.len() {
+            let curve = axis * self.names.len() + row.peer;
+            self.positions.add(curve, row.at, row.object.position[axis]);
+            self.forces.add(curve, row.at, row.coordination_force[axis]);
+        }
+        if let (Some(turn), Some(orientations)) = (&row.turn, &mut self.orientations) {
+            let [x, y, z] = turn.object.rotation_vector();
+            for (part, value) in [x, y, z, (x * x + y * y + z * z).sqrt()].into_iter().enumerate() {
+                orientations.add(part * self.names.len() + row.peer, row.at, value);
+            }
+        }
+        if let (Some(turn), Some(views)) = (&row.turn, &mut self.views) {
+            views.add(row.peer, row.at, row.object.position, turn.object);
+        }
+        Ok(())
+    }
+
+    fn on_packet(&mut self, row: &PacketRow) -> Result<(), Infallible> {
+        self.network.on_packet(row);
+        Ok(())
+    }
+}

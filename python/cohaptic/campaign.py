@@ -1,0 +1,152 @@
+"""Many runs of one scene, spread over any executor."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ThreadPoolExecutor, wait
+from functools import partial
+from typing import Any
+
+from cohaptic import _native
+from cohaptic.errors import CohapticError
+from cohaptic.scene import Scene, _toml
+from cohaptic.table import Table
+
+_Cells = list[list[Any]]
+_Piece = tuple[int, int]
+_Work = Callable[[int, int], _Cells]
+_Plan = tuple[str, str, list[str], list[str], int, str]
+
+_ASKED = 3
+"""How often the same runs are asked for before their worker's exception is raised."""
+
+_PIECES = 64
+"""About how many pieces a campaign is cut into: enough to keep workers busy to the end, and few enough to cost nothing."""
+
+
+def campaign(
+    scene: Scene,
+    *,
+    vary: Mapping[str, Sequence[Any]] | Iterable[str] = (),
+    runs: int = 1,
+    executor: Executor | Callable[[], Executor] | None = None,
+    piece: int | None = None,
+) -> Table:
+    """Runs a scene over values of keys and over seeds, and gives one row a run: the table of ``cohaptic campaign`` for the same keys.
+
+    ``vary`` maps keys to their values, or has texts as for ``--vary``, such as ``"coordination.stiffness=500..1500/3"``. Every combination is run with
+    ``runs`` seeds, which count up from that of the scene.
+
+    ``executor`` is any ``concurrent.futures.Executor``, whose workers have this package, or a callable that makes one; without it threads of this
+    process are taken. ``piece`` runs are asked for at a time. Runs that a worker lost are asked for again, up to three times. An executor that broke is
+    made anew if it came from a callable; otherwise its runs are made in this process. Which worker made a run changes nothing in its row.
+
+    >>> scene = Scene('''
+    ... scene = { duration = "100ms", count = 2 }
+    ... object.mass = 0.45
+    ... coordination = { strategy = "average-position", stiffness = 1000.0, update = "8ms" }
+    ... peer = { device = { mass = 0.1 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    ... link = { delay = "8ms", loss = "10%" }
+    ... ''')
+    >>> table = campaign(scene, vary={"coordination.stiffness": [500, 1000]}, runs=3)
+    >>> table.rows, table["seed"].tolist()
+    (6, [0, 1, 2, 0, 1, 2])
+    """
+    native = scene._native
+    texts = [f"{key}={_listed(values)}" for key, values in vary.items()] if isinstance(vary, Mapping) else list(vary)
+    whole = _native.Campaign(native.text, native.file, native.overrides, texts, runs, 0)
+    plan = (native.text, native.file, native.overrides, texts, runs, whole.roster)
+    size = piece or max(8, math.ceil(whole.runs / _PIECES))
+    pieces = [(start, min(start + size, whole.runs)) for start in range(0, whole.runs, size)]
+    if executor is None:
+        rows = _here(whole, pieces)
+    elif isinstance(executor, Executor) or not callable(executor):
+        rows = _gathered(partial(_rows, plan), pieces, executor, None)
+    else:
+        rows = _gathered(partial(_rows, plan), pieces, executor(), executor)
+    return Table(whole.table([row for place in pieces for row in rows[place]]))
+
+
+def _listed(values: Sequence[Any]) -> str:
+    return ",".join(map(_toml, values))
+
+
+def _rows(plan: _Plan, start: int, end: int) -> _Cells:
+    """Some rows, in any process."""
+    text, file, overrides, vary, runs, roster = plan
+    return _native.Campaign(text, file, overrides, vary, runs, 1, roster).rows(start, end)
+
+
+def _here(whole: _native.Campaign, pieces: list[_Piece]) -> dict[_Piece, _Cells]:
+    """All rows, by threads of this process, which end with it."""
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        try:
+            return _gathered(whole.rows, pieces, threads, None)
+        except BaseException:
+            whole.stop()
+            raise
+
+
+def _gathered(
+    work: _Work,
+    pieces: list[_Piece],
+    executor: Executor,
+    make: Callable[[], Executor] | None,
+) -> dict[_Piece, _Cells]:
+    rows: dict[_Piece, _Cells] = {}
+    asked = dict.fromkeys(pieces, 0)
+    try:
+        while missing := [place for place in pieces if place not in rows]:
+            if not _ask(work, missing, executor, rows, asked):
+                continue
+            if make is None:
+                # Nobody is left to ask.
+                rows.update({place: work(*place) for place in missing if place not in rows})
+            else:
+                executor.shutdown(wait=False, cancel_futures=True)
+                executor = make()
+    finally:
+        if make is not None:
+            executor.shutdown(cancel_futures=True)
+    return rows
+
+
+def _ask(
+    work: _Work,
+    missing: list[_Piece],
+    executor: Executor,
+    rows: dict[_Piece, _Cells],
+    asked: dict[_Piece, int],
+) -> bool:
+    """Asks for pieces and puts what comes to the rows; whether the executor broke meanwhile."""
+    futures = {}
+    broken = False
+    try:
+        for place in missing:
+            asked[place] += 1
+            futures[executor.submit(work, *place)] = place
+    except BrokenExecutor:
+        broken = True
+    left = set(futures)
+    try:
+        while left:
+            done, left = wait(left, return_when=FIRST_COMPLETED)
+            for future in done:
+                place = futures[future]
+                try:
+                    rows[place] = future.result()
+                except CohapticError:
+                    # A scene is refused, whoever runs it.
+                    raise
+                except BrokenExecutor:
+                    broken = True
+                except Exception:
+                    if asked[place] >= _ASKED:
+                        raise
+    except BaseException:
+        for future in left:
+            future.cancel()
+        raise
+    return broken

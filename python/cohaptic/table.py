@@ -1,0 +1,79 @@
+"""Tables: columns that NumPy and Arrow share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cohaptic import _native
+
+
+class Table:
+    """Columns by their names, as read-only NumPy arrays that are not copied.
+
+    It has the Arrow PyCapsule protocol: ``pyarrow.table(t)``, ``polars.DataFrame(t)`` and DuckDB take it as it is, over the same memory. A column
+    of names is kept as codes; Arrow gets a dictionary column.
+
+    >>> from cohaptic import Scene
+    >>> scene = Scene('''
+    ... scene = { duration = "16ms", count = 2 }
+    ... object.mass = 0.45
+    ... coordination = { strategy = "average-position", stiffness = 1000.0, update = "8ms" }
+    ... peer = { device = { mass = 0.1 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    ... ''')
+    >>> packets = scene.run().packets
+    >>> list(packets)
+    ['link', 'sequence', 'sent', 'arrived', 'fate']
+    >>> packets["sent"]
+    array([0.   , 0.   , 0.008, 0.008])
+    >>> packets.decode("link")[:2].tolist()
+    ['peer1->peer2', 'peer2->peer1']
+    """
+
+    def __init__(self, native: _native.Table) -> None:
+        self._native = native
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._native.column(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._native.names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._native.names
+
+    def keys(self) -> list[str]:
+        """The names of the columns, so that ``dict(table)`` has them with their arrays."""
+        return self._native.names
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return len(self._native)
+
+    def categories(self, name: str) -> list[str] | None:
+        """The names that the codes of a column stand for; ``None`` for a column of numbers."""
+        return self._native.categories(name)
+
+    def decode(self, name: str) -> np.ndarray:
+        """A column of names as an array of text, which is a copy; a column of numbers as it is."""
+        names = self.categories(name)
+        return self[name] if names is None else np.array(names, dtype=object)[self[name]]
+
+    def address(self, name: str) -> int:
+        """Where the numbers of a column begin in memory: those of the NumPy array, and those that Arrow gets."""
+        return self._native.address(name)
+
+    def __arrow_c_schema__(self) -> object:
+        """The schema, by the Arrow PyCapsule protocol."""
+        return self._native.__arrow_c_schema__()
+
+    def __arrow_c_stream__(self, requested_schema: Any | None = None) -> object:
+        """The rows, by the Arrow PyCapsule protocol."""
+        return self._native.__arrow_c_stream__(requested_schema)
+
+    def __repr__(self) -> str:
+        return f"<Table of {self.rows} rows: {', '.join(self)}>"

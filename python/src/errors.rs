@@ -1,0 +1,36 @@
+//! Faults as exceptions of Python, which are the classes of `cohaptic.errors`.
+
+use std::fmt::Display;
+
+use cohaptic_scene::{Diagnostic, SceneError};
+use pyo3::prelude::*;
+
+const MODULE: &str = "cohaptic.errors";
+
+/// An exception of that class; an exception of the import if there is none.
+fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
+    let made = py.import(MODULE).and_then(|module| module.getattr(class)).and_then(|class| class.call1((message,)));
+    made.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// A scene, a link or a key that makes no sense, with its place.
+pub(crate) fn of_scene(py: Python<'_>, error: &SceneError) -> PyErr {
+    let place = error.diagnostic();
+    let file = place.and_then(Diagnostic::file).map(|file| file.display().to_string());
+    let key = place.map(Diagnostic::key).filter(|key| !key.is_empty());
+    let numbers = (place.map(Diagnostic::line), place.map(Diagnostic::column));
+    let arguments =
+        (error.to_string(), file, place.and_then(Diagnostic::override_text), numbers.0, numbers.1, key, place.map(Diagnostic::message), error.is_io());
+    let made = py.import(MODULE).and_then(|module| module.getattr("_of_scene")).and_then(|make| make.call1(arguments));
+    made.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// A scene that has no such analysis.
+pub(crate) fn of_analysis(py: Python<'_>, error: &impl Display) -> PyErr {
+    exception(py, "AnalysisError", error.to_string())
+}
+
+/// A value that makes no sense.
+pub(crate) fn of_value(error: &impl Display) -> PyErr {
+    pyo3::exceptions::PyValueError::new_err(error.to_string())
+}

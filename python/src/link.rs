@@ -1,0 +1,213 @@
+//! One emulated link.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use cohaptic_linkfile::link_from_keys;
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::{DropCause, Fate, Link as Emulated, LinkModel, LinkName, PacketInfo, PacketRecord};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::errors::of_scene;
+use crate::interrupt::{Stop, interruptible};
+
+/// A link: a model, and one that runs step by step.
+#[pyclass(frozen, module = "cohaptic._native")]
+#[derive(Debug)]
+pub(crate) struct Link {
+    model: LinkModel,
+    seed: u64,
+    name: LinkName,
+    live: Mutex<Emulated<Arc<Py<PyAny>>>>,
+}
+
+/// The names of the causes, by code: no cause first.
+#[pyfunction]
+pub(crate) fn causes() -> Vec<&'static str> {
+    std::iter::once("").chain(DropCause::ALL.map(DropCause::name)).collect()
+}
+
+/// The code of a packet that is not out of the link yet, however long one waits.
+const ON_THE_WAY: u8 = u8::MAX;
+
+const fn cause(fate: Fate) -> u8 {
+    match fate {
+        Fate::Dropped(cause) => cause as u8 + 1,
+        Fate::Delivered(_) | Fate::Duplicated => 0,
+    }
+}
+
+/// What became of packets, by their places, and of the copies that the link made.
+#[derive(Debug)]
+struct Fates {
+    arrived: Vec<f64>,
+    cause: Vec<u8>,
+    marked: Vec<bool>,
+    damaged: Vec<bool>,
+    copies: Vec<PacketRecord>,
+}
+
+impl Fates {
+    fn of(packets: usize) -> Self {
+        let (arrived, cause) = (vec![f64::NAN; packets], vec![ON_THE_WAY; packets]);
+        Self { arrived, cause, marked: vec![false; packets], damaged: vec![false; packets], copies: Vec::new() }
+    }
+
+    #[inline]
+    fn take(&mut self, record: &PacketRecord) {
+        if !record.fate.is_end() {
+            return;
+        }
+        if record.copy != 0 {
+            self.copies.push(*record);
+            return;
+        }
+        // The number of a packet is its place.
+        let Some(place) = usize::try_from(record.sequence).ok().filter(|place| *place < self.cause.len()) else { return };
+        if let Fate::Delivered(at) = record.fate {
+            self.arrived[place] = at.as_secs_f64();
+        }
+        self.cause[place] = cause(record.fate);
+        if record.marked || record.damaged {
+            (self.marked[place], self.damaged[place]) = (record.marked, record.damaged);
+        }
+    }
+}
+
+/// An instant of that many seconds, to the nearest nanosecond; `None` before the beginning and beyond the end of time.
+#[inline]
+fn instant(seconds: f64) -> Option<Instant> {
+    let nanos = seconds * 1e9;
+    // 2^64 and everything above it is no instant, and a comparison with NaN is false.
+    (nanos >= 0.0 && nanos < 18_446_744_073_709_551_616.0).then(|| Instant::from_nanos((nanos + 0.5) as u64))
+}
+
+fn no_instant(seconds: f64) -> PyErr {
+    PyValueError::new_err(format!("{seconds} s is no instant: expected seconds from 0 to 1.8e10"))
+}
+
+fn gone_back(at: f64) -> PyErr {
+    PyValueError::new_err(format!("time goes back at {at} s: expected no instant before an earlier one"))
+}
+
+/// How many packets are sent between two looks at whether to go on.
+const BETWEEN: usize = 1 << 16;
+
+/// Arrivals, causes, marks, damages, and of copies: packets, numbers, arrivals, causes.
+type Sent<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u8>>,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<bool>>,
+    (Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u8>>),
+);
+
+/// An event: payload, number, copy, offered and happened \[s\], fate, size, marked, damaged.
+type Event = (Py<PyAny>, u64, u8, f64, f64, &'static str, u64, bool, bool);
+
+#[pymethods]
+impl Link {
+    /// A link of these keys, each `KEY=VALUE`. Seed and ends are the address of its random numbers.
+    #[new]
+    fn new(py: Python<'_>, keys: Vec<String>, seed: u64, sender: &str, receiver: &str) -> PyResult<Self> {
+        let model = link_from_keys(&keys).map_err(|error| of_scene(py, &error))?;
+        let name = LinkName::between(sender, receiver);
+        let live = Mutex::new(Emulated::new(seed, &name, model.clone()));
+        Ok(Self { model, seed, name, live })
+    }
+
+    /// Sends packets at those times \[s\] over a link that is new, and lets everything arrive.
+    #[pyo3(signature = (times: "numpy.ndarray", sizes: "numpy.ndarray", ecn: "bool") -> "tuple[typing.Any, ...]")]
+    fn send<'py>(&self, py: Python<'py>, times: PyReadonlyArray1<'py, f64>, sizes: PyReadonlyArray1<'py, u64>, ecn: bool) -> PyResult<Sent<'py>> {
+        let (times, sizes) = (times.as_slice()?, sizes.as_slice()?);
+        if !(sizes.len() == 1 || sizes.len() == times.len()) {
+            return Err(PyValueError::new_err(format!("{} sizes of {} packets: expected one of all, or one of each", sizes.len(), times.len())));
+        }
+        let sent = interruptible(py, |stop: &Stop| self.sent(times, sizes, ecn, stop))?;
+        let Fates { arrived, cause, marked, damaged, copies } = sent?;
+        let at = |record: &PacketRecord| if let Fate::Delivered(at) = record.fate { at.as_secs_f64() } else { f64::NAN };
+        let copies = (
+            copies.iter().map(|record| record.sequence).collect::<Vec<_>>().into_pyarray(py),
+            copies.iter().map(|record| record.copy).collect::<Vec<_>>().into_pyarray(py),
+            copies.iter().map(at).collect::<Vec<_>>().into_pyarray(py),
+            copies.iter().map(|record| self::cause(record.fate)).collect::<Vec<_>>().into_pyarray(py),
+        );
+        Ok((arrived.into_pyarray(py), cause.into_pyarray(py), marked.into_pyarray(py), damaged.into_pyarray(py), copies))
+    }
+
+    /// Offers a packet now \[s\].
+    fn handle_packet(&self, now: f64, size: u64, payload: Py<PyAny>, ecn: bool) -> PyResult<()> {
+        let at = instant(now).ok_or_else(|| no_instant(now))?;
+        let info = PacketInfo { size: Bytes::new(size), ecn_capable: ecn };
+        self.live().handle_packet(at, info, Arc::new(payload)).map_err(|_| gone_back(now))
+    }
+
+    /// Lets time pass until then \[s\], and gives what has happened.
+    #[pyo3(signature = (now: "float") -> "list[tuple[typing.Any, int, int, float, float, str, int, bool, bool]]")]
+    fn poll(&self, py: Python<'_>, now: f64) -> PyResult<Vec<Event>> {
+        let at = instant(now).ok_or_else(|| no_instant(now))?;
+        let mut live = self.live();
+        live.handle_timeout(at).map_err(|_| gone_back(now))?;
+        let mut happened = Vec::new();
+        while let Some(event) = live.poll_event() {
+            let record = event.record;
+            happened.push((
+                event.payload.clone_ref(py),
+                record.sequence,
+                record.copy,
+                record.offered.as_secs_f64(),
+                record.at.as_secs_f64(),
+                record.fate.name(),
+                record.size.get(),
+                record.marked,
+                record.damaged,
+            ));
+        }
+        Ok(happened)
+    }
+
+    /// When something happens next \[s\]; `None` if nothing is on the way.
+    #[getter]
+    fn next(&self) -> Option<f64> {
+        self.live().poll_timeout().map(Instant::as_secs_f64)
+    }
+
+    /// Replaces the model from now \[s\] on, with its packets on the way.
+    fn change(&self, py: Python<'_>, now: f64, keys: Vec<String>) -> PyResult<()> {
+        let at = instant(now).ok_or_else(|| no_instant(now))?;
+        let model = link_from_keys(&keys).map_err(|error| of_scene(py, &error))?;
+        self.live().set_model(at, model).map_err(|_| gone_back(now))
+    }
+}
+
+impl Link {
+    fn live(&self) -> std::sync::MutexGuard<'_, Emulated<Arc<Py<PyAny>>>> {
+        self.live.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn sent(&self, times: &[f64], sizes: &[u64], ecn: bool, stop: &Stop) -> PyResult<Fates> {
+        let mut link = Emulated::new(self.seed, &self.name, self.model.clone());
+        let mut fates = Fates::of(times.len());
+        for (chunk, place) in times.chunks(BETWEEN).zip((0..).step_by(BETWEEN)) {
+            if stop.is_asked() {
+                break;
+            }
+            for (now, place) in chunk.iter().zip(place..) {
+                let size = if let [size] = sizes { *size } else { sizes[place] };
+                let info = PacketInfo { size: Bytes::new(size), ecn_capable: ecn };
+                let at = instant(*now).ok_or_else(|| no_instant(*now))?;
+                link.handle_packet(at, info, ()).map_err(|_| gone_back(*now))?;
+                while let Some(event) = link.poll_event() {
+                    fates.take(&event.record);
+                }
+            }
+        }
+        // It is the last instant of all.
+        let _ = link.handle_timeout(Instant::MAX);
+        while let Some(event) = link.poll_event() {
+            fates.take(&event.record);
+        }
+        Ok(fates)
+    }
+}

@@ -1,0 +1,92 @@
+"""The examples, and the environment behind links."""
+
+import importlib.util
+from types import ModuleType
+
+import gymnasium
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from cohaptic import Link
+from cohaptic.gym import RemoteEnv
+
+
+def example(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, ROOT / "python" / "examples" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_ping_takes_both_links() -> None:
+    ping = example("simpy_ping").ping
+    assert np.allclose(ping(10, "delay 20ms"), 0.04)
+    sent = np.arange(500) * 0.01
+    address = {"seed": 7}
+    there = Link("delay 20ms 3ms loss 5%", sender="client", receiver="server", **address).send(sent)
+    arrived = there.arrived[there.delivered]
+    assert not np.all(np.diff(arrived) > 0.0) or len(arrived) < 500
+    order = np.argsort(arrived, kind="stable")
+    back = Link("delay 20ms 3ms loss 5%", sender="server", receiver="client", **address).send(arrived[order])
+    trips = (back.arrived - sent[there.delivered][order])[back.delivered]
+    # SimPy counts its time in sums of floating-point numbers.
+    assert np.allclose(np.sort(ping(500, seed=7)), np.sort(trips), atol=2e-9)
+
+
+def test_delay_makes_balancing_harder() -> None:
+    balance = example("gym_remote").balance
+    near, far = balance("delay 0ms"), balance("delay 200ms")
+    assert near == balance("")
+    assert near > 2 * far
+
+
+class Counting(gymnasium.Env):
+    """Its observation is the number of the step and the action that was taken."""
+
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (2,))
+    action_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,))
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.steps = 0
+        return (0, None), {}
+
+    def step(self, action):
+        self.steps += 1
+        return (self.steps, action), 0.0, False, False, {}
+
+
+def test_what_is_seen_and_done_is_as_old_as_the_links_make_it() -> None:
+    remote = RemoteEnv(Counting(), period=0.1, idle="idle", actions="delay 200ms", observations="delay 100ms")
+    observation, _ = remote.reset()
+    seen = []
+    for number in range(6):
+        observation, _, _, _, info = remote.step(f"action {number}")
+        seen.append((observation, round(info["action_age"], 9), round(info["observation_age"], 9)))
+    # Step 1 is observed a step later; action 0 is done two steps after it was sent.
+    assert [observation for observation, _, _ in seen] == [
+        (0, None),
+        (1, "idle"),
+        (2, "idle"),
+        (3, "action 0"),
+        (4, "action 1"),
+        (5, "action 2"),
+    ]
+    assert seen[-1][1:] == (0.2, 0.1)
+    remote.reset()
+    assert remote.step("again")[0] == (0, None)
+
+
+def test_overtaken_actions_are_not_done() -> None:
+    remote = RemoteEnv(Counting(), period=0.001, idle=-1, actions="delay 20ms 5ms", observations="", seed=3)
+    remote.reset()
+    done = [remote.step(number)[0][1] for number in range(500)]
+    assert done == sorted(done)
+    assert done[-1] > 450
+    # Some overtook others, which were skipped.
+    assert len(set(done)) < done[-1]
+    with pytest.raises(ValueError, match="netem"):
+        RemoteEnv(Counting(), period=0.1, idle=0, actions="delay")

@@ -1,0 +1,96 @@
+"""NumPy and Arrow see the same memory."""
+
+import gc
+
+import numpy as np
+import pandas
+import polars
+import pyarrow
+import pytest
+from conftest import TWO
+
+from cohaptic import Scene, Table
+
+
+@pytest.fixture(scope="module")
+def trajectory() -> Table:
+    return Scene(TWO).run().trajectory
+
+
+def address(array: np.ndarray) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def test_no_number_is_copied(trajectory: Table) -> None:
+    arrow = pyarrow.table(trajectory)
+    for name in trajectory:
+        column = arrow[name].chunk(0)
+        codes = column.indices if pyarrow.types.is_dictionary(column.type) else column
+        places = {
+            address(trajectory[name]),
+            address(trajectory[name]),
+            trajectory.address(name),
+            codes.buffers()[1].address,
+        }
+        assert len(places) == 1, name
+    assert len({trajectory.address(name) for name in trajectory}) == len(trajectory.keys())
+
+
+def test_arrays_cannot_be_written_to(trajectory: Table) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        trajectory["xo"][0] = 1.0
+    with pytest.raises(ValueError, match="WRITEABLE"):
+        trajectory["xo"].setflags(write=True)
+
+
+def test_memory_lives_as_long_as_any_array() -> None:
+    run = Scene(TWO).run()
+    expected = run.trajectory["xo"].tolist()
+    array, arrow = run.trajectory["xo"], pyarrow.table(run.trajectory)["xo"]
+    del run
+    gc.collect()
+    Scene(TWO).run()
+    assert array.tolist() == expected == arrow.to_pylist()
+
+
+def test_frames_of_others_have_the_same_numbers(trajectory: Table) -> None:
+    columns = {name: trajectory.decode(name).tolist() for name in trajectory}
+    assert pyarrow.table(trajectory).to_pydict() == columns
+    frame = polars.DataFrame(trajectory)
+    assert frame.columns == list(trajectory)
+    assert frame.to_dict(as_series=False) == columns
+    frame = pandas.DataFrame(dict(trajectory))
+    assert frame["xo"].tolist() == columns["xo"]
+
+
+def test_a_schema_names_types(trajectory: Table) -> None:
+    schema = pyarrow.schema(trajectory)
+    assert schema.field("t").type == pyarrow.float64()
+    assert schema.field("peer").type == pyarrow.dictionary(pyarrow.int32(), pyarrow.string())
+
+
+def test_an_unknown_column_is_a_key_error(trajectory: Table) -> None:
+    with pytest.raises(KeyError, match="zo"):
+        trajectory["zo"]
+    assert "zo" not in trajectory
+    assert trajectory.rows == 1000
+
+
+def test_a_run_without_rows_says_so() -> None:
+    run = Scene(TWO).run(record=False)
+    with pytest.raises(ValueError, match="record=True"):
+        _ = run.trajectory
+    with pytest.raises(ValueError, match="record=True"):
+        run.plot()
+    assert run._repr_svg_() is None
+    assert run.links["offered"].tolist() == [63, 63]
+
+
+def test_a_picture_is_saved_as_it_is_shown(tmp_path) -> None:
+    run = Scene(TWO).run()
+    picture = run.plot("forces")
+    picture.save(tmp_path / "forces.svg")
+    assert (tmp_path / "forces.svg").read_text(encoding="utf-8") == picture._repr_svg_()
+    assert run._repr_svg_() == run.plot("positions").svg
+    with pytest.raises(ValueError, match="expected one of positions, forces, network"):
+        run.plot("views")
