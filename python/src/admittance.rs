@@ -34,8 +34,7 @@ pub(crate) fn admittance_of<'py>(
     let admittance = interruptible(py, |stop| Admittance::between_watched(&scene.scene, place, axes.0, axes.1, stop))?.map_err(refused)?;
     let frequencies = if frequencies.is_callable() { frequencies.call1((admittance.highest_frequency(),))? } else { frequencies };
     let frequencies: Vec<f64> = frequencies.extract()?;
-    let (response, fit) =
-        interruptible(py, |stop| (admittance.response_watched(&frequencies, stop), admittance.fit_low_frequency()))?;
+    let (response, fit) = interruptible(py, |stop| (admittance.response_watched(&frequencies, stop), admittance.fit_low_frequency()))?;
     let points = response.map_err(refused)?.points;
     let said = PyDict::new(py);
     said.set_item("frequencies", frequencies.into_pyarray(py))?;

@@ -19,8 +19,16 @@ pub(crate) fn of_scene(py: Python<'_>, error: &SceneError) -> PyErr {
     let file = place.and_then(Diagnostic::file).map(|file| file.display().to_string());
     let key = place.map(Diagnostic::key).filter(|key| !key.is_empty());
     let numbers = (place.map(Diagnostic::line), place.map(Diagnostic::column));
-    let arguments =
-        (error.to_string(), file, place.and_then(Diagnostic::override_text), numbers.0, numbers.1, key, place.map(Diagnostic::message), error.is_io());
+    let arguments = (
+        error.to_string(),
+        file,
+        place.and_then(Diagnostic::override_text),
+        numbers.0,
+        numbers.1,
+        key,
+        place.map(Diagnostic::message),
+        error.is_io(),
+    );
     let made = py.import(MODULE).and_then(|module| module.getattr("_of_scene")).and_then(|make| make.call1(arguments));
     made.map_or_else(|error| error, PyErr::from_value)
 }

@@ -1,8 +1,6 @@
 //! Maps and boundaries: scenes with keys left open.
 
-use cohaptic_stability::{
-    Boundary, BoundaryError, BoundaryOptions, Criterion, Family, FamilyError, Grid, KeyRange, Map, MapError, MapRow,
-};
+use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Criterion, Family, FamilyError, Grid, KeyRange, Map, MapError, MapRow};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -39,7 +37,15 @@ fn criterion(family: &Family) -> &'static str {
 /// The radius over a grid of two keys, each `KEY=LOW..HIGH`, as a mapping.
 #[pyfunction]
 #[pyo3(name = "map", signature = (scene: "Scene", x: "str", y: "str", columns: "int", rows: "int", threads: "int") -> "dict[str, typing.Any]")]
-pub(crate) fn map_of<'py>(py: Python<'py>, scene: &Scene, x: &str, y: &str, columns: usize, rows: usize, threads: usize) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn map_of<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    x: &str,
+    y: &str,
+    columns: usize,
+    rows: usize,
+    threads: usize,
+) -> PyResult<Bound<'py, PyDict>> {
     let keys = vec![range(x)?, range(y)?];
     let grid = Grid::new(columns, rows).map_err(|error| of_value(&error))?;
     let family = scene.family(py, keys.clone())?;

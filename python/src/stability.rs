@@ -29,7 +29,11 @@ pub(crate) fn stability<'py>(py: Python<'py>, scene: &Scene, method: &str, law: 
     let laws = law.map(|law| Laws::new(&law, &scene.scene)).transpose()?;
     let judged = interruptible(py, |stop| match &laws {
         None => judge_watched(&scene.scene, method, &Limits { watch: stop, ..Limits::of_unknowns(usize::MAX) }),
-        Some(laws) => Laws::attached(|| analyse_with(&scene.scene, &laws)).map(|analysis| Judgement { verdict: analysis.verdict(), analysis, mean_square: None }),
+        Some(laws) => Laws::attached(|| analyse_with(&scene.scene, &laws)).map(|analysis| Judgement {
+            verdict: analysis.verdict(),
+            analysis,
+            mean_square: None,
+        }),
     })?;
     if let Some(laws) = &laws {
         laws.raise(py)?;
@@ -64,9 +68,8 @@ pub(crate) fn eigenvalues_of(py: Python<'_>, rows: Vec<Vec<f64>>) -> PyResult<Bo
     if rows.iter().any(|row| row.len() != rows.len()) {
         return Err(PyValueError::new_err("a matrix with eigenvalues is square"));
     }
-    let found = interruptible(py, |_: &Stop| {
-        eigenvalues(&cohaptic_stability::Matrix::from_fn(rows.len(), rows.len(), |row, column| rows[row][column]))
-    })?;
+    let found =
+        interruptible(py, |_: &Stop| eigenvalues(&cohaptic_stability::Matrix::from_fn(rows.len(), rows.len(), |row, column| rows[row][column])))?;
     Ok(found.into_pyarray(py))
 }
 

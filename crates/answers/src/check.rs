@@ -2,8 +2,8 @@
 
 use std::cell::RefCell;
 
-use cohaptic_harness::check::{Finding, Judged, Outcome, check_with};
 use cohaptic_harness::Model;
+use cohaptic_harness::check::{Finding, Judged, Outcome, check_with};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Verdict, Watch};
 use cohaptic_units::print::Number;

@@ -13,7 +13,8 @@ pub(crate) fn cells(outcome: &OutcomeDocument) -> [Html; 5] {
     let gauge = Gauge { low: *low, high: *high, measured: *measured, passed: *passed };
     let bar = if low.is_some() || high.is_some() { Html::gauge(&gauge) } else { Html::text("no number") };
     // A table of a page has no room for all digits, which are in the JSON.
-    let found = measured.map_or_else(|| found.clone(), |measured| found.replacen(&measured.to_string(), &Number(six_digits(measured)).to_string(), 1));
+    let found =
+        measured.map_or_else(|| found.clone(), |measured| found.replacen(&measured.to_string(), &Number(six_digits(measured)).to_string(), 1));
     [verdict(*passed), name.as_str().into(), expected.as_str().into(), found.into(), bar]
 }
 

@@ -14,7 +14,8 @@ const TEXT: &str = r#"
 
 fn plan() -> CampaignPlan {
     let variations = ["scene.count=2,3", "coordination.stiffness=500..1500/3"].map(|text| Variation::parse(text).unwrap()).to_vec();
-    let spec = PlanSpec { text: TEXT, file: Path::new("two.toml"), set: &[], variations, runs: 5, format: Format::Csv, part: None, program: "a test" };
+    let spec =
+        PlanSpec { text: TEXT, file: Path::new("two.toml"), set: &[], variations, runs: 5, format: Format::Csv, part: None, program: "a test" };
     CampaignPlan::new(spec).unwrap()
 }
 
