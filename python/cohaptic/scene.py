@@ -15,6 +15,8 @@ from cohaptic.law import Law, Peer
 from cohaptic.run import Run
 from cohaptic.stability import Admittance, Boundary, Map, Stability, _key_range, _spread
 
+_NO_VALUE: Any = object()
+
 MakeLaw = Callable[[Peer], Law]
 """Makes the law of a peer: a class, mostly."""
 
@@ -131,11 +133,28 @@ class Scene:
         """The seed of its random numbers."""
         return self._native.seed
 
-    def set(self, key: str, value: Any) -> Scene:
+    def set(self, key: str | Mapping[str, Any], value: Any = _NO_VALUE) -> Scene:
         """The scene with another value of a key, as by ``--set``: a number, a truth value, a list, a mapping, or a text such as ``"8ms"``.
 
-        Like there, a text is taken as TOML if it is TOML.
+        Like there, a text is taken as TOML if it is TOML. A mapping of keys to values in place of a key sets all of them at once, where
+        no scene makes sense with one of them alone.
+
+        >>> scene = Scene('''
+        ... scene = { duration = "1s" }
+        ... object.mass = 0.45
+        ... coordination = { strategy = "average-position", stiffness = 1000.0, update = "8ms" }
+        ... peer = { device = { mass = 0.1 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+        ... peers = [{ name = "left" }, { name = "right" }]
+        ... ''')
+        >>> scene.set({"peers": [], "scene.count": 5}).peers[-1]
+        'peer5'
         """
+        if isinstance(key, Mapping):
+            if value is not _NO_VALUE:
+                raise TypeError("set() takes a key and a value, or a mapping alone")
+            return self._with(*(f"{name}={_toml(item)}" for name, item in key.items()))
+        if value is _NO_VALUE:
+            raise TypeError("set() takes a key and a value, or a mapping alone")
         return self._with(f"{key}={_toml(value)}")
 
     def _with(self, *overrides: str) -> Scene:

@@ -75,5 +75,9 @@ def test_values_are_written_as_the_program_reads_them() -> None:
         "scene.seed=5",
     ]
     assert scene.overrides == []
+    assert scene.set({"peers": [], "scene.count": 4}).peers[3] == "peer4"
+    for wrong in (("scene.seed",), ({"scene.seed": 5}, 5)):
+        with pytest.raises(TypeError, match="a mapping alone"):
+            scene.set(*wrong)
     with pytest.raises(TypeError, match="no value of a scene"):
         scene.set("scene.seed", object())
