@@ -117,8 +117,8 @@ class Stability:
 
     @property
     def parts(self) -> list[Part]:
-        """The parts of the mode with the largest radius."""
-        return max(self.modes, key=lambda mode: mode.radius).parts
+        """The parts of the mode with the largest radius, of several the last."""
+        return max(reversed(self.modes), key=lambda mode: mode.radius).parts
 
     @cached_property
     def _monodromy(self) -> tuple[np.ndarray, list[tuple[str, str]], float, float, int, float]:
