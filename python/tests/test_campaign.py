@@ -2,12 +2,15 @@
 
 import csv
 import os
+import signal
+import threading
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
 import numpy as np
 import pytest
 from conftest import TWO
+from distributed import Client, LocalCluster
 
 import cohaptic
 from cohaptic import Scene, Table, campaign
@@ -109,6 +112,17 @@ def test_runs_of_a_worker_that_dies_are_asked_again(scene: Scene, expected: Tabl
     # Of one that cannot be made again the rest is computed here.
     with Losing(processes(), {3}) as losing:
         assert_same(campaign(scene, vary=VARY, runs=RUNS, executor=losing, piece=2), expected)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_of_dask_that_is_killed_changes_nothing(scene: Scene, expected: Table) -> None:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        first, *_ = client.run(os.getpid).values()
+        threading.Timer(0.05, os.kill, (first, signal.SIGKILL)).start()
+        assert_same(campaign(scene, vary=VARY, runs=RUNS, executor=client.get_executor(), piece=1), expected)
+        # Its nanny has begun another one.
+        client.wait_for_workers(2)
+        assert first not in client.run(os.getpid).values()
 
 
 class Forgetful(Executor):

@@ -2,7 +2,7 @@
 //!
 //! You need it if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
 //!
-//! [`run`] is a run, [`explanation`] what a scene makes the program model, [`check`] a scene and its expectations, where [`quick_verdict`] tells first whether the
+//! [`run()`] is a run, [`explanation()`] the model of a scene, [`check()`] a scene and its expectations, where [`quick_verdict()`] tells first whether the
 //! scene is stable. [`document!`] makes a document.
 //!
 //! Nothing here reads a clock or prints.
