@@ -3,7 +3,6 @@
 import csv
 import os
 import signal
-import threading
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
@@ -114,15 +113,30 @@ def test_runs_of_a_worker_that_dies_are_asked_again(scene: Scene, expected: Tabl
         assert_same(campaign(scene, vary=VARY, runs=RUNS, executor=losing, piece=2), expected)
 
 
+class Killing(Executor):
+    """It kills a worker when the first piece is done."""
+
+    def __init__(self, executor: Executor, worker: int) -> None:
+        self.executor, self.worker, self.killed = executor, worker, False
+
+    def submit(self, function, /, *arguments, **keywords) -> Future:
+        future = self.executor.submit(function, *arguments, **keywords)
+        future.add_done_callback(self.kill)
+        return future
+
+    def kill(self, _: Future) -> None:
+        if not self.killed:
+            self.killed = True
+            os.kill(self.worker, signal.SIGKILL)
+
+
 @pytest.mark.filterwarnings("ignore")
 def test_a_worker_of_dask_that_is_killed_changes_nothing(scene: Scene, expected: Table) -> None:
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
         first, *_ = client.run(os.getpid).values()
-        threading.Timer(0.05, os.kill, (first, signal.SIGKILL)).start()
-        assert_same(campaign(scene, vary=VARY, runs=RUNS, executor=client.get_executor(), piece=1), expected)
-        # Its nanny has begun another one.
-        client.wait_for_workers(2)
-        assert first not in client.run(os.getpid).values()
+        killing = Killing(client.get_executor(), first)
+        assert_same(campaign(scene, vary=VARY, runs=RUNS, executor=killing, piece=1), expected)
+        assert killing.killed
 
 
 class Forgetful(Executor):
