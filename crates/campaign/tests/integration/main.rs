@@ -6,5 +6,6 @@ mod bench;
 mod compare;
 mod folders;
 mod resume;
+mod shards;
 mod tables;
 mod verdicts;

@@ -1,0 +1,6 @@
+#!/bin/sh
+# Puts the shards together: refused, with exit status 3, while anything is missing.
+#
+#SBATCH --job-name=merge
+. ./work.sh
+cohaptic $work --merge losses
