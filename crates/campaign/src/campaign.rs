@@ -246,8 +246,11 @@ impl Campaign {
             judgements[usize::try_from(combination).unwrap_or_default()] = Some(judgement);
         }
         watch.judged(judgements.iter().flatten().count() as u64);
-        let missing: Vec<u64> =
-            (0..).zip(&judgements).filter(|(combination, known)| known.is_none() && is_wanted(*combination)).map(|(combination, _)| combination).collect();
+        let missing: Vec<u64> = (0..)
+            .zip(&judgements)
+            .filter(|(combination, known)| known.is_none() && is_wanted(*combination))
+            .map(|(combination, _)| combination)
+            .collect();
         if missing.is_empty() {
             return Ok(judgements);
         }

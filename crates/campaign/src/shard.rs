@@ -167,7 +167,8 @@ mod tests {
 
     #[test]
     fn a_shard_reads_back_and_what_is_none_is_refused() {
-        for (text, shard) in [("1/1", Shard { index: 1, count: 1 }), ("3/8", Shard { index: 3, count: 8 }), (" 8 / 8", Shard { index: 8, count: 8 })] {
+        for (text, shard) in [("1/1", Shard { index: 1, count: 1 }), ("3/8", Shard { index: 3, count: 8 }), (" 8 / 8", Shard { index: 8, count: 8 })]
+        {
             assert_eq!(text.parse(), Ok(shard));
             assert_eq!(shard.to_string().parse(), Ok(shard));
             assert_eq!(Shard::of_lease(&shard.lease()), Some(shard));

@@ -85,7 +85,8 @@ impl fmt::Display for Owner {
 
 /// The letters of a text that may stand in names of files; never nothing.
 fn plain(text: &str) -> String {
-    let plain: String = text.trim().chars().map(|letter| if letter.is_ascii_alphanumeric() || ".:[]_-".contains(letter) { letter } else { '_' }).collect();
+    let plain: String =
+        text.trim().chars().map(|letter| if letter.is_ascii_alphanumeric() || ".:[]_-".contains(letter) { letter } else { '_' }).collect();
     if plain.is_empty() { "unknown".to_owned() } else { plain.replace([':', '[', ']'], "") }
 }
 

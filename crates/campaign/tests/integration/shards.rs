@@ -110,7 +110,10 @@ fn a_merge_says_what_is_missing_and_computes_nothing() {
     assert!(error.to_string().contains("4 of 6 parts are missing, counted from 0: 0, 2 to 3, 5") && error.is_io(), "{error}");
     assert_eq!(bench.files("out"), before);
     let state = SharedCampaign::parts_in(bench.plan().unwrap(), &bench.path("out")).unwrap();
-    assert_eq!(state.iter().map(|part| (part.runs, part.is_done)).collect::<Vec<_>>(), [false, true, false, false, true, false].map(|done| (4, done)));
+    assert_eq!(
+        state.iter().map(|part| (part.runs, part.is_done)).collect::<Vec<_>>(),
+        [false, true, false, false, true, false].map(|done| (4, done))
+    );
     // Done again it is not computed again, and a process alone does the rest.
     assert_eq!(bench.shard("out", shard(2, 3), "b", 1, &NoWatch).unwrap().computed, 0);
     assert_eq!(bench.finish("out", 1).computed, 16);

@@ -34,7 +34,12 @@ impl FromStr for ShardName {
     fn from_str(text: &str) -> Result<Self, String> {
         let shard = match text.split_once('/') {
             None if text == "auto" => return Ok(Self::Auto(None)),
-            Some(("auto", count)) => return count.parse().map(|count| Self::Auto(Some(count))).map_err(|_| format!("\"{count}\" is no number of shards: expected auto/N, such as auto/8")),
+            Some(("auto", count)) => {
+                return count
+                    .parse()
+                    .map(|count| Self::Auto(Some(count)))
+                    .map_err(|_| format!("\"{count}\" is no number of shards: expected auto/N, such as auto/8"));
+            }
             _ => text.parse(),
         };
         shard.map(Self::Given).map_err(|error: ShardError| format!("{error}, or auto"))

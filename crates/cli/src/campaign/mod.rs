@@ -138,7 +138,9 @@ pub(crate) fn open(sharing: Sharing<'_>, plan: CampaignPlan, out: &Path) -> Resu
 pub(crate) fn not_all_judged(sharing: Sharing<'_>, judged: u64, combinations: u64, out: &Path) -> Failure {
     let kept = format!("{judged} of {combinations} verdicts are kept in {}", output::path(out));
     match sharing {
-        Sharing::Merge(_) => Failure::System(format!("{kept}: expected all. Do the shards again that are missing, or the command with --out and without --shard")),
+        Sharing::Merge(_) => {
+            Failure::System(format!("{kept}: expected all. Do the shards again that are missing, or the command with --out and without --shard"))
+        }
         Sharing::Whole(_) | Sharing::Shard(..) | Sharing::Status(_) => Failure::Interrupted(format!("{kept}; the same command goes on from there")),
     }
 }

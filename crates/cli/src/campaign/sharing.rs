@@ -50,9 +50,9 @@ fn work<'a>(
     let report = shared.run(shard, &Working { shown: &running, worker });
     running.clear();
     let report = report.map_err(|error| match error {
-        error @ CampaignError::File { .. } => {
-            Ended::Said(Failure::System(format!("{error}\nParts that are whole are kept: once that can be done, the same command goes on from there")))
-        }
+        error @ CampaignError::File { .. } => Ended::Said(Failure::System(format!(
+            "{error}\nParts that are whole are kept: once that can be done, the same command goes on from there"
+        ))),
         error => Ended::Error(error),
     })?;
     if report.left > 0 {

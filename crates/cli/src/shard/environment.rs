@@ -21,7 +21,10 @@ enum First {
 enum Count {
     In(&'static str),
     /// The last index, and the step between two of them, stand in variables.
-    Upto { last: &'static str, step: &'static str },
+    Upto {
+        last: &'static str,
+        step: &'static str,
+    },
     /// It is not said: users say it.
     Unknown,
 }
@@ -186,7 +189,9 @@ mod tests {
     /// An array with gaps has fewer tasks than indices.
     #[test]
     fn an_array_with_gaps_leaves_shards_out_and_renumbers_none() {
-        let of = |index: u64| format!("SLURM_ARRAY_TASK_ID={index} SLURM_ARRAY_TASK_MIN=1 SLURM_ARRAY_TASK_MAX=7 SLURM_ARRAY_TASK_STEP=1 SLURM_ARRAY_TASK_COUNT=3");
+        let of = |index: u64| {
+            format!("SLURM_ARRAY_TASK_ID={index} SLURM_ARRAY_TASK_MIN=1 SLURM_ARRAY_TASK_MAX=7 SLURM_ARRAY_TASK_STEP=1 SLURM_ARRAY_TASK_COUNT=3")
+        };
         assert_eq!([1, 3, 7].map(|index| auto_of(&of(index), None).unwrap()), ["1/7", "3/7", "7/7"]);
     }
 }

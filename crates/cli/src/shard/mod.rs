@@ -43,8 +43,9 @@ impl<'a> Sharing<'a> {
         };
         let shard = match shard {
             ShardName::Given(shard) => shard,
-            ShardName::Auto(count) => environment::auto(&|name| std::env::var(name).ok(), count)
-                .map_err(|reason| Failure::Input(format!("--shard auto: {reason}")))?,
+            ShardName::Auto(count) => {
+                environment::auto(&|name| std::env::var(name).ok(), count).map_err(|reason| Failure::Input(format!("--shard auto: {reason}")))?
+            }
         };
         Ok(Self::Shard(shard, folder))
     }
@@ -53,7 +54,9 @@ impl<'a> Sharing<'a> {
     pub(crate) fn is_whole(self, option: &str) -> Result<(), Failure> {
         match self {
             Self::Whole(_) => Ok(()),
-            Self::Shard(..) | Self::Merge(_) | Self::Status(_) => Err(Failure::Input(format!("{option}: a proof has no shards; expected --out alone"))),
+            Self::Shard(..) | Self::Merge(_) | Self::Status(_) => {
+                Err(Failure::Input(format!("{option}: a proof has no shards; expected --out alone")))
+            }
         }
     }
 

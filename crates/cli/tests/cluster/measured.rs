@@ -85,7 +85,9 @@ fn ways(page: &mut String) {
         None => skipped.push("Dask"),
     }
     match &slurm {
-        Ok(cluster) => all.push(("4 shards by a Slurm array, and a dependent merge", "2 nodes of 1 core", &there, Box::new(move || by_slurm(cluster)))),
+        Ok(cluster) => {
+            all.push(("4 shards by a Slurm array, and a dependent merge", "2 nodes of 1 core", &there, Box::new(move || by_slurm(cluster))))
+        }
         Err(_) => skipped.push("Slurm"),
     }
     let mut times = vec![Vec::new(); all.len()];
@@ -98,8 +100,13 @@ fn ways(page: &mut String) {
             fs::remove_dir_all(folder.join("losses")).unwrap();
         }
     }
-    page.push_str("## The same runs in each way\n\n4096 runs of two users, 2 s each, in 64 parts. Wall time from the command to the table, the median of ");
-    let _ = writeln!(page, "{ROUNDS} rounds in which all alternate. All tables are the same to the byte.\n\n| way | at the same time | \\[s\\] | runs a second |");
+    page.push_str(
+        "## The same runs in each way\n\n4096 runs of two users, 2 s each, in 64 parts. Wall time from the command to the table, the median of ",
+    );
+    let _ = writeln!(
+        page,
+        "{ROUNDS} rounds in which all alternate. All tables are the same to the byte.\n\n| way | at the same time | \\[s\\] | runs a second |"
+    );
     page.push_str("| --- | --- | ---: | ---: |\n");
     for ((name, at_once, ..), times) in all.iter().zip(times) {
         let time = median(times);
@@ -129,7 +136,11 @@ fn one_run(page: &mut String) {
     let (shards, runs) = (1..=SHARDS).map(|index| (shard(index), run())).unzip::<_, _, Vec<f64>, Vec<f64>>();
     let (shard, run) = (1000.0 * median(shards), 1000.0 * median(runs));
     page.push_str("\n## A shard of one run\n\nWall time of a process that does a shard of one run, from its start to its end, and of the run in it; medians of 40. The first shard also checks\nthe campaign. Asked for: at most 30 ms beside the run.\n\n");
-    let _ = writeln!(page, "| shard \\[ms\\] | run \\[ms\\] | beside it \\[ms\\] |\n| ---: | ---: | ---: |\n| {shard:.1} | {run:.2} | {:.1} |", shard - run);
+    let _ = writeln!(
+        page,
+        "| shard \\[ms\\] | run \\[ms\\] | beside it \\[ms\\] |\n| ---: | ---: | ---: |\n| {shard:.1} | {run:.2} | {:.1} |",
+        shard - run
+    );
 }
 
 /// The most memory that a process has held until it ends \[MB\].
@@ -151,7 +162,8 @@ fn merges(page: &mut String) {
     page.push_str("\n## The merge\n\nShards of 10,000 short runs, a combination each, put together from parts to the table on the disk, and summed up. Asked for: 100 MB/s, in memory that does not grow\nwith the number of shards.\n\n| shards | runs | table \\[MB\\] | \\[s\\] | \\[MB/s\\] | most memory \\[MB\\] |\n| ---: | ---: | ---: | ---: | ---: | ---: |\n");
     let most = std::env::var("COHAPTIC_SHARDS").ok().and_then(|most| most.parse().ok()).unwrap_or(1000_u64);
     for shards in [10, 100, 1000].into_iter().filter(|shards| *shards <= most) {
-        let words = format!("campaign scene.toml --set scene.duration=2ms --vary coordination.stiffness=1..2/{shards} --runs 10000 --part 10000 --no-plot");
+        let words =
+            format!("campaign scene.toml --set scene.duration=2ms --vary coordination.stiffness=1..2/{shards} --runs 10000 --part 10000 --no-plot");
         let command = |options: &str| {
             let mut command = work.command("cohaptic");
             command.args(words.split(' ')).args(options.split(' '));

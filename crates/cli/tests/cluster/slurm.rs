@@ -56,7 +56,13 @@ impl<'a> Cluster<'a> {
             let mut command = work.command(program);
             Service::start(command.args(options).env("SLURM_CONF", work.path("slurm.conf")).stdout(Stdio::null()).stderr(Stdio::null()))
         };
-        let files = [("key-file", "munge.key"), ("socket", "munge.socket"), ("pid-file", "munge.pid"), ("log-file", "munge.log"), ("seed-file", "munge.seed")];
+        let files = [
+            ("key-file", "munge.key"),
+            ("socket", "munge.socket"),
+            ("pid-file", "munge.pid"),
+            ("log-file", "munge.log"),
+            ("seed-file", "munge.seed"),
+        ];
         let files: Vec<String> = files.iter().map(|(option, name)| format!("--{option}={folder}/{name}")).collect();
         let munge = service("munged", &[&["--foreground"], &files.iter().map(String::as_str).collect::<Vec<_>>()[..]].concat());
         wait_for("munge", || work.path("munge.socket").exists().then_some(()));
@@ -130,7 +136,8 @@ fn an_array_of_slurm_whose_task_was_killed_is_submitted_again_and_merged() {
     assert_eq!(cluster.end_of(&shards), ["COMPLETED"; SHARDS]);
     work.assert_whole();
     // And as the tasks of one step.
-    let output = cluster.command("srun", &[&["-n", "2", "cohaptic"], &words()[..], &["--out", "again", "--shard", "auto"]].concat()).output().unwrap();
+    let output =
+        cluster.command("srun", &[&["-n", "2", "cohaptic"], &words()[..], &["--out", "again", "--shard", "auto"]].concat()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(said.contains("shard 1/2 in again") && said.contains("shard 2/2 in again"), "{said}");

@@ -75,7 +75,8 @@ fn while_anything_is_missing_a_merge_says_what_and_by_which_shard_it_is_done() {
         desk.text(&format!("{line} --out {out} --shard 2/4"));
         let before = desk.files(out);
         let refused = desk.cohaptic(&format!("{line} --merge {out}"));
-        let missing = format!("{out} is not whole: 6 of 8 {piece}s are missing, counted from 0: 0, 2 to 4, 6 to 7; of 4 shards, these do them: 1, 3 to 4");
+        let missing =
+            format!("{out} is not whole: 6 of 8 {piece}s are missing, counted from 0: 0, 2 to 4, 6 to 7; of 4 shards, these do them: 1, 3 to 4");
         refused.assert_refused(3, &[&missing, "Do them with --shard"]);
         assert_eq!(desk.files(out), before);
         let status = desk.text(&format!("{line} --status {out}"));

@@ -40,14 +40,7 @@ pub(super) fn shard<'a>(order: &Order, arguments: &BoundaryArguments, shard: Sha
     worker.end(done, |failure| failure)
 }
 
-fn look<'a>(
-    order: &Order,
-    arguments: &BoundaryArguments,
-    shard: Shard,
-    kept: Kept<'a>,
-    name: &str,
-    worker: &Worker,
-) -> Result<Done<'a>, Failure> {
+fn look<'a>(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept<'a>, name: &str, worker: &Worker) -> Result<Done<'a>, Failure> {
     let mine: Vec<(usize, (f64, bool))> = (0..).zip(samples(order, kept)?).filter(|(place, _)| shard.has(*place as u64)).collect();
     let wanted: Vec<(usize, f64)> = mine.iter().filter(|(_, (_, is_done))| !is_done).map(|(place, (value, _))| (*place, *value)).collect();
     let (file, _) = kept.open(Some(name))?;

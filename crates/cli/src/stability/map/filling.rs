@@ -234,7 +234,9 @@ fn interrupted(maps: &[Map], order: &Order, folder: Option<&Path>) -> Failure {
     let finished = maps.iter().flat_map(|map| &map.radius).filter(|row| !row.is_empty()).count();
     let all = order.grid.rows() * order.variants.len();
     let kept = match folder {
-        Some(folder) => format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(format!("{ROWS}{PARTIAL}")))),
+        Some(folder) => {
+            format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(format!("{ROWS}{PARTIAL}"))))
+        }
         None => "nothing is kept; with --out DIR finished rows are, and the same command goes on from there".to_owned(),
     };
     Failure::Interrupted(format!("{finished} of {} finished: {kept}", output::are(all, "row")))
