@@ -54,7 +54,7 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
         }
         Sharing::Status(out) => return sharing::status(arguments.scene.json, plan, out).map_err(|ended| ended.unwrap_or_else(refused)),
     }
-    let out = sharing.folder().unwrap_or(Path::new("."));
+    let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
     let report = pool(arguments.threads, || execute(sharing, out, plan.clone()))?.map_err(|ended| ended.unwrap_or_else(refused))?;
     let wall_s = start.elapsed().as_secs_f64();
@@ -123,9 +123,8 @@ impl Judge for Nobody {
 /// Begins or continues a campaign, and shows how far the check of its combinations is; or opens one whose runs shards have done.
 pub(crate) fn open(sharing: Sharing<'_>, plan: CampaignPlan, out: &Path) -> Result<Campaign, Ended> {
     if let Sharing::Merge(folder) = sharing {
-        return Campaign::open_whole(plan, folder).map_err(|error| match error {
-            CampaignError::Missing { path, missing } => Ended::Said(shard::missing(&path, &missing)),
-            error => Ended::Error(error),
+        return Campaign::open_whole(plan, folder).map_err(|error| {
+            if let CampaignError::Missing { path, missing } = &error { Ended::Said(shard::missing(path, missing)) } else { Ended::Error(error) }
         });
     }
     let checking = Shown::checking(plan.combinations());

@@ -49,11 +49,11 @@ fn work<'a>(
     let running = Shown::running(shared.campaign().runs() / shard.count(), 0);
     let report = shared.run(shard, &Working { shown: &running, worker });
     running.clear();
-    let report = report.map_err(|error| match error {
-        error @ CampaignError::File { .. } => Ended::Said(Failure::System(format!(
-            "{error}\nParts that are whole are kept: once that can be done, the same command goes on from there"
-        ))),
-        error => Ended::Error(error),
+    let report = report.map_err(|error| {
+        if !matches!(error, CampaignError::File { .. }) {
+            return Ended::Error(error);
+        }
+        Ended::Said(Failure::System(format!("{error}\nParts that are whole are kept: once that can be done, the same command goes on from there")))
     })?;
     if report.left > 0 {
         return Err(ended(&format!("all but {} of its {} runs", report.left, report.runs)));

@@ -59,7 +59,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
             return campaign::sharing::status(arguments.scene.json, plan, out).map_err(|error| error.unwrap_or_else(refused));
         }
     }
-    let out = sharing.folder().unwrap_or(Path::new("."));
+    let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
     let finished = campaign::pool(arguments.threads, || execute(arguments, sharing, out, plan))?;
     let mut finished = finished.map_err(|error| error.unwrap_or_else(refused))?;

@@ -6,7 +6,7 @@
 //!
 //! `measured.rs` writes `docs/measured-cluster.md`, when it is asked for.
 #![cfg(target_os = "linux")]
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run here says so")]
 
 mod dask;
