@@ -1,6 +1,4 @@
 #!/bin/sh
 # Puts the shards together: refused, with exit status 3, while anything is missing.
-#
 #SBATCH --job-name=merge
-. ./work.sh
-cohaptic $work --merge losses
+sh work.sh --merge losses

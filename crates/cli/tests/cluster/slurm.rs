@@ -73,7 +73,7 @@ impl<'a> Cluster<'a> {
         for name in ["array.sh", "merge.sh"] {
             work.bring(name);
         }
-        fs::write(work.path("work.sh"), format!("work='{}'\n", words().join(" ").replace(" --threads 1", ""))).unwrap();
+        fs::write(work.path("work.sh"), format!("cohaptic {} \"$@\"\n", words().join(" ").replace(" --threads 1", ""))).unwrap();
         Ok(cluster)
     }
 
