@@ -27,7 +27,7 @@ const NOT_YET: &str = "Not measured yet:";
 const OTHERS: &str = "## Written by other commands";
 
 /// Pages that need a quiet machine and privileges: what they say, and what writes them.
-const ALONE: [(&str, &str, &str); 3] = [
+const ALONE: [(&str, &str, &str); 4] = [
     (
         "measured-relay.md",
         "how late the relay and how fast",
@@ -42,6 +42,11 @@ const ALONE: [(&str, &str, &str); 3] = [
         "measured-soak.md",
         "an hour of both: memory, drift, lateness",
         "cargo run --release -p cohaptic-benches-realtime --bin soak -- 1h --out docs/measured-soak.md",
+    ),
+    (
+        "measured-cluster.md",
+        "the same campaign by shards, by GNU parallel, by Dask and by Slurm, and the merge",
+        "cargo test --release -p cohaptic-cli --test cluster -- --ignored",
     ),
 ];
 

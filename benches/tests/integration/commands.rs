@@ -6,6 +6,7 @@
 //! | `benches/measure` | run by `script.rs`, as the program that it starts |
 //! | `cohaptic …` | run by `crates/cli/tests/integration/measured.rs`, which is where that program can be had |
 //! | of `benches/realtime` | not run here: they wait by the wall clock, for an hour even. Package, program and arguments are looked up |
+//! | the ignored test of `crates/cli/tests/cluster` | not run here: it takes minutes, and schedulers. Its text is known |
 //! | of `benches/peers` | not run here: a workspace of its own with the crates of others, which CI does not build. Folder, programs and scripts are looked up |
 
 use std::process::Command;
@@ -27,6 +28,8 @@ enum Kind {
     Cohaptic,
     /// Programs of another package, by folder and name.
     Elsewhere(&'static str, Vec<String>),
+    /// An ignored test of the command line, which is where the program and schedulers can be had.
+    IgnoredTest,
 }
 
 /// `None` for a command that this test does not know.
@@ -36,6 +39,9 @@ fn kind(command: &str) -> Option<Kind> {
     }
     if command.starts_with("cohaptic ") {
         return Some(Kind::Cohaptic);
+    }
+    if command == "cargo test --release -p cohaptic-cli --test cluster -- --ignored" {
+        return Some(Kind::IgnoredTest);
     }
     if let Some(inside) = command.strip_prefix("cd benches/peers && ") {
         return peers(inside);
@@ -125,7 +131,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
                 // That the script starts this program is tested in script.rs.
                 Kind::Script => program == "measured-page",
                 Kind::Elsewhere(of, others) => *of == folder && others.contains(&program),
-                Kind::Cohaptic => false,
+                Kind::Cohaptic | Kind::IgnoredTest => false,
             });
             assert!(found, "{program} of {name} is on no page");
         }
@@ -134,7 +140,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
         let (folder, used) = match kind {
             Kind::Table { program, .. } => ("benches", std::slice::from_ref(program)),
             Kind::Elsewhere(folder, used) => (*folder, &used[..]),
-            Kind::Script | Kind::Cohaptic => continue,
+            Kind::Script | Kind::Cohaptic | Kind::IgnoredTest => continue,
         };
         assert!(used.iter().all(|program| programs(folder).contains(program)), "{command}");
     }
@@ -159,7 +165,7 @@ pub(crate) fn prints_its_page(path: &str, program: &str) {
     let all = all();
     let of_program = all.iter().find_map(|(_, _, kind)| match kind {
         Kind::Table { program: of, page, .. } if of == program => Some(page.clone()),
-        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Elsewhere(..) => None,
+        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Elsewhere(..) | Kind::IgnoredTest => None,
     });
     let page = of_program.unwrap_or_else(|| panic!("{program} is on no page"));
     let output = Command::new(path).arg("--smoke").output().unwrap();

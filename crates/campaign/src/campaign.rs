@@ -4,16 +4,17 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use cohaptic_files::write_whole;
+use cohaptic_files::{WholeFile, write_whole, write_whole_by};
 
 use crate::compare::{Comparison, MOST_NUMBERS_COMPARED, measured};
 use crate::error::CampaignError;
 use crate::folder::{Folder, Manifest};
 use crate::plan::{Accepted, CampaignPlan, Parts, Refused};
 use crate::report::{Report, Tally};
+use crate::shard::Missing;
 use crate::table::{Column, Head, Row, TableError, columns};
 use crate::verdicts::{Journal, Judge, Judgement, judge, read_whole, write_all};
-use crate::work::Work;
+use crate::work::{Keep, Work};
 
 /// What helps where the table is not as it was written.
 const TABLE_WAY_OUT: &str = "remove the folder, or choose another one";
@@ -21,12 +22,12 @@ const TABLE_WAY_OUT: &str = "remove the folder, or choose another one";
 /// A campaign in its folder, which no other process works on as long as this value lives.
 #[derive(Debug)]
 pub struct Campaign {
-    plan: CampaignPlan,
+    pub(crate) plan: CampaignPlan,
     manifest: Manifest,
-    accepted: Accepted,
-    parts: Parts,
+    pub(crate) accepted: Accepted,
+    pub(crate) parts: Parts,
     columns: Vec<Column>,
-    folder: Folder,
+    pub(crate) folder: Folder,
     /// One for each combination; none while they are not known, or not asked for.
     judgements: Arc<[Judgement]>,
 }
@@ -52,13 +53,45 @@ impl Campaign {
     /// [`CampaignError`] if a combination is refused, if the folder is no folder, has other files or another campaign in it, if another process works on it,
     /// or if it cannot be read or written.
     pub fn open(plan: CampaignPlan, folder: &Path, watch: &dyn Watch) -> Result<Self, CampaignError> {
+        let campaign = Self::open_in(plan, folder, None, watch)?;
+        campaign.folder.has_no_shards()?;
+        campaign.folder.sweep()?;
+        Ok(campaign)
+    }
+
+    /// [`Campaign::open`] of one whose runs are all done, by shards or otherwise, to put the table together.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Campaign::open`]; [`CampaignError::NoCampaign`] if the folder has none, [`CampaignError::Missing`] if parts of it are not done.
+    pub fn open_whole(plan: CampaignPlan, folder: &Path) -> Result<Self, CampaignError> {
+        if !Folder::has_campaign(folder)? {
+            return Err(CampaignError::NoCampaign { path: folder.to_path_buf() });
+        }
+        let campaign = Self::open_in(plan, folder, None, &NoWatch)?;
+        if !campaign.is_finished() {
+            let missing = campaign.missing(&|_| true)?;
+            if !missing.is_empty() {
+                let missing = Missing { piece: "part", count: campaign.parts.count(), pieces: missing };
+                return Err(CampaignError::Missing { path: folder.to_path_buf(), missing });
+            }
+        }
+        // A worker may still do what another one has done too, and is let to.
+        if campaign.folder.has_no_shards().is_ok() {
+            campaign.folder.sweep()?;
+        }
+        Ok(campaign)
+    }
+
+    /// Opens the campaign for this process alone, or for one of several workers.
+    pub(crate) fn open_in(plan: CampaignPlan, folder: &Path, worker: Option<&str>, watch: &dyn Watch) -> Result<Self, CampaignError> {
         let begun = Folder::has_campaign(folder)?;
         let new = if begun { None } else { Some(Self::new_manifest(&plan, watch)?) };
-        let folder = Folder::take(folder)?;
+        let folder = if worker.is_none() { Folder::take(folder)? } else { Folder::share(folder)? };
         let manifest = match new {
             // Unless somebody else began one meanwhile.
             Some(manifest) if !folder.manifest().exists() => {
-                if let Err(error) = manifest.write(&folder.manifest()) {
+                if let Err(error) = manifest.write(&folder.manifest(), worker) {
                     folder.give_up();
                     return Err(error);
                 }
@@ -66,11 +99,15 @@ impl Campaign {
             }
             Some(_) | None => Self::same_manifest(&plan, &folder)?,
         };
-        folder.sweep()?;
+        Ok(Self::of(plan, manifest, folder))
+    }
+
+    /// The campaign that a manifest in a folder says.
+    pub(crate) fn of(plan: CampaignPlan, manifest: Manifest, folder: Folder) -> Self {
         let accepted = manifest.accepted(&plan);
         let parts = manifest.parts(accepted.runs());
         let columns = columns(plan.variations(), plan.has_verdicts(), &manifest.roster);
-        Ok(Self { plan, manifest, accepted, parts, columns, folder, judgements: Arc::from([]) })
+        Self { plan, manifest, accepted, parts, columns, folder, judgements: Arc::from([]) }
     }
 
     fn new_manifest(plan: &CampaignPlan, watch: &dyn Watch) -> Result<Manifest, CampaignError> {
@@ -80,7 +117,7 @@ impl Campaign {
     }
 
     /// The manifest in the folder, which must be that of this plan.
-    fn same_manifest(plan: &CampaignPlan, folder: &Folder) -> Result<Manifest, CampaignError> {
+    pub(crate) fn same_manifest(plan: &CampaignPlan, folder: &Folder) -> Result<Manifest, CampaignError> {
         let manifest = Manifest::read(&folder.manifest())?;
         let mut differences = manifest.differences(plan);
         if differences.is_empty() && !manifest.has_fingerprint(plan.fingerprint()?) {
@@ -125,7 +162,15 @@ impl Campaign {
         if self.is_finished() {
             return self.runs();
         }
-        (0..self.parts.count()).filter(|part| self.has(*part)).map(|part| self.parts.len(part)).sum()
+        // In a folder that cannot be read nothing is known to be kept.
+        let kept = self.folder.parts(self.plan.format()).unwrap_or_default();
+        kept.into_iter().filter(|part| *part < self.parts.count()).map(|part| self.parts.len(part)).sum()
+    }
+
+    /// The wanted parts that are not there.
+    pub(crate) fn missing(&self, is_wanted: &dyn Fn(u64) -> bool) -> Result<Vec<u64>, CampaignError> {
+        let there = self.folder.parts(self.plan.format())?;
+        Ok((0..self.parts.count()).filter(|part| is_wanted(*part) && !there.contains(part)).collect())
     }
 
     /// Judges the combinations that are not judged yet, on all threads of the pool that it is called in. Each judgement is kept as soon as it is known.
@@ -165,29 +210,52 @@ impl Campaign {
 
     /// The judgements in the table of that name, which is made if it is not there; `Err` with how many are missing.
     fn judged(&self, path: &Path, by: &dyn Judge, watch: &dyn Watch) -> Result<Result<Vec<Judgement>, u64>, CampaignError> {
-        let journal = Folder::journal(path);
-        if let Some(judgements) = read_whole(path, &self.plan)? {
-            Folder::remove_journal(journal)?;
-            return Ok(Ok(judgements));
-        }
-        let combinations = self.plan.combinations();
-        let (mut file, known) = Journal::open(journal.clone(), combinations)?;
-        let mut judgements = vec![None; usize::try_from(combinations).unwrap_or_default()];
-        let refused = self.refused().iter().map(|(combination, reason)| (*combination, Judgement::Refused(reason.as_str().into())));
-        watch.judged((known.len() + self.refused().len()) as u64);
-        for (combination, judgement) in known.into_iter().chain(refused) {
-            judgements[usize::try_from(combination).unwrap_or_default()] = Some(judgement);
-        }
-        let judgements = judge(&self.plan, by, watch, &mut file, judgements)?;
+        let judgements = self.judge_some(path, None, &|_| true, by, watch)?;
         let missing = judgements.iter().filter(|judgement| judgement.is_none()).count() as u64;
         if missing > 0 {
             return Ok(Err(missing));
         }
         let judgements: Vec<Judgement> = judgements.into_iter().flatten().collect();
-        write_all(path, &self.plan, &judgements)?;
-        drop(file);
-        Folder::remove_journal(journal)?;
+        if !path.exists() {
+            write_all(path, &self.plan, &judgements)?;
+        }
+        self.folder.remove_journals(path)?;
         Ok(Ok(judgements))
+    }
+
+    /// The judgements that are known, by whichever worker, and then those of the wanted combinations; `None` where there is none.
+    pub(crate) fn judge_some(
+        &self,
+        path: &Path,
+        worker: Option<&str>,
+        is_wanted: &dyn Fn(u64) -> bool,
+        by: &dyn Judge,
+        watch: &dyn Watch,
+    ) -> Result<Vec<Option<Judgement>>, CampaignError> {
+        if let Some(judgements) = read_whole(path, &self.plan)? {
+            return Ok(judgements.into_iter().map(Some).collect());
+        }
+        let combinations = self.plan.combinations();
+        let mut judgements = vec![None; usize::try_from(combinations).unwrap_or_default()];
+        let refused = self.refused().iter().map(|(combination, reason)| (*combination, Judgement::Refused(reason.as_str().into())));
+        let mut known = refused.collect::<Vec<_>>();
+        for journal in self.folder.journals(path)? {
+            known.extend(Journal::read(&journal, combinations)?.0);
+        }
+        for (combination, judgement) in known {
+            judgements[usize::try_from(combination).unwrap_or_default()] = Some(judgement);
+        }
+        watch.judged(judgements.iter().flatten().count() as u64);
+        let missing: Vec<u64> = (0..)
+            .zip(&judgements)
+            .filter(|(combination, known)| known.is_none() && is_wanted(*combination))
+            .map(|(combination, _)| combination)
+            .collect();
+        if missing.is_empty() {
+            return Ok(judgements);
+        }
+        let (mut file, _) = Journal::open(Folder::journal(path, worker), combinations)?;
+        judge(&self.plan, by, watch, &mut file, &missing, judgements)
     }
 
     /// Does the runs that are missing, on all threads of the pool that it is called in, and puts the table together. A campaign that is finished is left as
@@ -203,18 +271,8 @@ impl Campaign {
         }
         let mut computed = 0;
         if !self.is_finished() {
-            let missing: Vec<u64> = (0..self.parts.count()).filter(|part| !self.has(*part)).collect();
-            let keep = |part: u64, rows: &[Row]| self.keep(part, rows);
-            let work = Work {
-                plan: &self.plan,
-                roster: &self.manifest.roster,
-                judgements: &self.judgements,
-                accepted: &self.accepted,
-                parts: self.parts,
-                watch,
-                keep: &keep,
-            };
-            computed = work.run(&missing)?;
+            let missing = self.missing(&|_| true)?;
+            computed = self.compute(&missing, &self.judgements, &|part, rows| self.keep(part, rows), watch)?;
             let kept = self.kept();
             if kept < self.runs() {
                 return Ok(Outcome::Interrupted { kept });
@@ -223,7 +281,14 @@ impl Campaign {
         }
         let report = self.report(computed)?;
         self.folder.remove_parts(self.parts.count(), self.plan.format())?;
+        self.folder.remove_traces_of_shards()?;
         Ok(Outcome::Finished(report))
+    }
+
+    /// Does these parts, and gives how many runs have been put away.
+    pub(crate) fn compute(&self, parts: &[u64], judgements: &[Judgement], keep: &Keep<'_>, watch: &dyn Watch) -> Result<u64, CampaignError> {
+        let (plan, roster, accepted) = (&self.plan, &self.manifest.roster, &self.accepted);
+        Work { plan, roster, judgements, accepted, parts: self.parts, watch, keep }.run(parts)
     }
 
     /// Compares the values of the first key, which are [`Strategies`](crate::Strategies), by the table of a finished campaign.
@@ -249,19 +314,28 @@ impl Campaign {
         Ok(Comparison::of(&self.plan, &self.accepted, self.refused(), measures, &columns))
     }
 
-    fn has(&self, part: u64) -> bool {
-        self.folder.part(part, self.plan.format()).exists()
-    }
-
     fn head<'a>(&'a self, about: &'a str) -> Head<'a> {
         Head { columns: &self.columns, about, program: self.plan.program() }
     }
 
     fn keep(&self, part: u64, rows: &[Row]) -> Result<(), CampaignError> {
         let path = self.folder.part(part, self.plan.format());
-        let about = self.manifest.text();
-        let written = write_whole(&path, |file| self.plan.format().write(file, self.head(&about), rows));
+        let written = write_whole(&path, |file| self.write_part(file, rows));
         written.map_err(|error| unwritten(&path, error))
+    }
+
+    /// [`Campaign::keep`] by one of several workers, who leaves alone a part that another one has put away: it is the same.
+    pub(crate) fn keep_by(&self, worker: &str, part: u64, rows: &[Row]) -> Result<(), CampaignError> {
+        let path = self.folder.part(part, self.plan.format());
+        if path.exists() {
+            return Ok(());
+        }
+        let written = write_whole_by(&path, worker, |file| self.write_part(file, rows));
+        written.map_err(|error| unwritten(&path, error))
+    }
+
+    fn write_part(&self, file: &mut WholeFile, rows: &[Row]) -> Result<(), TableError> {
+        self.plan.format().write(file, self.head(&self.manifest.text()), rows)
     }
 
     fn merge(&self) -> Result<(), CampaignError> {
@@ -334,6 +408,9 @@ pub trait Watch: Sync {
 
     /// This number of runs was done since the last call.
     fn ran(&self, _runs: u64) {}
+
+    /// A part was put away, which has this number of runs.
+    fn kept(&self, _part: u64, _runs: u64) {}
 }
 
 /// Nobody looks on.

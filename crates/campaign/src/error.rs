@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use cohaptic_scene::SceneError;
 
+use crate::shard::Missing;
 use crate::vary::VaryError;
 
 /// Why there is no campaign, or why it ended.
@@ -84,6 +85,35 @@ pub enum CampaignError {
         /// The folder.
         path: PathBuf,
     },
+    /// Workers do shards of the campaign in the folder.
+    #[error(
+        "{worker} works on the campaign in {}, {shard}, and renewed that {age_s} s ago: expected no worker there; wait for the shards and merge them, or choose another folder",
+        path.display()
+    )]
+    Shards {
+        /// The folder.
+        path: PathBuf,
+        /// One of the workers.
+        worker: String,
+        /// Its shard.
+        shard: String,
+        /// How long ago it renewed its lock \[s\].
+        age_s: u64,
+    },
+    /// The folder holds no campaign.
+    #[error("{} holds no campaign: expected the folder in which shards of it were done", path.display())]
+    NoCampaign {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Parts of the campaign are not done, so there is no table.
+    #[error("{} is not whole: {missing}", path.display())]
+    Missing {
+        /// The folder.
+        path: PathBuf,
+        /// What is missing.
+        missing: Missing,
+    },
     /// A file cannot be read or written. Finished parts are kept.
     #[error("cannot {verb} {}: {error}", path.display())]
     File {
@@ -107,7 +137,7 @@ impl CampaignError {
     #[must_use]
     pub fn is_io(&self) -> bool {
         match self {
-            Self::File { .. } | Self::Busy { .. } | Self::Damaged { .. } => true,
+            Self::File { .. } | Self::Busy { .. } | Self::Shards { .. } | Self::Missing { .. } | Self::Damaged { .. } => true,
             Self::Scene { error, .. } => error.is_io(),
             Self::Vary(_)
             | Self::SameKey { .. }
@@ -115,6 +145,7 @@ impl CampaignError {
             | Self::Seeds { .. }
             | Self::NotRun { .. }
             | Self::NoFolder { .. }
+            | Self::NoCampaign { .. }
             | Self::Foreign { .. }
             | Self::Other { .. }
             | Self::NotJudged

@@ -14,6 +14,9 @@
 //! A campaign over [`Strategies`] is [compared](Campaign::compare): the mean of every measure for each strategy, its difference to the first one seed by seed, and
 //! intervals of both. Combinations that a strategy refuses are [left out](CampaignPlan::leaving_out), and known before anything runs.
 //!
+//! A [`Shard`] of a campaign is done in the same folder by each of several processes, on any machines that share it ([`SharedCampaign`]);
+//! [`Campaign::open_whole`] then puts the table together, to the same bytes.
+//!
 //! Nothing here is printed and no clock is read.
 //!
 //! ```
@@ -41,6 +44,8 @@ mod error;
 mod folder;
 mod plan;
 mod report;
+mod shard;
+mod shared;
 mod spread;
 mod table;
 mod vary;
@@ -52,6 +57,8 @@ pub use compare::{Cell, Comparison, Estimate, Figures, MOST_NUMBERS_COMPARED, Me
 pub use error::CampaignError;
 pub use plan::{CampaignPlan, MOST_COMBINATIONS, MOST_RUNS, PlanSpec, Refused};
 pub use report::{CombinationReport, MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles, Report};
+pub use shard::{Missing, Shard, ShardError, is_log, worker_log};
+pub use shared::{PartState, ShardReport, SharedCampaign};
 pub use spread::SpreadCampaign;
 pub use table::{Column, Format, Kind, Row, Value};
 pub use vary::{MOST_VALUES, Variation, VaryError, split_at_commas};

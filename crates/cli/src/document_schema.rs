@@ -16,6 +16,8 @@ impl DocumentSchema {
     pub(crate) const CHECK: Self = Self { name: "cohaptic/check", version: 1 };
     pub(crate) const EXPLAIN: Self = Self { name: "cohaptic/explain", version: 1 };
     pub(crate) const CAMPAIGN: Self = Self { name: "cohaptic/campaign", version: 1 };
+    pub(crate) const SHARD: Self = Self { name: "cohaptic/shard", version: 1 };
+    pub(crate) const STATUS: Self = Self { name: "cohaptic/status", version: 1 };
     pub(crate) const COMPARE: Self = Self { name: "cohaptic/compare", version: 1 };
     pub(crate) const STABILITY_POINT: Self = Self { name: "cohaptic/stability-point", version: 1 };
     pub(crate) const STABILITY_MAP: Self = Self { name: "cohaptic/stability-map", version: 1 };

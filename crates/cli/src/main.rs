@@ -44,6 +44,7 @@ mod report;
 #[cfg(target_os = "linux")]
 mod router;
 mod run;
+mod shard;
 mod shell;
 mod stability;
 mod terminal_plot;

@@ -1,6 +1,7 @@
-//! Files: read up to a limit, and written as a whole.
+//! Files: read up to a limit, written as a whole, and shared by processes on several machines.
 //!
-//! You need it if your program reads files that may be too long, or must never leave half a file under its name.
+//! You need it if your program reads files that may be too long, must never leave half a file under its name, or shares a folder with processes elsewhere
+//! ([`Lease`]).
 //!
 //! A regular file that is longer than the limit is refused before it is read. A pipe or a device has no length and is read up to the limit. A file that is
 //! written has its name only when it is whole ([`WholeFile`]).
@@ -14,13 +15,15 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
+mod lease;
 mod whole;
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-pub use whole::{PARTIAL, WholeFile, partial_name, write_whole};
+pub use lease::{BEAT, Holder, Lease, Owner, STALE, Taking, leases};
+pub use whole::{PARTIAL, WholeFile, partial_name, write_whole, write_whole_by};
 
 /// The most bytes of a file that is read as a whole, 256 MiB: a scene, a trace, a replay, recorded motion, a table of a distribution, inputs,
 /// measurements, weights.

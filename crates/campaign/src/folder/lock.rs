@@ -17,6 +17,26 @@ impl Lock {
     pub(super) fn take(path: &Path) -> io::Result<Option<Self>> {
         Ok(locked(path)?.map(|file| Self { path: path.to_path_buf(), file: Some(file) }))
     }
+
+    /// Whether another process has it. Nothing is written; where the file system has no locks, none is held.
+    pub(super) fn is_held(path: &Path) -> bool {
+        match File::open(path) {
+            Ok(file) => is_locked(&file),
+            // On Windows the file is open for its process alone.
+            Err(error) => cfg!(windows) && error.kind() != io::ErrorKind::NotFound,
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_locked(file: &File) -> bool {
+    use rustix::fs::{FlockOperation, flock};
+    flock(file, FlockOperation::NonBlockingLockShared) == Err(rustix::io::Errno::WOULDBLOCK)
+}
+
+#[cfg(windows)]
+fn is_locked(_: &File) -> bool {
+    false
 }
 
 /// The file, open and locked; `None` if another process has locked it.
@@ -80,8 +100,9 @@ mod tests {
     fn the_second_is_refused_until_the_first_is_gone() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lock");
+        assert!(!Lock::is_held(&path));
         let first = Lock::take(&path).unwrap().unwrap();
-        assert!(Lock::take(&path).unwrap().is_none());
+        assert!(Lock::take(&path).unwrap().is_none() && Lock::is_held(&path));
         drop(first);
         assert!(!path.exists());
         // One that a killed process left is no hindrance.

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use cohaptic_files::write_whole;
+use cohaptic_files::{WholeFile, write_whole, write_whole_by};
 use serde::{Deserialize, Serialize};
 
 use crate::error::CampaignError;
@@ -77,9 +77,14 @@ impl Manifest {
         Ok(manifest)
     }
 
-    pub(crate) fn write(&self, path: &Path) -> Result<(), CampaignError> {
+    /// Writes the file, which other workers may be writing too if this is one of them.
+    pub(crate) fn write(&self, path: &Path, worker: Option<&str>) -> Result<(), CampaignError> {
         let text = self.text();
-        let written = write_whole(path, |file| file.write_all(text.as_bytes()));
+        let write = |file: &mut WholeFile| file.write_all(text.as_bytes());
+        let written = match worker {
+            None => write_whole(path, write),
+            Some(worker) => write_whole_by(path, worker, write),
+        };
         written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
     }
 

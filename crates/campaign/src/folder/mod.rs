@@ -1,7 +1,7 @@
 //! The folder of a campaign: which files there are, and in which order they come and go.
 //!
 //! ```text
-//! campaign.lock            as long as somebody works on it
+//! campaign.lock            as long as one process works on it alone
 //! campaign.json            what the campaign is; the first file with its own name
 //! verdicts.part.csv        judgements, as long as not all are known
 //! verdicts.csv             all judgements
@@ -10,15 +10,28 @@
 //! part-00000.parquet …     whole parts
 //! runs.parquet             the table; the parts go when it is there
 //! ```
+//!
+//! Workers that do shards of it at the same time, on any machines, have files of their own besides, and no two of them write the same file:
+//!
+//! ```text
+//! shard-3-of-8.lock                      as long as a worker works on that shard
+//! worker-WORKER.log                      what it did
+//! verdicts.WORKER.part.csv               judgements that it made
+//! part-00000.parquet.WORKER.partial …    what it is writing
+//! ```
 
 mod lock;
 mod manifest;
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use cohaptic_files::{Owner, PARTIAL};
+
 use crate::error::CampaignError;
+use crate::shard::{Shard, is_lease, is_log};
 use crate::table::Format;
 
 pub(crate) use manifest::Manifest;
@@ -27,12 +40,15 @@ use lock::Lock;
 
 const MANIFEST: &str = "campaign.json";
 const LOCK: &str = "campaign.lock";
+/// How the names of files of judgements end as they are made.
+const JOURNAL: &str = "part.csv";
 
-/// A folder that this process alone works on, as long as this value lives.
+/// A folder that this process works on, as long as this value lives.
 #[derive(Debug)]
 pub(crate) struct Folder {
     path: PathBuf,
-    lock: Lock,
+    /// As long as it works there alone; `None` if workers share the folder.
+    lock: Option<Lock>,
     /// Whether it was made for this campaign.
     is_new: bool,
 }
@@ -59,7 +75,7 @@ impl Folder {
                 return Ok(true);
             }
             // What a campaign leaves that was killed before it had a manifest.
-            if name != LOCK && name != cohaptic_files::partial_name(MANIFEST.as_ref()) {
+            if name != LOCK && !is_partial(Path::new(&name)) && !is_of_shards(&name) {
                 others.insert(name);
             }
         }
@@ -75,10 +91,32 @@ impl Folder {
         std::fs::create_dir_all(path).map_err(|error| CampaignError::File { verb: "make the folder", path: path.to_path_buf(), error })?;
         let file = path.join(LOCK);
         match Lock::take(&file) {
-            Ok(Some(lock)) => Ok(Self { path: path.to_path_buf(), lock, is_new }),
+            Ok(Some(lock)) => Ok(Self { path: path.to_path_buf(), lock: Some(lock), is_new }),
             Ok(None) => Err(CampaignError::Busy { path: path.to_path_buf() }),
             Err(error) => Err(CampaignError::File { verb: "lock", path: file, error }),
         }
+    }
+
+    /// Makes the folder if there is none, for work that other processes do at the same time.
+    pub(crate) fn share(path: &Path) -> Result<Self, CampaignError> {
+        let is_new = !path.exists();
+        std::fs::create_dir_all(path).map_err(|error| CampaignError::File { verb: "make the folder", path: path.to_path_buf(), error })?;
+        Ok(Self { path: path.to_path_buf(), lock: None, is_new })
+    }
+
+    /// That no process works on the folder alone, as far as this machine and its file system know.
+    pub(crate) fn is_shared(&self) -> Result<(), CampaignError> {
+        if Lock::is_held(&self.path.join(LOCK)) { Err(CampaignError::Busy { path: self.path.clone() }) } else { Ok(()) }
+    }
+
+    /// That no worker does a shard here.
+    pub(crate) fn has_no_shards(&self) -> Result<(), CampaignError> {
+        let held = cohaptic_files::leases(&self.path, &Owner::here(0), is_lease);
+        let held = held.map_err(|error| CampaignError::File { verb: "read", path: self.path.clone(), error })?;
+        let Some((lease, holder)) = held.into_iter().find(|(_, holder)| !holder.is_stale()) else { return Ok(()) };
+        let shard = Shard::of_lease(&lease).map_or(lease, |shard| format!("shard {shard}"));
+        let worker = holder.owner.map_or_else(|| "a process".to_owned(), |owner| owner.to_string());
+        Err(CampaignError::Shards { path: self.path.clone(), worker, shard, age_s: holder.age.as_secs() })
     }
 
     /// Leaves nothing behind where nothing could be written.
@@ -115,9 +153,36 @@ impl Folder {
         self.path.join("stability.csv")
     }
 
-    /// The file of judgements as they are made, before they are all in the table of that name.
-    pub(crate) fn journal(judgements: &Path) -> PathBuf {
-        judgements.with_extension("part.csv")
+    /// The file of judgements as they are made, before they are all in the table of that name: each worker has its own.
+    pub(crate) fn journal(judgements: &Path, worker: Option<&str>) -> PathBuf {
+        match worker {
+            None => judgements.with_extension(JOURNAL),
+            Some(worker) => judgements.with_extension(format!("{worker}.{JOURNAL}")),
+        }
+    }
+
+    /// All such files.
+    pub(crate) fn journals(&self, judgements: &Path) -> Result<Vec<PathBuf>, CampaignError> {
+        let begin = judgements.file_stem().map(|stem| format!("{}.", stem.to_string_lossy())).unwrap_or_default();
+        self.named(|name| name.starts_with(&begin) && name.ends_with(&format!(".{JOURNAL}")))
+    }
+
+    /// Which parts are there.
+    pub(crate) fn parts(&self, format: Format) -> Result<BTreeSet<u64>, CampaignError> {
+        let number = |path: &PathBuf| path.file_name()?.to_str()?.strip_prefix("part-")?.strip_suffix(&format!(".{}", format.name()))?.parse().ok();
+        Ok(self.named(|name| name.starts_with("part-"))?.iter().filter_map(number).collect())
+    }
+
+    /// The files with such names, sorted.
+    fn named(&self, is_meant: impl Fn(&str) -> bool) -> Result<Vec<PathBuf>, CampaignError> {
+        let unreadable = |error| CampaignError::File { verb: "read", path: self.path.clone(), error };
+        let mut found = Vec::new();
+        for entry in std::fs::read_dir(&self.path).map_err(unreadable)? {
+            let name = entry.map_err(unreadable)?.file_name();
+            found.extend(name.to_str().filter(|name| is_meant(name)).map(|name| self.path.join(name)));
+        }
+        found.sort_unstable();
+        Ok(found)
     }
 
     pub(crate) fn part(&self, part: u64, format: Format) -> PathBuf {
@@ -126,19 +191,20 @@ impl Folder {
 
     /// Removes what was being written when a campaign was killed.
     pub(crate) fn sweep(&self) -> Result<(), CampaignError> {
-        let unreadable = |error| CampaignError::File { verb: "read", path: self.path.clone(), error };
-        for entry in std::fs::read_dir(&self.path).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
-            if is_partial(&path) {
-                std::fs::remove_file(&path).map_err(|error| CampaignError::File { verb: "remove", path, error })?;
-            }
-        }
-        Ok(())
+        self.named(|name| is_partial(Path::new(name)))?.into_iter().try_for_each(remove)
     }
 
     /// Removes the judgements as they were made, which are all in their table.
-    pub(crate) fn remove_journal(journal: PathBuf) -> Result<(), CampaignError> {
-        remove(journal)
+    pub(crate) fn remove_journals(&self, judgements: &Path) -> Result<(), CampaignError> {
+        self.journals(judgements)?.into_iter().try_for_each(remove)
+    }
+
+    /// Removes what workers leave that are at work no more.
+    pub(crate) fn remove_traces_of_shards(&self) -> Result<(), CampaignError> {
+        if self.has_no_shards().is_err() {
+            return Ok(());
+        }
+        self.named(|name| is_of_shards(name.as_ref()))?.into_iter().try_for_each(remove)
     }
 
     /// Removes the parts, which are all in the table.
@@ -152,8 +218,14 @@ impl Folder {
 
 /// Whether a file of a campaign was being written: `campaign.json.partial`, `part-….partial`, `runs.….partial`, `verdicts.csv.partial`.
 fn is_partial(path: &Path) -> bool {
+    const BEGINS: [&str; 7] = ["campaign.", "part-", "runs.", "verdicts.", "stability.", "shard-", "leases."];
     let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-    name.ends_with(cohaptic_files::PARTIAL) && ["campaign.", "part-", "runs.", "verdicts.", "stability."].iter().any(|begin| name.starts_with(begin))
+    name.ends_with(PARTIAL) && BEGINS.iter().any(|begin| name.starts_with(begin))
+}
+
+/// Whether a file says what a worker does or did.
+fn is_of_shards(name: &OsStr) -> bool {
+    name.to_str().is_some_and(|name| is_lease(name) || is_log(name))
 }
 
 /// Removes a file if it is there.
@@ -175,6 +247,7 @@ mod tests {
             ("a/part-00012.parquet.partial", true),
             ("runs.csv.partial", true),
             ("campaign.json.partial", true),
+            ("a/part-00012.csv.node-7-1f.partial", true),
             ("part-00012.parquet", false),
             ("thesis.partial", false),
         ] {

@@ -25,16 +25,12 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal, or begins one, and gives what it holds.
-    pub(crate) fn open(path: PathBuf, combinations: u64) -> Result<(Self, Vec<(u64, Judgement)>), CampaignError> {
-        let failed = |verb: &'static str| {
-            let path = path.clone();
-            move |error: io::Error| CampaignError::File { verb, path, error }
-        };
-        let bytes = match fs::read(&path) {
+    /// What a journal holds, and how many bytes that is; nothing if there is none.
+    pub(crate) fn read(path: &Path, combinations: u64) -> Result<(Vec<(u64, Judgement)>, u64), CampaignError> {
+        let bytes = match fs::read(path) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(failed("read")(error)),
+            Err(error) => return Err(CampaignError::File { verb: "read", path: path.to_path_buf(), error }),
         };
         let (mut known, mut whole, mut words) = (Vec::new(), 0, Words::default());
         for line in bytes.split_inclusive(|byte| *byte == b'\n') {
@@ -42,13 +38,19 @@ impl Journal {
             known.push((combination, words.all(judgement)));
             whole += line.len() as u64;
         }
+        Ok((known, whole))
+    }
+
+    /// Opens the journal, or begins one, and gives what it holds.
+    pub(crate) fn open(path: PathBuf, combinations: u64) -> Result<(Self, Vec<(u64, Judgement)>), CampaignError> {
+        let (known, whole) = Self::read(&path, combinations)?;
         let open = || {
             let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(&path)?;
             file.set_len(whole)?;
             file.seek(SeekFrom::End(0))?;
             Ok(file)
         };
-        let file = open().map_err(failed("write"))?;
+        let file = open().map_err(|error| CampaignError::File { verb: "write", path: path.clone(), error })?;
         Ok((Self { path, file }, known))
     }
 

@@ -84,16 +84,16 @@ struct Shared<'a> {
     failed: Option<CampaignError>,
 }
 
-/// Judges the combinations without a judgement, and writes each judgement into the journal as soon as it is known. Each has its place, so the number of threads changes nothing.
+/// Judges these combinations, and writes each judgement into the journal as soon as it is known. Each has its place, so the number of threads changes nothing.
 /// Stops where the watch or the judge ends it; missing judgements are then `None`.
 pub(crate) fn judge(
     plan: &CampaignPlan,
     judge: &dyn Judge,
     watch: &dyn Watch,
     journal: &mut Journal,
+    missing: &[u64],
     judgements: Vec<Option<Judgement>>,
 ) -> Result<Vec<Option<Judgement>>, CampaignError> {
-    let missing: Vec<u64> = (0..).zip(&judgements).filter(|(_, known)| known.is_none()).map(|(combination, _)| combination).collect();
     let (next, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
     let shared = Mutex::new(Shared { journal, judgements, words: Words::default(), failed: None });
     let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use cohaptic_campaign::{Campaign, CampaignError, CampaignPlan, Format, NoWatch, Outcome, PlanSpec, Report, Variation, Watch};
+use cohaptic_campaign::{
+    Campaign, CampaignError, CampaignPlan, Format, NoWatch, Outcome, PlanSpec, Report, Shard, ShardReport, SharedCampaign, Variation, Watch,
+};
 use tempfile::TempDir;
 
 /// Two users for 40 ticks over links that lose and delay at random.
@@ -86,6 +88,17 @@ impl Bench {
     pub(crate) fn outcome(&self, folder: &str, threads: usize, watch: &dyn Watch) -> Result<Outcome, CampaignError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| Campaign::open(self.plan()?, &self.path(folder), watch)?.run(watch))
+    }
+
+    /// Does a shard of it with so many threads, as a worker of that name.
+    pub(crate) fn shard(&self, folder: &str, shard: Shard, worker: &str, threads: usize, watch: &dyn Watch) -> Result<ShardReport, CampaignError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| SharedCampaign::open(self.plan()?, &self.path(folder), worker, watch)?.run(shard, watch))
+    }
+
+    /// Puts the shards together.
+    pub(crate) fn merge(&self, folder: &str) -> Result<Report, CampaignError> {
+        Ok(finished(Campaign::open_whole(self.plan()?, &self.path(folder))?.run(&NoWatch)?))
     }
 
     /// Runs it to its end.

@@ -6,6 +6,7 @@ mod bench;
 mod compare;
 mod folders;
 mod resume;
+mod shards;
 mod spread;
 mod tables;
 mod verdicts;

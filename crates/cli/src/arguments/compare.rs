@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::examples::{self, after};
 use super::numbers::{any_integer, integer, threads};
-use super::{SceneArguments, TableFormat};
+use super::{SceneArguments, ShardArguments, TableFormat};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::COMPARE))]
@@ -28,8 +28,10 @@ pub(crate) struct CompareArguments {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 10, hide_default_value = true)]
     pub(crate) runs: u64,
     /// The folder of the comparison: the table of runs as campaign writes it, verdicts, compare.csv and compare.html. The same command goes on from there
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["merge", "status"])]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) shards: ShardArguments,
     /// As what the table of runs is written
     #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
     pub(crate) format: TableFormat,

@@ -44,6 +44,7 @@ pub(super) const CAMPAIGN: &[&str] = &[
     "cohaptic campaign scene.toml --vary link.delay=8ms..48ms/6 --runs 100 --out delays",
     "cohaptic campaign scene.toml --vary coordination.stiffness=10..1000/5:log --out gains",
     "cohaptic campaign scene.toml --vary link.loss=0%..30%/7 --verdicts --size one-column --out losses",
+    "cohaptic campaign scene.toml --runs 100000 --out many --shard 3/8",
 ];
 
 pub(super) const COMPARE: &[&str] = &[

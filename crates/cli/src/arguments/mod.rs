@@ -9,6 +9,7 @@ mod pages;
 mod paper;
 mod realtime;
 mod scenes;
+mod shards;
 mod stability;
 #[cfg(test)]
 mod tests;
@@ -27,6 +28,7 @@ pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArgumen
 pub(crate) use paper::{AccuracyArguments, PaperArguments};
 pub(crate) use realtime::{LiveArguments, RealTimeArguments, RelayArguments, RouterArguments};
 pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments, TableFormat};
+pub(crate) use shards::{ShardArguments, ShardName};
 pub(crate) use stability::{
     AdmittanceArguments, BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, RestName, StabilityArguments, StabilityCommand,
 };

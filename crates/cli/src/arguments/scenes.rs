@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::examples::{self, after};
 use super::numbers::{any_integer, integer, threads};
-use super::{Overrides, PictureArguments, SceneArguments};
+use super::{Overrides, PictureArguments, SceneArguments, ShardArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::RUN))]
@@ -92,8 +92,10 @@ pub(crate) struct CampaignArguments {
     #[command(flatten)]
     pub(crate) measure: MeasureArguments,
     /// The folder of the campaign: the table, and until that is there the parts. The same command goes on from there
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["merge", "status"])]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) shards: ShardArguments,
     /// Judge each combination as stability point does, and write the verdict into the rows of its runs
     #[arg(long)]
     pub(crate) verdicts: bool,

@@ -9,7 +9,7 @@ use cohaptic_stability::{Method, PushedAxis};
 
 use super::examples::{self, after};
 use super::numbers::{any_integer, integer, real, some, threads};
-use super::{PictureArguments, SceneArguments};
+use super::{PictureArguments, SceneArguments, ShardArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::STABILITY))]
@@ -174,6 +174,8 @@ pub(crate) struct MapArguments {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
+    pub(crate) shards: ShardArguments,
+    #[command(flatten)]
     pub(crate) pictures: PictureArguments,
     /// How many cells are computed at the same time [default: one a core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
@@ -200,6 +202,8 @@ pub(crate) struct BoundaryArguments {
     /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep the finished part there if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) shards: ShardArguments,
     #[command(flatten)]
     pub(crate) pictures: PictureArguments,
 }

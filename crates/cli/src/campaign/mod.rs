@@ -3,20 +3,24 @@
 mod answer;
 mod judge;
 pub(crate) mod picture;
+pub(crate) mod sharing;
 
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_campaign::{Campaign, CampaignError, CampaignPlan, Format, Outcome, PlanSpec, Report, Variation, Watch};
-use cohaptic_scene::Diagnostic;
+use cohaptic_campaign::{
+    Campaign, CampaignError, CampaignPlan, Format, Judge, Judgement, Outcome, PlanSpec, Report, SharedCampaign, Variation, Watch,
+};
+use cohaptic_scene::{Diagnostic, Scene};
 
 use crate::arguments::{CampaignArguments, TableFormat};
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::{input, interrupt, output};
+use crate::shard::Sharing;
+use crate::{input, interrupt, output, shard};
 use judge::ByAnalysis;
 use picture::Drawn;
 
@@ -36,33 +40,44 @@ struct Finished {
     files: Vec<PathBuf>,
 }
 
-/// Does the runs that are missing, and says what came out.
+/// Does the runs that are missing, all or those of a shard, and says what came out.
 pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failure> {
+    let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
     let plan = plan(arguments)?;
-    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let refused = |error: CampaignError| failure(error, &arguments.scene.scene, &[]);
+    match sharing {
+        Sharing::Whole(_) | Sharing::Merge(_) => {}
+        Sharing::Shard(shard, out) => {
+            let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge(shard, &ByAnalysis, watch);
+            let done = pool(arguments.threads, || sharing::shard(plan, shard, out, judge))?;
+            return shard::answer(arguments.scene.json, &done.map_err(|ended| ended.unwrap_or_else(refused))?);
+        }
+        Sharing::Status(out) => return sharing::status(arguments.scene.json, plan, out).map_err(|ended| ended.unwrap_or_else(refused)),
+    }
+    let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
-    let report = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| execute(arguments, plan.clone()))?,
-        Err(error) => return Err(Failure::System(format!("--threads {threads}: {error}"))),
-    };
+    let report = pool(arguments.threads, || execute(sharing, out, plan.clone()))?.map_err(|ended| ended.unwrap_or_else(refused))?;
     let wall_s = start.elapsed().as_secs_f64();
     let title = plan.scene(0).map_or_else(|_| output::path(input::named(&arguments.scene.scene)), |scene| scene.title);
     let notes = judge::notes(&report);
     let files = std::iter::once(report.file.clone()).chain(report.verdicts.clone()).collect();
     let mut finished = Finished { plan, title, report, wall_s, notes, files };
     if !arguments.no_plot {
-        let Drawn { files, notes } = picture::write(&finished, &arguments.out, arguments.pictures.size())?;
+        let Drawn { files, notes } = picture::write(&finished, out, arguments.pictures.size())?;
         finished.files.extend(files);
         finished.notes.extend(notes);
     }
-    output::answer(
-        arguments.scene.json,
-        DocumentSchema::CAMPAIGN,
-        &answer::of(&finished, &arguments.out),
-        || answer::describe(&finished),
-        &finished.files,
-    )?;
+    output::answer(arguments.scene.json, DocumentSchema::CAMPAIGN, &answer::of(&finished, out), || answer::describe(&finished), &finished.files)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Does something on a pool of threads of its own.
+pub(crate) fn pool<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+    let threads = usize::from(threads.unwrap_or(0));
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => Ok(pool.install(work)),
+        Err(error) => Err(Failure::System(format!("--threads {threads}: {error}"))),
+    }
 }
 
 fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
@@ -82,31 +97,51 @@ fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
     Ok(if arguments.verdicts { plan.with_verdicts() } else { plan })
 }
 
-fn execute(arguments: &CampaignArguments, plan: CampaignPlan) -> Result<Report, Failure> {
-    let refused = |error: CampaignError| failure(error, &arguments.scene.scene, &[]);
+fn execute(sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<Report, Ended> {
     let combinations = plan.combinations();
-    let mut campaign = open(plan, &arguments.out).map_err(refused)?;
+    let mut campaign = open(sharing, plan, out)?;
     let judging = Shown::judging(combinations);
-    let missing = campaign.judge(&ByAnalysis, &judging);
+    let by: &dyn Judge = if matches!(sharing, Sharing::Merge(_)) { &Nobody } else { &ByAnalysis };
+    let missing = campaign.judge(by, &judging);
     judging.clear();
-    let missing = missing.map_err(refused)?;
+    let missing = missing.map_err(Ended::Error)?;
     if missing > 0 {
-        return Err(not_all_judged(combinations - missing, combinations, &arguments.out));
+        return Err(Ended::Said(not_all_judged(sharing, combinations - missing, combinations, out)));
     }
-    run_to_end(&mut campaign, &arguments.out).map_err(|ended| ended.unwrap_or_else(refused))
+    run_to_end(&mut campaign, out)
 }
 
-/// Begins or continues a campaign, and shows how far the check of its combinations is.
-pub(crate) fn open(plan: CampaignPlan, out: &Path) -> Result<Campaign, CampaignError> {
+/// Judges nothing: verdicts are those that shards made.
+pub(crate) struct Nobody;
+
+impl Judge for Nobody {
+    fn judge(&self, _: &Scene) -> Option<Judgement> {
+        None
+    }
+}
+
+/// Begins or continues a campaign, and shows how far the check of its combinations is; or opens one whose runs shards have done.
+pub(crate) fn open(sharing: Sharing<'_>, plan: CampaignPlan, out: &Path) -> Result<Campaign, Ended> {
+    if let Sharing::Merge(folder) = sharing {
+        return Campaign::open_whole(plan, folder).map_err(|error| {
+            if let CampaignError::Missing { path, missing } = &error { Ended::Said(shard::missing(path, missing)) } else { Ended::Error(error) }
+        });
+    }
     let checking = Shown::checking(plan.combinations());
     let opened = Campaign::open(plan, out, &checking);
     checking.clear();
-    opened
+    opened.map_err(Ended::Error)
 }
 
-/// The user ended it before all combinations were judged.
-pub(crate) fn not_all_judged(judged: u64, combinations: u64, out: &Path) -> Failure {
-    Failure::Interrupted(format!("{judged} of {combinations} verdicts are kept in {}; the same command goes on from there", output::path(out)))
+/// There are not verdicts on all combinations: the user ended it before, or no shard has judged them.
+pub(crate) fn not_all_judged(sharing: Sharing<'_>, judged: u64, combinations: u64, out: &Path) -> Failure {
+    let kept = format!("{judged} of {combinations} verdicts are kept in {}", output::path(out));
+    match sharing {
+        Sharing::Merge(_) => {
+            Failure::System(format!("{kept}: expected all. Do the shards again that are missing, or the command with --out and without --shard"))
+        }
+        Sharing::Whole(_) | Sharing::Shard(..) | Sharing::Status(_) => Failure::Interrupted(format!("{kept}; the same command goes on from there")),
+    }
 }
 
 /// A command on a campaign that ended before its result: in words already, or with an error of the campaign.
@@ -165,6 +200,7 @@ pub(crate) fn failure(error: CampaignError, scene: &Path, strategies: &[String])
         error @ (CampaignError::NoFolder { .. } | CampaignError::Foreign { .. } | CampaignError::Other { .. }) => {
             Failure::Input(format!("--out: {error}"))
         }
+        error @ CampaignError::NoCampaign { .. } => Failure::Input(error.to_string()),
         error @ CampaignError::Stopped => Failure::Interrupted(error.to_string()),
         error @ (CampaignError::Damaged { .. } | CampaignError::Busy { .. } | CampaignError::File { .. } | _) => Failure::System(error.to_string()),
     }

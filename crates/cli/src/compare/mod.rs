@@ -9,18 +9,21 @@ mod rows_file;
 mod words;
 
 use std::num::NonZeroU64;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_campaign::{CampaignError, CampaignPlan, Comparison, Format, Judgement, PlanSpec, Report, Strategies, Variation};
+use cohaptic_campaign::{
+    CampaignError, CampaignPlan, Comparison, Format, Judge, Judgement, PlanSpec, Report, SharedCampaign, Strategies, Variation, Watch,
+};
 
 use crate::arguments::{CompareArguments, MeasureArguments, TableFormat};
 use crate::campaign::{self, PROGRAM, Shown};
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::file::write_file;
-use crate::{input, output};
+use crate::shard::Sharing;
+use crate::{input, output, shard};
 use judge::ByAnalysisOrRuns;
 use preset::Asked;
 
@@ -44,20 +47,30 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
     let settings: Vec<String> = overrides(&asked.strategies);
     let refused = |error: CampaignError| campaign::failure(error, &arguments.scene.scene, &settings);
     let plan = plan(arguments, &asked).map_err(|error| error.unwrap_or_else(refused))?;
-    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
+    match sharing {
+        Sharing::Whole(_) | Sharing::Merge(_) => {}
+        Sharing::Shard(shard, out) => {
+            let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge_apart(shard, &ByAnalysisOrRuns, watch);
+            let done = campaign::pool(arguments.threads, || campaign::sharing::shard(plan, shard, out, judge))?;
+            return shard::answer(arguments.scene.json, &done.map_err(|error| error.unwrap_or_else(refused))?);
+        }
+        Sharing::Status(out) => {
+            return campaign::sharing::status(arguments.scene.json, plan, out).map_err(|error| error.unwrap_or_else(refused));
+        }
+    }
+    let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
-    let mut finished = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| execute(arguments, plan)).map_err(|error| error.unwrap_or_else(refused))?,
-        Err(error) => return Err(Failure::System(format!("--threads {threads}: {error}"))),
-    };
+    let finished = campaign::pool(arguments.threads, || execute(arguments, sharing, out, plan))?;
+    let mut finished = finished.map_err(|error| error.unwrap_or_else(refused))?;
     finished.wall_s = start.elapsed().as_secs_f64();
     for (name, content) in [("compare.csv", rows_file::text(&finished)), ("compare.html", page::html(arguments, &finished)?)] {
-        let path = arguments.out.join(name);
+        let path = out.join(name);
         write_file(&path, content)?;
         finished.files.push(path);
     }
     let words = || words::describe(&finished);
-    output::answer(arguments.scene.json, DocumentSchema::COMPARE, &answer::of(&finished, &arguments.out), words, &finished.files)?;
+    output::answer(arguments.scene.json, DocumentSchema::COMPARE, &answer::of(&finished, out), words, &finished.files)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -93,18 +106,19 @@ fn plan(arguments: &CompareArguments, asked: &Asked) -> Result<CampaignPlan, cam
     Ok(plan.map_err(campaign::Ended::Error)?.leaving_out(Strategies::fallback()))
 }
 
-fn execute(arguments: &CompareArguments, plan: CampaignPlan) -> Result<Finished, campaign::Ended> {
+fn execute(arguments: &CompareArguments, sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<Finished, campaign::Ended> {
     let failed = campaign::Ended::Error;
     let combinations = plan.combinations();
-    let mut campaign = campaign::open(plan, &arguments.out).map_err(failed)?;
+    let mut campaign = campaign::open(sharing, plan, out)?;
     let judging = Shown::judging(combinations);
-    let judged = campaign.judge_apart(&ByAnalysisOrRuns, &judging);
+    let by: &dyn Judge = if matches!(sharing, Sharing::Merge(_)) { &campaign::Nobody } else { &ByAnalysisOrRuns };
+    let judged = campaign.judge_apart(by, &judging);
     judging.clear();
     let stability = match judged.map_err(failed)? {
         Ok(stability) => stability,
-        Err(missing) => return Err(campaign::Ended::Said(campaign::not_all_judged(combinations - missing, combinations, &arguments.out))),
+        Err(missing) => return Err(campaign::Ended::Said(campaign::not_all_judged(sharing, combinations - missing, combinations, out))),
     };
-    let report = campaign::run_to_end(&mut campaign, &arguments.out)?;
+    let report = campaign::run_to_end(&mut campaign, out)?;
     let comparison = campaign.compare().map_err(failed)?;
     let plan = campaign.plan().clone();
     let first = (0..combinations).find(|combination| !report.refused.contains_key(combination)).unwrap_or_default();

@@ -2,10 +2,14 @@
 //!
 //! The file begins with a header in words, which says what the rows belong to; each row is one line: its number, and values with the fewest digits that read back as
 //! the same `f64`. A line that is not whole, as a machine leaves it that loses its power, is forgotten together with all that follows.
+//!
+//! Workers that share a folder have a file each, `NAME.WORKER.partial` beside `NAME.partial`, and read those of all.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
+
+use cohaptic_files::PARTIAL;
 
 use crate::failure::Failure;
 use crate::output;
@@ -14,6 +18,8 @@ use crate::output;
 #[derive(Debug)]
 pub(crate) struct RowsFile {
     path: PathBuf,
+    /// Those of workers in the same folder.
+    others: Vec<PathBuf>,
     file: File,
     made_folder: bool,
 }
@@ -21,26 +27,82 @@ pub(crate) struct RowsFile {
 /// A row, with a number that tells it from others.
 pub(crate) type Row = (usize, Vec<f64>);
 
+/// Where rows of one work are kept.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Kept<'a> {
+    pub(crate) folder: &'a Path,
+    /// What the files are called, without their ends.
+    pub(crate) name: &'static str,
+    /// What the rows belong to.
+    pub(crate) header: &'a [String],
+}
+
+impl Kept<'_> {
+    /// The file of a worker, or of a process that works alone.
+    pub(crate) fn path(self, worker: Option<&str>) -> PathBuf {
+        let worker = worker.map_or_else(String::new, |worker| format!(".{worker}"));
+        self.folder.join(format!("{}{worker}{PARTIAL}", self.name))
+    }
+
+    /// All rows that are known, by whichever worker, and the files that they are in. Nothing is written.
+    pub(crate) fn read(self) -> Result<(Vec<Row>, Vec<PathBuf>), Failure> {
+        let unreadable = |error| Failure::File { verb: "read", path: self.folder.to_path_buf(), error };
+        let mut paths = Vec::new();
+        match fs::read_dir(self.folder) {
+            Ok(entries) => {
+                for entry in entries {
+                    let name = entry.map_err(unreadable)?.file_name().to_string_lossy().into_owned();
+                    if name.strip_prefix(self.name).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(PARTIAL)) {
+                        paths.push(self.folder.join(name));
+                    }
+                }
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(unreadable(error)),
+        }
+        paths.sort_unstable();
+        let mut rows = Vec::new();
+        for path in &paths {
+            rows.extend(begun(path, self.header)?.rows);
+        }
+        Ok((rows, paths))
+    }
+
+    /// Opens the file of a worker, or of a process that works alone, or begins it and makes its folder. Gives the rows of all.
+    ///
+    /// Nothing is written if it belongs to something else.
+    pub(crate) fn open(self, worker: Option<&str>) -> Result<(RowsFile, Vec<Row>), Failure> {
+        let (rows, others) = self.read()?;
+        let (file, _) = RowsFile::open(self.path(worker), self.header)?;
+        Ok((RowsFile { others, ..file }, rows))
+    }
+}
+
+/// What a file of rows holds; nothing if there is none.
+fn begun(path: &Path, header: &[String]) -> Result<Begun, Failure> {
+    let bytes = match cohaptic_files::read_bytes(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+        Err(error) => return Err(Failure::File { verb: "read", path: path.to_path_buf(), error }),
+    };
+    // Bytes that are not text are not whole either.
+    let text = match std::str::from_utf8(&bytes) {
+        Ok(text) => text,
+        Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
+    };
+    Begun::read(text, header).map_err(|difference| refused(path, &difference))
+}
+
 impl RowsFile {
     /// Opens the file, or begins it and makes its folder. Gives the rows that it has; none if it was begun.
     ///
     /// Nothing is written if it belongs to something else.
-    pub(crate) fn open(path: PathBuf, header: &[String]) -> Result<(Self, Vec<Row>), Failure> {
-        let bytes = match cohaptic_files::read_bytes(&path) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(Failure::File { verb: "read", path, error }),
-        };
-        // Bytes that are not text are not whole either.
-        let text = match std::str::from_utf8(&bytes) {
-            Ok(text) => text,
-            Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
-        };
-        let begun = Begun::read(text, header).map_err(|difference| refused(&path, &difference))?;
+    fn open(path: PathBuf, header: &[String]) -> Result<(Self, Vec<Row>), Failure> {
+        let begun = begun(&path, header)?;
         let made_folder = path.parent().is_some_and(|folder| !folder.exists());
         let opened = Self::open_at(&path, begun.whole, header);
         let file = opened.map_err(|error| Failure::File { verb: "write", path: path.clone(), error })?;
-        Ok((Self { path, file, made_folder }, begun.rows))
+        Ok((Self { path, others: Vec::new(), file, made_folder }, begun.rows))
     }
 
     fn open_at(path: &Path, whole: usize, header: &[String]) -> io::Result<File> {
@@ -68,9 +130,14 @@ impl RowsFile {
         written.map_err(|error| Failure::File { verb: "write", path: self.path.clone(), error })
     }
 
-    /// Removes the file, when all that it was kept for is written.
+    /// Removes the file and those of workers, when all that they were kept for is written.
     pub(crate) fn remove(self) -> Result<(), Failure> {
-        fs::remove_file(&self.path).map_err(|error| Failure::File { verb: "remove", path: self.path, error })
+        let remove = |path: PathBuf| match fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Failure::File { verb: "remove", path, error }),
+            Ok(()) | Err(_) => Ok(()),
+        };
+        let logs = self.path.parent().map_or_else(Vec::new, crate::shard::logs_in);
+        std::iter::once(self.path).chain(self.others).chain(logs).try_for_each(remove)
     }
 
     /// Removes the file and the folder that was made for it: nothing came of it. What cannot be removed stays.
@@ -199,5 +266,22 @@ mod tests {
             assert!(message.contains("rows.partial keeps the rows of something else"), "{message}");
             assert_eq!(fs::read_to_string(&path).unwrap(), text);
         }
+    }
+
+    #[test]
+    fn workers_have_files_of_their_own_and_the_rows_of_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let header = header();
+        let kept = Kept { folder: &folder.path().join("new"), name: "map.rows", header: &header };
+        assert_eq!(kept.read().unwrap(), (Vec::new(), Vec::new()));
+        for (number, worker) in [(0, Some("node-7-1f")), (1, None), (2, Some("node-8-2f"))] {
+            let (mut file, rows) = kept.open(worker).unwrap();
+            assert_eq!(rows.len(), number);
+            file.add(number, &[1.0]).unwrap();
+        }
+        let names: Vec<String> = kept.read().unwrap().1.iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned()).collect();
+        assert_eq!(names, ["map.rows.node-7-1f.partial", "map.rows.node-8-2f.partial", "map.rows.partial"]);
+        kept.open(None).unwrap().0.remove().unwrap();
+        assert_eq!(fs::read_dir(kept.folder).unwrap().count(), 0);
     }
 }

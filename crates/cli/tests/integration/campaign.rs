@@ -204,7 +204,7 @@ fn another_campaign_is_refused_and_it_is_said_what_differs() {
 }
 
 #[cfg(unix)]
-mod interrupted {
+pub(crate) mod interrupted {
     use std::process::{Command, Stdio};
     use std::thread::sleep;
     use std::time::Duration;
@@ -273,7 +273,7 @@ mod interrupted {
     }
 
     /// The command with no file allowed to grow beyond so many blocks of 512 bytes (1024 in some shells): writes then fail as on a full disk.
-    fn cramped(desk: &Desk, blocks: u32, line: &str) -> Outcome {
+    pub(crate) fn cramped(desk: &Desk, blocks: u32, line: &str) -> Outcome {
         let command = desk.command(line);
         let mut shell = Command::new("sh");
         shell.args(["-c", "trap '' XFSZ; ulimit -f \"$1\"; shift; exec \"$@\"", "sh", &blocks.to_string()]);

@@ -46,6 +46,8 @@ mod run_page;
 #[cfg(target_os = "linux")]
 mod running;
 mod scenes;
+#[cfg(unix)]
+mod shards;
 mod stability_boundary;
 mod stability_certificates;
 mod stability_chance;

@@ -149,6 +149,36 @@ impl Boundary {
         Self::searched(range, options, known, radius, progress, || watch.stops())
     }
 
+    /// The values that a search looks at first, ascending: those that it looks at then follow from what it finds there.
+    #[must_use]
+    pub fn first_values(range: &KeyRange, options: BoundaryOptions) -> Vec<f64> {
+        nodes(range, options.samples)
+    }
+
+    /// The radius at each of these values of the open key of a family, as a search computes it, on all threads of the pool that it is called in. `done` gets the place
+    /// of each value and its radius, in no particular order. Gives how many are done: fewer than there are if the watch ended it.
+    ///
+    /// # Errors
+    ///
+    /// [`FamilyError`] of a radius that cannot be computed.
+    pub fn look_at(family: &Family, values: &[f64], done: impl Fn(usize, Cell) + Sync, watch: &dyn Watch) -> Result<usize, FamilyError> {
+        let pool = Scratches::default();
+        let look = |(place, value): (usize, &f64)| {
+            if watch.stops() {
+                return Ok(0);
+            }
+            match pool.with(|scratch| family.bounded_radius_watched(&[*value], scratch, watch)) {
+                Ok(cell) => {
+                    done(place, cell);
+                    Ok(1)
+                }
+                Err(FamilyError::Analysis(AnalysisError::Stopped)) => Ok(0),
+                Err(error) => Err(error),
+            }
+        };
+        values.par_iter().enumerate().map(look).try_reduce(|| 0, |one, other| Ok(one + other))
+    }
+
     /// Finds every crossing of a radius over a range, which may be that of anything. Values are looked at on all threads of the pool it is called in;
     /// what comes out does not depend on how many there are.
     ///

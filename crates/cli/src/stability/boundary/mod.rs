@@ -3,6 +3,7 @@
 mod answer;
 mod files;
 mod prove;
+mod sharing;
 
 use std::process::ExitCode;
 
@@ -10,17 +11,18 @@ use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Cell, Criteri
 
 use cohaptic_units::print::Counted;
 
-use super::rows_file::{Row, RowsFile, fingerprint};
+use super::rows_file::{Kept, Row, RowsFile, fingerprint};
 use super::source::{self, Said};
 use crate::analysis_watch::CellWatch;
 use crate::arguments::BoundaryArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::{input, interrupt, output};
+use crate::shard::{Sharing, all_done, nobody_works_in, show};
+use crate::{input, interrupt, output, shard};
 
-/// The file in which values looked at are kept.
-const ROWS: &str = "boundary.rows.partial";
+/// What files are called in which values looked at are kept.
+const ROWS: &str = "boundary.rows";
 
 /// Everything that is asked for, checked: nothing is written before there is one.
 struct Order {
@@ -34,13 +36,25 @@ struct Order {
 
 /// Finds every crossing along a key.
 pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
+    let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
+    if arguments.prove {
+        sharing.is_whole("--prove")?;
+    }
     let order = Order::new(arguments)?;
     if arguments.prove {
         return prove::prove(&order, arguments);
     }
-    let (rows, known) = match &arguments.out {
+    let kept = sharing.folder().map(|folder| Kept { folder, name: ROWS, header: &order.header });
+    match (sharing, kept) {
+        (Sharing::Shard(shard, _), Some(kept)) => return shard::answer(arguments.scene.json, &sharing::shard(&order, arguments, shard, kept)?),
+        (Sharing::Status(folder), Some(kept)) => return show(arguments.scene.json, folder, sharing::NAMES, &sharing::pieces(&order, kept)?),
+        (Sharing::Merge(folder), Some(kept)) => all_done(folder, sharing::NAMES, &sharing::pieces(&order, kept)?)?,
+        (Sharing::Whole(_), Some(kept)) => nobody_works_in(kept.folder)?,
+        (_, None) => {}
+    }
+    let (rows, known) = match kept {
         None => (None, Vec::new()),
-        Some(folder) => RowsFile::open(folder.join(ROWS), &order.header).map(|(rows, known)| (Some(rows), known))?,
+        Some(kept) => kept.open(None).map(|(rows, known)| (Some(rows), known))?,
     };
     let found = look(&order, &known);
     let found = match found {
@@ -53,10 +67,10 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
         }
     };
     if !found.is_settled() && interrupt::requested() {
-        return Err(interrupted(&found, rows, &known, arguments));
+        return Err(interrupted(&found, rows, &known, kept));
     }
     let mut written = Vec::new();
-    if let Some(folder) = &arguments.out {
+    if let Some(folder) = sharing.folder() {
         written = files::write(folder, &order, &found, arguments.pictures.size())?;
         rows.map_or(Ok(()), RowsFile::remove)?;
     }
@@ -106,9 +120,19 @@ fn notes(found: &Boundary) -> Vec<String> {
     source::nominal(found.nominal(), ["of the values looked at is", "of the values looked at are"]).into_iter().collect()
 }
 
-fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic_stability::FamilyError>> {
+/// The values of rows, and what was found there.
+fn cells(rows: &[Row]) -> Vec<(f64, Cell)> {
     let cell = |row: &[f64]| Some(Cell { radius: Radius { value: *row.get(1)?, error: *row.get(2)? }, is_nominal: *row.get(3)? != 0.0 });
-    let known: Vec<(f64, Cell)> = known.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect();
+    rows.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect()
+}
+
+/// What is kept of a value.
+fn row(value: f64, Cell { radius, is_nominal }: &Cell) -> [f64; 4] {
+    [value, radius.value, radius.error, f64::from(u8::from(*is_nominal))]
+}
+
+fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic_stability::FamilyError>> {
+    let known = cells(known);
     let progress = Progress::new(0, "{spinner} {pos} values looked at, {elapsed} passed{msg}");
     progress.tick();
     let watch = CellWatch::new(&progress, "value", &interrupt::requested);
@@ -128,17 +152,15 @@ fn failure(arguments: &BoundaryArguments, range: &KeyRange, error: BoundaryError
 }
 
 /// Keeps what was looked at, and says how to go on.
-fn interrupted(found: &Boundary, rows: Option<RowsFile>, known: &[Row], arguments: &BoundaryArguments) -> Failure {
-    let kept = match (&arguments.out, rows) {
-        (Some(folder), Some(mut rows)) => {
+fn interrupted(found: &Boundary, rows: Option<RowsFile>, known: &[Row], kept: Option<Kept<'_>>) -> Failure {
+    let kept = match (kept, rows) {
+        (Some(kept), Some(mut rows)) => {
             let is_known = |value: f64| known.iter().any(|(_, row)| row.first().is_some_and(|known| known.to_bits() == value.to_bits()));
             let mut new = found.known.iter().filter(|(value, _)| !is_known(*value)).enumerate();
-            if let Err(failure) = new.try_for_each(|(number, (value, Cell { radius, is_nominal }))| {
-                rows.add(known.len() + number, &[*value, radius.value, radius.error, f64::from(u8::from(*is_nominal))])
-            }) {
+            if let Err(failure) = new.try_for_each(|(number, (value, cell))| rows.add(known.len() + number, &row(*value, cell))) {
                 return failure;
             }
-            format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(ROWS)))
+            format!("they are kept in {}, and the same command goes on from there", output::path(&kept.path(None)))
         }
         _ => "nothing is kept; with --out DIR they are, and the same command goes on from there".to_owned(),
     };

@@ -1,8 +1,12 @@
 //! Fills maps in parallel, and keeps finished rows, so that the same command goes on where it was interrupted.
 
+use std::path::Path;
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use cohaptic_campaign::Shard;
+use cohaptic_files::PARTIAL;
 use cohaptic_stability::{Map, MapError, MapRow};
 
 use super::Order;
@@ -10,12 +14,15 @@ use crate::analysis_watch::CellWatch;
 use crate::arguments::MapArguments;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::stability::rows_file::{Row, RowsFile, fingerprint};
+use crate::shard::{Done, Names, Piece, Sharing, Worker, all_done, nobody_works_in, owner, show};
+use crate::stability::rows_file::{Kept, Row, RowsFile, fingerprint};
 use crate::stability::source::fingerprint_of;
 use crate::{interrupt, output};
 
-/// The file in which finished rows are kept.
-const ROWS: &str = "map.rows.partial";
+/// What files are called in which finished rows are kept.
+const ROWS: &str = "map.rows";
+
+const NAMES: Names = Names { piece: "row", unit: "cell" };
 
 /// All maps, whole.
 pub(super) struct Filled {
@@ -27,28 +34,31 @@ pub(super) struct Filled {
     pub(super) rows: Option<RowsFile>,
 }
 
-/// Fills every map.
-pub(super) fn fill(order: &Order, arguments: &MapArguments) -> Result<Filled, Failure> {
-    let (file, known) = match &arguments.out {
+/// Fills every map, or puts together the rows of shards.
+pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>) -> Result<Filled, Failure> {
+    let header = header(order, arguments)?;
+    let (file, known) = match sharing.folder() {
         None => (None, Vec::new()),
-        Some(folder) => RowsFile::open(folder.join(ROWS), &header(order, arguments)?).map(|(file, known)| (Some(file), known))?,
+        Some(folder) => {
+            let kept = Kept { folder, name: ROWS, header: &header };
+            match sharing {
+                Sharing::Merge(_) => are_all_there(order, kept)?,
+                Sharing::Whole(_) | Sharing::Shard(..) | Sharing::Status(_) => nobody_works_in(folder)?,
+            }
+            kept.open(None).map(|(file, known)| (Some(file), known))?
+        }
     };
     let begun_before = !known.is_empty();
-    let keeper = Keeper { file: Mutex::new((file, None)), broken: AtomicBool::new(false) };
-    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let keeper = Keeper { file: Mutex::new((file, None)), broken: AtomicBool::new(false), worker: None };
     let work = || in_turn(order, sorted(known, order), &keeper);
-    let filled = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(work),
-        // Without threads of its own it uses those that there are.
-        Err(_) => work(),
-    };
+    let filled = on_threads(arguments, work);
     let (rows, broken) = keeper.file.into_inner().unwrap_or_else(PoisonError::into_inner);
     if let Some(failure) = broken {
         return Err(failure);
     }
     match filled {
         Ok((maps, cells)) if maps.len() == order.variants.len() && maps.iter().all(Map::is_complete) => Ok(Filled { maps, cells, rows }),
-        Ok((maps, _)) => Err(interrupted(&maps, order, arguments)),
+        Ok((maps, _)) => Err(interrupted(&maps, order, sharing.folder())),
         Err((variant, error)) => {
             if let Some(rows) = rows.filter(|_| !begun_before) {
                 rows.abandon();
@@ -58,13 +68,91 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments) -> Result<Filled, Fa
     }
 }
 
-/// Where finished rows go, and what went wrong there.
-struct Keeper {
-    file: Mutex<(Option<RowsFile>, Option<Failure>)>,
-    broken: AtomicBool,
+fn on_threads<T: Send>(arguments: &MapArguments, work: impl FnOnce() -> T + Send) -> T {
+    let threads = usize::from(arguments.threads.unwrap_or(0));
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(work),
+        // Without threads of its own it uses those that there are.
+        Err(_) => work(),
+    }
 }
 
-impl Keeper {
+/// Fills the rows of a shard.
+pub(super) fn shard<'a>(order: &Order, arguments: &MapArguments, shard: Shard, folder: &'a Path) -> Result<Done<'a>, Failure> {
+    let header = header(order, arguments)?;
+    let kept = Kept { folder, name: ROWS, header: &header };
+    // What is not this work's is refused before anything is written.
+    kept.read()?;
+    std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
+    let owner = owner();
+    let worker = Worker::begin(folder, shard, &owner)?;
+    let done = rows_of_shard(order, arguments, shard, kept, &owner.name(), &worker);
+    let done = done.map(|[pieces, units, computed]| Done { shard, folder, names: NAMES, pieces, units, computed, wall_s: worker.wall_s() });
+    worker.end(done, |failure| failure)
+}
+
+/// How many rows and cells the shard has, and how many cells were computed.
+fn rows_of_shard(order: &Order, arguments: &MapArguments, shard: Shard, kept: Kept<'_>, name: &str, worker: &Worker) -> Result<[u64; 3], Failure> {
+    let (columns, rows) = (order.grid.columns(), order.grid.rows());
+    let (file, known) = kept.open(Some(name))?;
+    let mut known = sorted(known, order);
+    let is_mine = |variant: usize, row: usize| shard.has((variant * rows + row) as u64);
+    let (mut mine, mut there) = (0, 0);
+    for (variant, row) in (0..order.variants.len()).flat_map(|variant| (0..rows).map(move |row| (variant, row))) {
+        let cells = &mut known[variant][row];
+        if is_mine(variant, row) {
+            mine += 1;
+            there += usize::from(!cells.radius.is_empty());
+        } else {
+            // Of another shard: a row that is known is not computed, and this one is not looked at.
+            *cells = MapRow { radius: vec![f64::NAN; columns], nominal: vec![false; columns] };
+        }
+    }
+    let keeper = Keeper { file: Mutex::new((Some(file), None)), broken: AtomicBool::new(false), worker: Some(worker) };
+    let filled = on_threads(arguments, || in_turn(order, known, &keeper));
+    if let Some(failure) = keeper.file.into_inner().unwrap_or_else(PoisonError::into_inner).1 {
+        return Err(failure);
+    }
+    let (maps, computed) = filled.map_err(|(variant, error)| order.failure(variant, arguments, error))?;
+    if maps.len() < order.variants.len() || !maps.iter().all(Map::is_complete) {
+        let kept = format!("{} of {} finished are kept in {}", there + computed / columns, output::are(mine, "row"), output::path(kept.folder));
+        return Err(Failure::Interrupted(format!("shard {shard}: {kept}; the same command goes on from there")));
+    }
+    Ok([mine, mine * columns, computed].map(|number| number as u64))
+}
+
+/// The rows that there are.
+fn pieces(order: &Order, kept: Kept<'_>) -> Result<Vec<Piece>, Failure> {
+    let known = sorted(kept.read()?.0, order);
+    let piece = |row: &MapRow| Piece { units: order.grid.columns() as u64, is_done: !row.radius.is_empty() };
+    Ok(known.iter().flatten().map(piece).collect())
+}
+
+/// That shards have done every row.
+fn are_all_there(order: &Order, kept: Kept<'_>) -> Result<(), Failure> {
+    all_done(kept.folder, NAMES, &pieces(order, kept)?)
+}
+
+/// Says which rows are done.
+pub(super) fn status(order: &Order, arguments: &MapArguments, folder: &Path) -> Result<ExitCode, Failure> {
+    let header = header(order, arguments)?;
+    let kept = Kept { folder, name: ROWS, header: &header };
+    show(arguments.scene.json, folder, NAMES, &pieces(order, kept)?)
+}
+
+/// Where finished rows go, and what went wrong there.
+struct Keeper<'a> {
+    file: Mutex<(Option<RowsFile>, Option<Failure>)>,
+    broken: AtomicBool,
+    /// Whose shard they are.
+    worker: Option<&'a Worker>,
+}
+
+impl Keeper<'_> {
+    fn stops(&self) -> bool {
+        interrupt::requested() || self.broken.load(Ordering::Relaxed) || self.worker.is_some_and(|worker| !worker.goes_on())
+    }
+
     fn keep(&self, number: usize, row: &MapRow) {
         let nominal = row.nominal.iter().map(|nominal| f64::from(u8::from(*nominal)));
         let cells: Vec<f64> = row.radius.iter().copied().chain(nominal).collect();
@@ -73,12 +161,14 @@ impl Keeper {
         if let Some(Err(failure)) = file.as_mut().map(|file| file.add(number, &cells)) {
             broken.get_or_insert(failure);
             self.broken.store(true, Ordering::Relaxed);
+        } else if let Some(worker) = self.worker {
+            worker.kept(number as u64, row.radius.len() as u64);
         }
     }
 }
 
 /// Fills one map after the other, up to the first that is not whole; and how many cells that took.
-fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper) -> Result<(Vec<Map>, usize), (usize, MapError)> {
+fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper<'_>) -> Result<(Vec<Map>, usize), (usize, MapError)> {
     let (columns, rows) = (order.grid.columns(), order.grid.rows());
     let there: usize = known.iter().flatten().filter(|row| !row.radius.is_empty()).count();
     let progress = Progress::new((rows * order.families.len()) as u64, "{bar:30} {percent:>3} %  {pos}/{len} rows, {eta} left{msg}");
@@ -90,7 +180,7 @@ fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper) -> Result<(V
             keeper.keep(variant * rows + row, cells);
             progress.one_more();
         };
-        let stop = || interrupt::requested() || keeper.broken.load(Ordering::Relaxed);
+        let stop = || keeper.stops();
         let watch = CellWatch::new(&progress, "cell", &stop);
         let filled = Map::resume_watched(family, order.grid, known, done, &watch).map_err(|error| (variant, error));
         if filled.is_err() {
@@ -140,11 +230,13 @@ fn header(order: &Order, arguments: &MapArguments) -> Result<Vec<String>, Failur
     Ok(lines)
 }
 
-fn interrupted(maps: &[Map], order: &Order, arguments: &MapArguments) -> Failure {
+fn interrupted(maps: &[Map], order: &Order, folder: Option<&Path>) -> Failure {
     let finished = maps.iter().flat_map(|map| &map.radius).filter(|row| !row.is_empty()).count();
     let all = order.grid.rows() * order.variants.len();
-    let kept = match &arguments.out {
-        Some(folder) => format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(ROWS))),
+    let kept = match folder {
+        Some(folder) => {
+            format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(format!("{ROWS}{PARTIAL}"))))
+        }
         None => "nothing is kept; with --out DIR finished rows are, and the same command goes on from there".to_owned(),
     };
     Failure::Interrupted(format!("{finished} of {} finished: {kept}", output::are(all, "row")))

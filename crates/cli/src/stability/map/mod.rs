@@ -15,8 +15,9 @@ use super::source::{self, Said};
 use crate::arguments::MapArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
+use crate::shard::Sharing;
 use crate::variants::Variant;
-use crate::{input, output};
+use crate::{input, output, shard};
 use filling::Filled;
 
 /// Everything that is asked for, checked: nothing is written before there is one.
@@ -58,12 +59,21 @@ impl Speed {
 
 /// Fills the maps and shows or writes them.
 pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
+    let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
+    if arguments.prove.is_some() {
+        sharing.is_whole("--prove")?;
+    }
     let order = Order::new(arguments)?;
     if let Some(halvings) = arguments.prove {
         return prove::prove(&order, arguments, halvings);
     }
+    match sharing {
+        Sharing::Whole(_) | Sharing::Merge(_) => {}
+        Sharing::Shard(shard, folder) => return shard::answer(arguments.scene.json, &filling::shard(&order, arguments, shard, folder)?),
+        Sharing::Status(folder) => return filling::status(&order, arguments, folder),
+    }
     let start = Clock::now();
-    let Filled { maps, cells, rows } = filling::fill(&order, arguments)?;
+    let Filled { maps, cells, rows } = filling::fill(&order, arguments, sharing)?;
     let named = maps.into_iter().enumerate().map(|(number, map)| {
         let Variant { name, overrides, .. } = &order.variants[number];
         let verdicts = map.verdicts(&order.families[number]).map_err(|error| order.failure(number, arguments, error.into()))?;
@@ -72,7 +82,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let mut maps = named.collect::<Result<Vec<VariantMap>, Failure>>()?;
     let speed = Speed { wall_s: start.elapsed().as_secs_f64(), cells };
     let mut files = Vec::new();
-    if let Some(folder) = &arguments.out {
+    if let Some(folder) = sharing.folder() {
         files = files::write(folder, &order, &mut maps, arguments.pictures.size())?;
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
@@ -80,7 +90,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         arguments.scene.json,
         DocumentSchema::STABILITY_MAP,
         &answer::of(&order, &maps, speed, &files),
-        || answer::describe(&order, &maps, speed, arguments.out.is_none()),
+        || answer::describe(&order, &maps, speed, sharing.folder().is_none()),
         &files,
     )?;
     Ok(ExitCode::SUCCESS)

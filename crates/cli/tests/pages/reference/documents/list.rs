@@ -11,7 +11,7 @@ pub(super) struct Document {
 /// What the router needs: two devices in namespaces.
 pub(super) const NAMESPACES: &str = "unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V";
 
-pub(super) const DOCUMENTS: [Document; 21] = [
+pub(super) const DOCUMENTS: [Document; 23] = [
     Document {
         command: "run",
         lines: &[
@@ -111,6 +111,31 @@ pub(super) const DOCUMENTS: [Document; 21] = [
                 "with `--verdicts`: [verdicts](campaign.md#verdicts)",
             ),
             ("notes", "parts that verdicts leave out, and pictures that are not drawn"),
+        ],
+    },
+    Document {
+        command: "campaign --shard",
+        lines: &["cohaptic campaign scenarios/network/loss-independent.toml --runs 2 --out shards --shard 1/1 --json"],
+        rows: &[
+            ("shard, out", "as `I/N`; the folder"),
+            ("piece, unit", "names: a `part` of runs, a `row` of cells, or a `sample`, which is one value"),
+            ("pieces, units, units_computed", "of the shard; computed this time"),
+            ("wall_s", "of this time"),
+        ],
+    },
+    Document {
+        command: "campaign --status",
+        lines: &["cohaptic campaign scenarios/network/loss-independent.toml --runs 2 --out shards --shard 1/1 > said && \
+                  cohaptic campaign scenarios/network/loss-independent.toml --runs 2 --status shards --json"],
+        rows: &[
+            ("out, piece, unit", "as of [a shard](#campaign---shard)"),
+            ("pieces, pieces_done, units, units_done", "of the whole work"),
+            ("pieces_unassigned", "missing, and of no shard that a worker does now"),
+            ("ends_in_s", "the latest end of a worker; `null` if one is not known, or pieces are unassigned"),
+            ("workers[].shard, workers[].host, workers[].process", "each process that did a shard, in order of shards"),
+            ("workers[].state", "`working`, `done`, `interrupted`, `failed`, or `killed`: it neither ended nor renews its lock"),
+            ("workers[].pieces, workers[].units, workers[].units_per_s", "what it did; `null` before the first piece"),
+            ("workers[].units_left, workers[].ends_in_s", "of its shard; `null` if it is not at work, or its speed is not known"),
         ],
     },
     Document {

@@ -1,0 +1,94 @@
+//! Shards of a campaign, and their status.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use cohaptic_campaign::{CampaignError, CampaignPlan, Shard, SharedCampaign, Watch};
+
+use super::{Ended, Shown};
+use crate::failure::Failure;
+use crate::output;
+use crate::shard::{Done, Names, Piece, Worker, owner, show};
+
+const NAMES: Names = Names { piece: "part", unit: "run" };
+
+/// Judges and does a shard. `judge` gives how many combinations of it have no verdict because it was ended.
+pub(crate) fn shard(
+    plan: CampaignPlan,
+    shard: Shard,
+    folder: &Path,
+    judge: impl FnOnce(&mut SharedCampaign, &dyn Watch) -> Result<u64, CampaignError>,
+) -> Result<Done<'_>, Ended> {
+    let combinations = plan.combinations();
+    let owner = owner();
+    let checking = Shown::checking(combinations);
+    let opened = SharedCampaign::open(plan, folder, &owner.name(), &checking);
+    checking.clear();
+    let mut shared = opened.map_err(Ended::Error)?;
+    let worker = Worker::begin(folder, shard, &owner).map_err(Ended::Said)?;
+    let done = work(&mut shared, shard, folder, &worker, judge);
+    worker.end(done, Ended::Said)
+}
+
+fn work<'a>(
+    shared: &mut SharedCampaign,
+    shard: Shard,
+    folder: &'a Path,
+    worker: &Worker,
+    judge: impl FnOnce(&mut SharedCampaign, &dyn Watch) -> Result<u64, CampaignError>,
+) -> Result<Done<'a>, Ended> {
+    let ended = |what: &str| {
+        Ended::Said(Failure::Interrupted(format!("shard {shard}: {what} is kept in {}; the same command goes on from there", output::path(folder))))
+    };
+    let judging = Shown::judging(shared.campaign().plan().combinations());
+    let missing = judge(shared, &Working { shown: &judging, worker });
+    judging.clear();
+    if missing.map_err(Ended::Error)? > 0 {
+        return Err(ended("each verdict that was made"));
+    }
+    let running = Shown::running(shared.campaign().runs() / shard.count(), 0);
+    let report = shared.run(shard, &Working { shown: &running, worker });
+    running.clear();
+    let report = report.map_err(|error| {
+        if !matches!(error, CampaignError::File { .. }) {
+            return Ended::Error(error);
+        }
+        Ended::Said(Failure::System(format!("{error}\nParts that are whole are kept: once that can be done, the same command goes on from there")))
+    })?;
+    if report.left > 0 {
+        return Err(ended(&format!("all but {} of its {} runs", report.left, report.runs)));
+    }
+    let wall_s = worker.wall_s();
+    Ok(Done { shard, folder, names: NAMES, pieces: report.parts, units: report.runs, computed: report.computed, wall_s })
+}
+
+/// Shows how far a shard is, and ends it when it must.
+struct Working<'a> {
+    shown: &'a Shown,
+    worker: &'a Worker,
+}
+
+impl Watch for Working<'_> {
+    fn keep_going(&self) -> bool {
+        self.worker.goes_on()
+    }
+
+    fn judged(&self, combinations: u64) {
+        self.shown.judged(combinations);
+    }
+
+    fn ran(&self, runs: u64) {
+        self.shown.ran(runs);
+    }
+
+    fn kept(&self, part: u64, runs: u64) {
+        self.worker.kept(part, runs);
+    }
+}
+
+/// Says what is done in a folder.
+pub(crate) fn status(json: bool, plan: CampaignPlan, folder: &Path) -> Result<ExitCode, Ended> {
+    let parts = SharedCampaign::parts_in(plan, folder).map_err(Ended::Error)?;
+    let pieces: Vec<Piece> = parts.iter().map(|part| Piece { units: part.runs, is_done: part.is_done }).collect();
+    show(json, folder, NAMES, &pieces).map_err(Ended::Said)
+}

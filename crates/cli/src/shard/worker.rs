@@ -1,0 +1,185 @@
+//! A worker: it holds its shard, says that it lives, and writes down what it did.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant as Clock, SystemTime, UNIX_EPOCH};
+
+use cohaptic_campaign::{Shard, worker_log};
+use cohaptic_files::{BEAT, Holder, Lease, Owner, STALE, Taking};
+
+use crate::failure::Failure;
+use crate::{interrupt, output};
+
+/// A process that does a shard in a folder.
+pub(crate) struct Worker {
+    shard: Shard,
+    folder: PathBuf,
+    begun: Clock,
+    log: Mutex<File>,
+    /// Whether another process has the shard now.
+    is_lost: Arc<AtomicBool>,
+    /// Ends the heart when it is dropped.
+    alive: Option<mpsc::Sender<()>>,
+    heart: Option<JoinHandle<()>>,
+}
+
+/// This process as the owner of files.
+pub(crate) fn owner() -> Owner {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    Owner::here(u64::try_from(since.as_nanos()).unwrap_or_default())
+}
+
+impl Worker {
+    /// Takes a shard in a folder that is there. If another worker has it, waits until that is seen to live, which is refused, or to be gone.
+    pub(crate) fn begin(folder: &Path, shard: Shard, owner: &Owner) -> Result<Self, Failure> {
+        let lease = take(folder, shard, owner)?;
+        let path = folder.join(worker_log(&owner.name()));
+        let head = format!("shard {shard} process {} host {}\n", owner.pid, owner.host);
+        let begin = || {
+            let mut log = OpenOptions::new().append(true).create_new(true).open(&path)?;
+            log.write_all(head.as_bytes())?;
+            Ok(log)
+        };
+        let log = begin().map_err(|error| Failure::File { verb: "write", path: path.clone(), error })?;
+        let is_lost = Arc::new(AtomicBool::new(false));
+        let (alive, ended) = mpsc::channel();
+        let heart = thread::Builder::new().name("heart".to_owned()).spawn({
+            let is_lost = is_lost.clone();
+            move || renew(lease, &ended, &is_lost)
+        });
+        let heart = heart.map_err(|error| Failure::System(format!("cannot start a thread: {error}")))?;
+        let folder = folder.to_path_buf();
+        Ok(Self { shard, folder, begun: Clock::now(), log: Mutex::new(log), is_lost, alive: Some(alive), heart: Some(heart) })
+    }
+
+    /// Whether it may go on.
+    pub(crate) fn goes_on(&self) -> bool {
+        !interrupt::requested() && !self.is_lost.load(Ordering::Relaxed)
+    }
+
+    /// Writes down that a piece of work is kept. What cannot be written is not in the status; the work is done all the same.
+    pub(crate) fn kept(&self, piece: u64, units: u64) {
+        self.write(&format!("piece {piece} {units} {:.3}\n", self.begun.elapsed().as_secs_f64()));
+    }
+
+    fn write(&self, line: &str) {
+        let _ = self.log.lock().unwrap_or_else(PoisonError::into_inner).write_all(line.as_bytes());
+    }
+
+    /// How long it has been at work \[s\].
+    pub(crate) fn wall_s(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    /// Ends it, and gives what it came to, or the reason why it did not: also that another process has the shard now.
+    pub(crate) fn end<T, E>(mut self, outcome: Result<T, E>, said: impl FnOnce(Failure) -> E) -> Result<T, E> {
+        let word = match &outcome {
+            Ok(_) => "done",
+            Err(_) if interrupt::requested() => "interrupted",
+            Err(_) => "failed",
+        };
+        self.write(&format!("end {word} {:.3}\n", self.begun.elapsed().as_secs_f64()));
+        self.stop();
+        if outcome.is_ok() || !self.is_lost.load(Ordering::Relaxed) {
+            return outcome;
+        }
+        Err(said(Failure::System(format!(
+            "another process has shard {} in {} now: this one stood still for more than {} s. What it had done is kept; expected one process for a shard",
+            self.shard,
+            output::path(&self.folder),
+            STALE.as_secs()
+        ))))
+    }
+
+    fn stop(&mut self) {
+        drop(self.alive.take());
+        if let Some(heart) = self.heart.take() {
+            // It waits for nothing but the end of the channel.
+            let _ = heart.join();
+        }
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// Renews a lease until the worker ends or it is lost.
+fn renew(mut lease: Lease, ended: &mpsc::Receiver<()>, is_lost: &AtomicBool) {
+    while ended.recv_timeout(BEAT) == Err(mpsc::RecvTimeoutError::Timeout) {
+        // A file server that is away for a moment is asked again. If it is away for longer, another process may take the lease, and that is seen then.
+        if lease.renew().is_ok_and(|is_mine| !is_mine) {
+            is_lost.store(true, Ordering::Relaxed);
+            return;
+        }
+    }
+}
+
+/// How often a worker that waits looks again.
+const LOOK: Duration = Duration::from_millis(500);
+
+fn take(folder: &Path, shard: Shard, owner: &Owner) -> Result<Lease, Failure> {
+    let path = folder.join(shard.lease());
+    let mut seen: Option<Holder> = None;
+    loop {
+        let taking = Lease::take(&path, owner).map_err(|error| Failure::File { verb: "lock", path: path.clone(), error })?;
+        let holder = match taking {
+            Taking::Taken(lease) => return Ok(lease),
+            Taking::Held(holder) => holder,
+        };
+        if seen.as_ref().is_some_and(|seen| holder.has_lived_since(seen)) {
+            return Err(busy(folder, shard, &holder));
+        }
+        if seen.is_none() {
+            say_that_it_waits(folder, shard, &holder);
+        }
+        if interrupt::requested() {
+            return Err(Failure::Interrupted("nothing was begun".to_owned()));
+        }
+        seen.get_or_insert(holder);
+        thread::sleep(LOOK);
+    }
+}
+
+fn words(holder: &Holder) -> String {
+    holder.owner.as_ref().map_or_else(|| "another process".to_owned(), ToString::to_string)
+}
+
+fn busy(folder: &Path, shard: Shard, holder: &Holder) -> Failure {
+    Failure::System(format!(
+        "{} works on shard {shard} in {}: expected to be the only one; wait for it, or do another shard",
+        words(holder),
+        output::path(folder)
+    ))
+}
+
+fn say_that_it_waits(folder: &Path, shard: Shard, holder: &Holder) {
+    // If it cannot be said, it waits all the same.
+    let _ = writeln!(
+        std::io::stderr(),
+        "{} has shard {shard} in {} and was heard of {} s ago: waiting until it is heard of again, or has not been for {} s",
+        words(holder),
+        output::path(folder),
+        holder.age.as_secs(),
+        STALE.as_secs()
+    );
+}
+
+/// That no worker does a shard in a folder, so that this process may work there alone.
+pub(crate) fn nobody_works_in(folder: &Path) -> Result<(), Failure> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    let unreadable = |error| Failure::File { verb: "read", path: folder.to_path_buf(), error };
+    let leases = cohaptic_files::leases(folder, &owner(), |name| Shard::of_lease(name).is_some()).map_err(unreadable)?;
+    match leases.iter().find_map(|(name, holder)| Shard::of_lease(name).filter(|_| !holder.is_stale()).map(|shard| (shard, holder))) {
+        Some((shard, holder)) => Err(busy(folder, shard, holder)),
+        None => Ok(()),
+    }
+}
