@@ -93,6 +93,25 @@ proptest! {
 }
 
 proptest! {
+    #![proptest_config(cases(150))]
+
+    /// Samples that overtake each other in a tick, over ticks, and beyond those that are looked ahead, sent as often as peers tick.
+    #[test]
+    fn samples_that_overtake_come_to_the_same(mut drafts in drafts::alike(Just(1)), delay in 1..400_u32, part in 1..57_u32, more in 0..600_u64) {
+        let draft = &mut drafts[0];
+        let jitter = format!("jitter = {{ sd = \"{}us\", distribution = \"uniform\" }}", 10 * delay * part);
+        draft.link = format!("delay = \"{delay}ms\", {jitter}, order = \"allow-reordering\", loss = 0.1");
+        (draft.update, draft.gains) = (draft.peers[0].tick, draft.gains.scaled(0.05));
+        draft.duration = u64::from(delay) + more;
+        draft.peers.iter_mut().for_each(|peer| peer.phase = 0);
+        let scene = draft.scene();
+        let expected = run(&scene, Model::General);
+        let difference = difference(&run(&scene, Model::Least), &expected);
+        prop_assert!(difference.is_none(), "{}", difference.unwrap());
+    }
+}
+
+proptest! {
     #![proptest_config(cases(300))]
 
     #[test]
@@ -176,9 +195,11 @@ fn threads_come_to_what_one_comes_to() {
 /// Of 257 peers on the means are exact, whether samples travel together or each by itself.
 #[test]
 fn many_peers_come_to_the_same() {
-    for link in ["delay = \"3ms\"", "delay = \"3ms\", jitter = \"400us\", loss = \"5%\""] {
+    let overtaking = "delay = \"6ms\", jitter = { sd = \"3ms\", distribution = \"uniform\" }, order = \"allow-reordering\"";
+    for (link, update) in [("delay = \"3ms\"", 8), ("delay = \"3ms\", jitter = \"400us\", loss = \"5%\"", 8), (overtaking, 2)] {
         let mut scene = mesh(260, link);
-        scene.peers.iter_mut().zip(0..).for_each(|(peer, place)| peer.phase = place % 8);
+        scene.coordination.update = Duration::from_millis(update);
+        scene.peers.iter_mut().zip(0..).for_each(|(peer, place)| peer.phase = place % update);
         scene.duration = Duration::from_millis(24);
         let [least, general] = [Model::Least, Model::General].map(|model| run(&scene, model));
         assert_eq!(difference(&least, &general), None, "{link}");
