@@ -117,6 +117,25 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
+    /// Changes the model of a link, of which `seed` and `name` are those that it was added with; see [`crate::Network::set_link`]. Until then time has passed on it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    pub fn set_model(
+        &mut self,
+        now: Instant,
+        link: LinkId,
+        (seed, name): (u64, &LinkName),
+        model: LinkModel,
+        mut arrives: impl FnMut(Instant, bool, T),
+    ) {
+        self.pass(now, link, &mut arrives);
+        let Self { lines, outputs, arrivals, .. } = self;
+        lines[link.index()].line.reconfigure(now, seed, name, model, outputs, &mut Arriving(arrivals));
+        self.pass(now, link, arrives);
+    }
+
     /// Takes back that a packet is delivered: nobody will look when it arrives.
     ///
     /// # Panics

@@ -187,6 +187,33 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         }
     }
 
+    /// The other peers that a receiver hears.
+    pub(in crate::arrays) fn senders(&self, receiver: usize) -> impl Iterator<Item = usize> + '_ {
+        let senders = (0..self.rows.columns(receiver)).map(move |column| self.rows.sender(receiver, column));
+        senders.filter(move |sender| *sender != self.receivers.start + receiver)
+    }
+
+    /// In runs of these scenes a link to one of the receivers is another one from an instant on, which is not before the latest tick.
+    #[cold]
+    pub(in crate::arrays) fn set_link(
+        &mut self,
+        (latest, at): ((u64, Instant), Instant),
+        scenes: &[&Scene; L],
+        (from, to): (usize, usize),
+        model: &LinkModel,
+    ) {
+        let Self { rows, receivers, links: Links::Stepped(links, _), in_flight, .. } = self else { return };
+        let receiver = to - receivers.start;
+        let Some(column) = rows.column(receiver, from) else { return };
+        for (run, scene) in scenes.iter().enumerate() {
+            let link = LinkId::new(rows.link(receiver, column) * L + run);
+            let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
+            links.set_model(at, link, (scene.seed, &name), model.clone(), |arrival, overtakes, packet| {
+                in_flight.push(latest, Packet { arrival, ..packet }, overtakes)
+            });
+        }
+    }
+
     /// What has arrived is held from now on.
     pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         self.take_in(tick, Instant::MAX);
