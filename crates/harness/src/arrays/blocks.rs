@@ -269,7 +269,7 @@ impl<const A: usize> Blocks<A> {
         }
     }
 
-    /// The law looks back that many ticks from now on. The latest copies stay; before the oldest one they were as then.
+    /// The law looks back this number of ticks from now on. The latest copies stay; before the oldest one they were as then.
     pub(super) fn set_lag(&mut self, lag: usize) {
         let known = self.past.len() / self.blocks.len();
         if lag == known {

@@ -100,7 +100,7 @@ impl Shape {
             (scene.coordination.send_when.is_none() && !scene.timeline.iter().any(sends_by_difference), "there are dead bands"),
             (!scene.has_gains_by_peer(), "the gains follow the weight that a peer hears, so they differ from peer to peer"),
             (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
-            (scene.rotation.is_none() || scene.peers.len() <= EXACT_FROM, "the mean of so many attitudes is an exact sum"),
+            (scene.rotation.is_none() || scene.peers.len() <= EXACT_FROM, "more than 256 peers turn, and their mean is an exact sum"),
             (scene.rotation.is_none() || !may_have_past(), "the law remembers, and the object turns"),
             // What each packet carries counts them in 16 bits.
             (scene.peers.len() <= usize::from(u16::MAX) || delay.is_some(), "there are more than 65,535 peers, over links that take memory"),

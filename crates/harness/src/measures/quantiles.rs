@@ -35,7 +35,7 @@ impl QuantileSketch {
         self.insert_many(value, 1);
     }
 
-    /// Counts a value that many times.
+    /// Counts a value this number of times.
     #[inline]
     pub fn insert_many(&mut self, value: f64, times: u64) {
         self.count += times;
