@@ -136,12 +136,24 @@ pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Valu
 /// Scenes of one shape that need no events, if nobody watches: this number of them, with equal peers, ticks and durations. Everything else may differ, in half of
 /// the cases even the links.
 pub fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Draft>> {
+    of_one_shape(scenes, false)
+}
+
+/// [`alike`], with one timeline.
+pub fn changing(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Draft>> {
+    of_one_shape(scenes, true)
+}
+
+fn of_one_shape(scenes: impl Strategy<Value = usize>, with_timeline: bool) -> impl Strategy<Value = Vec<Draft>> {
     let counts = prop_oneof![3 => 2..=5_usize, 1 => 6..=11_usize];
-    (scenes, counts).prop_flat_map(|(scenes, count)| {
+    (scenes, counts).prop_flat_map(move |(scenes, count)| {
         let drafts = vec((anything_among(Just(count)), direct_link(), vec((0..count, 1..count, direct_link()), 0..3)), scenes);
-        (drafts, any::<bool>(), 0.9..2.0).prop_map(|(mut drafts, same_links, stiffer)| {
+        (drafts, any::<bool>(), 0.9..2.0).prop_map(move |(mut drafts, same_links, stiffer)| {
+            let has_arms = drafts.iter().any(|(draft, ..)| draft.peers.iter().any(|peer| matches!(peer.hand, DraftHand::Arm { .. })));
+            let mut timeline = std::mem::take(&mut drafts[0].0.timeline);
+            timeline.retain(|entry| with_timeline && !(has_arms && entry.contains("hand =")));
             for (draft, link, links) in &mut drafts {
-                draft.timeline.clear();
+                draft.timeline.clone_from(&timeline);
                 draft.send_when = None;
                 if draft.strategy.kind() != SampleKind::State {
                     draft.strategy = Coordination::AveragePosition;

@@ -70,19 +70,22 @@ pub(crate) fn ticking<'a>(peers: impl Iterator<Item = &'a PeerSpec> + Clone) -> 
     if first.is_some() && peers.clone().all(together) { Ticking::Lockstep } else { Ticking::EventDriven }
 }
 
+/// Whether the device of a peer ever touches its copy.
+pub(crate) fn touches(scene: &Scene, peer: usize) -> bool {
+    let touches_later =
+        |what: &ChangeKind| matches!(what, ChangeKind::Contact { peer: changed, contact } if *changed == peer && *contact != Contact::None);
+    scene.peers[peer].contact != Contact::None || scene.timeline.iter().any(|change| touches_later(&change.what))
+}
+
 fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice {
     let spec = &scene.peers[peer];
     // A device that turns, or that begins with the motion of a point of a turning copy, is not at rest.
     let turns = scene.rotation.as_ref().map(|rotation| &rotation.peers[peer]);
     let moves = spec.velocity.iter().any(|v| *v != 0.0)
         || turns.is_some_and(|turns| turns.device.is_some() || turns.attitude.rate.iter().any(|rate| *rate != 0.0));
-    let touches_later = scene
-        .timeline
-        .iter()
-        .any(|change| matches!(&change.what, ChangeKind::Contact { peer: changed, contact } if *changed == peer && *contact != Contact::None));
     let moved_later =
         scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Hand { peer: changed, hand: Some(_) } if *changed == peer));
-    if spec.contact != Contact::None || touches_later {
+    if touches(scene, peer) {
         DeviceChoice::Simulated
     } else if spec.hand.is_none() && !moved_later && !moves {
         DeviceChoice::Resting

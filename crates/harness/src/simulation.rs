@@ -110,7 +110,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     /// The shape of the scene, if it needs no events and nobody watches more than ticks and instants.
     fn arrays(&self, plan: &Plan, watch: Watch) -> Option<(Shape, BuiltIn)> {
         let fits = watch.is_of_ticks() && self.disturbance.is_none() && self.model == Model::Least;
-        if fits { Shape::of(self.scene, plan, &self.strategies) } else { None }
+        if fits { Shape::of(self.scene, plan, &self.strategies).ok() } else { None }
     }
 
     pub(crate) fn world<const A: usize, E: Remote<A>>(&self, plan: &Plan, remote: E) -> World<A, S::Strategy<A>, E> {

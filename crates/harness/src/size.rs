@@ -67,14 +67,14 @@ fn too_large_for(scene: &Scene, way: Way, free: Option<u64>) -> Option<TooLarge>
         let needed = Megabytes(least.bytes(peers, links));
         format!("to look at nothing but counters, without plot, records and measures, which takes {needed} or a little more")
     } else {
-        "one constant delay for all links, one tick for all peers and no timeline, without plot, records and measures".to_owned()
+        "one constant delay for all links at all times and one tick for all peers, without plot, records and measures".to_owned()
     };
     Some(TooLarge { peer, reason: format!("{peers} peers with {links} links between them are {what}: expected fewer peers, or {cure}") })
 }
 
 impl Way {
     fn of(scene: &Scene, model: Model, watched: bool) -> Self {
-        let in_arrays = if watched || model != Model::Least { None } else { Shape::of(scene, &Plan::new(scene, model, false), &FromScene) };
+        let in_arrays = if watched || model != Model::Least { None } else { Shape::of(scene, &Plan::new(scene, model, false), &FromScene).ok() };
         match in_arrays {
             Some((shape, _)) if shape.is_broadcast() => Self::Broadcast,
             Some(_) => Self::Packets,

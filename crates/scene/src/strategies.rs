@@ -56,6 +56,32 @@ impl Scene {
         self.coordination.strategy.law(&self.law_parameters(peer))
     }
 
+    /// [`Scene::law`] at the beginning and after each change of the timeline; nothing if the strategy of the scene is not a law.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    pub fn laws_in_time(&self, peer: usize) -> impl Iterator<Item = BuiltIn> {
+        let changes = self.law(peer).into_iter().flat_map(move |begins| {
+            self.timeline.iter().scan((self.clone(), begins), move |(then, law), change| {
+                match &change.what {
+                    ChangeKind::Coordination(gains) => then.coordination.gains = *gains,
+                    ChangeKind::Parameters(settings) => then.coordination.settings = **settings,
+                    ChangeKind::Link(_)
+                    | ChangeKind::AllLinks(_)
+                    | ChangeKind::Contact { .. }
+                    | ChangeKind::Hand { .. }
+                    | ChangeKind::HandTorque { .. }
+                    | ChangeKind::RotationalGains(_)
+                    | ChangeKind::SendWhen(_) => return Some(*law),
+                }
+                *law = then.law(peer)?;
+                Some(*law)
+            })
+        });
+        self.law(peer).into_iter().chain(changes)
+    }
+
     /// β [N·s/m]: by how much the strategy damps the copy of a peer.
     ///
     /// # Panics

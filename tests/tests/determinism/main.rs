@@ -3,6 +3,7 @@
 
 mod arrays;
 mod bystander;
+mod changes;
 mod models;
 mod threads;
 mod topologies;

@@ -43,7 +43,7 @@ proptest! {
     #![proptest_config(cases(600))]
 
     #[test]
-    fn in_arrays_they_come_to_what_their_events_come_to(drafts in drafts::alike(Just(1)), topology in any_topology()) {
+    fn in_arrays_they_come_to_what_their_events_come_to(drafts in prop_oneof![drafts::alike(Just(1)), drafts::changing(Just(1))], topology in any_topology()) {
         let Some(scene) = on(&drafts[0], &topology) else { return Ok(()) };
         prop_assert!(scene.has_gains_by_peer() || same_shape(&scene, &scene), "it is run in arrays");
         let expected = run(&scene, Model::General);

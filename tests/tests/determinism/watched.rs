@@ -13,7 +13,7 @@ use super::arrays::{difference, mesh};
 use super::turning_arrays::alike;
 
 /// Keeps the bits of all rows, until it has had enough.
-struct Keeper {
+pub(super) struct Keeper {
     /// Wants rows of samples held as well, for which a run has events.
     has_events: bool,
     /// Until when it wants the run to go on, and how many rows it takes before it fails.
@@ -24,7 +24,7 @@ struct Keeper {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Full;
+pub(super) struct Full;
 
 impl Keeper {
     fn new(has_events: bool) -> Self {
@@ -94,7 +94,7 @@ impl Observer for Keeper {
 }
 
 /// Runs the scene with two such observers, and gives the first thing in which they differ.
-fn found(scene: &Scene, change: impl Fn(&mut Keeper)) -> Option<String> {
+pub(super) fn found(scene: &Scene, change: impl Fn(&mut Keeper)) -> Option<String> {
     let run = |has_events| {
         let mut keeper = Keeper::new(has_events);
         change(&mut keeper);

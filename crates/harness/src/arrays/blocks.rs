@@ -7,14 +7,14 @@ mod block;
 mod law;
 
 use cohaptic_peer::coordination::{BuiltIn, Law};
-use cohaptic_peer::{Contact, Enclosure, HandForce, Motion, Plant, State, StepMap};
+use cohaptic_peer::{Contact, Enclosure, Hand, HandForce, Motion, Plant, State, StepMap};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use super::lanes::{Lanes, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 use super::samples::Sample;
-use crate::plan::DeviceChoice;
+use crate::plan::{DeviceChoice, touches};
 pub(super) use block::Block;
 use block::{Forces, Late, RESTING, ZERO_MAP, set_map};
 use law::memory_of_lane;
@@ -99,17 +99,10 @@ fn set_lane(motions: &mut Motions, lane: usize, motion: Motion) {
 
 impl<const A: usize> Blocks<A> {
     /// The bodies of runs of these scenes, all of which have that law, with numbers of their own. `devices` says what stands for the device of each peer, if anybody
-    /// looks; otherwise only those move that touch their copies.
+    /// looks; otherwise only those move that ever touch their copies.
     pub(super) fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
-        let moves = |peer: usize, run: usize| {
-            scenes[run].peers[peer].contact != Contact::None || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated)
-        };
+        let moves = |peer: usize, run: usize| touches(scenes[run], peer) || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated);
         let tick = scenes[0].peers[0].clock.tick;
-        let mut object_map = ZERO_MAP;
-        for lane in 0..WIDTH {
-            let run = lane % places.runs;
-            set_map(&mut object_map, lane, &scenes[run].copy_config(0).plant().step(tick, scenes[run].integrator));
-        }
         let step = |plant: Plant, run: usize| plant.step(tick, scenes[run].integrator);
         let hand = |peer: usize, run: usize| HandForce::of(scenes[run].peers[places.first + peer].hand.as_ref());
         let mut blocks = Vec::with_capacity(A * places.blocks());
@@ -125,7 +118,7 @@ impl<const A: usize> Blocks<A> {
                 block.device.position.0[spot.lane] = device.position[axis];
                 set_lane(&mut block.object, spot.lane, initial.along(axis));
                 late[spot.block].is_late.set(spot.lane, config.compute_delay);
-                block.touch(axis, spot.lane, config.contact);
+                block.touch(spot.lane, config.contact);
                 if !moves(member, run) {
                     // Nothing depends on its device.
                     set_map(&mut block.device_map, spot.lane, &RESTING);
@@ -155,7 +148,7 @@ impl<const A: usize> Blocks<A> {
             oldest: 0,
             places,
             blocks,
-            object_map,
+            object_map: object_map(scenes),
             late: any_late.then_some(late),
             walls: walls.iter().any(Option::is_some).then_some(walls),
             hands: hands.collect(),
@@ -248,6 +241,48 @@ impl<const A: usize> Blocks<A> {
         }
     }
 
+    /// The damping of copies from now on is that of these scenes, in each run.
+    pub(super) fn set_damping(&mut self, scenes: &[&Scene]) {
+        self.object_map = object_map(scenes);
+    }
+
+    /// A device touches its copy in that way from now on, in all runs.
+    pub(super) fn set_contact(&mut self, peer: usize, contact: Contact) {
+        for (spot, ..) in (0..A).flat_map(|axis| self.places.all(axis)).filter(|(_, other, _)| *other == peer) {
+            self.blocks[spot.block].touch(spot.lane, contact);
+        }
+    }
+
+    /// A hand does that from now on, in all runs.
+    pub(super) fn set_hand(&mut self, peer: usize, hand: Option<&Hand>) {
+        let hand = HandForce::<A>::of(hand);
+        self.hands.retain(|(other, ..)| *other != peer);
+        match hand.constant() {
+            None => self.hands.extend((0..self.places.runs).map(|run| (peer, run, hand.clone()))),
+            Some(force) => {
+                for (axis, force) in force.into_iter().enumerate() {
+                    for (spot, ..) in self.places.all(axis).filter(|(_, other, _)| *other == peer) {
+                        self.blocks[spot.block].hand.0[spot.lane] = force;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The law looks back this number of ticks from now on. The latest copies stay; before the oldest one they were as then.
+    pub(super) fn set_lag(&mut self, lag: usize) {
+        let known = self.past.len() / self.blocks.len();
+        if lag == known {
+            return;
+        }
+        let place = |tick: usize| (self.oldest + (tick + known).saturating_sub(lag)) % known * self.blocks.len();
+        self.past = match known {
+            0 => (0..lag).flat_map(|_| self.blocks.iter().map(|block| block.object)).collect(),
+            _ => (0..lag).flat_map(|tick| self.past[place(tick)..][..self.blocks.len()].iter().copied()).collect(),
+        };
+        self.oldest = 0;
+    }
+
     /// Hands whose force varies take what it is now.
     pub(super) fn move_hands(&mut self, now: Instant) {
         for (peer, run, hand) in &self.hands {
@@ -327,6 +362,16 @@ impl<const A: usize> Blocks<A> {
         }
         finite
     }
+}
+
+/// How copies of runs of these scenes move in a tick.
+fn object_map(scenes: &[&Scene]) -> StepMap<Lanes> {
+    let mut map = ZERO_MAP;
+    for lane in 0..WIDTH {
+        let scene = scenes[lane % scenes.len()];
+        set_map(&mut map, lane, &scene.copy_config(0).plant().step(scene.peers[0].clock.tick, scene.integrator));
+    }
+    map
 }
 
 /// The distance from the least to the greatest of each run.

@@ -2,6 +2,7 @@
 
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::rotation::{Attitude, Triple};
+use cohaptic_peer::{Contact, Gains, Signal};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -36,6 +37,22 @@ pub(super) trait Bodies<const A: usize, const P: usize> {
 
     /// Hands take the force and torque of now.
     fn move_hands(&mut self, now: Instant);
+
+    /// A device touches its copy in that way from now on, in all runs.
+    fn set_contact(&mut self, peer: usize, contact: Contact) {
+        self.translations_mut().set_contact(peer, contact);
+    }
+
+    /// A hand turns its device by that torque from now on, in all runs, if the device turns.
+    fn set_hand_torque(&mut self, _peer: usize, _torque: Option<&Signal>) {}
+
+    /// KR and BR of each run from now on, if copies turn.
+    fn set_gains_of_turns<const L: usize>(&mut self, _gains: &[Gains<Triple>; L]) {}
+
+    /// The damping of copies from now on is that of these scenes, in each run.
+    fn set_damping(&mut self, scenes: &[&Scene]) {
+        self.translations_mut().set_damping(scenes);
+    }
 
     /// Everybody computes forces by the law and moves to the next tick.
     fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L>;

@@ -1,7 +1,6 @@
 //! Scenes that need no events: all numbers of all peers in arrays, one scene or several of one shape side by side.
 //!
-//! Where everybody ticks together, nothing changes on the way, and nobody watches more than ticks, a run is a loop over ticks: sending, arrivals, forces,
-//! motion. Here that loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what
+//! Where everybody ticks together and nobody watches more than ticks, a run is a loop over ticks: sending, arrivals, forces, motion. Here that loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what
 //! [`crate::world::World`] does, with the same operations in the same order on each number, the same random numbers at the same addresses and the same
 //! counters, and comes to the same [`Summary`] to the bit.
 //!
@@ -9,6 +8,7 @@
 
 mod blocks;
 mod bodies;
+mod changes;
 mod lanes;
 mod place;
 mod run_watch;
@@ -20,7 +20,7 @@ mod ticks;
 mod turn;
 mod turning;
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -36,6 +36,7 @@ use crate::plan::{DeviceChoice, Plan};
 use crate::summary::{Ending, LinkSummaries, PeerSummary, Summary};
 use blocks::{Blocks, LawOfLanes, Moved, law_of_lanes};
 use bodies::Bodies;
+use changes::Changes;
 use lanes::Lanes;
 use place::Places;
 pub(crate) use run_watch::Onlooker;
@@ -102,6 +103,7 @@ struct Arrays<'a, B, const A: usize, const P: usize, const L: usize> {
     members: Range<usize>,
     bodies: B,
     samples: Samples<P, L>,
+    changes: Changes<'a, L>,
     /// Up to which age samples are extrapolated in each run \[s\], and how far they have come by peer and run, if the law does that.
     leads: Option<([f64; L], Vec<[Lead<A>; L]>)>,
     /// The tick at which each peer of the scene sends next.
@@ -155,6 +157,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         };
         Self {
             law: law_of_lanes(&laws),
+            changes: Changes::new(&scenes),
             bodies,
             leads: Law::<f64>::horizon(&laws[0])
                 .is_some()
@@ -175,43 +178,55 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     }
 
     /// Runs all of them to their end.
-    fn run(self, watch: impl RunWatch<B, A, P>) -> [Summary; L] {
-        // A copy, so that the law is a constant of the loop and nothing that is written can change it.
-        let law = self.law;
-        law.visit(ToEnd { arrays: self, watch })
-    }
-
-    fn run_by(mut self, law: &impl LawOfLanes, mut watch: impl RunWatch<B, A, P>) -> [Summary; L] {
-        let tick_nanos = nanos(self.shape.tick);
-        let mut tick = 0;
+    fn run(mut self, mut watch: impl RunWatch<B, A, P>) -> [Summary; L] {
+        let (mut tick, last) = (0, self.shape.tick_at(self.shape.end));
         loop {
-            let now = Instant::from_nanos(tick * tick_nanos);
-            if is_asked_before(tick) {
-                let before = Instant::from_nanos((tick - 1) * tick_nanos);
-                if !watch.keep_going(before) {
-                    self.end_all(tick, |_| Ending::Interrupted(before));
-                    break;
-                }
-            }
-            if now >= self.shape.end {
-                if let Samples::PerPacket(samples) = &mut self.samples {
-                    samples.finish(self.shape.before(tick));
-                }
-                let end = self.shape.end;
-                self.end_all(tick, |finite| if finite { Ending::Complete } else { Ending::Diverged(end) });
+            let until = self.next_change().min(last);
+            // A copy, so that the law is a constant of the loop and nothing that is written can change it.
+            let law = self.law;
+            if law.visit(Stretch { arrays: &mut self, watch: &mut watch, ticks: tick..until }).is_break() {
                 break;
             }
-            if self.finite.contains(&false) && self.end_diverged(tick, now) {
+            tick = until;
+            if tick == last {
+                self.finish(tick, &mut watch);
                 break;
             }
-            let discrepancy = self.step(law, tick, now, (&mut Nowhere, &mut watch));
-            tick += 1;
-            if !watch.after_motion(now, discrepancy[0]) {
-                self.end_all(tick, |_| Ending::Interrupted(now));
+            let now = self.shape.instant(tick);
+            if self.end_diverged(tick, now) {
                 break;
             }
+            self.change(tick, now, &mut watch);
         }
         self.summaries.map(|summary| summary.expect("every run has ended"))
+    }
+
+    /// Runs all of them over those ticks, or until they have all ended.
+    fn run_over(&mut self, law: &impl LawOfLanes, ticks: Range<u64>, watch: &mut impl RunWatch<B, A, P>) -> ControlFlow<()> {
+        let tick_nanos = nanos(self.shape.tick);
+        for tick in ticks {
+            let now = Instant::from_nanos(tick * tick_nanos);
+            if self.finite.contains(&false) && self.end_diverged(tick, now) {
+                return ControlFlow::Break(());
+            }
+            let discrepancy = self.step(law, tick, now, (&mut Nowhere, watch));
+            let ticks = tick + 1;
+            if !watch.after_motion(now, discrepancy[0]) || is_asked_before(ticks) && !watch.keep_going(now) {
+                self.end_all(ticks, |_| Ending::Interrupted(now));
+                return ControlFlow::Break(());
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The scenes end after that number of ticks.
+    fn finish(&mut self, ticks: u64, watch: &mut impl RunWatch<B, A, P>) {
+        let end = self.shape.end;
+        self.change(ticks, end, watch);
+        if let Samples::PerPacket(samples) = &mut self.samples {
+            samples.finish(self.shape.before(ticks));
+        }
+        self.end_all(ticks, |finite| if finite { Ending::Complete } else { Ending::Diverged(end) });
     }
 
     /// Everything that happens at a tick. Gives how far copies are apart \[m\].
@@ -298,7 +313,8 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         }
         if let Samples::PerPacket(samples) = &mut self.samples {
             others.exchange(&self.senders, &mut self.sent);
-            samples.send((tick, now), &self.senders, &self.sent, |sender| until(&self.shape, tick, self.next_send[sender]));
+            let change = self.changes.next_at();
+            samples.send((tick, now), &self.senders, &self.sent, |sender| until(&self.shape, tick, self.next_send[sender]).min(change));
         }
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
     }
@@ -307,7 +323,8 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     #[cold]
     fn pass(&mut self, tick: u64) {
         if let Samples::PerPacket(samples) = &mut self.samples {
-            samples.pass(self.shape.before(tick), |sender| until(&self.shape, tick, self.next_send[sender]));
+            let change = self.changes.next_at();
+            samples.pass(self.shape.before(tick), |sender| until(&self.shape, tick, self.next_send[sender]).min(change));
         }
     }
 
@@ -441,19 +458,20 @@ fn bodies_of<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
     B::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0], devices)
 }
 
-/// A run to its end. The loop is compiled for each law: where it chooses between laws at every tick, a run of three peers over constant delays takes a sixth
+/// A run over some ticks. The loop is compiled for each law: where it chooses between laws at every tick, a run of three peers over constant delays takes a sixth
 /// longer.
-struct ToEnd<'a, E, B, const A: usize, const P: usize, const L: usize> {
-    arrays: Arrays<'a, B, A, P, L>,
-    watch: E,
+struct Stretch<'s, 'a, E, B, const A: usize, const P: usize, const L: usize> {
+    arrays: &'s mut Arrays<'a, B, A, P, L>,
+    watch: &'s mut E,
+    ticks: Range<u64>,
 }
 
-impl<E: RunWatch<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> LawVisitor<Lanes> for ToEnd<'_, E, B, A, P, L> {
-    type Output = [Summary; L];
+impl<E: RunWatch<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> LawVisitor<Lanes> for Stretch<'_, '_, E, B, A, P, L> {
+    type Output = ControlFlow<()>;
 
     #[inline(never)]
-    fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> [Summary; L] {
-        self.arrays.run_by(law, self.watch)
+    fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> ControlFlow<()> {
+        self.arrays.run_over(law, self.ticks, self.watch)
     }
 }
 

@@ -19,6 +19,9 @@ pub(super) trait RunWatch<B, const A: usize, const P: usize> {
     #[inline(always)]
     fn before_motion(&mut self, _now: Instant, _bodies: &B, _law: &impl LawOfLanes) {}
 
+    /// The damping of the law from now on is that of this scene.
+    fn change_damping(&mut self, _scene: &Scene) {}
+
     /// At that tick copies were that far apart \[m\]; gives whether the run goes on.
     #[inline(always)]
     fn after_motion(&mut self, _now: Instant, _discrepancy: f64) -> bool {
@@ -56,12 +59,20 @@ pub(super) struct WatchedTicks<'a> {
 
 impl<'a> WatchedTicks<'a> {
     pub(super) fn new(scene: &Scene, onlooker: &'a mut dyn Onlooker) -> Self {
-        let damping = |peer| (scene.own_damping(peer), scene.own_rotational_damping(peer));
-        Self { onlooker, damping: (0..scene.peers.len()).map(damping).collect() }
+        Self { onlooker, damping: damping(scene) }
     }
 }
 
+/// By how much the law damps each peer, and its turn.
+fn damping(scene: &Scene) -> Vec<(f64, Triple)> {
+    (0..scene.peers.len()).map(|peer| (scene.own_damping(peer), scene.own_rotational_damping(peer))).collect()
+}
+
 impl<B: Bodies<A, P>, const A: usize, const P: usize> RunWatch<B, A, P> for WatchedTicks<'_> {
+    fn change_damping(&mut self, scene: &Scene) {
+        self.damping = damping(scene);
+    }
+
     fn keep_going(&mut self, now: Instant) -> bool {
         self.onlooker.keep_going(now)
     }

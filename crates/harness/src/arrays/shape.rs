@@ -6,7 +6,7 @@ use std::time::Duration;
 use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Coordination, EXACT_FROM, Integrator};
-use cohaptic_scene::{Scene, Strategies, Topology};
+use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DirectLinks, LinkModel, SteppedLinks};
 
@@ -33,7 +33,7 @@ pub(crate) struct Shape {
     pub(super) phases: Vec<u64>,
     /// The size of a sample.
     pub(super) size: Bytes,
-    /// Whether the fate of a packet on some link may depend on later ones.
+    /// Whether the fate of a packet on some link may depend on later ones, or on a change of the timeline.
     pub(super) has_queues: bool,
     /// The delay of all links, if they do nothing but delay, all alike, and lead from all to all.
     pub(super) delay: Option<Duration>,
@@ -48,7 +48,12 @@ impl Shape {
     /// The tick before one, and when it is.
     pub(super) fn before(&self, tick: u64) -> (u64, Instant) {
         let before = tick.saturating_sub(1);
-        (before, Instant::from_nanos(before * nanos(self.tick)))
+        (before, self.instant(before))
+    }
+
+    /// When a tick is.
+    pub(super) fn instant(&self, tick: u64) -> Instant {
+        Instant::from_nanos(tick * nanos(self.tick))
     }
 
     /// Whether a sample reaches all others together, so that links take no memory.
@@ -66,48 +71,76 @@ impl Shape {
         self.has_queues
     }
 
-    /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and no link counts or damages packets inside.
-    /// `None` for any other, for strategies that are no law of the registry, on an object that turns for laws with a past, which may have one of its
-    /// attitudes, and for exact means, and for gains that differ from peer to peer.
-    pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, BuiltIn)> {
+    /// The first tick at or after an instant.
+    pub(super) fn tick_at(&self, at: Instant) -> u64 {
+        at.as_nanos().div_ceil(nanos(self.tick))
+    }
+
+    /// The shape of a scene, and its law; why it cannot be run in arrays, if it cannot.
+    pub(crate) fn of<S: Strategies>(scene: &Scene, plan: &Plan, strategies: &S) -> Result<(Self, BuiltIn), &'static str> {
         // All tick together, so that all have one law.
-        let law = strategies.law(scene, 0)?;
-        let clock = scene.peers.first()?.clock;
+        let law = strategies.law(scene, 0).ok_or("the strategy is not a law of the registry")?;
+        let clock = scene.peers[0].clock;
         let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
         let size = Bytes::new(kind.datagram_len(scene.axes.count()) as u64);
         let links = scene.used_links();
-        let fits = plan.ticking == Ticking::Lockstep
-            && !plan.general_links
-            && (scene.rotation.is_none() || Law::<f64>::lag(&law) == 0 && Law::<f64>::memory(&law) == 0 && scene.peers.len() <= EXACT_FROM)
-            && scene.timeline.is_empty()
-            && scene.coordination.send_when.is_none()
-            && scene.duration <= LONGEST
-            && clock.tick <= LONGEST
+        let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
+        let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, size));
+        let delay = one_delay(scene).filter(|_| !links_change);
+        let has_past = |law: BuiltIn| Law::<f64>::lag(&law) > 0 || Law::<f64>::memory(&law) > 0;
+        let may_have_past = || has_past(law) || !scene.timeline.is_empty() && scene.laws_in_time(0).any(has_past);
+        let sends_by_difference = |change: &Change| matches!(change.what, ChangeKind::SendWhen(_));
+        // Of strategies that are not the scene's own nobody knows the law after a change.
+        let changes_law = |change: &Change| matches!(change.what, ChangeKind::Coordination(_) | ChangeKind::Parameters(_));
+        let fits = [
+            (plan.ticking == Ticking::Lockstep && !plan.general_links, "peers tick at instants of their own"),
+            (scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()), "there are access lines, which links share"),
+            (are_direct || links.iter().all(|(link, _)| SteppedLinks::takes(link)), "a link damages, counts or replays packets"),
+            (scene.timeline.iter().all(|change| has_steps(&change.what)), "the timeline makes a link damage, count or replay packets"),
+            (scene.coordination.send_when.is_none() && !scene.timeline.iter().any(sends_by_difference), "there are dead bands"),
+            (!scene.has_gains_by_peer(), "the gains follow the weight that a peer hears, so they differ from peer to peer"),
+            (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
+            (scene.rotation.is_none() || scene.peers.len() <= EXACT_FROM, "more than 256 peers turn, and their mean is an exact sum"),
+            (scene.rotation.is_none() || !may_have_past(), "the law remembers, and the object turns"),
             // What each packet carries counts them in 16 bits.
-            && (scene.peers.len() <= usize::from(u16::MAX) || one_delay(scene).is_some())
-            && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none())
-            // All have one law.
-            && !scene.has_gains_by_peer()
-            && links.iter().all(|(link, _)| DirectLinks::takes(link, size) || SteppedLinks::takes(link));
-        fits.then(|| {
-            let shape = Self {
-                law: scene.coordination.strategy,
-                memory: Law::<f64>::memory(&law),
-                lag: Law::<f64>::lag(&law),
-                peers: scene.peers.len(),
-                axes: plan.axes.count(),
-                turns: scene.rotation.as_ref().map(|rotation| (scene.integrator, rotation.steps)),
-                tick: clock.tick,
-                end: Instant::ZERO.saturating_add(scene.duration),
-                send_every: u64::try_from(scene.coordination.update.as_nanos() / clock.tick.as_nanos()).unwrap_or(u64::MAX),
-                phases: scene.peers.iter().map(|peer| peer.phase).collect(),
-                size,
-                has_queues: !links.iter().all(|(link, _)| DirectLinks::takes(link, size)),
-                delay: one_delay(scene),
-                topology: scene.topology.clone(),
-            };
-            (shape, law)
-        })
+            (scene.peers.len() <= usize::from(u16::MAX) || delay.is_some(), "there are more than 65,535 peers, over links that take memory"),
+            (scene.duration <= LONGEST && clock.tick <= LONGEST, "it lasts longer than a year"),
+        ];
+        if let Some((_, why)) = fits.into_iter().find(|(fits, _)| !fits) {
+            return Err(why);
+        }
+        let shape = Self {
+            law: scene.coordination.strategy,
+            memory: Law::<f64>::memory(&law),
+            lag: Law::<f64>::lag(&law),
+            peers: scene.peers.len(),
+            axes: plan.axes.count(),
+            turns: scene.rotation.as_ref().map(|rotation| (scene.integrator, rotation.steps)),
+            tick: clock.tick,
+            end: Instant::ZERO.saturating_add(scene.duration),
+            send_every: scene.samples_every(0),
+            phases: scene.peers.iter().map(|peer| peer.phase).collect(),
+            size,
+            has_queues: !are_direct,
+            delay,
+            topology: scene.topology.clone(),
+        };
+        Ok((shape, law))
+    }
+}
+
+/// Whether links after such a change are told when the next packet comes.
+fn has_steps(what: &ChangeKind) -> bool {
+    match what {
+        ChangeKind::Link(link) => SteppedLinks::takes(&link.config),
+        ChangeKind::AllLinks(links) => links.configs().iter().all(|link| SteppedLinks::takes(link)),
+        ChangeKind::Contact { .. }
+        | ChangeKind::Hand { .. }
+        | ChangeKind::HandTorque { .. }
+        | ChangeKind::Coordination(_)
+        | ChangeKind::RotationalGains(_)
+        | ChangeKind::Parameters(_)
+        | ChangeKind::SendWhen(_) => true,
     }
 }
 
@@ -119,4 +152,50 @@ fn one_delay(scene: &Scene) -> Option<Duration> {
     let mut delays = scene.links.used().map(|(link, _)| link.is_constant_delay().then(|| LinkModel::mean_delay(link)));
     let first = delays.next()??;
     (first <= LONGEST && delays.all(|delay| delay == Some(first))).then_some(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use cohaptic_scene::FromScene;
+
+    use super::*;
+    use crate::plan::Model;
+
+    /// Why two peers with these keys besides cannot be run in arrays.
+    fn refusal(keys: &str) -> Option<&'static str> {
+        let text = format!(
+            "scene = {{ duration = \"1s\", count = 2 }}\nobject.mass = 1\npeer = {{ contact = \"none\", device.mass = 1 }}\nlink.delay = \"9ms\"\n\
+             coordination = {{ strategy = \"average-position\", stiffness = 1, update = \"8ms\" }}\n"
+        );
+        let settings: Vec<String> = keys.lines().map(str::to_owned).collect();
+        let scene = Scene::parse(&text, Path::new("x.toml"), &settings).unwrap_or_else(|error| panic!("{keys}: {error}"));
+        Shape::of(&scene, &Plan::new(&scene, Model::Least, false), &FromScene).err()
+    }
+
+    #[test]
+    fn what_needs_events_has_a_reason() {
+        let change = |what: &str| format!("timeline=[{{ at = \"1ms\", {what} }}]");
+        for fits in [
+            String::new(),
+            change("link = \"all\", set = { rate = \"1Mbit\" }"),
+            change("peer = \"peer1\", set = { hand = { force = 1 } }"),
+            change("coordination = { stiffness = 2 }"),
+        ] {
+            assert_eq!(refusal(&fits), None, "{fits}");
+        }
+        for (keys, expected) in [
+            ("peer.clock.drift=\"10ppm\"".to_owned(), "instants of their own"),
+            ("peer.uplink={ rate = \"1Mbit\" }".to_owned(), "access lines"),
+            ("link.corrupt=0.1".to_owned(), "a link damages"),
+            (change("link = \"all\", set = { corrupt = 0.1 }"), "the timeline makes a link damage"),
+            ("coordination.send-when={ position = 0.001 }".to_owned(), "dead bands"),
+            (change("coordination = { send-when = { position = 0.001 } }"), "dead bands"),
+            ("coordination.strategy=\"wave\"\ncoordination.wave.impedance=1".to_owned(), "not a law"),
+            ("scene.duration=\"9000h\"".to_owned(), "longer than a year"),
+        ] {
+            assert!(refusal(&keys).is_some_and(|why| why.contains(expected)), "{keys}: {:?}", refusal(&keys));
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Many runs, those of one shape at the same time.
 
 use cohaptic_peer::EXACT_FROM;
-use cohaptic_scene::{FromScene, Scene};
+use cohaptic_scene::{Change, FromScene, Scene};
 
 use super::Shape;
 use super::lanes::WIDTH;
@@ -11,7 +11,7 @@ use crate::{NoObserver, Simulation, Summary};
 /// Runs scenes that nobody watches, and gives what came out of each, in their order: the same to the bit as [`Simulation::run`] of each alone.
 ///
 /// Neighbours of one shape ([`same_shape`]) are run eight at a time where that pays, a number of each in one register: scenes with the same peers, ticks,
-/// duration and delays that differ in their seed, in gains, masses, hands, jitter or loss. Others are run alone.
+/// duration, timeline and delays that differ in their seed, in gains, masses, hands, jitter or loss. Others are run alone.
 ///
 /// # Panics
 ///
@@ -23,7 +23,7 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
     while let Some(first) = rest.first() {
         let shape = shape(first);
         let alike = rest.iter().take(WIDTH).take_while(|scene| shape.is_some() && self::shape(scene) == shape).count();
-        if let Some(shape) = shape.filter(|shape| pays(shape, alike)) {
+        if let Some((shape, _)) = shape.filter(|(shape, _)| pays(shape, alike)) {
             let (now, later) = rest.split_at(alike);
             summaries.extend(run_eight(now, shape));
             rest = later;
@@ -52,8 +52,9 @@ pub fn same_shape(one: &Scene, other: &Scene) -> bool {
     shape(one).is_some_and(|shape_of_one| Some(shape_of_one) == shape(other))
 }
 
-fn shape(scene: &Scene) -> Option<Shape> {
-    Shape::of(scene, &Plan::new(scene, Model::Least, false), &FromScene).map(|(shape, _)| shape)
+/// The shape of a scene that can be run in arrays, and what changes on its way.
+fn shape(scene: &Scene) -> Option<(Shape, &[Change])> {
+    Shape::of(scene, &Plan::new(scene, Model::Least, false), &FromScene).ok().map(|(shape, _)| (shape, &scene.timeline[..]))
 }
 
 /// Runs up to eight scenes of one shape; the last one fills the lanes that are left.

@@ -6,7 +6,7 @@
 
 mod barrier;
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -130,8 +130,7 @@ pub(super) fn run<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
             max_discrepancy: 0.0,
         };
         let arrays = Arrays::of_members([scene], shape.clone(), [law], members, bodies, &initial);
-        let law = arrays.law;
-        law.visit(PartToEnd { arrays, thread, keep_going })
+        Part { arrays, thread, keep_going }.run()
     };
     let ended: Vec<Option<Ended<'_, B, A, P>>> = std::thread::scope(|scope| {
         let mut bodies = bodies.into_iter();
@@ -159,53 +158,80 @@ struct Ended<'a, B, const A: usize, const P: usize> {
 }
 
 /// The run of a thread.
-struct PartToEnd<'a, 'e, 'k, B, const A: usize, const P: usize> {
+struct Part<'a, 'e, 'k, B, const A: usize, const P: usize> {
     arrays: Arrays<'a, B, A, P, 1>,
     thread: Thread<'e, P>,
     keep_going: Option<&'k mut dyn FnMut(Instant) -> bool>,
 }
 
-impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> LawVisitor<Lanes> for PartToEnd<'a, '_, '_, B, A, P> {
-    type Output = Option<Ended<'a, B, A, P>>;
+/// Some ticks of the run of a thread.
+struct Stretch<'s, 'a, 'e, 'k, B, const A: usize, const P: usize> {
+    part: &'s mut Part<'a, 'e, 'k, B, A, P>,
+    ticks: Range<u64>,
+}
+
+/// Why the run of a thread ends early.
+enum Early {
+    Diverged,
+    /// After that number of ticks.
+    Interrupted(u64),
+}
+
+impl<B: Bodies<A, P>, const A: usize, const P: usize> LawVisitor<Lanes> for Stretch<'_, '_, '_, '_, B, A, P> {
+    type Output = ControlFlow<Early>;
 
     #[inline(never)]
     fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> Self::Output {
-        self.run(law)
+        self.part.run_over(law, self.ticks)
     }
 }
 
-impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> PartToEnd<'a, '_, '_, B, A, P> {
-    fn run(mut self, law: &impl LawOfLanes) -> Option<Ended<'a, B, A, P>> {
-        let tick_nanos = nanos(self.arrays.shape.tick);
-        let mut tick = 0;
-        let ending = loop {
-            let now = Instant::from_nanos(tick * tick_nanos);
-            if is_asked_before(tick) && !self.goes_on(Instant::from_nanos((tick - 1) * tick_nanos)) {
-                break Ending::Interrupted(Instant::from_nanos((tick - 1) * tick_nanos));
+impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> Part<'a, '_, '_, B, A, P> {
+    fn run(mut self) -> Option<Ended<'a, B, A, P>> {
+        let (mut tick, last) = (0, self.arrays.shape.tick_at(self.arrays.shape.end));
+        let nobody = &mut Unwatched(&mut |_| true);
+        let (ending, ticks) = loop {
+            let (law, until) = (self.arrays.law, self.arrays.next_change().min(last));
+            match law.visit(Stretch { part: &mut self, ticks: tick..until }) {
+                ControlFlow::Break(Early::Diverged) => return None,
+                ControlFlow::Break(Early::Interrupted(ticks)) => break (Ending::Interrupted(self.arrays.shape.before(ticks).1), ticks),
+                ControlFlow::Continue(()) => tick = until,
             }
-            if now >= self.arrays.shape.end {
-                break Ending::Complete;
+            let now = self.arrays.shape.instant(tick).min(self.arrays.shape.end);
+            self.arrays.change(tick, now, nobody);
+            if tick == last {
+                break (Ending::Complete, tick);
             }
-            if !self.thread.all_are_finite {
-                return None;
-            }
-            self.thread.extremes.extend(self.arrays.bodies.translations().extremes(0));
-            self.arrays.step(law, tick, now, (&mut self.thread, &mut Unwatched(&mut |_| true)));
-            self.thread.is_finite &= self.arrays.finite[0];
-            tick += 1;
         };
         let Self { mut arrays, mut thread, .. } = self;
         if ending == Ending::Complete
             && let Samples::PerPacket(samples) = &mut arrays.samples
         {
-            samples.finish(arrays.shape.before(tick));
+            samples.finish(arrays.shape.before(ticks));
         }
         thread.exchange(&[], &mut arrays.sent);
         if !thread.all_are_finite {
             return None;
         }
-        let until = arrays.stop(0, tick, ending);
-        Some(Ended { part: arrays, ending, ticks: tick, until, max_discrepancy: thread.max_discrepancy })
+        let until = arrays.stop(0, ticks, ending);
+        Some(Ended { part: arrays, ending, ticks, until, max_discrepancy: thread.max_discrepancy })
+    }
+
+    fn run_over(&mut self, law: &impl LawOfLanes, ticks: Range<u64>) -> ControlFlow<Early> {
+        let tick_nanos = nanos(self.arrays.shape.tick);
+        for tick in ticks {
+            if !self.thread.all_are_finite {
+                return ControlFlow::Break(Early::Diverged);
+            }
+            let now = Instant::from_nanos(tick * tick_nanos);
+            self.thread.extremes.extend(self.arrays.bodies.translations().extremes(0));
+            self.arrays.step(law, tick, now, (&mut self.thread, &mut Unwatched(&mut |_| true)));
+            self.thread.is_finite &= self.arrays.finite[0];
+            if is_asked_before(tick + 1) && !self.goes_on(now) {
+                return ControlFlow::Break(Early::Interrupted(tick + 1));
+            }
+        }
+        ControlFlow::Continue(())
     }
 
     /// Whether the run goes on after that instant: the first thread asks the observer.

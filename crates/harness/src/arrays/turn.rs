@@ -44,7 +44,7 @@ pub(super) struct Handles {
     /// Those that are there.
     present: Mask,
     /// What turns the hand of each, and its torque now in world axes.
-    pub(super) hands: [Option<Signal>; WIDTH],
+    hands: [Option<Signal>; WIDTH],
     torque: Triple<Lanes>,
     /// Those that have such a hand.
     held: Mask,
@@ -285,6 +285,16 @@ impl Handles {
         (self.coupling.stiffness.0[lane], self.coupling.damping.0[lane]) = (coupling.stiffness, coupling.damping);
         self.grasps.set(lane, grasps);
         self.present.set(lane, true);
+    }
+
+    /// Whether the device of a lane grasps its copy from now on.
+    pub(super) fn set_grasps(&mut self, lane: usize, grasps: bool) {
+        self.grasps.set(lane, grasps && self.present.get(lane));
+    }
+
+    /// What turns the hand of a lane from now on, if its device turns.
+    pub(super) fn set_hand(&mut self, lane: usize, hand: Option<&Signal>) {
+        self.hands[lane] = hand.filter(|_| self.present.get(lane)).cloned();
     }
 
     /// Hands take the torque of now.

@@ -3,8 +3,8 @@
 //! What a lane computes is what [`cohaptic_peer::rotation::Rotation`] does, with the same functions in the same order, so every bit is the same.
 
 use cohaptic_peer::coordination::BuiltIn;
-use cohaptic_peer::rotation::{Attitude, DeviceRotation, RotationConfig, Spin};
-use cohaptic_peer::{Clock, Contact};
+use cohaptic_peer::rotation::{Attitude, DeviceRotation, RotationConfig, RotationStep, Spin, Triple};
+use cohaptic_peer::{Contact, Gains, Signal};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use pulp::NullaryFnOnce;
@@ -114,10 +114,48 @@ impl TurningBlocks {
         self.turns[block].attitude.orientation.map(|part| part.0[lane])
     }
 
+    /// Changes what there is of devices of a peer that turn, in all runs.
+    fn change_handles(&mut self, peer: usize, mut change: impl FnMut(&mut Handles, usize)) {
+        for (Spot { block, lane }, ..) in self.places.all(0).filter(|(_, other, _)| *other == peer) {
+            if let Some(handles) = &mut self.turns[block].handles {
+                change(handles, lane);
+            }
+        }
+    }
+
     #[cold]
     fn look_at_each(&self, finite: &mut [bool]) {
         for (Spot { block, lane }, _, run) in self.places.all(0) {
             finite[run] &= self.turns[block].is_finite(lane);
+        }
+    }
+}
+
+/// The turning part of a peer of a scene.
+fn config(scene: &Scene, peer: usize) -> RotationConfig {
+    scene.rotation_config(peer).expect("the shape of the scenes says that their objects turn")
+}
+
+/// The step of a body in a tick of a scene.
+fn step(scene: &Scene, spin: Spin, config: &RotationConfig) -> RotationStep {
+    spin.step(scene.peers[0].clock.tick, config.integrator, config.steps)
+}
+
+impl Shared {
+    /// Copies turn as in these scenes, in each run.
+    fn set_steps(&mut self, scenes: &[&Scene]) {
+        for lane in 0..WIDTH {
+            let scene = scenes[lane % scenes.len()];
+            let config = config(scene, 0);
+            self.step.set(lane, &step(scene, config.copy, &config));
+        }
+    }
+
+    /// KR and BR of each run.
+    fn set_gains(&mut self, gains: &[Gains<Triple>]) {
+        for (lane, axis) in (0..WIDTH).flat_map(|lane| (0..3).map(move |axis| (lane, axis))) {
+            let gains = &gains[lane % gains.len()];
+            (self.gains.stiffness[axis].0[lane], self.gains.damping[axis].0[lane]) = (gains.stiffness[axis], gains.damping[axis]);
         }
     }
 }
@@ -138,31 +176,23 @@ impl NullaryFnOnce for Turned<'_> {
 
 impl Bodies<3, PAIRS> for TurningBlocks {
     fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
-        let clock: &Clock = &scenes[0].peers[0].clock;
-        let config = |peer: usize, run: usize| scenes[run].rotation_config(peer).expect("the shape of the scenes says that their objects turn");
-        let step = |spin: Spin, config: &RotationConfig| spin.step(clock.tick, config.integrator, config.steps);
-        let of_runs: Vec<RotationConfig> = (0..places.runs).map(|run| config(0, run)).collect();
+        let of_runs: Vec<RotationConfig> = scenes.iter().map(|scene| config(scene, 0)).collect();
         let mut turns = vec![Turn::at_rest(); places.blocks()];
         for (Spot { block, lane }, peer, run) in places.all(0) {
-            let (turn, spec, config) = (&mut turns[block], &scenes[run].peers[peer], config(peer, run));
+            let (turn, spec, config) = (&mut turns[block], &scenes[run].peers[peer], config(scenes[run], peer));
             let attitude = scenes[run].rotation.as_ref().map_or(Attitude::REST, |rotation| rotation.peers[peer].attitude);
             turn.begin(lane, attitude, config.grasp, spec.compute_delay);
             if let Some(DeviceRotation { handle, coupling, hand }) = &config.device {
-                let handles = turn.handles.get_or_insert_with(|| Box::new(Handles::none(&step(*handle, &config))));
-                handles.begin(lane, attitude, &step(*handle, &config), coupling, spec.contact == Contact::Grasp);
-                handles.hands[lane].clone_from(hand);
+                let step = step(scenes[run], *handle, &config);
+                let handles = turn.handles.get_or_insert_with(|| Box::new(Handles::none(&step)));
+                handles.begin(lane, attitude, &step, coupling, spec.contact == Contact::Grasp);
+                handles.set_hand(lane, hand.as_ref());
             }
         }
-        let of_lanes = |lane: usize| &of_runs[lane % places.runs];
-        let mut shared = Shared { step: Steps::of(&step(of_runs[0].copy, &of_runs[0])), gains: of_runs[0].gains.map(|_| [Lanes::ZERO; 3]) };
-        for lane in 0..WIDTH {
-            let config = of_lanes(lane);
-            shared.step.set(lane, &step(config.copy, config));
-            for axis in 0..3 {
-                shared.gains.stiffness[axis].0[lane] = config.gains.stiffness[axis];
-                shared.gains.damping[axis].0[lane] = config.gains.damping[axis];
-            }
-        }
+        let mut shared =
+            Shared { step: Steps::of(&step(scenes[0], of_runs[0].copy, &of_runs[0])), gains: of_runs[0].gains.map(|_| [Lanes::ZERO; 3]) };
+        shared.set_steps(scenes);
+        shared.set_gains(&of_runs.iter().map(|config| config.gains).collect::<Vec<_>>());
         Self {
             places,
             translations: Blocks::new(places, scenes, law, devices),
@@ -217,6 +247,24 @@ impl Bodies<3, PAIRS> for TurningBlocks {
             mean[2 * pair].0[lane..].fill(x[L - 1]);
             mean[2 * pair + 1].0[lane..].fill(v[L - 1]);
         }
+    }
+
+    fn set_contact(&mut self, peer: usize, contact: Contact) {
+        self.translations.set_contact(peer, contact);
+        self.change_handles(peer, |handles, lane| handles.set_grasps(lane, contact == Contact::Grasp));
+    }
+
+    fn set_hand_torque(&mut self, peer: usize, torque: Option<&Signal>) {
+        self.change_handles(peer, |handles, lane| handles.set_hand(lane, torque));
+    }
+
+    fn set_gains_of_turns<const L: usize>(&mut self, gains: &[Gains<Triple>; L]) {
+        self.shared.set_gains(gains);
+    }
+
+    fn set_damping(&mut self, scenes: &[&Scene]) {
+        self.translations.set_damping(scenes);
+        self.shared.set_steps(scenes);
     }
 
     fn move_hands(&mut self, now: Instant) {

@@ -99,18 +99,27 @@ pub fn explain(scene: &Scene) -> Explanation {
         };
         rows.model("measures", format!("{count}, computed tick by tick"), why);
     }
-    let arrays = Shape::of(scene, &plan, &FromScene).filter(|_| watch.is_of_ticks());
-    let in_arrays = arrays.is_some();
-    if let Some((shape, _)) = arrays {
+    let arrays = match Shape::of(scene, &plan, &FromScene) {
+        Err(why) => {
+            rows.leave_out(format!("arrays: {why}; the run has events"));
+            None
+        }
+        Ok((shape, _)) => Some(shape).filter(|_| watch.is_of_ticks()),
+    };
+    let nanos = match &arrays {
+        None => WITH_EVENTS,
+        Some(shape) if shape.is_broadcast() => IN_ARRAYS,
+        Some(_) => Nanos { a_packet: IN_ARRAYS.an_impaired_packet, ..IN_ARRAYS },
+    };
+    if let Some(shape) = arrays {
         rows.model(
             "runs of which nobody watches more than ticks",
             "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
-            "all tick together, nothing changes on the way, and no link counts or damages packets; a run that is recorded has events, since packets are recorded",
+            "all tick together, and no link counts or damages packets; a run that is recorded has events, since packets are recorded",
         );
         let (threads, why) = shape.threads();
         rows.model("threads of such a run, if nobody watches", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
     }
-    let nanos = if in_arrays { IN_ARRAYS } else { WITH_EVENTS };
     Explanation { dimensions: dimensions(scene, &plan), cost: cost(scene, &nanos), models: rows.models, left_out: rows.left_out }
 }
 
@@ -279,9 +288,6 @@ impl Rows {
             TopologyKind::Graph => format!("a graph of {} neighbours, with their weights", Counted(topology.links() / 2, "pair")),
         };
         self.model("topology", model, "[topology]: links and samples held are those of neighbours, and no others");
-        if scene.has_gains_by_peer() {
-            self.leave_out("arrays: the gains follow the weight that a peer hears, so they differ from peer to peer");
-        }
     }
 
     fn network(&mut self, scene: &Scene) {

@@ -28,6 +28,25 @@ struct Receiver {
     sampled: Vec<(usize, Instant)>,
     /// Σ of these instants \[ns\].
     nanos: u128,
+    /// These instants in ascending order, and how many samples are of each, if a quantile is asked for. Where peers sample together these are a few.
+    instants: Vec<(Instant, u64)>,
+}
+
+impl Receiver {
+    /// A sample of one instant takes the place of one of another, if there was one.
+    fn replace(&mut self, before: Option<Instant>, now: Instant) {
+        let place = |instants: &[(Instant, u64)], at: Instant| instants.binary_search_by_key(&at, |(instant, _)| *instant);
+        if let Some(Ok(place)) = before.map(|before| place(&self.instants, before)) {
+            self.instants[place].1 -= 1;
+            if self.instants[place].1 == 0 {
+                self.instants.remove(place);
+            }
+        }
+        match place(&self.instants, now) {
+            Ok(place) => self.instants[place].1 += 1,
+            Err(place) => self.instants.insert(place, (now, 1)),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +62,7 @@ impl Accumulator for Ages {
     const ROWS: Rows = Rows { ticks: true, holds: true, ..Rows::NONE };
 
     fn new(asked: &Asked<'_>) -> Self {
-        let receiver = Receiver { sampled: Vec::new(), nanos: 0 };
+        let receiver = Receiver { sampled: Vec::new(), nanos: 0, instants: Vec::new() };
         Self {
             receivers: vec![receiver; asked.scene.peers.len()],
             nanos: 0,
@@ -53,23 +72,28 @@ impl Accumulator for Ages {
     }
 
     fn on_hold(&mut self, row: &HoldRow) {
-        let Receiver { sampled, nanos } = &mut self.receivers[row.to];
-        let place = sampled.binary_search_by_key(&row.from, |(from, _)| *from).unwrap_or_else(|place| {
-            sampled.insert(place, (row.from, Instant::ZERO));
-            place
-        });
-        let before = std::mem::replace(&mut sampled[place].1, row.sampled);
-        *nanos = *nanos + u128::from(row.sampled.as_nanos()) - u128::from(before.as_nanos());
+        let receiver = &mut self.receivers[row.to];
+        let before = match receiver.sampled.binary_search_by_key(&row.from, |(from, _)| *from) {
+            Ok(place) => Some(std::mem::replace(&mut receiver.sampled[place].1, row.sampled)),
+            Err(place) => {
+                receiver.sampled.insert(place, (row.from, row.sampled));
+                None
+            }
+        };
+        receiver.nanos = receiver.nanos + u128::from(row.sampled.as_nanos()) - before.map_or(0, |before| u128::from(before.as_nanos()));
+        if self.sketch.is_some() {
+            receiver.replace(before, row.sampled);
+        }
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) {
-        let Receiver { sampled, nanos, .. } = &self.receivers[row.peer];
+        let Receiver { sampled, nanos, instants } = &self.receivers[row.peer];
         let held = sampled.len() as u64;
         self.nanos += u128::from(held) * u128::from(row.at.as_nanos()) - nanos;
         self.count += held;
         if let Some(sketch) = &mut self.sketch {
-            for (_, sampled) in sampled {
-                sketch.insert(seconds(row.at.as_nanos() - sampled.as_nanos()));
+            for (sampled, count) in instants {
+                sketch.insert_many(seconds(row.at.as_nanos() - sampled.as_nanos()), *count);
             }
         }
     }

@@ -32,14 +32,20 @@ impl QuantileSketch {
     /// Counts a value. One below 2⁻⁴⁰, or below zero, counts as zero; one of 2²⁴ or more, and a NaN, as infinite.
     #[inline]
     pub fn insert(&mut self, value: f64) {
-        self.count += 1;
+        self.insert_many(value, 1);
+    }
+
+    /// Counts a value this number of times.
+    #[inline]
+    pub fn insert_many(&mut self, value: f64, times: u64) {
+        self.count += times;
         if value < LEAST {
-            self.below += 1;
+            self.below += times;
             return;
         }
         let bin = usize::try_from((value.to_bits() >> BEHIND).wrapping_sub(FIRST)).unwrap_or(usize::MAX);
         if let Some(bin) = self.bins.get_mut(bin) {
-            *bin += 1;
+            *bin += times;
         }
     }
 
@@ -128,6 +134,14 @@ mod tests {
             merged.merge(&sketch(one));
             prop_assert_eq!(merged.count(), values.len() as u64);
             prop_assert_eq!(merged, sketch(&values));
+        }
+
+        #[test]
+        fn a_value_counts_as_often_as_it_is_said(values in values(), times in 0..20_u64) {
+            let mut many = QuantileSketch::default();
+            values.iter().for_each(|value| many.insert_many(*value, times));
+            let each: Vec<f64> = values.iter().flat_map(|value| (0..times).map(|_| *value)).collect();
+            prop_assert_eq!(many, sketch(&each));
         }
     }
 

@@ -17,15 +17,23 @@ use crate::packet::{Marks, Outputs, PacketInfo};
 ///
 /// What a queue does with a packet may depend on those that come later, but never before they come. So a link that is told when its next packet comes decides at
 /// once all that happens until then: no queue of events wakes it. It does what [`crate::Network`] does with such links, with the same random numbers at the
-/// same addresses and the same counters. Packets of type `T` come out in no order of time.
+/// same addresses and the same counters. Packets of type `T` come out in no order of time, each with the word whether one that came out before it arrives later
+/// or at the same instant.
 ///
 /// Links are numbered from 0 as they are added.
 #[derive(Clone, Debug)]
 pub struct SteppedLinks<T> {
     until: Instant,
-    lines: Vec<Line<(), Sent<T>>>,
+    lines: Vec<Stepped<T>>,
     outputs: Outputs<Sent<T>>,
     arrivals: Vec<(Instant, Sent<T>)>,
+}
+
+/// A link, and the latest arrival over it so far.
+#[derive(Clone, Debug)]
+struct Stepped<T> {
+    line: Line<(), Sent<T>>,
+    latest: Instant,
 }
 
 /// A packet and when it was offered.
@@ -57,7 +65,7 @@ impl<T: Clone> SteppedLinks<T> {
 
     /// Adds a link that can be [taken](SteppedLinks::takes).
     pub fn add(&mut self, seed: u64, name: &LinkName, model: LinkModel) {
-        self.lines.push(Line::new(seed, name, model, false));
+        self.lines.push(Stepped { line: Line::new(seed, name, model, false), latest: Instant::ZERO });
     }
 
     /// The number of the next packet of a link.
@@ -67,18 +75,18 @@ impl<T: Clone> SteppedLinks<T> {
     /// If there is no such link.
     #[must_use]
     pub fn offered(&self, link: LinkId) -> u64 {
-        self.lines[link.index()].offered()
+        self.lines[link.index()].line.offered()
     }
 
     /// Offers a packet to a link, and says until when nothing else is offered to it. `arrives` is told of each packet that leaves the link's stages until then,
-    /// and when it arrives. Instants must not go back.
+    /// when it arrives, and whether it does not arrive after all that left them before. Instants must not go back.
     ///
     /// # Panics
     ///
     /// If there is no such link.
-    pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, info: PacketInfo, item: T, arrives: impl FnMut(Instant, T)) {
+    pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, info: PacketInfo, item: T, arrives: impl FnMut(Instant, bool, T)) {
         let Self { lines, outputs, arrivals, .. } = self;
-        let line = &mut lines[link.index()];
+        let line = &mut lines[link.index()].line;
         match line.offer(now, None) {
             Outcome::Arrives(at) => arrivals.push((at, Sent { at: now, item })),
             Outcome::Dropped(cause) => line.drop(cause),
@@ -92,9 +100,9 @@ impl<T: Clone> SteppedLinks<T> {
     /// # Panics
     ///
     /// If there is no such link.
-    pub fn pass(&mut self, next: Instant, link: LinkId, mut arrives: impl FnMut(Instant, T)) {
+    pub fn pass(&mut self, next: Instant, link: LinkId, mut arrives: impl FnMut(Instant, bool, T)) {
         let Self { until, lines, outputs, arrivals } = self;
-        let line = &mut lines[link.index()];
+        let Stepped { line, latest } = &mut lines[link.index()];
         // What happens after the end is not counted.
         let next = next.min(*until);
         if line.next_wake().is_some_and(|wake| wake <= next) {
@@ -104,8 +112,28 @@ impl<T: Clone> SteppedLinks<T> {
             if at <= *until {
                 line.deliver(sent, at);
             }
-            arrives(at, item);
+            arrives(at, at <= *latest, item);
+            *latest = at.max(*latest);
         }
+    }
+
+    /// Changes the model of a link, of which `seed` and `name` are those that it was added with; see [`crate::Network::set_link`]. Until then time has passed on it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    pub fn set_model(
+        &mut self,
+        now: Instant,
+        link: LinkId,
+        (seed, name): (u64, &LinkName),
+        model: LinkModel,
+        mut arrives: impl FnMut(Instant, bool, T),
+    ) {
+        self.pass(now, link, &mut arrives);
+        let Self { lines, outputs, arrivals, .. } = self;
+        lines[link.index()].line.reconfigure(now, seed, name, model, outputs, &mut Arriving(arrivals));
+        self.pass(now, link, arrives);
     }
 
     /// Takes back that a packet is delivered: nobody will look when it arrives.
@@ -115,7 +143,7 @@ impl<T: Clone> SteppedLinks<T> {
     /// If there is no such link.
     pub fn forget(&mut self, link: LinkId, sent: Instant, arrival: Instant) {
         if arrival <= self.until {
-            self.lines[link.index()].forget(sent, arrival);
+            self.lines[link.index()].line.forget(sent, arrival);
         }
     }
 
@@ -126,7 +154,7 @@ impl<T: Clone> SteppedLinks<T> {
     /// If there is no such link.
     #[must_use]
     pub fn stats(&self, link: LinkId) -> LinkStats {
-        self.lines[link.index()].stats()
+        self.lines[link.index()].line.stats()
     }
 }
 

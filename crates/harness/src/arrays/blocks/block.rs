@@ -113,16 +113,13 @@ impl Block {
         }
     }
 
-    pub(super) fn touch(&mut self, axis: usize, lane: usize, contact: Contact) {
-        match contact {
-            Contact::None => {}
-            Contact::Grasp => self.grasps.set(lane, true),
-            Contact::Push(direction) if direction.axis != axis => {}
-            Contact::Push(_) => {
-                let grasps = self.grasps;
-                let so_far = |lane| if grasps.get(lane) { Contact::Grasp } else { Contact::None };
-                self.contacts.get_or_insert_with(|| Box::new(std::array::from_fn(so_far)));
-            }
+    /// A device touches its copy in that way from now on.
+    pub(super) fn touch(&mut self, lane: usize, contact: Contact) {
+        self.grasps.set(lane, contact == Contact::Grasp);
+        if matches!(contact, Contact::Push(direction) if direction.axis == self.axis) {
+            let grasps = self.grasps;
+            let so_far = |lane| if grasps.get(lane) { Contact::Grasp } else { Contact::None };
+            self.contacts.get_or_insert_with(|| Box::new(std::array::from_fn(so_far)));
         }
         if let Some(contacts) = &mut self.contacts {
             contacts[lane] = contact;

@@ -27,14 +27,15 @@ pub(super) struct InFlight<const P: usize> {
 /// The samples in force at a tick.
 #[derive(Clone, Debug)]
 pub(super) struct Bucket<const P: usize> {
-    pub(super) packets: Vec<Packet<P>>,
-    /// Whether one of them overtook another that may be here too.
-    pub(super) is_mixed: bool,
+    /// Those of each link in the order in which they arrive.
+    pub(super) in_order: Vec<Packet<P>>,
+    /// Those that may arrive before others that were put here earlier.
+    pub(super) overtaking: Vec<Packet<P>>,
 }
 
 impl<const P: usize> Default for Bucket<P> {
     fn default() -> Self {
-        Self { packets: Vec::new(), is_mixed: false }
+        Self { in_order: Vec::new(), overtaking: Vec::new() }
     }
 }
 
@@ -85,28 +86,33 @@ impl<const P: usize> InFlight<P> {
         }
     }
 
-    /// A packet that is known at this tick and instant; whether it may arrive in another order than it was put here.
+    /// A packet that is known at this tick and instant; whether it may arrive before another of its link that was put here earlier.
     #[inline(always)]
-    pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<P>, is_mixed: bool) {
+    pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<P>, overtakes: bool) {
         // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
         let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
         let due = tick.saturating_add(ticks);
         let bucket = if ticks < HORIZON { &mut self.wheel[slot(due)] } else { self.beyond.entry(due).or_default() };
-        if bucket.packets.capacity() == 0 {
-            bucket.packets = self.emptied.pop().unwrap_or_default();
+        let packets = if overtakes { &mut bucket.overtaking } else { &mut bucket.in_order };
+        if packets.capacity() == 0 {
+            *packets = self.emptied.pop().unwrap_or_default();
         }
-        bucket.is_mixed |= is_mixed;
-        bucket.packets.push(packet);
+        packets.push(packet);
     }
 
     /// All of them, in no order.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Packet<P>> {
-        self.wheel.iter().chain(self.beyond.values()).flat_map(|bucket| &bucket.packets)
+        self.wheel.iter().chain(self.beyond.values()).flat_map(|bucket| bucket.in_order.iter().chain(&bucket.overtaking))
     }
 
     /// Takes back the memory of a bucket whose packets are gone.
-    pub(super) fn reuse(&mut self, emptied: Vec<Packet<P>>) {
-        self.emptied.push(emptied);
+    pub(super) fn reuse(&mut self, Bucket { in_order, overtaking }: Bucket<P>) {
+        for mut packets in [overtaking, in_order] {
+            if packets.capacity() > 0 {
+                packets.clear();
+                self.emptied.push(packets);
+            }
+        }
     }
 
     /// The samples that are due at that tick, if there are any.
@@ -115,16 +121,17 @@ impl<const P: usize> InFlight<P> {
             self.come_near(tick);
         }
         let bucket = std::mem::take(&mut self.wheel[slot(tick)]);
-        (!bucket.packets.is_empty()).then_some(bucket)
+        (!bucket.in_order.is_empty() || !bucket.overtaking.is_empty()).then_some(bucket)
     }
 
     /// The samples that are due at that tick and were sent long ago.
     #[cold]
     fn come_near(&mut self, tick: u64) {
-        if let Some(bucket) = self.beyond.remove(&tick) {
+        if let Some(mut bucket) = self.beyond.remove(&tick) {
             let near = &mut self.wheel[slot(tick)];
-            near.packets.extend(bucket.packets);
-            near.is_mixed = true;
+            bucket.in_order.append(&mut near.in_order);
+            bucket.overtaking.append(&mut near.overtaking);
+            *near = bucket;
         }
     }
 }

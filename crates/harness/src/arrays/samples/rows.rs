@@ -118,7 +118,7 @@ impl Rows {
     }
 
     /// The places of a receiver that hold something.
-    #[inline]
+    #[inline(always)]
     pub(super) fn held(&self, receiver: usize) -> Range<usize> {
         match self {
             Self::All { peers, .. } => receiver * whole(peers - 1)..receiver * whole(peers - 1) + peers - 1,

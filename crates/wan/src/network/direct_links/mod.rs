@@ -14,7 +14,7 @@ use crate::fates::stats::LinkStats;
 use crate::line::direct::{Direct, Words};
 use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
-use crate::random::{PacketDraws, Stream};
+use crate::random::Stream;
 use crate::stages::config::LinkConfig;
 use crate::stages::queue::EqualPackets;
 
@@ -143,14 +143,9 @@ impl DirectLinks {
         let are_few = count == Self::AT_ONCE && excluded.count_zeros() <= 2;
         match &mut self.kinds[..] {
             _ if are_few => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => {
-                alike(kind.is_random, links, span, excluded, arrivals, |_, words, packet| kind.fate(now, words, packet));
-            }
+            [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => alike::<false>(kind, (links, &mut []), span, excluded, arrivals),
             [(_, kind)] if self.others.is_empty() => {
-                let remembered = &mut self.remembered[first..first + count];
-                alike(kind.is_random, links, span, excluded, arrivals, |place, words, packet| {
-                    kind.verdict(now, &mut remembered[place], words, packet)
-                });
+                alike::<true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals);
             }
             _ => self.offer_one_by_one(now, first, count, excluded, arrivals),
         }
@@ -249,28 +244,30 @@ impl Other {
     }
 }
 
-/// Offers a packet to neighbouring links of one kind: each step for all of them before the next. `verdict` decides about the packet of the link in a place.
+/// Offers a packet to neighbouring links of one kind, which remember something or nothing: each step for all of them before the next.
+///
+/// A closure for the verdict would be called for each packet: a seventh of the time of ten peers.
 #[inline(always)]
-fn alike(
-    is_random: bool,
-    links: &mut [LinkState],
+fn alike<const REMEMBER: bool>(
+    kind: &mut Kind,
+    (links, remembered): (&mut [LinkState], &mut [Remembered]),
     (now, until): (Instant, Instant),
     excluded: u8,
     arrivals: &mut Arrivals,
-    mut verdict: impl FnMut(usize, Words, PacketDraws) -> Verdict,
 ) {
     let mut words = [[0; 2]; DirectLinks::AT_ONCE];
     let Arrivals { sequences, at, .. } = arrivals;
     for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(sequences)) {
         *sequence = link.offered;
-        if is_random {
+        if kind.is_random {
             *words = link.draws.packet(link.offered).loss_and_jitter();
         }
     }
     let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
     for (place, (link, (words, at))) in links.iter_mut().zip(words.into_iter().zip(at)).enumerate() {
         if excluded & bit == 0 {
-            let verdict = verdict(place, words, link.draws.packet(link.offered));
+            let draws = link.draws.packet(link.offered);
+            let verdict = if REMEMBER { kind.verdict(now, &mut remembered[place], words, draws) } else { kind.fate(now, words, draws) };
             if let Some((arrival, overtakes)) = link.count(now, until, verdict) {
                 *at = arrival;
                 arrive |= bit;

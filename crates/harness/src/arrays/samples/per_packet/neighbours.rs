@@ -65,8 +65,8 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                         }
                         let link = LinkId::new(first_link + number);
                         let packet = packet(rows, receiver, number, now, links.offered(link));
-                        links.offer((now, next(sender)), link, *info, packet, |arrival, packet| {
-                            in_flight.push((tick, now), Packet { arrival, ..packet }, true);
+                        links.offer((now, next(sender)), link, *info, packet, |arrival, overtakes, packet| {
+                            in_flight.push((tick, now), Packet { arrival, ..packet }, overtakes);
                         });
                     }
                 }
