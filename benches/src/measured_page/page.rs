@@ -27,7 +27,7 @@ const NOT_YET: &str = "Not measured yet:";
 const OTHERS: &str = "## Written by other commands";
 
 /// Pages that need a quiet machine and privileges: what they say, and what writes them.
-const ALONE: [(&str, &str, &str); 3] = [
+const ALONE: [(&str, &str, &str); 4] = [
     (
         "measured-relay.md",
         "how late the relay and how fast",
@@ -37,6 +37,11 @@ const ALONE: [(&str, &str, &str); 3] = [
         "measured-live.md",
         "how late the ticks of a live session, and what they cost",
         "cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md",
+    ),
+    (
+        "measured-tcp.md",
+        "how far the TCP of the test kit and that of Linux are apart, over the same links",
+        "cargo run --release -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md",
     ),
     (
         "measured-soak.md",
