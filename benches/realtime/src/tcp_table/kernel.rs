@@ -14,6 +14,8 @@ use cohaptic_linkfile::router::RouterFile;
 use cohaptic_realtime::{Pacing, Wishes, prepare_thread};
 use cohaptic_router::Router;
 use nix::sched::{CloneFlags, unshare};
+use nix::sys::socket::setsockopt;
+use nix::sys::socket::sockopt::TcpCongestion;
 use nix::unistd::gettid;
 
 use crate::{QUESTION, Times, Work};
@@ -47,24 +49,31 @@ pub(crate) fn check() -> Result<(), Box<dyn Error>> {
 /// The times of connections between two hosts, all at once or one after the other. Of [`Tcp::Kept`] as many are made before, of which the kernel keeps what it learned.
 pub(crate) fn times(words: &str, work: Work, (count, at_once): (u32, bool), tcp: Tcp) -> Result<Times, Box<dyn Error>> {
     let rounds = if tcp == Tcp::Kept { 2 } else { 1 };
-    let stop = AtomicBool::new(false);
+    let stop = &AtomicBool::new(false);
     let outcome = thread::scope(|scope| -> Outcome<Times> {
         let (named, names) = channel();
         let (named_too, (client_runs, at_client)) = (named.clone(), channel());
         let ((server_runs, at_server), (listens, is_listening)) = (channel(), channel());
-        let server = scope.spawn(move || enter(1, &named, &at_server, tcp).and_then(|()| serve(&listens, work, rounds * count)));
+        let (serves, is_served) = channel();
+        // If a client fails, it waits for ever: not within the scope.
+        let server = move || drop(serves.send(enter(1, &named, &at_server, tcp).and_then(|()| serve(&listens, work, rounds * count))));
+        thread::spawn(server);
         let client = scope.spawn(move || {
             enter(0, &named_too, &at_client, tcp)?;
             is_listening.recv()?;
-            (0..rounds).map(|_| ask(work, count, at_once)).next_back().unwrap_or_else(|| Ok(Times::new()))
+            for _ in 1..rounds {
+                ask(work, count, at_once)?;
+            }
+            ask(work, count, at_once)
         });
-        let router = scope.spawn(|| route(&names, words, &stop, &[client_runs, server_runs]));
-        let times = client.join().map_err(|_| "the thread of the clients has panicked")?;
+        let router = scope.spawn(move || route(&names, words, stop, &[client_runs, server_runs]));
+        let times = client.join().unwrap_or_else(|_| Err("the thread of the clients has panicked".into()));
+        // The last acknowledgements are on their way still.
+        let served = if times.is_ok() { is_served.recv_timeout(LONGEST) } else { Ok(Ok(())) };
         stop.store(true, Ordering::Relaxed);
         router.join().map_err(|_| "the thread of the router has panicked")??;
-        let times = times?;
-        server.join().map_err(|_| "the thread of the server has panicked")??;
-        Ok(times)
+        served??;
+        times
     });
     outcome.map_err(|error| format!("`{words}`: {error}").into())
 }
@@ -104,6 +113,8 @@ links = {{ x = {{ netem = \"{words}\" }} }}"
 
 fn serve(listens: &Sender<()>, work: Work, connections: u32) -> Outcome<()> {
     let listener = TcpListener::bind(SocketAddr::from(SERVER))?;
+    // Systems differ in their default. Connections take it over from the listener.
+    setsockopt(&listener, TcpCongestion, &"cubic".into())?;
     listens.send(())?;
     // Threads are in the network of the one that starts them.
     thread::scope(|scope| {
@@ -143,6 +154,7 @@ fn one(work: Work) -> io::Result<Duration> {
     let mut begin = Instant::now();
     let mut stream = TcpStream::connect(SocketAddr::from(SERVER))?;
     stream.set_read_timeout(Some(LONGEST))?;
+    setsockopt(&stream, TcpCongestion, &"cubic".into())?;
     match work {
         Work::Gives(octets) => {
             let mut chunk = vec![0; 65_536];

@@ -71,9 +71,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("    cargo run --release -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md\n");
     println!("and measured on: {}. Linux here is {}, as it comes: CUBIC, SACK, RACK.\n", machine::name(), system.trim());
     println!("Linux runs in two network namespaces with [`cohaptic router`](router.md) between them, whose two links have the words of the row. The");
-    println!("test kit runs the same program in [virtual time](glossary.md#virtual-time) over links of the same words. Figures are medians of {most} connections, or");
-    println!("of {} where a link has a rate, which they would share; behind them are the quartiles. *Ratio* is the test kit's median divided by Linux's.", most.min(ALONE));
-    println!("In each table *kept* is Linux as it comes, which keeps a threshold and a round trip of earlier connections to the same host; *fresh* is Linux with");
+    println!(
+        "test kit runs the same program in [virtual time](glossary.md#virtual-time) over links of the same words. Figures are medians of {most} connections, or"
+    );
+    println!(
+        "of {} where a link has a rate, which they would share; behind them are the quartiles. *Ratio* is the test kit's median divided by Linux's.",
+        most.min(ALONE)
+    );
+    println!(
+        "In each table *kept* is Linux as it comes, which keeps a threshold and a round trip of earlier connections to the same host; *fresh* is Linux with"
+    );
     println!("`tcp_no_metrics_save`, where each connection begins anew, as all connections of the test kit do.\n");
     transfers(most)?;
     long(most)?;
@@ -86,7 +93,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The times of a row: the test kit's, and those of fresh and of kept connections of the kernel.
 fn measure(words: &str, work: Work, count: u32) -> Result<[Times; 3], Box<dyn Error>> {
     let at_once = !words.contains("rate");
-    let mut all = [test_kit::times(words, work, count)?, kernel::times(words, work, (count, at_once), Tcp::Fresh)?, kernel::times(words, work, (count, at_once), Tcp::Kept)?];
+    let mut all = [
+        test_kit::times(words, work, count)?,
+        kernel::times(words, work, (count, at_once), Tcp::Fresh)?,
+        kernel::times(words, work, (count, at_once), Tcp::Kept)?,
+    ];
     all.iter_mut().for_each(|times| times.sort());
     Ok(all)
 }
@@ -141,7 +152,9 @@ fn long(most: u32) -> Result<(), Box<dyn Error>> {
 
 fn questions(most: u32) -> Result<(), Box<dyn Error>> {
     println!("## A question after each answer\n");
-    println!("Milliseconds for a question of {QUESTION} octets and its answer: all of a connection, without the handshake, divided by their number.\n");
+    println!(
+        "Milliseconds for a question of {QUESTION} octets and its answer: all of a connection, without the handshake, divided by their number.\n"
+    );
     println!("| link, each way | questions | test kit \\[ms\\] | Linux, fresh \\[ms\\] | ratio | Linux, kept \\[ms\\] | ratio |");
     println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: |");
     for (words, questions) in QUESTIONS {
@@ -156,7 +169,9 @@ fn explain() {
     println!("## What makes the difference\n");
     println!("- **Lateness.** The router is never early; how late it is, [measured-router.md](measured-router.md) tells. The test kit is exact.");
     println!("- **Ticks.** The kernel rounds its timers up to its ticks, of up to 4 ms, and its round trips to 1 ms on timestamps.");
-    println!("- **Large segments.** Between the kernel and the device one segment may stand for many packets. The router cuts it before the link and joins");
+    println!(
+        "- **Large segments.** Between the kernel and the device one segment may stand for many packets. The router cuts it before the link and joins"
+    );
     println!("  what leaves together, so that a receiver acknowledges less often than the test kit's, which sees every packet.");
     println!("- **HyStart.** Linux's CUBIC may leave slow start when round trips grow, before anything is lost. The test kit has no HyStart.");
     println!("- **Memory of a host.** *Kept* connections begin with the threshold of one before them, often one that lost packets at the beginning.");
