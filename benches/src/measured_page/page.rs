@@ -39,6 +39,11 @@ const ALONE: [(&str, &str, &str); 4] = [
         "cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md",
     ),
     (
+        "measured-tcp.md",
+        "how far the TCP of the test kit and that of Linux are apart, over the same links",
+        "cargo run --release -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md",
+    ),
+    (
         "measured-soak.md",
         "an hour of both: memory, drift, lateness",
         "cargo run --release -p cohaptic-benches-realtime --bin soak -- 1h --out docs/measured-soak.md",

@@ -14,7 +14,7 @@ fn root() -> PathBuf {
 }
 
 /// The pages whose every command is looked at.
-const PAGES: [&str; 10] = [
+const PAGES: [&str; 11] = [
     "measured.md",
     "measured-speed.md",
     "measured-link.md",
@@ -24,6 +24,7 @@ const PAGES: [&str; 10] = [
     "measured-peers.md",
     "measured-relay.md",
     "measured-live.md",
+    "measured-tcp.md",
     "measured-soak.md",
 ];
 

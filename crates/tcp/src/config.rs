@@ -25,6 +25,8 @@ pub struct TcpConfig {
     pub timestamps: bool,
     /// Explicit congestion notification (RFC 3168), asked for and granted. Default off.
     pub ecn: bool,
+    /// When a connection that asks for ECN goes on without, since a box on the way takes such a SYN for an attack. Default: when a SYN is lost.
+    pub ecn_fallback: EcnFallback,
     /// The retransmission timeout before a round trip is known. Default 1 s.
     pub initial_timeout: Duration,
     /// The least of 4·RTTVAR in a timeout SRTT + 4·RTTVAR. Default 200 ms.
@@ -75,6 +77,18 @@ pub enum CongestionControl {
     Reno,
 }
 
+/// When a SYN that asks for ECN is followed by one that does not (RFC 3168, section 6.1.1.1).
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum EcnFallback {
+    /// Every SYN asks.
+    Never,
+    /// Only the first SYN asks: nobody answered it. This is Linux with `tcp_ecn_fallback`.
+    #[default]
+    Lost,
+    /// The same, and a reset that answers a SYN which asks is no refusal yet: a SYN that does not ask follows at once.
+    LostOrReset,
+}
+
 /// The times of keep-alive probes.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Keepalive {
@@ -105,6 +119,7 @@ impl Default for TcpConfig {
             tail_loss_probe: true,
             timestamps: true,
             ecn: false,
+            ecn_fallback: EcnFallback::Lost,
             initial_timeout: Duration::from_secs(1),
             least_variance: Duration::from_millis(200),
             least_timeout: Duration::ZERO,
@@ -148,12 +163,13 @@ pub enum ConfigError {
 
 impl TcpConfig {
     /// TCP as in books: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, no selective acknowledgements, timestamps or tail
-    /// loss probes.
+    /// loss probes. Where ECN is asked for, a reset is answered without, as RFC 3168 says and Linux does not.
     #[must_use]
     pub fn textbook() -> Self {
         Self {
             initial_window: 3,
             congestion: CongestionControl::Reno,
+            ecn_fallback: EcnFallback::LostOrReset,
             sack: false,
             rack: false,
             tail_loss_probe: false,

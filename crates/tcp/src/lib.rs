@@ -51,7 +51,7 @@ mod segment;
 mod send_buffer;
 mod sequence;
 
-pub use config::{ConfigError, CongestionControl, Keepalive, TcpConfig};
+pub use config::{ConfigError, CongestionControl, EcnFallback, Keepalive, TcpConfig};
 pub use connection::Connection;
 pub use error::Error;
 pub use info::{Info, State};

@@ -3,12 +3,29 @@
 //! `axum::serve` starts tasks with `tokio::spawn`: run it [on tokio](crate::Testbed::on_tokio). They live on no host: a crash of the host does not drop them, but
 //! resets what they hold. Responses have a `Date` header, which reads the time of day: two runs differ by it, unless a layer sets the header.
 
+use std::io;
 use std::net::SocketAddr;
 
+use axum::Router;
 use axum::extract::connect_info::Connected;
 use axum::serve::{IncomingStream, Listener};
 
-use crate::{TcpListener, TcpStream};
+use crate::{Host, JoinHandle, TcpListener, TcpStream, ToSocketAddrs};
+
+/// Listens on a host, and serves there from now on: until the host crashes or its program is killed, or the handle aborts it.
+///
+/// # Errors
+///
+/// As [`Host::listen`].
+///
+/// # Panics
+///
+/// Outside the run, or if the host is down.
+#[track_caller]
+pub fn serve(host: &Host, address: impl ToSocketAddrs, service: Router) -> io::Result<JoinHandle<io::Result<()>>> {
+    let listener = host.listen(address)?;
+    Ok(host.spawn(async move { axum::serve(listener, service).await }))
+}
 
 impl Listener for TcpListener {
     type Io = TcpStream;
@@ -22,7 +39,7 @@ impl Listener for TcpListener {
         }
     }
 
-    fn local_addr(&self) -> std::io::Result<SocketAddr> {
+    fn local_addr(&self) -> io::Result<SocketAddr> {
         Self::local_addr(self)
     }
 }

@@ -12,10 +12,22 @@ use std::pin::Pin;
 use std::task::{Context, Poll};
 
 use hyper::Uri;
+use hyper::body::Body;
+use hyper_util::client::legacy::Client;
 use hyper_util::client::legacy::connect::{Connected, Connection};
 use hyper_util::rt::TokioIo;
 
 use crate::{Host, TcpStream};
+
+/// The client of `hyper-util` on a host, with a pool of connections from there. `B` is the body of its requests.
+#[must_use]
+pub fn client<B>(host: &Host) -> Client<Connector, B>
+where
+    B: Body + Send,
+    B::Data: Send,
+{
+    Client::builder(Executor::new(host)).build(Connector::new(host))
+}
 
 /// Opens connections from a host, to the authorities of URIs: names of hosts, or addresses. Without a port it is 443 for `https`, and 80 otherwise; encryption is
 /// left to a connector around this one.

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use cohaptic_units::Instant;
 
 use super::Connection;
+use crate::config::EcnFallback;
 use crate::info::State;
 use crate::segment::{Ecn, Flags, Options, SackBlocks, Segment, TIMESTAMPS_LENGTH};
 use crate::sequence::{Position, on_wire};
@@ -23,8 +24,11 @@ impl Connection {
             timestamps: self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value))),
             sack: SackBlocks::default(),
         };
-        let flags =
-            Flags::SYN.with_if(Flags::ACK, has_come).with_if(Flags::ECE, self.send.has_ecn).with_if(Flags::CWR, self.send.has_ecn && !has_come);
+        let flags = if has_come {
+            (Flags::SYN | Flags::ACK).with_if(Flags::ECE, self.send.has_ecn)
+        } else {
+            Flags::SYN.with_if(Flags::ECE | Flags::CWR, self.asks_for_ecn())
+        };
         let acknowledgement = if has_come { on_wire(self.receive.next) } else { 0 };
         Segment {
             sequence: on_wire(self.send.first),
@@ -33,6 +37,11 @@ impl Connection {
             options,
             ..self.empty(flags)
         }
+    }
+
+    /// Whether the SYN that is to leave asks for ECN. Linux keeps to ECN if the answer grants it all the same: to the SYN before.
+    pub(super) fn asks_for_ecn(&self) -> bool {
+        self.send.has_ecn && (self.counters.retries == 0 || self.config.ecn_fallback == EcnFallback::Never)
     }
 
     /// A segment without data, options or window, at the next position.

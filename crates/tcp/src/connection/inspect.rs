@@ -2,6 +2,7 @@
 
 use super::Connection;
 use crate::info::Info;
+use crate::sequence::on_wire;
 
 impl Connection {
     /// Whether data is left that only the peer's program can set free: the window is closed, and a probe was answered by that (nothing is on the way).
@@ -18,6 +19,18 @@ impl Connection {
     pub const fn is_only_kept_alive(&self) -> bool {
         let is_idle = self.timer.is_none() && self.receive.ack_at.is_none() && self.linger_until.is_none();
         is_idle && self.keepalive_at.is_some() && self.counters.probes == 0
+    }
+
+    /// The sequence numbers of the SYNs, this end's and the peer's, once that has come: for tools that show numbers counted from them.
+    #[must_use]
+    pub const fn initial_sequences(&self) -> (u32, Option<u32>) {
+        (on_wire(self.send.first), self.receive.first)
+    }
+
+    /// By how many bits the windows of this end's segments are shifted, apart from SYNs (RFC 7323, section 2).
+    #[must_use]
+    pub const fn window_shift(&self) -> u8 {
+        self.receive.scale
     }
 
     /// Figures, as of Linux's `TCP_INFO`.

@@ -7,7 +7,7 @@ use cohaptic_units::Instant;
 
 use super::parts::{Receive, Send};
 use super::{Connection, Timer};
-use crate::config::{ConfigError, TcpConfig};
+use crate::config::{ConfigError, EcnFallback, TcpConfig};
 use crate::congestion::Congestion;
 use crate::error::Error;
 use crate::info::State;
@@ -75,6 +75,7 @@ impl Connection {
             tells_reduction: false,
         };
         let receive = Receive {
+            first: None,
             next: 0,
             edge: 0,
             acked: 0,
@@ -145,6 +146,7 @@ impl Connection {
         self.send.mss = mss.map_or(DEFAULT_MSS, usize::from).max(64).min(room) - options;
         let asked = Flags::ECE.with_if(Flags::CWR, !syn.flags.has(Flags::ACK));
         self.send.has_ecn &= syn.flags.has(asked);
+        self.receive.first = Some(syn.sequence);
         self.receive.next = first(syn.sequence) + 1;
         self.receive.acked = self.receive.next;
         self.receive.edge = self.receive.next + self.config.receive_buffer.min(65_535) as u64;
@@ -161,7 +163,12 @@ impl Connection {
             return;
         }
         if segment.flags.has(Flags::RST) {
-            if has_ack {
+            if has_ack && self.asks_for_ecn() && self.config.ecn_fallback == EcnFallback::LostOrReset {
+                self.send.has_ecn = false;
+                self.send.board.sent_again(self.send.first, now, false);
+                self.timer = Some((now.saturating_add(self.config.initial_timeout), Timer::Retransmission));
+                self.repeat_syn(now);
+            } else if has_ack {
                 self.die(Some(Error::ConnectionRefused));
             }
             return;

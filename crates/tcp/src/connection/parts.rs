@@ -64,6 +64,8 @@ impl Send {
 /// The receiving half.
 #[derive(Clone, Debug)]
 pub(super) struct Receive {
+    /// The number of the peer's SYN, once it has come.
+    pub(super) first: Option<u32>,
     /// The next position that is expected.
     pub(super) next: Position,
     /// The end of the window that was offered.

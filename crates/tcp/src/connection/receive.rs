@@ -107,8 +107,8 @@ impl Connection {
         true
     }
 
-    /// The peer's SYN again: it has not heard the answer.
-    fn repeat_syn(&mut self, now: Instant) {
+    /// This end's SYN again: the peer has not heard it.
+    pub(super) fn repeat_syn(&mut self, now: Instant) {
         let answer = self.build_syn(now);
         self.replies.push_back(answer);
     }

@@ -149,6 +149,23 @@ fn fire(config: TcpConfig, shots: Vec<Shot>) {
     }
 }
 
+impl World {
+    /// How an end has failed. A program that has read the end hears of an error no more.
+    fn failure(&self, side: usize) -> Option<Error> {
+        self.programs[side].error.map(|(_, error)| error).or_else(|| self.ends[side].as_ref()?.error())
+    }
+
+    /// Whether an end may fail so: it has heard nothing for as long as it repeats its SYN with ACK, the least of all limits; or it was reset by one that is over.
+    fn is_legitimate(&self, side: usize, error: Error) -> bool {
+        let silence = self.closed_at[side].map(|at| at.saturating_duration_since(self.heard_at[side]));
+        let is_peer_over = self.closed_at[1 - side].is_some_and(|over| self.closed_at[side].is_some_and(|at| over <= at));
+        match error {
+            Error::TimedOut => silence.is_some_and(|silence| silence >= Duration::from_secs(63)),
+            _ => is_peer_over,
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -225,9 +242,11 @@ proptest! {
             .programs(Program::writes(there).and_shuts(), Program::writes(back).and_shuts())
             .connect();
         world.run_until(Instant::from_nanos(1_000_000_000_000_000));
-        // A program that has read the end hears of an error no more.
-        let has_failed = world.programs.iter().any(|program| program.error.is_some()) || world.ends.iter().flatten().any(|end| end.error().is_some());
-        if !has_failed {
+        let failures: Vec<(usize, Error)> = (0..2).filter_map(|side| Some((side, world.failure(side)?))).collect();
+        for (side, error) in &failures {
+            prop_assert!(world.is_legitimate(*side, *error), "{error:?} of end {side} {:?}", world);
+        }
+        if failures.is_empty() {
             prop_assert_eq!([world.programs[1].read, world.programs[0].read], [there, back], "{:?}", world);
             prop_assert!(world.ends.iter().flatten().all(Connection::is_finished), "{:?}", world);
         }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::time::Duration;
 
-use cohaptic_tcp::{Connection, Error, Flags, Options, Segment, State, TcpConfig};
+use cohaptic_tcp::{Connection, Ecn, EcnFallback, Error, Flags, Options, Segment, State, TcpConfig};
 use cohaptic_units::Instant;
 
 use crate::world::{Program, World, millis, octet};
@@ -361,4 +361,77 @@ fn segments_fit_the_mtu_of_both_versions() {
     assert_eq!(a.write(&[0; 5000]), Ok(5000));
     let lengths: Vec<_> = core::iter::from_fn(|| a.poll_transmit(Instant::ZERO)).map(|segment| segment.to_packet().len()).collect();
     assert_eq!(lengths, [1500, 1500, 1500, 788]);
+}
+
+/// Asks for ECN, with that fallback.
+fn asks(fallback: EcnFallback) -> TcpConfig {
+    TcpConfig { ecn: true, ecn_fallback: fallback, ..TcpConfig::default() }
+}
+
+const ASKS: [u8; 2] = [Flags::SYN.bits() | Flags::ECE.bits() | Flags::CWR.bits(), Flags::SYN.bits()];
+
+/// The flags of the SYNs of the client, and when each left.
+fn syns(world: &World) -> Vec<(Instant, u8)> {
+    let left = world.log.iter().flatten().filter(|left| left.from == 0 && left.segment.flags.has(Flags::SYN));
+    left.map(|left| (left.at, left.segment.flags.bits())).collect()
+}
+
+/// Whether data of the server's was marked as capable.
+fn is_capable(world: &World) -> bool {
+    world.log.iter().flatten().any(|left| left.from == 1 && left.segment.ecn == Ecn::Capable0)
+}
+
+#[test]
+fn behind_a_box_that_drops_syns_with_ecn_the_second_syn_gets_through_without() {
+    let [with, without] = ASKS;
+    let connect = |fallback| {
+        let world = World::new("delay 10ms", 1).config(&asks(fallback)).programs(Program::default(), Program::writes(10_000)).logged();
+        let mut world = world.dropping(move |side, segment| side == 0 && segment.flags.bits() == with).connect();
+        world.run_until(millis(200_000));
+        world
+    };
+    for fallback in [EcnFallback::Lost, EcnFallback::LostOrReset] {
+        let world = connect(fallback);
+        assert_eq!(syns(&world), [(Instant::ZERO, with), (millis(1000), without)]);
+        assert_eq!((world.programs[0].connected_at, world.programs[0].read), (Some(millis(1020)), 10_000));
+        assert!(!is_capable(&world));
+    }
+    let world = connect(EcnFallback::Never);
+    assert_eq!((syns(&world).len(), syns(&world).iter().all(|(_, flags)| *flags == with)), (7, true));
+    assert_eq!(world.programs[0].error, Some((millis(127_000), Error::TimedOut)));
+}
+
+/// As Linux does it: the answer counts, whichever SYN it answers.
+#[test]
+fn an_answer_that_grants_ecn_after_the_second_syn_counts() {
+    let mut answers = 0;
+    let world = World::new("delay 10ms", 1).config(&asks(EcnFallback::Lost)).programs(Program::default(), Program::writes(10_000)).logged();
+    let mut world = world.dropping(move |side, segment| {
+        answers += u32::from(side == 1 && segment.flags.has(Flags::SYN));
+        side == 1 && segment.flags.has(Flags::SYN) && answers == 1
+    });
+    world = world.connect();
+    world.run_until(millis(5000));
+    assert_eq!(syns(&world), [(Instant::ZERO, ASKS[0]), (millis(1000), ASKS[1])]);
+    assert_eq!(world.programs[0].read, 10_000);
+    assert!(is_capable(&world));
+}
+
+#[test]
+fn a_reset_in_answer_to_a_syn_with_ecn_is_final_as_in_linux_or_not_as_rfc_3168_says() {
+    let (us, them) = ("10.0.0.1:1".parse().unwrap(), "10.0.0.2:2".parse().unwrap());
+    let (now, later) = (millis(0), millis(20));
+    for fallback in [EcnFallback::Never, EcnFallback::Lost, EcnFallback::LostOrReset] {
+        let mut end = Connection::connect(now, asks(fallback), us, them, 7).unwrap();
+        let syn = end.poll_transmit(now).unwrap();
+        end.handle_segment(later, &syn.refusal(64).unwrap());
+        if fallback == EcnFallback::LostOrReset {
+            let again = end.poll_transmit(later).unwrap();
+            assert_eq!((again.flags, again.sequence, end.poll_timeout()), (Flags::SYN, syn.sequence, Some(millis(1020))));
+            assert_eq!((end.take_error(), end.poll_transmit(later)), (None, None));
+            // That one is refused too: nobody listens.
+            end.handle_segment(millis(40), &again.refusal(64).unwrap());
+        }
+        assert_eq!((end.take_error(), end.state(), end.poll_transmit(later)), (Some(Error::ConnectionRefused), State::Closed, None));
+    }
 }

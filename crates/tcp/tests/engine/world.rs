@@ -64,6 +64,9 @@ pub(crate) struct World {
     pub(crate) programs: [Program; 2],
     pub(crate) configs: [TcpConfig; 2],
     pub(crate) is_listening: bool,
+    /// When a segment last came to each end, and when the end was over.
+    pub(crate) heard_at: [Instant; 2],
+    pub(crate) closed_at: [Option<Instant>; 2],
     /// Everything that left, if it is kept.
     pub(crate) log: Option<Vec<Left>>,
     /// Says which segments are lost on the way.
@@ -103,6 +106,8 @@ impl World {
             programs: [Program::default(), Program::default()],
             configs: [TcpConfig::default(), TcpConfig::default()],
             is_listening: true,
+            heard_at: [Instant::ZERO; 2],
+            closed_at: [None; 2],
             log: None,
             drops: Box::new(|_, _| false),
             is_encoded: true,
@@ -152,6 +157,9 @@ impl World {
         self.transmit(side);
         self.run_program(side);
         self.transmit(side);
+        if self.ends[side].as_ref().is_some_and(|end| end.state() == State::Closed) {
+            self.closed_at[side].get_or_insert(self.now);
+        }
     }
 
     fn transmit(&mut self, side: usize) {
@@ -275,6 +283,7 @@ impl World {
             }
             Packet::Whole(segment) => segment,
         };
+        self.heard_at[side] = self.now;
         match &mut self.ends[side] {
             Some(end) if end.state() != State::Closed => end.handle_segment(self.now, segment),
             slot => {

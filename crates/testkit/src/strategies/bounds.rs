@@ -96,6 +96,12 @@ impl LinkBounds {
         Self { presence: [Presence::Maybe; Stage::ALL.len()], ..Self::ideal() }
     }
 
+    /// A phone: a delay of up to 100 ms, a rate from 64 kbit/s to 20 Mbit/s, and nothing else.
+    #[must_use]
+    pub fn phone() -> Self {
+        Self::ideal().delay(Duration::ZERO..=Duration::from_millis(100)).rate(64_000..=20_000_000)
+    }
+
     /// No stage is there.
     #[must_use]
     pub fn ideal() -> Self {

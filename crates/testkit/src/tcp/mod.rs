@@ -18,7 +18,7 @@ mod traits;
 
 use std::net::SocketAddr;
 
-pub use cohaptic_tcp::{ConfigError, CongestionControl, Flags, Info, Keepalive, State, TcpConfig};
+pub use cohaptic_tcp::{ConfigError, CongestionControl, EcnFallback, Flags, Info, Keepalive, State, TcpConfig};
 #[cfg(feature = "tokio")]
 pub use owned::{OwnedReadHalf, OwnedWriteHalf, ReuniteError};
 #[cfg(feature = "tokio")]

@@ -3,7 +3,8 @@
 use std::io::ErrorKind;
 use std::time::Duration;
 
-use cohaptic_testkit::tcp::{State, TcpConfig};
+use cohaptic_testkit::hit::Verdict;
+use cohaptic_testkit::tcp::{Flags, State, TcpConfig};
 use cohaptic_testkit::{Bed, Instant, TcpSocket, TcpStream, Testbed, time};
 use tokio::io::AsyncReadExt;
 
@@ -40,6 +41,23 @@ fn no_listener_refuses_after_a_round_trip() {
     for bed in beds() {
         let seen = bed.run_twice(|bed| async move { connecting(&bed, "b:80").await });
         assert_eq!(seen, (Err(ErrorKind::ConnectionRefused), millis(100)));
+    }
+}
+
+#[test]
+fn a_box_that_drops_syns_with_ecn_costs_a_second_and_the_marks() {
+    let config = TcpConfig { ecn: true, ..TcpConfig::default() };
+    for bed in beds() {
+        let is_asking = |flags: Flags| flags.has(Flags::SYN | Flags::ECE);
+        let bed = bed.tcp(config.clone()).on_packet("a", "b", move |packet| match packet.tcp() {
+            Some(segment) if is_asking(segment.flags) => Verdict::Drop,
+            _ => Verdict::Pass,
+        });
+        let seen = bed.run_twice(|bed| async move {
+            let _listener = bed.host("b").listen("0.0.0.0:80").unwrap();
+            connecting(&bed, "b:80").await
+        });
+        assert_eq!(seen, (Ok(()), millis(1100)));
     }
 }
 

@@ -1,5 +1,6 @@
 //! What is recorded of TCP, and what is told of programs that wait for ever.
 
+use std::io::ErrorKind;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use cohaptic_testkit::tcp::{Keepalive, TcpConfig};
@@ -31,6 +32,27 @@ fn the_trace_shows_flags_relative_numbers_and_windows() {
     // With headers: 20 of IP, 20 of TCP and 12 of timestamps.
     let sizes: Vec<_> = record.fates("a", "b").records().iter().map(|record| record.size.get()).collect();
     assert_eq!(sizes[..3], [60, 52, 57]);
+}
+
+#[test]
+fn refusals_count_from_the_syns_of_what_they_refuse() {
+    let ((), record) = Testbed::new(["a", "b"]).links("delay 50ms").seed(1).run_recorded(|bed| async move {
+        assert!(bed.host("a").connect("b:81").await.is_err());
+        let (mut client, _server, _listener) = pair(&bed).await;
+        bed.host("b").crash();
+        bed.host("b").restart();
+        client.write_all(b"hello").await.unwrap();
+        assert_eq!(client.read(&mut [0]).await.unwrap_err().kind(), ErrorKind::ConnectionReset);
+    });
+    let trace = record.trace();
+    let lines: Vec<_> = trace.events().iter().map(|event| trace.words(event).to_string()).filter(|line| line.contains(" is RST")).collect();
+    assert_eq!(
+        lines,
+        [
+            "0.05 s  b -> a  packet 0 is RST|ACK 81 > 49152, sequence 0, 0 octets, acknowledges 1, window 0",
+            "0.65 s  b -> a  packet 2 is RST 80 > 49153, sequence 1, 0 octets, window 0",
+        ]
+    );
 }
 
 /// The frames of a capture: enhanced packet blocks (type 6), whose data begins after 28 octets.

@@ -61,8 +61,6 @@ pub(super) struct Tcp {
     time_waits: VecDeque<(Instant, ConnId)>,
     /// Packets that do not leave their host.
     loopback: VecDeque<(NodeId, Bytes)>,
-    /// What the trace must know of each direction: its first sequence number and the shift of its windows.
-    flows: BTreeMap<(SocketAddr, SocketAddr), (u32, Option<u8>)>,
     /// How often programs have called: an answer about a window counts until the next call.
     calls: u64,
 }
@@ -128,7 +126,6 @@ impl Tcp {
             timers: BTreeSet::new(),
             time_waits: VecDeque::new(),
             loopback: VecDeque::new(),
-            flows: BTreeMap::new(),
             calls: 0,
         }
     }

@@ -42,13 +42,13 @@ impl Core {
             return self.take_syn(listener, &segment);
         }
         if let Some(reset) = segment.refusal(self.tcp_config(host).ttl) {
-            self.emit(host, &reset);
+            self.emit(host, None, &reset);
         }
         Err(Lost::NoSocket)
     }
 
-    /// A segment leaves. It arrives when [`Core::take_arrivals`] is next called, however short its way.
-    fn emit(&mut self, host: NodeId, segment: &Segment<'_>) {
+    /// A segment leaves a connection, or answers one of no connection. It arrives when [`Core::take_arrivals`] is next called, however short its way.
+    fn emit(&mut self, host: NodeId, connection: Option<ConnId>, segment: &Segment<'_>) {
         let (from, to) = (segment.source.ip(), segment.destination.ip());
         if self.is_own(host, to) {
             self.tcp.loopback.push_back((host, segment.to_packet().into()));
@@ -63,21 +63,23 @@ impl Core {
         // Over a way that is cut it is lost, as others are.
         let _ = self.wire.offer(path, parcel);
         if self.wire.recording().traces {
-            self.note_segment(packet, segment);
+            self.note_segment(packet, connection, segment);
         }
     }
 
-    /// Notes a segment with numbers that count from its SYN.
-    fn note_segment(&mut self, packet: PacketName, segment: &Segment<'_>) {
-        let (there, back) = ((segment.source, segment.destination), (segment.destination, segment.source));
-        let is_syn = segment.flags.has(Flags::SYN);
-        if is_syn {
-            self.tcp.flows.insert(there, (segment.sequence, segment.options.window_scale));
-        }
-        let (first, scale) = self.tcp.flows.get(&there).copied().unwrap_or_default();
-        let (peers_first, peers_scale) = self.tcp.flows.get(&back).copied().unwrap_or_default();
-        // Windows are scaled if both have said so, and never on a SYN (RFC 7323, section 2.2).
-        let shift = scale.filter(|_| peers_scale.is_some() && !is_syn).unwrap_or(0);
+    /// Notes a segment with numbers that count from its SYN, as its connection knows them, or that of the peer. Where neither is left they count from zero.
+    fn note_segment(&mut self, packet: PacketName, connection: Option<ConnId>, segment: &Segment<'_>) {
+        let (first, peers_first, shift) = if let Some(id) = connection {
+            let machine = &self.tcp.end(id).machine;
+            let (own, peers) = machine.initial_sequences();
+            (own, peers.unwrap_or(0), machine.window_shift())
+        } else {
+            let peer = self.tcp.routes.get(&super::route(packet.path.to, segment.destination, segment.source));
+            let (peers, own) = peer.map_or((0, None), |id| self.tcp.end(*id).machine.initial_sequences());
+            (own.unwrap_or(0), peers, 0)
+        };
+        // No window is scaled on a SYN (RFC 7323, section 2.2).
+        let shift = if segment.flags.has(Flags::SYN) { 0 } else { shift };
         self.wire.note(Happening::Segment {
             packet,
             ports: [segment.source.port(), segment.destination.port()],
@@ -85,7 +87,7 @@ impl Core {
             sequence: segment.sequence.wrapping_sub(first),
             octets: u32::try_from(segment.payload.len()).unwrap_or(u32::MAX),
             acknowledges: segment.flags.has(Flags::ACK).then(|| segment.acknowledgement.wrapping_sub(peers_first)),
-            window: u32::from(segment.window) << shift.min(14),
+            window: u32::from(segment.window) << shift,
         });
     }
 
@@ -102,7 +104,7 @@ impl Core {
         let now = self.now();
         let host = self.tcp.end(id).host;
         while let Some(segment) = self.tcp.end_mut(id).machine.poll_transmit(now) {
-            self.emit(host, &segment);
+            self.emit(host, Some(id), &segment);
         }
         let end = self.tcp.connections.get_mut(id.0);
         if !end.readers.is_empty() && end.machine.is_readable() {

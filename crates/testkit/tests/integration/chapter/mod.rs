@@ -12,11 +12,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 const CHAPTER: &str = include_str!("../../../../../docs/testing.md");
 
 /// The code in which the blocks must stand as they are. What needs the feature `scenes` is among the tests across crates, which always have it.
-const CODE: [&str; 5] = [
+const CODE: [&str; 6] = [
     include_str!("programs.rs"),
     include_str!("files.rs"),
     include_str!("nodes.rs"),
-    include_str!("../../programs/phone.rs"),
+    include_str!("../../programs/phone/each_part.rs"),
+    include_str!("../../programs/phone/whole_photo.rs"),
     include_str!("../../../../../tests/tests/testkit/chapter.rs"),
 ];
 
@@ -44,6 +45,14 @@ fn the_first_test_has_fewer_than_forty_lines() {
     let (needed, _) = manifest.split_once("\n\n# ").unwrap();
     let count = needed.lines().count() + FIRST_TEST.lines().count();
     assert!(count < 40, "{count} lines");
+}
+
+#[test]
+fn the_page_begins_with_a_service_and_its_test_in_ten_lines() {
+    let blocks = blocks("rust");
+    assert!(blocks[0].contains("StatusCode") && blocks[1].contains("fn a_phone_sends_a_photo"));
+    let is_code = |line: &&str| !line.trim().is_empty();
+    assert_eq!(blocks[..2].iter().flat_map(|block| block.lines()).filter(is_code).count(), 10);
 }
 
 /// Those that the blocks read.
