@@ -183,7 +183,9 @@ impl Scene {
             None => copy,
         };
         let spec = &self.peers[place];
-        let said = |start: Option<[f64; 3]>, otherwise| start.map_or(otherwise, |start| core::array::from_fn(|axis| start.get(axis).copied().unwrap_or(0.0)));
+        let said = |start: Option<[f64; 3]>, otherwise| {
+            start.map_or(otherwise, |start| core::array::from_fn(|axis| start.get(axis).copied().unwrap_or(0.0)))
+        };
         State { position: said(spec.device_position, with_copy.position), velocity: said(spec.device_velocity, with_copy.velocity) }
     }
 

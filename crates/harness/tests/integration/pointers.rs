@@ -129,11 +129,9 @@ fn a_scene_begun_anew_in_the_middle_goes_on_without_a_jump() {
     let (rows, _) = run(&duo(""), shows, 700);
     let (last, next) = (rows[699], rows[700]);
     let Row { device: [xd, vd], copy: [xc, vc], other, .. } = next;
-    let text = duo(&format!(
-        "position = {xc:?}, velocity = {vc:?}, device-position = {xd:?}, device-velocity = {vd:?}, pointer = {{ held = true }}"
-    ))
-    .text
-    .replace("name = \"other\"", &format!("name = \"other\", position = {other:?}"));
+    let text = duo(&format!("position = {xc:?}, velocity = {vc:?}, device-position = {xd:?}, device-velocity = {vd:?}, pointer = {{ held = true }}"))
+        .text
+        .replace("name = \"other\"", &format!("name = \"other\", position = {other:?}"));
     let (anew, live) = run(&read(text), shows, 10);
     assert_eq!((anew[0].device, anew[0].copy, anew[0].force.to_bits()), (next.device, next.copy, next.force.to_bits()));
     assert!((anew[1].force - anew[0].force).abs() < 2.0 * (next.force - last.force).abs() + 1e-3, "{anew:?}");

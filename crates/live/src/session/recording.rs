@@ -13,8 +13,8 @@ use cohaptic_harness::{Observer as _, PacketRow, Summary, TickRow};
 use cohaptic_realtime::Lateness;
 use cohaptic_scene::{Scene, SceneContent};
 
-use super::files::{Release, Releases, write_lateness};
 use super::Recorded;
+use super::files::{Release, Releases, write_lateness};
 use super::rows::{InputCopy, TickCopy};
 
 /// How many rows may wait: of three peers, ten seconds.
