@@ -43,7 +43,7 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     let stage = Arc::new(PlayStage::new(beginning.clone()));
     let scene = beginning.scene()?;
     let board = Arc::new(Board::new(onlookers::description(&scene, &onlookers::pairs(&scene))));
-    let address = arguments.real_time.control.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 0)));
+    let address = arguments.real_time.control.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], 0)));
     let config =
         ServerConfig { token: token_of(&arguments.real_time)?, allow_remote: arguments.real_time.allow_remote, ..ServerConfig::new(address) };
     let server = serve_stage(config, Arc::clone(&board), Box::new(PartLinks(Arc::clone(&stage))), Arc::clone(&stage) as _);
@@ -224,7 +224,7 @@ fn reached_from_elsewhere(listening: SocketAddr, url: String) -> String {
         socket.connect(("192.0.2.1", 9))?;
         socket.local_addr()
     });
-    own.map_or(url.clone(), |own| url.replacen(loopback, &own.ip().to_string(), 1))
+    own.map_or_else(|_| url.clone(), |own| url.replacen(loopback, &own.ip().to_string(), 1))
 }
 
 #[cfg(test)]

@@ -101,14 +101,12 @@ impl Recording {
 impl Files {
     fn write(mut self, rows: &Receiver<Row>, axes: usize) -> Result<Self, RecordError> {
         for row in rows {
-            match row {
-                Row::Input(row) => self.inputs.on_input(&row.borrowed(axes))?,
-                other => match (&mut self.others, other) {
-                    (Some((recorder, _)), Row::Tick(row)) => recorder.on_tick(&row.borrowed(axes))?,
-                    (Some((recorder, _)), Row::Packet(row)) => recorder.on_packet(&row)?,
-                    (Some((_, releases)), Row::Release(row)) => releases.write(&row)?,
-                    (_, _) => {}
-                },
+            match (row, &mut self.others) {
+                (Row::Input(row), _) => self.inputs.on_input(&row.borrowed(axes))?,
+                (Row::Tick(row), Some((recorder, _))) => recorder.on_tick(&row.borrowed(axes))?,
+                (Row::Packet(row), Some((recorder, _))) => recorder.on_packet(&row)?,
+                (Row::Release(row), Some((_, releases))) => releases.write(&row)?,
+                (Row::Tick(_) | Row::Packet(_) | Row::Release(_), None) => {}
             }
         }
         Ok(self)
