@@ -23,6 +23,7 @@ need_linux! {
     accuracy: AccuracyArguments,
     falcon: FalconArguments,
     live: LiveArguments,
+    play: PlayArguments,
     relay: RelayArguments,
     router: RouterArguments,
 }

@@ -35,6 +35,8 @@ mod live;
 mod measures;
 mod output;
 mod paper;
+#[cfg(target_os = "linux")]
+mod play;
 mod progress;
 #[cfg(target_os = "linux")]
 mod realtime;
@@ -57,7 +59,7 @@ use clap::Parser as _;
 
 use arguments::{Arguments, Command};
 #[cfg(not(target_os = "linux"))]
-use elsewhere::{accuracy, falcon, live, relay, router};
+use elsewhere::{accuracy, falcon, live, play, relay, router};
 
 fn main() -> ExitCode {
     if std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json") {
@@ -77,6 +79,7 @@ fn main() -> ExitCode {
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Live(arguments) => live::live(&arguments),
+        Command::Play(arguments) => play::play(&arguments),
         Command::Relay(arguments) => relay::relay(&arguments),
         Command::Router(arguments) => router::router(&arguments),
         Command::Falcon(arguments) => falcon::falcon(&arguments),

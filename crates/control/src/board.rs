@@ -4,18 +4,19 @@ use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 use crate::{Description, Snapshot};
 
-/// The last [`Snapshot`] of a run, and its [`Description`].
+/// The last [`Snapshot`] of a run, and its [`Description`]. One run may follow another.
 ///
 /// Neither side waits for the other: what reads holds the lock for as long as it takes to count a reference, and what publishes tries once.
 #[derive(Debug)]
 pub struct Board {
-    description: Description,
     latest: Mutex<Latest>,
 }
 
-/// A snapshot with its number.
-#[derive(Clone, Debug, Default)]
+/// A snapshot with its number, and what its numbers belong to.
+#[derive(Clone, Debug)]
 pub struct Latest {
+    /// The run.
+    pub description: Arc<Description>,
     /// How many snapshots were published, this one included; 0 before the first. Two that have the same number are the same.
     pub number: u64,
     /// The snapshot; before the first one, a run in which nothing has happened.
@@ -26,13 +27,19 @@ impl Board {
     /// A board on which nothing has happened yet.
     #[must_use]
     pub fn new(description: Description) -> Self {
-        Self { description, latest: Mutex::default() }
+        Self { latest: Mutex::new(Latest { description: Arc::new(description), number: 0, snapshot: Arc::default() }) }
     }
 
     /// The run.
     #[must_use]
-    pub const fn description(&self) -> &Description {
-        &self.description
+    pub fn description(&self) -> Arc<Description> {
+        self.latest().description
+    }
+
+    /// Another run takes the place of this one: nothing has happened in it yet.
+    pub fn begin(&self, description: Description) {
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        *latest = Latest { description: Arc::new(description), number: latest.number + 1, snapshot: Arc::default() };
     }
 
     /// Puts a snapshot up in place of the last one, without ever waiting. About 20 times a second is often enough.

@@ -43,12 +43,14 @@ mod http;
 mod metrics;
 mod server;
 mod snapshot;
+mod stage;
 mod token;
 mod typed;
 mod views;
 
 pub use board::{Board, Latest, LinkEditor};
-pub use server::{ServeError, Server, ServerConfig, serve};
+pub use server::{ServeError, Server, ServerConfig, serve, serve_stage};
 pub use snapshot::{Body, Description, Kind, LinkName, MeasureLabel, PeerName};
 pub use snapshot::{LinkCounters, PeerView, Presence, Quantiles, Snapshot, TurnView};
+pub use stage::{Role, Stage, StageFile};
 pub use token::{Token, TokenError};

@@ -7,10 +7,10 @@ use std::thread::JoinHandle;
 
 use thiserror::Error;
 use tokio::runtime::Builder;
-use tokio::sync::oneshot;
+use tokio::sync::{Semaphore, oneshot};
 
 use crate::http::{self, App};
-use crate::{Board, LinkEditor, Token, TokenError};
+use crate::{Board, LinkEditor, Stage, Token, TokenError};
 
 /// Where to listen, and which requests to let in.
 #[derive(Clone, Debug)]
@@ -67,6 +67,7 @@ pub enum ServeError {
 pub struct Server {
     address: SocketAddr,
     token: Token,
+    guests: Option<Token>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -77,6 +78,19 @@ pub struct Server {
 ///
 /// [`ServeError`] if it may not or cannot listen there. When this returns `Ok`, connections are taken.
 pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>) -> Result<Server, ServeError> {
+    start(config, board, editor, None)
+}
+
+/// Starts a server of a run in which people take part from a page; links to hand out have a token of their own, with which nothing can be changed.
+///
+/// # Errors
+///
+/// As [`serve()`].
+pub fn serve_stage(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, stage: Arc<dyn Stage>) -> Result<Server, ServeError> {
+    start(config, board, editor, Some(stage))
+}
+
+fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, stage: Option<Arc<dyn Stage>>) -> Result<Server, ServeError> {
     let address = config.address;
     if !address.ip().to_canonical().is_loopback() && !config.allow_remote {
         return Err(ServeError::NotLoopback { address });
@@ -89,7 +103,17 @@ pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor
     let listener = TcpListener::bind(address).map_err(listen)?;
     listener.set_nonblocking(true).map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
-    let app = App { board, editor: Mutex::new(editor), token: token.clone(), hosts: config.hosts };
+    let guests = if stage.is_some() { Some(Token::random()?) } else { None };
+    let app = App {
+        board,
+        editor: Mutex::new(editor),
+        token: token.clone(),
+        guests: guests.clone(),
+        hosts: config.hosts,
+        stage,
+        hands: Arc::new(Semaphore::new(http::MOST)),
+        comparing: Semaphore::new(1),
+    };
     let runtime = Builder::new_current_thread().enable_io().enable_time().build().map_err(ServeError::Thread)?;
     let listener = {
         let _inside = runtime.enter();
@@ -106,7 +130,7 @@ pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor
         runtime.shutdown_background();
     };
     let thread = std::thread::Builder::new().name("live-control".to_owned()).spawn(run).map_err(ServeError::Thread)?;
-    Ok(Server { address, token, stop: Some(stop), thread: Some(thread) })
+    Ok(Server { address, token, guests, stop: Some(stop), thread: Some(thread) })
 }
 
 impl Server {
@@ -120,6 +144,12 @@ impl Server {
     #[must_use]
     pub fn url(&self) -> String {
         format!("http://{}/?token={}", self.reachable(), self.token.secret())
+    }
+
+    /// The link to hand out to those who are to take part, with a token of their own; `None` if nobody takes part from a page.
+    #[must_use]
+    pub fn join_url(&self) -> Option<String> {
+        self.guests.as_ref().map(|guests| format!("http://{}/join?token={}", self.reachable(), guests.secret()))
     }
 
     /// The secret that requests must show.

@@ -7,8 +7,8 @@ use serde_json::{Map, Value, json};
 use crate::{Description, Latest, LinkCounters, MeasureLabel, PeerView, Quantiles, Snapshot};
 
 /// Everything that changes by itself, with the names.
-pub(crate) fn state(description: &Description, latest: &Latest) -> Value {
-    let snapshot = &*latest.snapshot;
+pub(crate) fn state(latest: &Latest) -> Value {
+    let (description, snapshot) = (&*latest.description, &*latest.snapshot);
     let mut state = json!({
         "kind": description.kind,
         "title": description.title,
@@ -55,8 +55,8 @@ pub(crate) fn link(description: &Description, snapshot: &Snapshot, number: usize
 }
 
 /// Distributions of lateness and of delay.
-pub(crate) fn histograms(description: &Description, latest: &Latest) -> Value {
-    let snapshot = &*latest.snapshot;
+pub(crate) fn histograms(latest: &Latest) -> Value {
+    let (description, snapshot) = (&*latest.description, &*latest.snapshot);
     let links = description.links.iter().enumerate().map(|(number, name)| {
         let delays = snapshot.links.get(number).map(|counters| counters.recent_delay).unwrap_or_default();
         json!({ "link": number, "name": name.name, "recent_delay": quantiles(&delays) })

@@ -44,6 +44,7 @@ mod entropy;
 pub mod falcons;
 pub mod handshake;
 mod key;
+pub mod pointers;
 mod seal;
 pub mod session;
 

@@ -56,6 +56,17 @@ pub fn scene_content_of_text(text: &str, file: &Path, overrides: &[String]) -> R
     Ok(SceneContent { keys, files: files.into_iter().map(|(path, bytes)| (name(path), bytes)).collect() })
 }
 
+/// A scene as one text with its overrides in it: a line for each key at the top. `text` and `file` as in [`Scene::parse`].
+///
+/// # Errors
+///
+/// As [`Scene::parse_live`].
+pub fn scene_text(text: &str, file: &Path, overrides: &[String]) -> Result<String, FileError> {
+    let Parsed { document, .. } = parse_scene(Sources { file, text, overrides }, true, &mut |_, _, _| ())?;
+    let entries = document.as_table().map(|table| table.0.as_slice()).unwrap_or_default();
+    Ok(entries.iter().map(|entry| format!("{} = {}\n", key_text(&entry.name), value_text(&entry.node))).collect())
+}
+
 /// Every value below a node that is no table.
 fn collect(node: &Node, path: &str, keys: &mut BTreeMap<String, String>) {
     match &node.value {
@@ -105,6 +116,16 @@ mod tests {
         peer = { device = { mass = 1.0, damping = 1.0 }, coupling = { stiffness = 1.0, damping = 1.0 } }\n\
         peers = [{ name = \"left\", contact = \"none\", hand = { file = \"hand.csv\" } }, { name = \"right\" }]\nlink = { delay = \"24ms\" }\n\
         timeline = [{ at = \"0.5s\", link = \"all\", set = { loss = 0.5 } }]\n[measure]\nband = 0.002\n[expect]\nstable = true\n";
+
+    #[test]
+    fn the_text_of_a_scene_with_overrides_is_that_scene() {
+        let (_folder, file) = desk();
+        let overrides = ["link.delay=8ms", "peers.right.contact=none", "links.left.right.loss=5%"].map(str::to_owned);
+        let text = scene_text(TEXT, &file, &overrides).unwrap();
+        let (one, other) = (Scene::parse_live(TEXT, &file, &overrides).unwrap(), Scene::parse_live(&text, &file, &[]).unwrap());
+        assert_eq!(one, other, "{text}");
+        assert_eq!(scene_content_of_text(TEXT, &file, &overrides).unwrap(), scene_content_of_text(&text, &file, &[]).unwrap());
+    }
 
     fn desk() -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();

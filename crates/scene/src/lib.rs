@@ -50,7 +50,7 @@ mod tests;
 mod topology;
 
 pub use cohaptic_linkfile::{Diagnostic, FileError as SceneError, Fingerprint, KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable};
-pub use content::{SceneContent, scene_content, scene_content_of_text};
+pub use content::{SceneContent, scene_content, scene_content_of_text, scene_text};
 pub use link_keys::{link_key_changes_of_text, link_keys, link_keys_of_text};
 pub use measures::{Measure, MeasureName, Scope};
 pub use model::*;

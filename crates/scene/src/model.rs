@@ -243,7 +243,7 @@ impl fmt::Debug for CoordinationSpec {
 }
 
 /// One peer.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq)]
 pub struct PeerSpec {
     /// Its name, unique in the scene.
     pub name: String,
@@ -270,10 +270,32 @@ pub struct PeerSpec {
     pub position: [f64; 3],
     /// With which velocity its copy and its device begin [m/s].
     pub velocity: [f64; 3],
+    /// Where its device begins \[m\]; `None`: with the copy.
+    pub device_position: Option<[f64; 3]>,
+    /// With which velocity its device begins [m/s]; `None`: with that of the copy.
+    pub device_velocity: Option<[f64; 3]>,
     /// The line that all it sends passes before the links, if it has one.
     pub uplink: Option<Arc<LinkModel>>,
     /// The line that all it receives passes after the links, if it has one.
     pub downlink: Option<Arc<LinkModel>>,
+}
+
+impl fmt::Debug for PeerSpec {
+    /// Where the device begins is shown only where it is said: fingerprints of records are made of this text.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, kind, clock, phase, compute_delay, contact, device, coupling, coupling_scaling, hand, .. } = self;
+        let Self { position, velocity, device_position, device_velocity, uplink, downlink, .. } = self;
+        let mut shown = f.debug_struct("PeerSpec");
+        shown.field("name", name).field("kind", kind).field("clock", clock).field("phase", phase).field("compute_delay", compute_delay);
+        shown.field("contact", contact).field("device", device).field("coupling", coupling).field("coupling_scaling", coupling_scaling);
+        shown.field("hand", hand).field("position", position).field("velocity", velocity);
+        for (name, start) in [("device_position", device_position), ("device_velocity", device_velocity)] {
+            if let Some(start) = start {
+                shown.field(name, start);
+            }
+        }
+        shown.field("uplink", uplink).field("downlink", downlink).finish()
+    }
 }
 
 /// Where a peer lives. In virtual time every peer is simulated, whatever its kind; a live session (`cohaptic live`) goes by it.
@@ -286,6 +308,8 @@ pub enum PeerKind {
     Udp(Silence),
     /// The copy in this program, the device in somebody's hand: a Novint Falcon.
     Falcon(Silence, FalconSpec),
+    /// Copy and device in this program; a mouse, a pen, a finger or a stick pulls the device through an arm.
+    Pointer(Silence, PointerSpec),
 }
 
 impl PeerKind {
@@ -296,6 +320,7 @@ impl PeerKind {
             Self::Simulated => "simulated",
             Self::Udp(_) => "udp",
             Self::Falcon(..) => "falcon",
+            Self::Pointer(..) => "pointer",
         }
     }
 
@@ -304,8 +329,14 @@ impl PeerKind {
     pub const fn silence(&self) -> Option<Silence> {
         match self {
             Self::Simulated => None,
-            Self::Udp(silence) | Self::Falcon(silence, _) => Some(*silence),
+            Self::Udp(silence) | Self::Falcon(silence, _) | Self::Pointer(silence, _) => Some(*silence),
         }
+    }
+
+    /// Whether somebody's hand is read at each tick in a live session.
+    #[must_use]
+    pub const fn is_in_hand(&self) -> bool {
+        matches!(self, Self::Falcon(..) | Self::Pointer(..))
     }
 }
 
@@ -321,6 +352,26 @@ pub struct Silence {
 impl Default for Silence {
     fn default() -> Self {
         Self { after: Duration::from_millis(100), fade: Duration::from_millis(250) }
+    }
+}
+
+/// The arm through which a pointer pulls the device of a peer.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PointerSpec {
+    /// The stiffness of the arm [N/m]; at least zero.
+    pub stiffness: f64,
+    /// Its damping [N·s/m]; at least zero.
+    pub damping: f64,
+    /// It pulls with no greater force \[N\]; above zero.
+    pub force_limit: f64,
+    /// Whether it holds the device from the beginning; otherwise it takes hold little by little, as after a silence.
+    pub held: bool,
+}
+
+impl Default for PointerSpec {
+    /// With the device of a Falcon nearly without overshoot, and no stronger than an adult's wrist.
+    fn default() -> Self {
+        Self { stiffness: 400.0, damping: 20.0, force_limit: 20.0, held: false }
     }
 }
 

@@ -178,10 +178,15 @@ impl Scene {
     #[must_use]
     pub fn initial_device<const A: usize>(&self, place: usize) -> State<A> {
         let copy = self.initial_state(place);
-        match &self.rotation {
+        let with_copy = match &self.rotation {
             Some(rotation) => rotation.peers[place].attitude.point(rotation.peers[place].grasp, &copy),
             None => copy,
-        }
+        };
+        let spec = &self.peers[place];
+        let said = |start: Option<[f64; 3]>, otherwise| {
+            start.map_or(otherwise, |start| core::array::from_fn(|axis| start.get(axis).copied().unwrap_or(0.0)))
+        };
+        State { position: said(spec.device_position, with_copy.position), velocity: said(spec.device_velocity, with_copy.velocity) }
     }
 
     /// Why the object cannot turn in this scene; `None` if it can, or if it does not turn.

@@ -217,7 +217,8 @@ fn is_zero(vector: Triple) -> bool {
 /// A peer that begins at rest, whose hand does nothing but hold.
 fn at_rest(spec: &PeerSpec) -> PeerSpec {
     let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
-    PeerSpec { kind: PeerKind::Simulated, hand, position: [0.0; 3], velocity: [0.0; 3], ..spec.clone() }
+    let (position, velocity) = ([0.0; 3], [0.0; 3]);
+    PeerSpec { kind: PeerKind::Simulated, hand, position, velocity, device_position: None, device_velocity: None, ..spec.clone() }
 }
 
 /// A peer without a device: one that touches nothing and is equal to all others of that kind.

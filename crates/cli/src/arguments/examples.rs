@@ -18,7 +18,7 @@ pub(super) fn after(examples: &[&str]) -> String {
 
 /// The examples of the program, the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
-    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: accuracy, falcon, live, relay, router." };
+    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: accuracy, falcon, live, play, relay, router." };
     after(PROGRAM) + needs
 }
 
@@ -83,6 +83,9 @@ pub(super) const LIVE: &[&str] = &[
     "cohaptic live scene.toml --for 30s --listen 127.0.0.1:7400 --out session",
     "cohaptic live --new-key session.key",
 ];
+
+pub(super) const PLAY: &[&str] =
+    &["cohaptic play", "cohaptic play scene.toml --set link.delay=60ms --out played", "cohaptic play --control 0.0.0.0:8080 --allow-remote"];
 
 pub(super) const RELAY: &[&str] = &[
     "cohaptic relay --listen 127.0.0.1:7000 --to 127.0.0.1:9000 delay 24ms 2ms loss 1%",

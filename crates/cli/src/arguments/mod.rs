@@ -26,7 +26,7 @@ pub(crate) use falcon::{
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
 pub(crate) use paper::{AccuracyArguments, PaperArguments};
-pub(crate) use realtime::{LiveArguments, RealTimeArguments, RelayArguments, RouterArguments};
+pub(crate) use realtime::{LiveArguments, PlayArguments, RealTimeArguments, RelayArguments, RouterArguments};
 pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments, TableFormat};
 pub(crate) use shards::{ShardArguments, ShardName};
 pub(crate) use stability::{
@@ -61,6 +61,8 @@ pub(crate) enum Command {
     Admittance(AdmittanceArguments),
     /// Runs a scene by the wall clock, with other programs and Falcons attached, all through the emulated links
     Live(LiveArguments),
+    /// Opens a page on which people pull the object with a mouse, a finger or a stick, and feel by eye what the network does
+    Play(PlayArguments),
     /// Puts the emulator between programs that speak UDP to each other
     Relay(RelayArguments),
     /// Puts the emulator between two network devices: any IP traffic

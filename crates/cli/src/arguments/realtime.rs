@@ -1,4 +1,4 @@
-//! `live`, `relay` and `router`, and what they share.
+//! `live`, `play`, `relay` and `router`, and what they share.
 
 use std::ffi::OsString;
 use std::net::{SocketAddr, ToSocketAddrs as _};
@@ -66,6 +66,23 @@ pub(crate) struct LiveArguments {
     pub(crate) firmware: Option<PathBuf>,
     /// Write the files of run --out into this folder, and inputs.csv (all that came from outside: run --inputs replays it), releases.csv and
     /// lateness.csv
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = after(examples::PLAY))]
+pub(crate) struct PlayArguments {
+    /// The scene, a TOML file; - reads it from standard input [default: three users, average-position, 24 ms]
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) overrides: Overrides,
+    #[command(flatten)]
+    pub(crate) real_time: RealTimeArguments,
+    /// End by itself after this time [default: on Ctrl-C]
+    #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
+    pub(crate) length: Option<Duration>,
+    /// Keep the scene and the inputs of each part in this folder: run --inputs replays them
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

@@ -31,6 +31,9 @@ pub(crate) struct RunArguments {
     pub(crate) links: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) pictures: PictureArguments,
+    /// Draw the copies in motion into this file, an SVG that moves; with --against those of both runs
+    #[arg(long, value_name = "FILE")]
+    pub(crate) motion: Option<PathBuf>,
     /// Replay a live session: its inputs.csv, with the scene and the --set of that session. Fates and motion are the same to the last bit
     #[arg(long, value_name = "FILE", conflicts_with_all = ["against", "general"])]
     pub(crate) inputs: Option<PathBuf>,

@@ -100,6 +100,7 @@ shipped![
     "network/timeline",
     "network/token-bucket",
     "network/two-axes",
+    "live/play",
     "live/three-falcons",
     "live/two-and-a-program",
     "rigid/damped-spin",

@@ -1,7 +1,7 @@
 //! `cohaptic live`.
 
 mod answer;
-mod onlookers;
+pub(crate) mod onlookers;
 
 use std::fmt::Write as _;
 use std::net::SocketAddr;
@@ -133,7 +133,7 @@ fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control:
     report
 }
 
-fn refused(error: SessionError) -> Failure {
+pub(crate) fn refused(error: SessionError) -> Failure {
     if let SessionError::Record(error) = error {
         return error.into();
     }

@@ -41,9 +41,7 @@ impl Conductor for SessionConductor {
     }
 
     fn next_change(&mut self) -> Option<LinkChange> {
-        let Edit { link, keys, model } = self.wanted.try_recv().ok()?;
-        let (from, to) = *self.pairs.get(link)?;
-        Some(LinkChange { from, to, keys, model })
+        change(&self.wanted, &self.pairs)
     }
 
     fn show(&mut self, status: Status) {
@@ -58,13 +56,20 @@ impl Conductor for SessionConductor {
     }
 }
 
+/// The next change that somebody wants of a link.
+pub(crate) fn change(wanted: &Receiver<Edit>, pairs: &[(usize, usize)]) -> Option<LinkChange> {
+    let Edit { link, keys, model } = wanted.try_recv().ok()?;
+    let (from, to) = *pairs.get(link)?;
+    Some(LinkChange { from, to, keys, model })
+}
+
 /// Every directed link, by sender, then receiver.
-pub(super) fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
+pub(crate) fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
     let places = 0..scene.peers.len();
     places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to).collect()
 }
 
-pub(super) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Description {
+pub(crate) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Description {
     let name = |peer: usize| scene.peers[peer].name.clone();
     let label = |name: &MeasureName| MeasureLabel { name: name.text(scene), unit: name.measure.unit(), about: name.measure.about() };
     Description {
@@ -85,7 +90,7 @@ pub(super) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Descriptio
     }
 }
 
-pub(super) fn snapshot(status: &Status, axes: usize) -> Snapshot {
+pub(crate) fn snapshot(status: &Status, axes: usize) -> Snapshot {
     let now = Instant::ZERO.saturating_add(status.elapsed);
     let validity = status.validity.to_string();
     Snapshot {

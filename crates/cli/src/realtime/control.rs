@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use cohaptic_control::{Board, Description, LinkCounters, LinkEditor, Quantiles, ServeError, Server, ServerConfig, Snapshot, serve};
+use cohaptic_control::{Board, Description, LinkCounters, LinkEditor, Quantiles, ServeError, Server, ServerConfig, Snapshot, Token, serve};
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::LinkKeys;
 use cohaptic_wan::{DropCause, LinkModel, LinkStats};
@@ -26,18 +26,8 @@ impl LiveControl {
     pub(crate) fn open(arguments: &RealTimeArguments, description: Description, editor: Box<dyn LinkEditor>) -> Result<Self, Failure> {
         let board = Arc::new(Board::new(description));
         let Some(address) = arguments.control else { return Ok(Self { board, server: None }) };
-        let token = match &arguments.token_file {
-            None => None,
-            Some(path) => {
-                let text = file::read_text(path)?;
-                Some(text.trim().parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?)
-            }
-        };
-        let config = ServerConfig { token, allow_remote: arguments.allow_remote, ..ServerConfig::new(address) };
-        let server = serve(config, Arc::clone(&board), editor).map_err(|error| {
-            let is_of_system = matches!(error, ServeError::Listen { .. } | ServeError::Thread(_));
-            if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
-        })?;
+        let config = ServerConfig { token: token_of(arguments)?, allow_remote: arguments.allow_remote, ..ServerConfig::new(address) };
+        let server = serve(config, Arc::clone(&board), editor).map_err(|error| refused_server(&error))?;
         // What cannot be said does not keep the run from beginning.
         let _ = writeln!(io::stderr(), "live control: {}", server.url());
         Ok(Self { board, server: Some(server) })
@@ -55,10 +45,27 @@ impl LiveControl {
     }
 }
 
+/// The token that a file has, if one was named.
+pub(crate) fn token_of(arguments: &RealTimeArguments) -> Result<Option<Token>, Failure> {
+    let Some(path) = &arguments.token_file else { return Ok(None) };
+    let text = file::read_text(path)?;
+    text.trim().parse().map(Some).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
+}
+
+pub(crate) fn refused_server(error: &ServeError) -> Failure {
+    let is_of_system = matches!(error, ServeError::Listen { .. } | ServeError::Thread(_));
+    if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
+}
+
 /// Where a run publishes.
 pub(crate) struct Look(Arc<Board>);
 
 impl Look {
+    /// On a board of one's own.
+    pub(crate) fn on(board: &Arc<Board>) -> Self {
+        Self(Arc::clone(board))
+    }
+
     /// Puts it up unless somebody is reading at this very moment; the next one comes soon.
     pub(crate) fn publish(&self, snapshot: Snapshot) {
         let _ = self.0.publish(Arc::new(snapshot));

@@ -9,7 +9,7 @@ use cohaptic_realtime::{Pacing, Tolerance, Wishes};
 
 use crate::arguments::RealTimeArguments;
 
-pub(crate) use control::{Edit, KeyedLinks, LiveControl, Look, counters, quantiles, quantiles_of};
+pub(crate) use control::{Edit, KeyedLinks, LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
 pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, lasted, late, loading, notes, say, some_length, status};
 
 impl RealTimeArguments {

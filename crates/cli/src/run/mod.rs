@@ -1,6 +1,7 @@
 //! `cohaptic run`.
 
 pub(crate) mod answer;
+mod motion;
 mod page;
 mod replayed;
 
@@ -28,6 +29,7 @@ use crate::progress::Progress;
 use crate::shell::{path, quoted};
 use crate::{input, interrupt, output};
 use answer::describe;
+use motion::Places;
 
 /// Runs a scene, or a scene and a variant of it, and says what happened.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
@@ -65,6 +67,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         }
         _ => None,
     };
+    let drawn = arguments.motion.as_deref().map(|file| motion::draw(file, arguments, &scene, [Some(&first), second.as_ref()]));
+    drawn.transpose()?;
     if arguments.scene.json {
         let against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| answer::of(variant, run, &[], None::<()>));
         output::json(DocumentSchema::RUN, &answer::of(&scene, &first, &replayed_otherwise.unwrap_or_default(), against))?;
@@ -74,7 +78,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
             let _ = write!(text, "\nAgainst {}:\n{}", arguments.against.join(", "), describe(variant, run));
         }
         output::text(&text)?;
-        output::wrote([Some(&first), second.as_ref()].into_iter().flatten().flat_map(|run| &run.files));
+        output::wrote([Some(&first), second.as_ref()].into_iter().flatten().flat_map(|run| &run.files).chain(&arguments.motion));
     }
     Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
@@ -90,7 +94,7 @@ const fn is_shown(arguments: &RunArguments) -> bool {
 
 /// Whether a run is looked at.
 fn is_watched(arguments: &RunArguments, scene: &Scene) -> bool {
-    is_shown(arguments) || arguments.out.is_some() || arguments.inputs.is_some() || Measures::of(scene).is_some()
+    is_shown(arguments) || arguments.out.is_some() || arguments.motion.is_some() || arguments.inputs.is_some() || Measures::of(scene).is_some()
 }
 
 /// The overrides of the scene: all `--set`, then the seed and the measures.
@@ -106,6 +110,7 @@ struct Run {
     measured: Vec<MeasuredValue>,
     wall_s: f64,
     positions: Option<Bands>,
+    places: Option<Places>,
     files: Vec<PathBuf>,
 }
 
@@ -123,6 +128,7 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
     let mut watch = Watch {
         progress: Progress::through_scene(&scene.title, scene.duration),
         positions: shown.then(|| Bands::new(scene.duration, PLOT_SPANS, scene.peers.len())),
+        places: arguments.motion.as_ref().map(|_| Places::new(scene.peers.len())),
     };
     let start = Clock::now();
     let measures = Measures::of(scene);
@@ -158,7 +164,7 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
         write_links(path, &summary)?;
         files.push(path.clone());
     }
-    Ok(Run { summary, measured, wall_s, positions: watch.positions, files })
+    Ok(Run { summary, measured, wall_s, positions: watch.positions, places: watch.places, files })
 }
 
 /// Writes a row a link: into a file, or as they come into a pipe or a device.
@@ -189,18 +195,22 @@ const PLOT_SPANS: usize = 144;
 struct Watch {
     progress: Progress,
     positions: Option<Bands>,
+    places: Option<Places>,
 }
 
 impl Observer for &mut Watch {
     type Error = RecordError;
 
     fn wants_ticks(&self) -> bool {
-        self.positions.is_some()
+        self.positions.is_some() || self.places.is_some()
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         if let Some(positions) = &mut self.positions {
             positions.add(row.peer, row.at, row.object.position[0]);
+        }
+        if let Some(places) = &mut self.places {
+            places.add(row);
         }
         Ok(())
     }
@@ -208,6 +218,14 @@ impl Observer for &mut Watch {
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), RecordError> {
         if let Some(positions) = &mut self.positions {
             positions.add_all(ticks.at(), ticks.positions(0));
+        }
+        if let Some(places) = &mut self.places
+            && places.wants(ticks.at())
+        {
+            return ticks.each(|row| {
+                places.add(row);
+                Ok(())
+            });
         }
         Ok(())
     }

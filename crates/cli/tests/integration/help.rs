@@ -15,6 +15,7 @@ fn help_names_the_commands() {
             "compare",
             "stability",
             "admittance",
+            "play",
             "relay",
             "router",
             "link",

@@ -89,6 +89,7 @@ pages! {
     falcon: "docs/falcon.md",
     hard_cases: "docs/hard-cases.md",
     live: "docs/live.md",
+    play: "docs/play.md",
     live_control: "docs/live-control.md",
     measured_cluster: "docs/measured-cluster.md",
     measured_router: "docs/measured-router.md",

@@ -4,11 +4,12 @@ use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 
 use super::{App, Refusal, page};
+use crate::Role;
 
 /// What every answer says about itself, unless it says something else.
 const HEADERS: [(HeaderName, &str); 7] = [
@@ -23,10 +24,20 @@ const HEADERS: [(HeaderName, &str); 7] = [
 
 /// Lets a request through to its route, or refuses it.
 pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    let mut answer = match check(&app, request.uri(), request.headers()) {
-        Ok(()) => next.run(request).await,
+    let mut request = request;
+    let mut answer = match check(&app, request.uri(), request.headers()).and_then(|role| may(role, request.method())) {
+        Ok(role) => {
+            request.extensions_mut().insert(role);
+            next.run(request).await
+        }
         // A person with a browser gets a place to enter the token.
-        Err(refusal) if refusal.status == StatusCode::UNAUTHORIZED && request.uri().path() == "/" && accepts_html(request.headers()) => page::door(),
+        Err(refusal)
+            if refusal.status == StatusCode::UNAUTHORIZED
+                && ["/", "/join", "/details"].contains(&request.uri().path())
+                && accepts_html(request.headers()) =>
+        {
+            page::door()
+        }
         Err(refusal) => refusal.into_response(),
     };
     if answer.status() == StatusCode::UNAUTHORIZED {
@@ -38,7 +49,15 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
     answer
 }
 
-fn check(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
+/// A guest changes nothing but a hand.
+fn may(role: Role, method: &Method) -> Result<Role, Refusal> {
+    if role == Role::Guest && method != Method::GET {
+        return Err(Refusal::new(StatusCode::FORBIDDEN, "only whoever started the run may change it: this token is that of a guest"));
+    }
+    Ok(role)
+}
+
+fn check(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Role, Refusal> {
     let mut hosts = headers.get_all(header::HOST).iter();
     let (Some(host), None) = (hosts.next(), hosts.next()) else {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "expected exactly one Host header"));
@@ -52,13 +71,17 @@ fn check(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
     }
     let in_header = headers.get_all(header::AUTHORIZATION).iter().filter_map(|value| bearer(value.as_bytes()));
     let in_query = uri.query().unwrap_or_default().split('&').filter_map(|part| part.strip_prefix("token=")).map(str::as_bytes);
-    if !in_header.chain(in_query).any(|offered| app.token.is(offered)) {
-        return Err(Refusal::new(
+    let role_of = |offered: &[u8]| match &app.guests {
+        _ if app.token.is(offered) => Some(Role::Host),
+        Some(guests) if guests.is(offered) => Some(Role::Guest),
+        Some(_) | None => None,
+    };
+    in_header.chain(in_query).find_map(role_of).ok_or_else(|| {
+        Refusal::new(
             StatusCode::UNAUTHORIZED,
             "no token, or a wrong one: show it as \"Authorization: Bearer TOKEN\" or as ?token=TOKEN; it was printed when the server started",
-        ));
-    }
-    Ok(())
+        )
+    })
 }
 
 /// Whether a host, with or without a port, is one to be asked for.

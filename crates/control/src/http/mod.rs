@@ -2,7 +2,9 @@
 
 mod change;
 mod guard;
+mod hand;
 mod page;
+mod play;
 mod read;
 #[cfg(test)]
 mod tests;
@@ -23,14 +25,22 @@ use serde_json::{Value, json};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::{Board, LinkEditor, Token};
+use crate::{Board, LinkEditor, Stage, Token};
 
 /// What all answers are made from.
 pub(crate) struct App {
     pub(crate) board: Arc<Board>,
     pub(crate) editor: Mutex<Box<dyn LinkEditor>>,
     pub(crate) token: Token,
+    /// That of those to whom a link was handed out.
+    pub(crate) guests: Option<Token>,
     pub(crate) hosts: Vec<String>,
+    /// If people take part from a page.
+    pub(crate) stage: Option<Arc<dyn Stage>>,
+    /// The pages that take part.
+    pub(crate) hands: Arc<Semaphore>,
+    /// One comparison takes a core.
+    pub(crate) comparing: Semaphore,
 }
 
 impl App {
@@ -49,8 +59,8 @@ impl App {
 /// The routes, behind the guard.
 pub(crate) fn router(app: App) -> Router {
     let app = Arc::new(app);
-    Router::new()
-        .route("/", get(page::page))
+    let pages = if app.stage.is_some() { play::routes() } else { Router::new().route("/", get(page::page)) };
+    pages
         .route("/api/state", get(read::state))
         .route("/api/links", get(read::links).patch(change::all))
         .route("/api/links/{link}", get(read::link).patch(change::one))
@@ -100,12 +110,17 @@ async fn not_found(uri: Uri) -> Refusal {
 
 /// There is such a path, but not for this method.
 async fn method_not_allowed(method: Method, uri: Uri) -> Refusal {
-    let expected = if uri.path().starts_with("/api/links") { "GET or PATCH" } else { "GET" };
+    let expected = match uri.path() {
+        path if path.starts_with("/api/links") => "GET or PATCH",
+        "/api/play" => "GET or POST",
+        "/api/compare" => "POST",
+        _ => "GET",
+    };
     Refusal::new(StatusCode::METHOD_NOT_ALLOWED, format!("{method} is nothing that {} does: expected {expected}", uri.path().escape_debug()))
 }
 
 /// How many connections may be open. The others wait: the real-time side shares the limit of open files with them.
-const MOST: usize = 64;
+pub(crate) const MOST: usize = 64;
 /// How long a request head may take, from its connection or from the answer before it.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// When no connection can be taken, because there are too many open files, it is tried again after this.
@@ -134,6 +149,6 @@ async fn answer(stream: TcpStream, router: Router, place: OwnedSemaphorePermit) 
     let mut builder = Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
     // The program at the other end has gone, or spoke no HTTP: nobody is left to be told.
-    let _ended: hyper::Result<()> = builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router)).await;
+    let _ended: hyper::Result<()> = builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router)).with_upgrades().await;
     drop(place);
 }

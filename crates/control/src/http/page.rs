@@ -11,12 +11,15 @@ use sha2::{Digest as _, Sha256};
 const STYLE: &str = include_str!("../../page/style.css");
 const SCRIPT: &str = concat!(
     include_str!("../../page/server.js"),
+    include_str!("../../page/events.js"),
     include_str!("../../page/words.js"),
     include_str!("../../page/history.js"),
     include_str!("../../page/plot.js"),
     include_str!("../../page/links.js"),
+    include_str!("../../page/scales.js"),
     include_str!("../../page/editor.js"),
     include_str!("../../page/copies.js"),
+    include_str!("../../page/turn.js"),
     include_str!("../../page/depth.js"),
     include_str!("../../page/facts.js"),
     include_str!("../../page/main.js"),
@@ -24,6 +27,28 @@ const SCRIPT: &str = concat!(
 
 static PAGE: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/page.html"), STYLE, SCRIPT));
 static DOOR: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/door.html"), STYLE, include_str!("../../page/door.js")));
+
+const PLAY_STYLE: &str = concat!(include_str!("../../page/style.css"), include_str!("../../page/play/style.css"));
+const PLAY_SCRIPT: &str = concat!(
+    include_str!("../../page/server.js"),
+    include_str!("../../page/words.js"),
+    include_str!("../../page/scales.js"),
+    include_str!("../../page/turn.js"),
+    include_str!("../../page/play/socket.js"),
+    include_str!("../../page/play/motion.js"),
+    include_str!("../../page/play/rooms.js"),
+    include_str!("../../page/play/packets.js"),
+    include_str!("../../page/play/draw.js"),
+    include_str!("../../page/play/hand.js"),
+    include_str!("../../page/play/keyboard.js"),
+    include_str!("../../page/play/gamepad.js"),
+    include_str!("../../page/play/controls.js"),
+    include_str!("../../page/play/steps.js"),
+    include_str!("../../page/play/compare.js"),
+    include_str!("../../page/play/main.js"),
+);
+
+static PLAY: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/play/page.html"), PLAY_STYLE, PLAY_SCRIPT));
 
 /// A document with what it may do.
 struct Document {
@@ -59,6 +84,11 @@ impl Document {
 /// The page itself.
 pub(super) async fn page() -> Response {
     PAGE.answer(StatusCode::OK)
+}
+
+/// The page of a run in which people take part.
+pub(super) async fn play() -> Response {
+    PLAY.answer(StatusCode::OK)
 }
 
 /// For a browser that has not shown the token: takes it from the tab, where the page left it, or asks for it.

@@ -19,7 +19,7 @@ use crate::{metrics, typed, views};
 
 /// Everything that changes by itself.
 pub(super) async fn state(State(app): State<Arc<App>>) -> Response {
-    answer(&views::state(app.board.description(), &app.board.latest()))
+    answer(&views::state(&app.board.latest()))
 }
 
 /// Every link with its counters and keys.
@@ -36,12 +36,13 @@ pub(super) async fn link(State(app): State<Arc<App>>, path: Result<Path<String>,
 
 /// Distributions of lateness and of delay.
 pub(super) async fn histograms(State(app): State<Arc<App>>) -> Response {
-    answer(&views::histograms(app.board.description(), &app.board.latest()))
+    answer(&views::histograms(&app.board.latest()))
 }
 
 /// All counters as Prometheus reads them.
 pub(super) async fn metrics(State(app): State<Arc<App>>) -> Response {
-    let text = metrics::text(app.board.description(), &app.board.latest());
+    let latest = app.board.latest();
+    let text = metrics::text(&latest.description, &latest);
     ([(header::CONTENT_TYPE, HeaderValue::from_static("text/plain; version=0.0.4; charset=utf-8"))], text).into_response()
 }
 
@@ -64,12 +65,13 @@ pub(super) fn with_keys(app: &App, links: &[usize]) -> Vec<Value> {
     let latest = app.board.latest();
     let editor = app.editor();
     let view = |link: &usize| {
-        let mut view = views::link(app.board.description(), &latest.snapshot, *link);
+        let mut view = views::link(&latest.description, &latest.snapshot, *link);
         let keys: Map<String, Value> = editor.keys(*link).into_iter().map(|(key, value)| (key, typed::shown(&value).into())).collect();
         view["keys"] = keys.into();
         view
     };
-    links.iter().map(view).collect()
+    // Another run, with fewer links, may have taken the place of the one that was asked about.
+    links.iter().filter(|link| **link < latest.description.links.len()).map(view).collect()
 }
 
 /// How often it is looked whether there is something new.
@@ -104,7 +106,7 @@ impl Listener {
             if self.sent != Some(latest.number) {
                 self.sent = Some(latest.number);
                 self.quiet = 0;
-                let state = views::state(self.app.board.description(), &latest);
+                let state = views::state(&latest);
                 return Event::default().event("state").id(latest.number.to_string()).data(state.to_string());
             }
             self.quiet += 1;

@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, Request, StatusCode};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use tokio::runtime::{Builder, Runtime};
+use tokio::sync::Semaphore;
 use tower::ServiceExt as _;
 
 use super::{App, router};
@@ -68,7 +69,11 @@ impl Site {
             board,
             editor: Mutex::new(Box::new(Recorder(Arc::clone(&calls)))),
             token: TOKEN.parse().unwrap(),
+            guests: None,
             hosts: vec!["lab.example".to_owned()],
+            stage: None,
+            hands: Arc::new(Semaphore::new(1)),
+            comparing: Semaphore::new(1),
         };
         Self { router: router(app), calls, runtime: Builder::new_current_thread().enable_time().build().unwrap() }
     }
@@ -117,7 +122,7 @@ fn the_state_has_measures_where_the_run_has_some() {
     assert_eq!(site.ask("GET", "/api/state", "").json()["measures"], json!(expected));
     let description =
         Description { kind: Kind::Router, title: String::new(), links: vec![], peers: vec![], clocks: vec![], measures: vec![], body: None };
-    let state = crate::views::state(&description, &Board::new(description.clone()).latest());
+    let state = crate::views::state(&Board::new(description.clone()).latest());
     assert!(!state.as_object().unwrap().contains_key("measures"));
 }
 
@@ -133,7 +138,7 @@ fn attitudes_are_in_the_state_of_an_object_that_turns_alone() {
     let shown = |description: &Description, turn: Option<TurnView>| {
         let board = Board::new(description.clone());
         board.publish(Arc::new(Snapshot { peers: vec![PeerView { turn, ..PeerView::default() }], ..Snapshot::default() })).unwrap();
-        crate::views::state(description, &board.latest())
+        crate::views::state(&board.latest())
     };
     let state = shown(&Description { body: Some(body), ..still.clone() }, Some(turn));
     assert_eq!(state["body"], json!({ "edges": [0.4, 0.3, 0.0] }));

@@ -153,7 +153,7 @@ fn example(strange: &str) -> (Description, Latest) {
         refused: vec![("too-short", 9), ("wrong-magic", 0)],
         measures: Vec::new(),
     };
-    (description, Latest { number: 250, snapshot: Arc::new(snapshot) })
+    (description.clone(), Latest { description: Arc::new(description), number: 250, snapshot: Arc::new(snapshot) })
 }
 
 #[test]

@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{Device, RestingDevice, State};
+use cohaptic_peer::{Age, Device, RestingDevice, State};
 use cohaptic_units::Instant;
 
-/// What a live session needs of a device. Components beyond the axes of the scene are zero, and are not looked at.
+use super::pulled::PulledDevice;
+
+/// What a live session needs of a device, or of the pointer that pulls a simulated one. Components beyond the axes of the scene are zero, and are not looked at.
 pub trait LiveDevice: Send {
-    /// Position and velocity in the coordinates of the scene, at the tick at `now`; called once a tick. `None` if that cannot be told: there is no device, it
+    /// Position and velocity in the coordinates of the scene, at the tick at `now`; called once a tick. For a peer of kind `pointer` those of the pointer. `None` if that cannot be told: there is no device, it
     /// does not answer, it is not homed. A peer whose device is silent for long lets go of the object, and takes it up again, little by little.
     fn read(&mut self, now: Instant) -> Option<State<3>>;
 
@@ -53,12 +55,20 @@ pub(crate) struct HandDevice<const A: usize> {
     /// What was felt when it came back, and how far it has come from there.
     before: State<A>,
     share: f64,
+    /// What is pulled, if what is read is a pointer.
+    pulled: Option<PulledDevice<A>>,
 }
 
 impl<const A: usize> HandDevice<A> {
     /// `None` is a device that is never there.
     pub(crate) const fn new(device: Option<Box<dyn LiveDevice>>, state: State<A>) -> Self {
-        Self { device, read: state, before: state, share: 1.0 }
+        Self { device, read: state, before: state, share: 1.0, pulled: None }
+    }
+
+    /// A pointer that pulls a simulated device; `None` is one that is never there.
+    pub(crate) fn pulling(pointer: Option<Box<dyn LiveDevice>>, pulled: PulledDevice<A>) -> Self {
+        let state = pulled.state();
+        Self { pulled: Some(pulled), ..Self::new(pointer, state) }
     }
 
     /// Reads the device, and says whether that could be done.
@@ -75,11 +85,30 @@ impl<const A: usize> HandDevice<A> {
 
     /// The share counts from the force felt until now.
     pub(crate) fn keep(&mut self) {
-        self.before = self.state();
+        self.before = self.shown();
     }
 
-    pub(crate) const fn set_share(&mut self, share: f64) {
-        self.share = share;
+    /// How far the way to what was read is gone, and how much of the hand is felt. Gives what the coupling is to be multiplied by.
+    pub(crate) const fn set_age(&mut self, age: Age) -> f64 {
+        self.share = age.share;
+        match &mut self.pulled {
+            // The device lives here and stays coupled: it is the arm that lets go.
+            Some(pulled) => {
+                pulled.set_weight(age.weight);
+                1.0
+            }
+            None => age.weight,
+        }
+    }
+
+    /// What was read, after the way there from what was felt before.
+    fn shown(&self) -> State<A> {
+        if self.share < 1.0 {
+            let mix = |from: [f64; A], to: [f64; A]| core::array::from_fn(|axis| from[axis] + self.share * (to[axis] - from[axis]));
+            State { position: mix(self.before.position, self.read.position), velocity: mix(self.before.velocity, self.read.velocity) }
+        } else {
+            self.read
+        }
     }
 
     pub(crate) fn let_go(&mut self, now: Instant) {
@@ -91,15 +120,14 @@ impl<const A: usize> HandDevice<A> {
 
 impl<const A: usize> Device<A> for HandDevice<A> {
     fn state(&self) -> State<A> {
-        if self.share < 1.0 {
-            let mix = |from: [f64; A], to: [f64; A]| core::array::from_fn(|axis| from[axis] + self.share * (to[axis] - from[axis]));
-            State { position: mix(self.before.position, self.read.position), velocity: mix(self.before.velocity, self.read.velocity) }
-        } else {
-            self.read
-        }
+        self.pulled.as_ref().map_or_else(|| self.shown(), PulledDevice::state)
     }
 
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        let wanted = self.shown();
+        if let Some(pulled) = &mut self.pulled {
+            pulled.advance(now, span, &wanted, coupling_force);
+        }
         if let Some(device) = &mut self.device {
             device.hold(now, span, core::array::from_fn(|axis| coupling_force.get(axis).copied().unwrap_or(0.0)));
         }

@@ -56,6 +56,11 @@ impl Fade {
         Self { weight: Ramp::down(over), share: Ramp::up(over) }
     }
 
+    /// Of a peer that is wholly there.
+    pub(crate) const fn whole(over: Duration) -> Self {
+        Self { weight: Ramp::up(over), share: Ramp::up(over) }
+    }
+
     pub(crate) fn fall(&mut self, at: Instant) {
         self.weight.turn(at, false);
     }

@@ -1,5 +1,7 @@
 //! What came into a session from outside.
 
+use std::collections::BTreeMap;
+
 use cohaptic_peer::State;
 use cohaptic_scene::LinkKeys;
 use cohaptic_units::Instant;
@@ -102,6 +104,32 @@ impl Inputs {
     #[must_use]
     pub fn len(&self) -> usize {
         self.rows.len()
+    }
+
+    /// Without the changes of links, as for a session whose links are others.
+    #[must_use]
+    pub fn without_links(&self) -> Self {
+        let is_link = |what: &Recorded| matches!(what, Recorded::Link { .. });
+        Self { rows: self.rows.iter().filter(|(_, what)| !is_link(what)).cloned().collect() }
+    }
+
+    /// When the last one came; `None` if none did.
+    #[must_use]
+    pub fn last_instant(&self) -> Option<Instant> {
+        self.rows.last().map(|(at, _)| *at)
+    }
+
+    /// The peer whose device, or pointer, could be read most often; `None` if none could.
+    #[must_use]
+    pub fn busiest_device(&self) -> Option<usize> {
+        let mut read = BTreeMap::new();
+        for (_, what) in &self.rows {
+            if let Recorded::Device { peer, state: Some(_) } = what {
+                *read.entry(*peer).or_insert(0_usize) += 1;
+            }
+        }
+        // Of equally many the first.
+        read.into_iter().rev().max_by_key(|(_, count)| *count).map(|(peer, _)| peer)
     }
 
     /// Whether nothing came in.

@@ -10,6 +10,7 @@ mod device;
 mod fade;
 mod inputs;
 mod presence;
+mod pulled;
 mod recorded;
 mod replay;
 mod rows;
@@ -18,6 +19,8 @@ mod seat;
 
 pub(crate) use device::{HandDevice, UnsimulatedDevice};
 pub(crate) use presence::RemotePeers;
+pub(crate) use pulled::PulledDevice;
+pub(crate) use seat::Seat;
 
 pub use device::LiveDevice;
 pub use inputs::{HEADER, Input, InputRow, Inputs, InputsError};

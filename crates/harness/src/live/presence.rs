@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample};
 use cohaptic_peer::{Age, Ages, Device, Peer, ReceiveError, Reception, Strategy};
-use cohaptic_scene::{PeerKind, Scene};
+use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use super::seat::Seat;
@@ -69,10 +69,7 @@ pub(crate) struct RemotePeers<const A: usize> {
 impl<const A: usize> RemotePeers<A> {
     pub(crate) fn new(scene: &Scene) -> Self {
         let peers = scene.peers.len();
-        let seat = |(place, peer): (usize, &cohaptic_scene::PeerSpec)| {
-            let is_process = matches!(peer.kind, PeerKind::Udp(_));
-            peer.kind.silence().map(|silence| Seat::new(is_process, silence, peers, scene.peer_config(place).coupling))
-        };
+        let seat = |(place, peer): (usize, &cohaptic_scene::PeerSpec)| Seat::of(&peer.kind, place, peers, scene.peer_config(place).coupling);
         let seats: Vec<Option<Seat>> = scene.peers.iter().enumerate().map(seat).collect();
         let places = seats.iter().enumerate().filter_map(|(place, seat)| seat.as_ref().map(|_| place)).collect();
         let has_processes = seats.iter().flatten().any(|seat| seat.is_process);

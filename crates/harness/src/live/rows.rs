@@ -9,7 +9,7 @@
 //! 12000000,end,,,
 //! ```
 //!
-//! A sample is written in hexadecimal. A device shows position and velocity on each axis in turn (`x vx y vy`), with digits that read back as the same numbers,
+//! A sample is written in hexadecimal. A device, or the pointer that pulls one, shows position and velocity on each axis in turn (`x vx y vy`), with digits that read back as the same numbers,
 //! or `none`. A link has all its keys, as a TOML table. The rows before these say [with which scene](super::RecordedScene) they were recorded.
 
 use std::fmt;
@@ -112,10 +112,10 @@ fn read_row(line: usize, row: &str, scene: &Scene, keys: &LinkKeys, folder: &Pat
     let cells = Cells { line, cells };
     let at = cells.instant()?;
     let what = match cells.cells[1] {
-        "sample" => Recorded::Sample { peer: cells.peer(2, scene, "udp")?, datagram: cells.bytes()? },
-        "device" => Recorded::Device { peer: cells.peer(2, scene, "falcon")?, state: cells.state(scene.axes.count())? },
+        "sample" => Recorded::Sample { peer: cells.peer(2, scene, &["udp"])?, datagram: cells.bytes()? },
+        "device" => Recorded::Device { peer: cells.peer(2, scene, &["falcon", "pointer"])?, state: cells.state(scene.axes.count())? },
         "link" => {
-            let (from, to) = (cells.peer(2, scene, "")?, cells.peer(3, scene, "")?);
+            let (from, to) = (cells.peer(2, scene, &[])?, cells.peer(3, scene, &[])?);
             if from == to {
                 return Err(cells.refused(3, "another peer than the sender"));
             }
@@ -140,12 +140,12 @@ impl Cells<'_> {
         nanos.map(Instant::from_nanos).ok_or_else(|| self.refused(0, "a whole number of nanoseconds from 0 to 2^64 - 1"))
     }
 
-    /// A peer of that kind, or of any if that is empty.
-    fn peer(&self, column: usize, scene: &Scene, kind: &str) -> Result<usize, InputsError> {
+    /// A peer of one of those kinds, or of any if there are none.
+    fn peer(&self, column: usize, scene: &Scene, kinds: &[&str]) -> Result<usize, InputsError> {
         let named = scene.peer_index(self.cells[column]);
-        let fits = |kind_of: &PeerKind| kind.is_empty() || kind_of.name() == kind;
+        let fits = |kind: &PeerKind| kinds.is_empty() || kinds.contains(&kind.name());
         named.filter(|place| fits(&scene.peers[*place].kind)).ok_or_else(|| {
-            let kind = if kind.is_empty() { String::new() } else { format!(" of kind \"{kind}\"") };
+            let kind = if kinds.is_empty() { String::new() } else { format!(" of kind \"{}\"", kinds.join("\" or \"")) };
             self.refused(column, format!("the name of a peer{kind} of the scene"))
         })
     }

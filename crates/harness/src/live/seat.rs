@@ -1,10 +1,11 @@
 //! The place of a peer that is remote, taken or not.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use cohaptic_peer::wire::DecodeError;
 use cohaptic_peer::{Gains, ReceiveError};
-use cohaptic_scene::Silence;
+use cohaptic_scene::{PeerKind, Silence};
 use cohaptic_units::Instant;
 
 use super::fade::Fade;
@@ -74,6 +75,8 @@ pub struct SeatStats {
 #[derive(Clone, Debug)]
 pub(crate) struct Seat {
     pub(crate) is_process: bool,
+    /// Whose fades follow whether it is heard: all of them, or with a device that is simulated here that of its hand alone.
+    followed: Range<usize>,
     silence: Silence,
     pub(crate) heard: Option<Instant>,
     /// Whether the present silence has been noticed. So is one before anything was heard.
@@ -90,25 +93,42 @@ pub(crate) struct Seat {
 }
 
 impl Seat {
-    pub(crate) fn new(is_process: bool, silence: Silence, peers: usize, coupling: Gains) -> Self {
-        Self {
-            is_process,
+    /// `None` for a peer that is never silent.
+    pub(crate) fn of(kind: &PeerKind, place: usize, peers: usize, coupling: Gains) -> Option<Self> {
+        let silence = kind.silence()?;
+        let pointer = if let PeerKind::Pointer(_, pointer) = kind { Some(pointer) } else { None };
+        let followed = if pointer.is_some() { place..place + 1 } else { 0..peers };
+        let is_held = pointer.is_some_and(|pointer| pointer.held);
+        let fade = |to: usize| if is_held || !followed.contains(&to) { Fade::whole(silence.fade) } else { Fade::unheard(silence.fade) };
+        Some(Self {
+            is_process: matches!(kind, PeerKind::Udp(_)),
+            fades: (0..peers).map(fade).collect(),
+            followed,
             silence,
-            heard: None,
-            is_silent: true,
+            heard: is_held.then_some(Instant::ZERO),
+            is_silent: !is_held,
             newest: 0,
             next_sequence: 0,
-            stats: SeatStats::default(),
-            fades: vec![Fade::unheard(silence.fade); peers],
+            stats: SeatStats { joined: u64::from(is_held), ..SeatStats::default() },
             coupling,
-        }
+        })
+    }
+
+    /// What follows whether it is heard.
+    pub(crate) fn followed_mut(&mut self) -> &mut [Fade] {
+        &mut self.fades[self.followed.clone()]
+    }
+
+    /// Whether its copy is of interest: one of a device that is simulated here is, whoever holds that.
+    pub(crate) fn is_there(&self) -> bool {
+        !self.is_silent || self.followed.len() < self.fades.len()
     }
 
     /// Notices that nothing has been heard for too long, and answers whether that is new.
     pub(crate) fn notice_silence(&mut self, now: Instant) -> bool {
         let Some(since) = self.falls_silent().filter(|since| !self.is_silent && now >= *since) else { return false };
         self.is_silent = true;
-        self.fades.iter_mut().for_each(|fade| fade.fall(since));
+        self.followed_mut().iter_mut().for_each(|fade| fade.fall(since));
         true
     }
 

@@ -1,7 +1,7 @@
 //! A running scene some of whose peers are remote.
 
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
-use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, State, Strategy};
+use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, PacketInfo, Path};
@@ -9,7 +9,8 @@ use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, PacketInfo, Path};
 use super::{Arriving, DeviceModel, Remote, Step, Watch, World, row};
 use crate::datagrams::Handle;
 use crate::live::{
-    Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, TurnState, UnsimulatedDevice,
+    Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, PulledDevice, RemotePeers, SampleError, Seat, SeatStats, Transmit, TurnState,
+    UnsimulatedDevice,
 };
 use crate::observer::{AnyObserver, Ended};
 use crate::plan::ticking;
@@ -35,6 +36,11 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
                 PeerKind::Falcon(..) => {
                     let state = member.peer.device().state();
                     let hand = Box::new(HandDevice::new(devices(place), state));
+                    *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
+                }
+                PeerKind::Pointer(_, arm) => {
+                    let body = SimulatedDevice::new(peer.device, None, member.peer.device().state(), scene.integrator, &peer.clock);
+                    let hand = Box::new(HandDevice::pulling(devices(place), PulledDevice::new(body, arm)));
                     *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
                 }
                 PeerKind::Simulated => {}
@@ -223,7 +229,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
     }
 
     fn is_there(&self, place: usize) -> bool {
-        self.seat(place).is_none_or(|seat| !seat.is_silent())
+        self.seat(place).is_none_or(Seat::is_there)
     }
 
     fn receive<S: Strategy<A>>(
@@ -268,13 +274,12 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
                 if joins {
                     device.keep();
                     seat.fades[place].moved(now);
-                    seat.fades.iter_mut().for_each(|fade| fade.rise(now));
+                    seat.followed_mut().iter_mut().for_each(|fade| fade.rise(now));
                 }
                 device.set(state);
             }
-            let age = seat.fades[place].age(now);
-            device.set_share(age.share);
-            peer.set_coupling(seat.coupling.scaled(age.weight));
+            let coupled = device.set_age(seat.fades[place].age(now));
+            peer.set_coupling(seat.coupling.scaled(coupled));
         }
         self.tell(place, now, peer);
         Ok(())

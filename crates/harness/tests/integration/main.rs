@@ -4,6 +4,7 @@
 
 mod hands;
 mod many_peers;
+mod pointers;
 mod records;
 mod remote;
 mod replays;

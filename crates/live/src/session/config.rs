@@ -29,6 +29,8 @@ pub struct SessionConfig {
     pub tolerance: Tolerance,
     /// Where to record; `None`: nowhere.
     pub out: Option<PathBuf>,
+    /// Which files are recorded.
+    pub recorded: Recorded,
     /// The keys and files of the scene, from [`cohaptic_scene::scene_content`], which the record keeps: a replay with another scene says what differs.
     /// Without them it says only that something does.
     pub content: SceneContent,
@@ -46,9 +48,20 @@ impl SessionConfig {
             wishes: Wishes::default(),
             tolerance: Tolerance { limit: Duration::from_millis(1) },
             out: None,
+            recorded: Recorded::All,
             content: SceneContent::default(),
         }
     }
+}
+
+/// Which files of a session are recorded.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Recorded {
+    /// Every motion and every packet too.
+    #[default]
+    All,
+    /// `inputs.csv` alone, from which all others can be made again.
+    Inputs,
 }
 
 /// Why a session cannot begin, or had to end.

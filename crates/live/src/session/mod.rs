@@ -5,6 +5,7 @@
 
 mod config;
 mod files;
+mod motion;
 mod outside;
 mod recording;
 mod rows;
@@ -19,11 +20,13 @@ use cohaptic_scene::{LinkKeys, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
+use motion::EndedPackets;
 use outside::Outside;
 use recording::{Recording, Stopped};
 use watch::Watch;
 
-pub use config::{SessionConfig, SessionError};
+pub use config::{Recorded, SessionConfig, SessionError};
+pub use motion::{EndedPacket, Motion};
 pub use status::{LinkStatus, PeerStatus, Report, SocketCounts, Status};
 
 /// The conductor of a session: looks on while it runs, changes links, and ends it. Called on the thread that has to be on time: calls must neither wait nor take long.
@@ -40,6 +43,14 @@ pub trait Conductor {
     /// Whether anybody looks on. The answer must stay.
     fn wants_status(&self) -> bool {
         true
+    }
+
+    /// What moves, about 50 times a second, and at the end, if [`Conductor::wants_motion`].
+    fn show_motion(&mut self, _motion: Motion) {}
+
+    /// Whether anybody looks on so closely. The answer must stay.
+    fn wants_motion(&self) -> bool {
+        false
     }
 }
 
@@ -82,7 +93,7 @@ impl Session {
     /// If the scene is [`cohaptic_harness::too_large`].
     pub fn open(scene: &Scene, config: SessionConfig, devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Result<Self, SessionError> {
         let outside = Outside::open(scene, &config)?;
-        let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene, config.content.clone())).transpose()?;
+        let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene, config.content.clone(), config.recorded)).transpose()?;
         let peers = scene.peers.len();
         Ok(Self { live: LiveScene::new(scene, devices), outside, watch: Watch::new(scene, recording), config, peers })
     }
@@ -129,6 +140,7 @@ impl Session {
     fn drive(&mut self, clock: &MonotonicClock, conductor: &mut impl Conductor) -> Result<(), SessionError> {
         let mut pacer = Pacer::new(self.config.pacing);
         self.watch.is_shown = conductor.wants_status();
+        self.watch.ended = conductor.wants_motion().then(Default::default);
         let (mut next_look, mut looks) = (Instant::ZERO, 0_u32);
         while let Some(due) = self.live.poll_timeout() {
             let woken = {
@@ -157,6 +169,9 @@ impl Session {
         }
         if conductor.wants_status() {
             conductor.show(self.status());
+        }
+        if conductor.wants_motion() {
+            conductor.show_motion(self.motion());
         }
         Ok(())
     }
@@ -193,8 +208,13 @@ impl Session {
         }
         if !conductor.keep_going() {
             self.live.stop(clock.now(), &mut self.watch)?;
-        } else if show && conductor.wants_status() {
+            return Ok(());
+        }
+        if show && conductor.wants_status() {
             conductor.show(self.status());
+        }
+        if conductor.wants_motion() {
+            conductor.show_motion(self.motion());
         }
         Ok(())
     }
@@ -205,6 +225,19 @@ impl Session {
         self.config.tolerance.judge(&all)
     }
 
+    fn peers(&self) -> Vec<PeerStatus> {
+        let peer = |place| {
+            let state = self.live.peer(place)?;
+            Some(PeerStatus { state, force: self.watch.forces[place], seat: self.live.seat_stats(place) })
+        };
+        (0..self.peers).filter_map(peer).collect()
+    }
+
+    fn motion(&mut self) -> Motion {
+        let packets = self.watch.ended.as_mut().map(EndedPackets::take).unwrap_or_default();
+        Motion { elapsed: self.live.open().saturating_duration_since(Instant::ZERO), peers: self.peers(), packets }
+    }
+
     fn status(&self) -> Status {
         let places = 0..self.peers;
         let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
@@ -213,10 +246,6 @@ impl Session {
             let stats = self.live.link_stats(from, to)?;
             Some(LinkStatus { from, to, stats, delivered_bytes: carried.bytes, recent: carried.recent().to_vec() })
         };
-        let peer = |place| {
-            let state = self.live.peer(place)?;
-            Some(PeerStatus { state, force: self.watch.forces[place], seat: self.live.seat_stats(place) })
-        };
         let elapsed = self.live.open().saturating_duration_since(Instant::ZERO);
         Status {
             elapsed,
@@ -224,7 +253,7 @@ impl Session {
             ticks: self.watch.ticks.summary(),
             releases: self.watch.releases.summary(),
             validity: self.validity(),
-            peers: places.clone().filter_map(peer).collect(),
+            peers: self.peers(),
             links: pairs.filter_map(link).collect(),
             admission: self.outside.as_ref().map(|outside| *outside.admission_stats()),
         }

@@ -13,6 +13,7 @@ use cohaptic_harness::{Observer as _, PacketRow, Summary, TickRow};
 use cohaptic_realtime::Lateness;
 use cohaptic_scene::{Scene, SceneContent};
 
+use super::Recorded;
 use super::files::{Release, Releases, write_lateness};
 use super::rows::{InputCopy, TickCopy};
 
@@ -25,6 +26,7 @@ pub(crate) struct Recording {
     folder: PathBuf,
     rows: SyncSender<Row>,
     writer: JoinHandle<Result<Files, RecordError>>,
+    has_others: bool,
 }
 
 #[derive(Debug)]
@@ -38,9 +40,9 @@ enum Row {
 /// The files that grow while the session lasts.
 #[derive(Debug)]
 struct Files {
-    recorder: Recorder,
     inputs: InputRecorder,
-    releases: Releases,
+    /// Those that can be made again from the inputs, and how late everything was.
+    others: Option<(Recorder, Releases)>,
 }
 
 /// The writer could not write; [`Recording::finish`] says why.
@@ -49,32 +51,37 @@ pub(crate) struct Stopped;
 
 impl Recording {
     /// Begins to record.
-    pub(crate) fn create(folder: &Path, scene: &Scene, content: SceneContent) -> Result<Self, RecordError> {
-        let recorder = Recorder::create(folder, scene)?;
-        let files = Files { recorder, inputs: InputRecorder::create(folder, scene, content)?, releases: Releases::create(folder, scene)? };
+    pub(crate) fn create(folder: &Path, scene: &Scene, content: SceneContent, recorded: Recorded) -> Result<Self, RecordError> {
+        let others = match recorded {
+            Recorded::All => Some((Recorder::create(folder, scene)?, Releases::create(folder, scene)?)),
+            Recorded::Inputs => None,
+        };
+        let has_others = others.is_some();
+        let files = Files { inputs: InputRecorder::create(folder, scene, content)?, others };
         let axes = scene.axes.count();
         let (rows, waiting) = sync_channel(ROWS);
         let writer = thread::spawn(move || files.write(&waiting, axes));
-        Ok(Self { folder: folder.to_path_buf(), rows, writer })
+        Ok(Self { folder: folder.to_path_buf(), rows, writer, has_others })
     }
 
     /// Writes the rest and gives every file its name; gives the files.
     pub(crate) fn finish(self, summary: &Summary, ticks: &Lateness, releases: &Lateness) -> Result<Vec<PathBuf>, RecordError> {
         drop(self.rows);
         let files = self.writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-        let mut written = files.recorder.finish(summary)?;
+        let Some((recorder, sent)) = files.others else { return Ok(vec![files.inputs.finish()?]) };
+        let mut written = recorder.finish(summary)?;
         written.push(files.inputs.finish()?);
-        written.push(files.releases.finish()?);
+        written.push(sent.finish()?);
         written.push(write_lateness(&self.folder, ticks, releases)?);
         Ok(written)
     }
 
     pub(crate) fn tick(&self, row: &TickRow<'_>) -> Result<(), Stopped> {
-        self.put(Row::Tick(TickCopy::of(row)))
+        if self.has_others { self.put(Row::Tick(TickCopy::of(row))) } else { Ok(()) }
     }
 
     pub(crate) fn packet(&self, row: &PacketRow) -> Result<(), Stopped> {
-        self.put(Row::Packet(*row))
+        if self.has_others { self.put(Row::Packet(*row)) } else { Ok(()) }
     }
 
     pub(crate) fn input(&self, row: &InputRow<'_>) -> Result<(), Stopped> {
@@ -82,7 +89,7 @@ impl Recording {
     }
 
     pub(crate) fn release(&self, release: Release) -> Result<(), Stopped> {
-        self.put(Row::Release(release))
+        if self.has_others { self.put(Row::Release(release)) } else { Ok(()) }
     }
 
     fn put(&self, row: Row) -> Result<(), Stopped> {
@@ -94,11 +101,12 @@ impl Recording {
 impl Files {
     fn write(mut self, rows: &Receiver<Row>, axes: usize) -> Result<Self, RecordError> {
         for row in rows {
-            match row {
-                Row::Tick(row) => self.recorder.on_tick(&row.borrowed(axes))?,
-                Row::Packet(row) => self.recorder.on_packet(&row)?,
-                Row::Input(row) => self.inputs.on_input(&row.borrowed(axes))?,
-                Row::Release(row) => self.releases.write(&row)?,
+            match (row, &mut self.others) {
+                (Row::Input(row), _) => self.inputs.on_input(&row.borrowed(axes))?,
+                (Row::Tick(row), Some((recorder, _))) => recorder.on_tick(&row.borrowed(axes))?,
+                (Row::Packet(row), Some((recorder, _))) => recorder.on_packet(&row)?,
+                (Row::Release(row), Some((_, releases))) => releases.write(&row)?,
+                (Row::Tick(_) | Row::Packet(_) | Row::Release(_), None) => {}
             }
         }
         Ok(self)

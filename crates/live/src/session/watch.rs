@@ -11,6 +11,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
 
 use super::files::Release;
+use super::motion::EndedPackets;
 use super::recording::{Recording, Stopped};
 
 /// Sees every tick and packet: how late ticks were, what links have carried of late, and the record if there is one.
@@ -26,6 +27,8 @@ pub(super) struct Watch {
     pub(super) links: Vec<Carried>,
     /// Whether anybody looks at what links have carried: of 100 peers it is a quarter of a tick.
     pub(super) is_shown: bool,
+    /// Packets for those who look closely.
+    pub(super) ended: Option<EndedPackets>,
     /// The force that each device renders.
     pub(super) forces: Vec<[f64; 3]>,
     measures: Option<Measures>,
@@ -70,6 +73,7 @@ impl Watch {
             releases: Lateness::new(),
             links: vec![empty; peers * peers],
             is_shown: true,
+            ended: None,
             forces: vec![[0.0; 3]; peers],
             measures: Measures::of(scene),
         }
@@ -153,6 +157,9 @@ impl Observer for Watch {
             && self.is_shown
         {
             self.links[row.path.from.index() * self.peers + row.path.to.index()].deliver(row.size.get(), at.saturating_duration_since(row.offered));
+        }
+        if let Some(ended) = &mut self.ended {
+            ended.see(row);
         }
         self.recording.as_ref().map_or(Ok(()), |recording| recording.packet(row))
     }

@@ -223,7 +223,7 @@ static SIMULATION: Table = Table::of(&[&[
 const INTEGRATORS: [(&str, &str); 3] =
     [("exact", "the exact solution"), ("semi-implicit-euler", "the velocity first, then the position"), ("rk4", "Runge and Kutta's fourth order")];
 
-const PEER: [Key; 18] = [
+const PEER: [Key; 21] = [
     somewhere("device", Form::Table(&DEVICE), "The haptic device"),
     somewhere("coupling", Form::Table(&COUPLING), "Spring and damper between device and copy; not needed where contact is none"),
     usual("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "\"grasp\"", "How the device touches the object"),
@@ -234,6 +234,8 @@ const PEER: [Key; 18] = [
     optional("clock", Form::Table(&CLOCK), "How the peer's clock differs"),
     optional("position", vector(POSITION), "Where its copy and device begin; without it where the object does"),
     optional("velocity", vector(VELOCITY), "With which velocity they begin; without it that of the object"),
+    optional("device-position", vector(POSITION), "Where its device begins, if not with its copy"),
+    optional("device-velocity", vector(VELOCITY), "With which velocity its device begins, if not with that of its copy"),
     usual("grasp", vector(POSITION), "0", "Where the device grasps an object that turns, from its centre in its own axes"),
     optional("orientation", QUATERNION, "As of the object"),
     optional("angular-velocity", vector(RATE), "As of the object"),
@@ -242,14 +244,16 @@ const PEER: [Key; 18] = [
     usual("kind", Form::Words(&KINDS), "\"simulated\"", "Where the peer lives in a live session"),
     optional("silence", Form::Table(&SILENCE), "When the pull of a peer that lives elsewhere fades"),
     optional("falcon", Form::Table(&FALCON), "Which device a peer of kind falcon has, and how its numbers are meant"),
+    optional("pointer", Form::Table(&POINTER), "The arm through which a pointer pulls the device of a peer of kind pointer"),
 ];
 static PEER_TABLE: Table = Table::of(&[&PEER]);
 static PEERS: Table =
     Table::over(&[&[required("name", Form::Text, "Its name: unique, not all, without space and without . > / , and quotes")], &PEER]);
-const KINDS: [(&str, &str); 3] = [
+const KINDS: [(&str, &str); 4] = [
     ("simulated", "simulated here"),
     ("udp", "another program, which sends and receives samples"),
     ("falcon", "simulated here, with a Novint Falcon"),
+    ("pointer", "simulated here, pulled by a mouse, a finger or a stick"),
 ];
 const CONTACTS: [(&str, &str); 2] = [("grasp", "held both ways"), ("none", "not touched")];
 
@@ -281,6 +285,12 @@ const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number
 static SILENCE: Table = Table::of(&[&[
     usual("after", Form::Duration, "\"100ms\"", "After how long a silence the pull fades"),
     usual("fade", Form::Duration, "\"250ms\"", "How long that takes"),
+]]);
+static POINTER: Table = Table::of(&[&[
+    usual("stiffness", number(STIFFNESS), "400", "Stiffness of the arm between pointer and device"),
+    usual("damping", number(DAMPING), "20", "Its damping"),
+    usual("force-limit", number(POSITIVE_FORCE), "20", "The arm pulls with no greater force"),
+    usual("held", Form::Boolean, "false", "Whether the pointer holds the device from the beginning"),
 ]]);
 static FALCON: Table = Table::of(&[&[
     usual("device", Form::Like(&["first", "simulated"]), "\"first\"", "The first that no other peer has, one that is simulated, or a serial number"),

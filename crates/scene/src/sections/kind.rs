@@ -1,4 +1,4 @@
-//! Where a peer lives: `kind`, `silence` and `falcon` of a peer.
+//! Where a peer lives: `kind`, `silence`, `falcon` and `pointer` of a peer.
 
 use cohaptic_linkfile::document::{Node, quote};
 use cohaptic_linkfile::reading::values::ReadNumber as _;
@@ -6,10 +6,10 @@ use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::DeviceConfig;
 use cohaptic_units::print::Counted;
 
-use crate::model::{FalconDevice, FalconSpec, PeerKind, Silence};
-use crate::quantities::{POSITION, POSITIVE_COUNTS, POSITIVE_FORCE};
+use crate::model::{FalconDevice, FalconSpec, PeerKind, PointerSpec, Silence};
+use crate::quantities::{DAMPING, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS};
 
-/// The model of a Falcon in Rakhsha & Constantinescu (2015), for virtual time.
+/// The model of a Falcon in Rakhsha & Constantinescu (2015): for virtual time, and for the device that a pointer pulls.
 pub(crate) const FALCON_DEVICE: DeviceConfig = DeviceConfig { mass: 0.1, damping: 5.0 };
 
 /// What a peer has that lives elsewhere and was given no device: something that nobody moves and that touches nothing.
@@ -20,19 +20,22 @@ enum Word {
     Simulated,
     Udp,
     Falcon,
+    Pointer,
 }
 
-/// Reads the three keys. `silence` and `falcon` may come from `[peer]` and say nothing to a peer of another kind; they are checked all the same.
+/// Reads the four keys. All but `kind` may come from `[peer]` and say nothing to a peer of another kind; they are checked all the same.
 pub(crate) fn read_kind(table: &mut TableReader<'_>, context: Context<'_>) -> Option<PeerKind> {
-    let words = [("simulated", Word::Simulated), ("udp", Word::Udp), ("falcon", Word::Falcon)];
+    let words = [("simulated", Word::Simulated), ("udp", Word::Udp), ("falcon", Word::Falcon), ("pointer", Word::Pointer)];
     let word = table.optional("kind", Word::Simulated, |node, context| values::choice(node, context, &words));
     let silence = table.optional("silence", Silence::default(), read_silence);
     let falcon = table.optional("falcon", FalconSpec::default(), |node, _| read_falcon(node, context));
-    let (silence, falcon) = (silence?, falcon?);
+    let pointer = table.optional("pointer", PointerSpec::default(), read_pointer);
+    let (silence, falcon, pointer) = (silence?, falcon?, pointer?);
     Some(match word? {
         Word::Simulated => PeerKind::Simulated,
         Word::Udp => PeerKind::Udp(silence),
         Word::Falcon => PeerKind::Falcon(silence, falcon),
+        Word::Pointer => PeerKind::Pointer(silence, pointer),
     })
 }
 
@@ -43,6 +46,17 @@ fn read_silence(node: &Node, context: Context<'_>) -> Option<Silence> {
     let fade = table.optional("fade", usual.fade, values::positive_duration);
     table.finish();
     Some(Silence { after: after?, fade: fade? })
+}
+
+fn read_pointer(node: &Node, context: Context<'_>) -> Option<PointerSpec> {
+    let mut table = TableReader::new(node, context, "a table such as { stiffness = 400.0, damping = 20.0 }")?;
+    let usual = PointerSpec::default();
+    let stiffness = table.optional("stiffness", usual.stiffness, |node, context| STIFFNESS.read(node, context));
+    let damping = table.optional("damping", usual.damping, |node, context| DAMPING.read(node, context));
+    let force_limit = table.optional("force-limit", usual.force_limit, |node, context| POSITIVE_FORCE.read(node, context));
+    let held = table.optional("held", usual.held, values::boolean);
+    table.finish();
+    Some(PointerSpec { stiffness: stiffness?, damping: damping?, force_limit: force_limit?, held: held? })
 }
 
 fn read_falcon(node: &Node, context: Context<'_>) -> Option<FalconSpec> {

@@ -22,7 +22,7 @@ use crate::model::{PeerKind, Scaling};
 use crate::quantities::{DAMPING, MASS, STIFFNESS};
 
 /// The keys whose tables are laid over each other key by key; every other key replaces the one below.
-pub(crate) const NESTED: [&str; 7] = ["silence", "falcon", "device", "coupling", "clock", "uplink", "downlink"];
+pub(crate) const NESTED: [&str; 8] = ["silence", "falcon", "pointer", "device", "coupling", "clock", "uplink", "downlink"];
 
 const COUPLING: &str = "a table such as { stiffness = 3500.0, damping = 5.0 }";
 
@@ -39,6 +39,8 @@ pub(crate) struct PeerKeys {
     pub(crate) hand: Option<Hand>,
     pub(crate) position: Option<[f64; 3]>,
     pub(crate) velocity: Option<[f64; 3]>,
+    pub(crate) device_position: Option<[f64; 3]>,
+    pub(crate) device_velocity: Option<[f64; 3]>,
     pub(crate) rotation: PeerRotationKeys,
     pub(crate) uplink: Option<Arc<LinkModel>>,
     pub(crate) downlink: Option<Arc<LinkModel>>,
@@ -74,7 +76,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
             }
             Some(STILL_DEVICE)
         }
-        Some(PeerKind::Falcon(..)) => Some(FALCON_DEVICE),
+        Some(PeerKind::Falcon(..) | PeerKind::Pointer(..)) => Some(FALCON_DEVICE),
     };
     // What lives elsewhere and has no device here touches nothing here.
     let contact = if elsewhere && table.get("device").is_none() { Some(Contact::None) } else { contact };
@@ -88,6 +90,8 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
     let clock = table.optional("clock", (Duration::ZERO, Drift::default()), read_clock);
     let position = table.maybe("position", |node, _| read_position(node, context));
     let velocity = table.maybe("velocity", |node, _| read_velocity(node, context));
+    let device_position = table.maybe("device-position", |node, _| read_position(node, context));
+    let device_velocity = table.maybe("device-velocity", |node, _| read_velocity(node, context));
     let turned = read_peer_rotation(&mut table);
     let uplink = table.maybe("uplink", |node, context| read_link(node, context, &[]).map(Arc::new));
     let downlink = table.maybe("downlink", |node, context| read_link(node, context, &[]).map(Arc::new));
@@ -125,6 +129,8 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
         hand: hand?,
         position: position?,
         velocity: velocity?,
+        device_position: device_position?,
+        device_velocity: device_velocity?,
         rotation,
         uplink: uplink?,
         downlink: downlink?,

@@ -149,6 +149,8 @@ fn spec(name: &str, keys: PeerKeys, object: &ObjectSpec) -> PeerSpec {
         hand: keys.hand,
         position: keys.position.unwrap_or(object.position),
         velocity: keys.velocity.unwrap_or(object.velocity),
+        device_position: keys.device_position,
+        device_velocity: keys.device_velocity,
         uplink: keys.uplink,
         downlink: keys.downlink,
     }

@@ -199,8 +199,9 @@ fn peer_rotation(read: &PeerRead, attitude: Attitude, context: Context<'_>) -> O
         None
     };
     let device = match device {
-        Some(_) if matches!(read.spec.kind, crate::PeerKind::Falcon(..)) => {
-            return refuse(format!("peer \"{name}\": a Falcon turns nothing: expected a device without an inertia"));
+        Some(_) if read.spec.kind.is_in_hand() => {
+            let device = if matches!(read.spec.kind, crate::PeerKind::Falcon(..)) { "Falcon" } else { "pointer" };
+            return refuse(format!("peer \"{name}\": a {device} turns nothing: expected a device without an inertia"));
         }
         Some(handle) => {
             let touches = read.spec.contact == cohaptic_peer::Contact::Grasp;

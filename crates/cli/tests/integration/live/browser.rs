@@ -2,7 +2,7 @@
 
 #[path = "../../../../control/tests/integration/browser/chromium.rs"]
 #[allow(dead_code, reason = "the tests of the page alone do more with it")]
-mod chromium;
+pub(super) mod chromium;
 
 use chromium::Browser;
 use serde_json::json;

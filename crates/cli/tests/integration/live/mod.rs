@@ -11,6 +11,8 @@ mod http;
 mod jump;
 mod peer;
 mod peer_elsewhere;
+mod play;
+mod play_page;
 mod records;
 mod session;
 mod strangers;

@@ -23,7 +23,16 @@ pub(super) struct Session {
 impl Session {
     /// Begins one: `words` are what follows `live` on the command line.
     pub(super) fn begin(desk: &Desk, words: &str) -> Self {
-        let mut child = desk.command(&format!("live {words} --no-priority")).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        Self::of(desk, &format!("live {words}"))
+    }
+
+    /// One with a page to take part: `words` are what follows `play`.
+    pub(super) fn play(desk: &Desk, words: &str) -> Self {
+        Self::of(desk, &format!("play {words}"))
+    }
+
+    fn of(desk: &Desk, line: &str) -> Self {
+        let mut child = desk.command(&format!("{line} --no-priority")).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let (mut out, err) = (child.stdout.take().unwrap(), BufReader::new(child.stderr.take().unwrap()));
         let (say, said) = channel();
         // Both are read to their ends: a program that cannot print stops.
@@ -46,7 +55,7 @@ impl Session {
     }
 
     /// What follows these words in a line of standard error.
-    fn told(&mut self, words: &str) -> String {
+    pub(super) fn told(&mut self, words: &str) -> String {
         loop {
             if let Some(line) = self.heard.iter().find_map(|line| line.strip_prefix(words)) {
                 return line.to_owned();

@@ -181,6 +181,19 @@ impl Browser {
         }
     }
 
+    /// Presses the mouse at a point, moves it by that much in small steps of 16 ms each, and leaves it pressed.
+    #[allow(dead_code, reason = "some tests drag nothing")]
+    pub(crate) fn drag(&mut self, from: [f64; 2], by: [f64; 2], steps: u32) {
+        let [x, y] = from;
+        self.call("Input.dispatchMouseEvent", json!({ "type": "mousePressed", "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1 }));
+        for step in 1..=steps {
+            let share = f64::from(step) / f64::from(steps);
+            let (x, y) = (x + by[0] * share, y + by[1] * share);
+            self.call("Input.dispatchMouseEvent", json!({ "type": "mouseMoved", "x": x, "y": y, "button": "left", "buttons": 1 }));
+            std::thread::sleep(Duration::from_millis(16));
+        }
+    }
+
     /// Types a text into a field in place of what is there.
     pub(crate) fn type_into(&mut self, selector: &str, text: &str) {
         self.click(selector);

@@ -1,0 +1,135 @@
+//! The same hand again, in virtual time: as it was, under the other strategy, and without a network.
+
+use std::convert::Infallible;
+use std::thread;
+use std::time::{Duration, Instant as Clock};
+
+use cohaptic_harness::live::{Inputs, replay};
+use cohaptic_harness::{Ending, Observer, TickRow};
+use cohaptic_scene::{PeerKind, link_keys_of_text};
+use cohaptic_units::Instant;
+use serde_json::{Value, json};
+
+use super::scene::PlayedScene;
+use super::stage::Finished;
+
+/// As many values of each curve are drawn.
+const VALUES: u64 = 600;
+
+const AP: &str = "average-position";
+const PD: &str = "proportional-derivative";
+
+/// A way to run it again.
+struct Variant {
+    name: &'static str,
+    scene: PlayedScene,
+    has_network: bool,
+}
+
+/// Runs the part again in three ways, and gives the curves of each.
+pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
+    let began = Clock::now();
+    let text = std::fs::read_to_string(&finished.inputs).map_err(|error| format!("{}: {error}", finished.inputs.display()))?;
+    let scene = finished.scene.scene().map_err(|error| error.to_string())?;
+    let strategy = scene.coordination.strategy.name();
+    let (other, other_name) = if strategy == AP { (PD, "PD") } else { (AP, "AP") };
+    let own_name = match strategy {
+        AP => "AP",
+        PD => "PD",
+        other => other,
+    };
+    let variants = [
+        Variant { name: own_name, scene: finished.scene.clone(), has_network: true },
+        Variant { name: other_name, scene: finished.scene.clone().with_strategy(other), has_network: true },
+        Variant { name: "without network", scene: finished.scene.clone().without_network(), has_network: false },
+    ];
+    let keys = link_keys_of_text(&finished.scene.text(), finished.scene.file(), &[]).map_err(|error| error.to_string())?;
+    let inputs = Inputs::read(&text, &scene, &keys.into_values().next().unwrap_or_default()).map_err(|error| error.to_string())?;
+    let lasted = inputs.last_instant().unwrap_or(Instant::ZERO);
+    if inputs.is_empty() || lasted == Instant::ZERO {
+        return Err("nothing was recorded: move the cube, then compare".to_owned());
+    }
+    let hand = scene.peers.iter().position(|peer| matches!(peer.kind, PeerKind::Pointer(..))).unwrap_or(0);
+    let hand = inputs.busiest_device().unwrap_or(hand);
+    let step = Duration::from_nanos((lasted.as_nanos() / VALUES).max(1_000_000));
+    let run = |variant: &Variant| curve(variant, &inputs, hand, step, lasted);
+    let runs: Vec<Result<Value, String>> = thread::scope(|scope| {
+        let threads: Vec<_> = variants.iter().map(|variant| scope.spawn(move || run(variant))).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    });
+    Ok(json!({
+        "part": finished.number,
+        "lasted_s": lasted.as_secs_f64(),
+        "step_s": step.as_secs_f64(),
+        "hand": scene.peers[hand].name,
+        "runs": runs.into_iter().collect::<Result<Vec<_>, _>>()?,
+        "took_s": began.elapsed().as_secs_f64(),
+        "command": "cohaptic run scene.toml --inputs inputs.csv",
+    }))
+}
+
+fn curve(variant: &Variant, inputs: &Inputs, hand: usize, step: Duration, lasted: Instant) -> Result<Value, String> {
+    let scene = variant.scene.scene().map_err(|error| error.to_string())?;
+    let mut curves = Curves { hand, step, at: vec![[f64::NAN; 3]; scene.peers.len()], discrepancy: Vec::new(), force: Vec::new() };
+    let without_links;
+    let inputs = if variant.has_network {
+        inputs
+    } else {
+        without_links = inputs.without_links();
+        &without_links
+    };
+    let Ok(summary) = replay(&scene, inputs, &mut curves);
+    let diverged = match summary.ending {
+        Ending::Diverged(at) => Some(at.as_secs_f64()),
+        Ending::Complete | Ending::Interrupted(_) => None,
+    };
+    let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+    Ok(json!({
+        "name": variant.name,
+        "discrepancy_m": curves.discrepancy,
+        "force_n": curves.force,
+        "largest_discrepancy_m": largest(&curves.discrepancy),
+        "largest_force_n": largest(&curves.force),
+        "diverged_s": diverged.filter(|at| *at < lasted.as_secs_f64()),
+    }))
+}
+
+/// The largest distance between two copies, and the force that the hand feels: the largest of each step.
+struct Curves {
+    hand: usize,
+    step: Duration,
+    at: Vec<[f64; 3]>,
+    discrepancy: Vec<f64>,
+    force: Vec<f64>,
+}
+
+impl Curves {
+    fn raise(values: &mut Vec<f64>, place: usize, value: f64) {
+        if values.len() <= place {
+            values.resize(place + 1, 0.0);
+        }
+        values[place] = values[place].max(value);
+    }
+}
+
+impl Observer for Curves {
+    type Error = Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        let place = usize::try_from(row.at.as_nanos() / u64::try_from(self.step.as_nanos()).unwrap_or(u64::MAX)).unwrap_or(usize::MAX);
+        let length = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+        self.at[row.peer] = core::array::from_fn(|axis| row.object.position.get(axis).copied().unwrap_or(0.0));
+        if row.peer == self.hand {
+            Self::raise(&mut self.force, place, length(row.coupling_force));
+        }
+        let here = self.at[row.peer];
+        let apart = |there: &[f64; 3]| length(&[here[0] - there[0], here[1] - there[1], here[2] - there[2]]);
+        let most = self.at.iter().map(apart).filter(|apart| apart.is_finite()).fold(0.0, f64::max);
+        Self::raise(&mut self.discrepancy, place, most);
+        Ok(())
+    }
+}

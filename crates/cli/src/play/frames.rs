@@ -1,0 +1,135 @@
+//! The picture of everything that moves, from the thread that has to be on time to the pages.
+
+use std::fmt::Write as _;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use cohaptic_harness::live::Presence;
+use cohaptic_live::session::{EndedPacket, Motion, PeerStatus};
+
+/// The newest motion. It is written as text when somebody looks, not on the thread that has to be on time.
+#[derive(Default)]
+pub(super) struct Frames(Mutex<Newest>);
+
+#[derive(Default)]
+struct Newest {
+    number: u64,
+    part: usize,
+    axes: usize,
+    motion: Option<Motion>,
+    /// The text of that number.
+    text: Option<(u64, Arc<str>)>,
+}
+
+impl Frames {
+    /// Another part begins, of a scene with that number of axes.
+    pub(super) fn begin(&self, part: usize, axes: usize) {
+        let mut newest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        (newest.part, newest.axes) = (part, axes);
+    }
+
+    /// Takes a motion unless somebody is reading at this very moment; the next one comes soon.
+    pub(super) fn publish(&self, motion: Motion) {
+        let Ok(mut newest) = self.0.try_lock() else { return };
+        newest.number += 1;
+        newest.motion = Some(motion);
+    }
+
+    /// The last motion of the part that has ended.
+    pub(super) fn last(&self) -> Option<Motion> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).motion.clone()
+    }
+
+    pub(super) fn text(&self) -> (u64, Arc<str>) {
+        let mut newest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((number, text)) = &newest.text
+            && *number == newest.number
+        {
+            return (*number, Arc::clone(text));
+        }
+        let text: Arc<str> = newest.motion.as_ref().map_or_else(|| "{}".to_owned(), |motion| written(newest.part, newest.axes, motion)).into();
+        newest.text = Some((newest.number, Arc::clone(&text)));
+        (newest.number, text)
+    }
+}
+
+/// `{"part":1,"t":0.5,"peers":[…],"packets":[[from,to,ms,lost],…]}`: metres with micrometres, newtons with millinewtons.
+fn written(part: usize, axes: usize, motion: &Motion) -> String {
+    let mut text = format!("{{\"part\":{part},\"t\":{:.4},\"peers\":[", motion.elapsed.as_secs_f64());
+    for (place, peer) in motion.peers.iter().enumerate() {
+        text.push_str(if place == 0 { "" } else { "," });
+        write_peer(&mut text, axes, peer);
+    }
+    text.push_str("],\"packets\":[");
+    for (place, EndedPacket { from, to, after, is_lost }) in motion.packets.iter().enumerate() {
+        let comma = if place == 0 { "" } else { "," };
+        let _ = write!(text, "{comma}[{from},{to},{:.1},{}]", after.as_secs_f64() * 1e3, u8::from(*is_lost));
+    }
+    text.push_str("]}");
+    text
+}
+
+fn write_peer(text: &mut String, axes: usize, peer: &PeerStatus) {
+    let state = &peer.state;
+    let hand = match state.presence {
+        Presence::Here => "here",
+        Presence::Absent => "absent",
+        Presence::Present => "present",
+        Presence::Stale(_) => "stale",
+    };
+    let _ = write!(text, "{{\"hand\":\"{hand}\",\"at\":");
+    write_numbers(text, &state.object.position[..axes], 6);
+    text.push_str(",\"force\":");
+    write_numbers(text, &peer.force[..axes], 3);
+    if let Some(device) = state.device {
+        text.push_str(",\"device\":");
+        write_numbers(text, &device.position[..axes], 6);
+    }
+    if let Some(turn) = state.turn {
+        text.push_str(",\"turned\":");
+        write_numbers(text, &turn.object.orientation, 4);
+    }
+    text.push('}');
+}
+
+/// What is no number is `null`: a scene may diverge.
+fn write_numbers(text: &mut String, numbers: &[f64], digits: usize) {
+    for (place, number) in numbers.iter().enumerate() {
+        text.push(if place == 0 { '[' } else { ',' });
+        let _ = if number.is_finite() { write!(text, "{number:.digits$}") } else { write!(text, "null") };
+    }
+    text.push(']');
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use cohaptic_harness::live::PeerState;
+    use cohaptic_peer::State;
+
+    use super::*;
+
+    #[test]
+    fn a_frame_is_json_with_what_moves() {
+        let state = |x: f64| State { position: [x, f64::NAN, 9.0], velocity: [0.0; 3] };
+        let seen = PeerState { presence: Presence::Present, heard: None, device: Some(state(0.02)), object: state(0.0123456789), turn: None };
+        let packet = EndedPacket { from: 0, to: 2, after: Duration::from_micros(24_040), is_lost: true };
+        let motion = Motion {
+            elapsed: Duration::from_millis(1500),
+            peers: vec![PeerStatus { state: seen, force: [1.0, -0.5, 7.0], seat: None }],
+            packets: vec![packet],
+        };
+        let frames = Frames::default();
+        assert_eq!(&*frames.text().1, "{}");
+        frames.begin(3, 2);
+        frames.publish(motion);
+        let (number, text) = frames.text();
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let expected = serde_json::json!({
+            "part": 3, "t": 1.5,
+            "peers": [{ "hand": "present", "at": [0.012346, null], "force": [1.0, -0.5], "device": [0.02, null] }],
+            "packets": [[0, 2, 24.0, 1]],
+        });
+        assert_eq!((number, value), (1, expected));
+    }
+}

@@ -1,0 +1,241 @@
+//! `cohaptic play`: a session in which people take part from a page.
+
+mod compare;
+mod frames;
+mod scene;
+mod stage;
+
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::Instant as Clock;
+
+use cohaptic_control::{Board, ServerConfig, serve_stage};
+use cohaptic_harness::Ending;
+use cohaptic_live::session::{Motion, Recorded, SessionConfig};
+use cohaptic_live::{Conductor, LinkChange, Report, Session, Status};
+use cohaptic_scene::{PeerKind, link_keys_of_text, scene_content_of_text};
+
+use self::scene::{PEERS, PlayedScene};
+use self::stage::{Part, PartLinks, PlayStage};
+use crate::arguments::PlayArguments;
+use crate::failure::Failure;
+use crate::live::onlookers;
+use crate::realtime::{Edit, KeyedLinks, Look, refused_server, say, token_of};
+use crate::{input, interrupt};
+
+/// What is played without a scene: three users, average-position, 24 ms.
+const USUAL: &str = include_str!("../../scenarios/live/play.toml");
+const USUAL_NAME: &str = "play.toml";
+
+/// Runs the session until Ctrl-C, and says where its page is.
+pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
+    let overrides = &arguments.overrides.set;
+    let beginning = match &arguments.scene {
+        Some(path) => input::with(path, |text, file| PlayedScene::read(text, file, overrides))?,
+        None => PlayedScene::read(USUAL, Path::new(USUAL_NAME), overrides)?,
+    };
+    check(&beginning)?;
+    let records = Records::create(arguments.out.as_deref())?;
+    let stage = Arc::new(PlayStage::new(beginning.clone()));
+    let scene = beginning.scene()?;
+    let board = Arc::new(Board::new(onlookers::description(&scene, &onlookers::pairs(&scene))));
+    let address = arguments.real_time.control.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], 0)));
+    let config =
+        ServerConfig { token: token_of(&arguments.real_time)?, allow_remote: arguments.real_time.allow_remote, ..ServerConfig::new(address) };
+    let server = serve_stage(config, Arc::clone(&board), Box::new(PartLinks(Arc::clone(&stage))), Arc::clone(&stage) as _);
+    let server = server.map_err(|error| refused_server(&error))?;
+    let join = reached_from_elsewhere(server.address(), server.join_url().unwrap_or_default());
+    let _first = stage.join.set(join.clone());
+    let announce = || {
+        say(&format!("open {}", server.url()));
+        say(&format!("for others: {join}"));
+    };
+    let begun = Clock::now();
+    let mut next = beginning;
+    for number in 1.. {
+        let (part, session, conductor) = prepare(arguments, &stage, &board, number, next, &records, begun)?;
+        if number == 1 {
+            announce();
+        }
+        let report = run_part(session, conductor)?;
+        let is_over = interrupt::requested() || arguments.length.is_some_and(|length| begun.elapsed() >= length);
+        let fell_apart = matches!(report.summary.ending, Ending::Diverged(_));
+        next = stage.finish(&part, records.inputs(number), fell_apart);
+        say(&format!("part {number}: {}, the run is {}", part.scene.coordination.strategy.name(), report.validity));
+        if is_over {
+            break;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What cannot be played.
+fn check(played: &PlayedScene) -> Result<(), Failure> {
+    let scene = played.scene()?;
+    let refuse = |message: String| Err(Failure::Input(format!("{}: {message}", played.file().display())));
+    if scene.topology.is_some() {
+        return refuse("topology: in a session every peer sends to every other: expected a scene without [topology], or kind = \"full\"".to_owned());
+    }
+    if played.has_timeline() {
+        return refuse("timeline: a session that begins anew has no timeline: expected a scene without one".to_owned());
+    }
+    if !PEERS.contains(&scene.peers.len()) {
+        return refuse(format!("peers: {} of them: expected {} to {}", scene.peers.len(), PEERS.start(), PEERS.end()));
+    }
+    if let Some(peer) = scene.peers.iter().find(|peer| matches!(peer.kind, PeerKind::Udp(_) | PeerKind::Falcon(..))) {
+        let kind = peer.kind.name();
+        return refuse(format!("peers.{}.kind: {kind}: expected simulated or pointer; `cohaptic live` takes the others", peer.name));
+    }
+    Ok(())
+}
+
+/// Makes a part ready, and shows it to the pages.
+fn prepare(
+    arguments: &PlayArguments,
+    stage: &Arc<PlayStage>,
+    board: &Arc<Board>,
+    number: usize,
+    played: PlayedScene,
+    records: &Records,
+    begun: Clock,
+) -> Result<(Arc<Part>, Session, PartConductor), Failure> {
+    let real_time = &arguments.real_time;
+    let (text, scene) = (played.text(), played.scene()?);
+    let pairs = onlookers::pairs(&scene);
+    let keys = link_keys_of_text(&text, played.file(), &[])?.into_values().collect();
+    let content = scene_content_of_text(&text, played.file(), &[])?;
+    let folder = played.file().parent().map(Path::to_path_buf).unwrap_or_default();
+    let (changes, wanted) = channel();
+    let config = SessionConfig {
+        pacing: real_time.pacing(),
+        wishes: real_time.wishes(),
+        tolerance: real_time.tolerance(),
+        out: Some(records.begin(number, &text)?),
+        recorded: Recorded::Inputs,
+        content,
+        ..SessionConfig::new(SocketAddr::from(([127, 0, 0, 1], 0)))
+    };
+    let session = Session::open(&scene, config, |place| stage.device(place)).map_err(crate::live::refused)?;
+    board.begin(onlookers::description(&scene, &pairs));
+    let axes = scene.axes.count();
+    let part = stage.begin(Part { number, played, scene }, KeyedLinks { keys, folder, changes });
+    let end = arguments.length.map(|length| begun + length);
+    Ok((part, session, PartConductor { stage: Arc::clone(stage), look: Look::on(board), wanted, pairs, axes, end }))
+}
+
+/// Runs a part until somebody wants another one.
+fn run_part(session: Session, mut conductor: PartConductor) -> Result<Report, Failure> {
+    let running = thread::Builder::new().name("play".to_owned()).spawn(move || session.run(&mut conductor));
+    let running = running.map_err(|error| Failure::System(format!("the session gets no thread: {error}")))?;
+    running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(crate::live::refused)
+}
+
+/// Publishes a part and hands in what the pages change.
+struct PartConductor {
+    stage: Arc<PlayStage>,
+    look: Look,
+    wanted: Receiver<Edit>,
+    pairs: Vec<(usize, usize)>,
+    axes: usize,
+    end: Option<Clock>,
+}
+
+impl Conductor for PartConductor {
+    fn keep_going(&mut self) -> bool {
+        !interrupt::requested() && !self.stage.is_wished() && self.end.is_none_or(|end| Clock::now() < end)
+    }
+
+    fn next_change(&mut self) -> Option<LinkChange> {
+        onlookers::change(&self.wanted, &self.pairs)
+    }
+
+    fn show(&mut self, status: Status) {
+        self.look.publish(onlookers::snapshot(&status, self.axes));
+    }
+
+    fn show_motion(&mut self, motion: Motion) {
+        self.stage.frames.publish(motion);
+    }
+
+    fn wants_motion(&self) -> bool {
+        true
+    }
+}
+
+/// The folders of the parts: those that were asked for, or some that go with the program.
+struct Records {
+    folder: PathBuf,
+    is_kept: bool,
+}
+
+impl Records {
+    fn create(out: Option<&Path>) -> Result<Self, Failure> {
+        let refused = |folder: &Path, error: &std::io::Error| Failure::System(format!("{}: {error}", folder.display()));
+        if let Some(folder) = out {
+            std::fs::create_dir_all(folder).map_err(|error| refused(folder, &error))?;
+            return Ok(Self { folder: folder.to_path_buf(), is_kept: true });
+        }
+        let folder = std::env::temp_dir().join(format!("cohaptic-play-{}", std::process::id()));
+        // Its own, not one that somebody else has laid there.
+        std::fs::create_dir(&folder).map_err(|error| refused(&folder, &error))?;
+        Ok(Self { folder, is_kept: false })
+    }
+
+    /// The folder of a part, with its scene.
+    fn begin(&self, number: usize, scene: &str) -> Result<PathBuf, Failure> {
+        let folder = self.part(number);
+        let file = folder.join("scene.toml");
+        let written = std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&file, scene));
+        written.map_err(|error| Failure::System(format!("{}: {error}", file.display())))?;
+        Ok(folder)
+    }
+
+    fn part(&self, number: usize) -> PathBuf {
+        self.folder.join(format!("part-{number}"))
+    }
+
+    fn inputs(&self, number: usize) -> PathBuf {
+        self.part(number).join("inputs.csv")
+    }
+}
+
+impl Drop for Records {
+    fn drop(&mut self) {
+        if !self.is_kept {
+            // What cannot be removed now, the system removes with its temporary files.
+            let _ = std::fs::remove_dir_all(&self.folder);
+        }
+    }
+}
+
+/// A link with an address that other machines can ask for, where the server listens on all of them.
+fn reached_from_elsewhere(listening: SocketAddr, url: String) -> String {
+    let loopback = match listening.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => "127.0.0.1",
+        IpAddr::V6(ip) if ip.is_unspecified() => "[::1]",
+        IpAddr::V4(_) | IpAddr::V6(_) => return url,
+    };
+    // The address of the network card through which others would be answered. Nothing is sent.
+    let own = UdpSocket::bind(("0.0.0.0", 0)).and_then(|socket| {
+        socket.connect(("192.0.2.1", 9))?;
+        socket.local_addr()
+    });
+    own.map_or_else(|_| url.clone(), |own| url.replacen(loopback, &own.ip().to_string(), 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_for_others_has_an_address_that_they_can_ask_for() {
+        let url = "http://127.0.0.1:80/join?token=x".to_owned();
+        assert_eq!(reached_from_elsewhere("127.0.0.1:80".parse().unwrap(), url.clone()), url);
+        let elsewhere = reached_from_elsewhere("0.0.0.0:80".parse().unwrap(), url);
+        assert!(elsewhere.starts_with("http://") && elsewhere.ends_with(":80/join?token=x"), "{elsewhere}");
+    }
+}

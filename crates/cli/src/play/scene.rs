@@ -1,0 +1,261 @@
+//! The scene of `cohaptic play`, part by part: the same text with another strategy, another number of peers, the links as they were changed, and everything
+//! where it stands.
+
+use std::path::{Path, PathBuf};
+
+use cohaptic_live::session::PeerStatus;
+use cohaptic_scene::{LinkKeys, PeerKind, Scene, SceneError, scene_text};
+use toml::{Table, Value};
+
+/// As many peers can be played with.
+pub(super) const PEERS: std::ops::RangeInclusive<usize> = 2..=10;
+
+/// A part lasts no longer than this; recordings of longer ones would not be compared in a moment.
+const DURATION: &str = "1h";
+
+/// A scene as a document that can be changed.
+#[derive(Clone, Debug)]
+pub(super) struct PlayedScene {
+    /// All but the peers.
+    table: Table,
+    peers: Vec<Table>,
+    /// Beside which files are looked for that it names.
+    file: PathBuf,
+}
+
+/// Keys of the links, by sender and receiver.
+pub(super) type Links = Vec<((usize, usize), LinkKeys)>;
+
+impl PlayedScene {
+    /// Takes the scene for play: it lasts long and expects nothing.
+    pub(super) fn read(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let scene = Scene::parse_live(text, file, overrides)?;
+        let text = scene_text(text, file, overrides)?;
+        let mut table: Table = toml::from_str(&text).expect("what was read as TOML is TOML");
+        table.remove("expect");
+        section(&mut table, "scene").insert("duration".to_owned(), DURATION.into());
+        section(&mut table, "scene").insert("title".to_owned(), scene.title.into());
+        let peers = table.remove("peers").and_then(|peers| peers.try_into().ok()).unwrap_or_default();
+        Ok(Self { table, peers, file: file.to_path_buf() })
+    }
+
+    /// Its text, which is a scene file.
+    pub(super) fn text(&self) -> String {
+        let mut table = self.table.clone();
+        table.insert("peers".to_owned(), Value::Array(self.peers.iter().cloned().map(Value::Table).collect()));
+        toml::to_string(&table).expect("a table of TOML can be written")
+    }
+
+    pub(super) fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// The scene itself.
+    pub(super) fn scene(&self) -> Result<Scene, SceneError> {
+        Scene::parse_live(&self.text(), &self.file, &[])
+    }
+
+    pub(super) fn has_timeline(&self) -> bool {
+        self.table.get("timeline").and_then(Value::as_array).is_some_and(|changes| !changes.is_empty())
+    }
+
+    pub(super) fn with_strategy(mut self, name: &str) -> Self {
+        section(&mut self.table, "coordination").insert("strategy".to_owned(), name.into());
+        self
+    }
+
+    /// With links that do nothing to a packet.
+    pub(super) fn without_network(mut self) -> Self {
+        self.table.remove("links");
+        self.table.insert("link".to_owned(), Value::Table(Table::new()));
+        for peer in self.peers.iter_mut().chain([section(&mut self.table, "peer")]) {
+            peer.remove("uplink");
+            peer.remove("downlink");
+        }
+        self
+    }
+
+    /// With the links as they are now. All that is written anew is complete: pairs that are new have the keys of the first.
+    pub(super) fn with_links(mut self, links: &Links) -> Self {
+        let Some((_, first)) = links.first() else { return self };
+        let names = self.names();
+        let keys = |keys: &LinkKeys| -> Table {
+            let value = |text: &str| toml::from_str::<Table>(&format!("value = {text}")).ok().and_then(|mut table| table.remove("value"));
+            keys.iter().filter_map(|(key, text)| Some((key.to_owned(), value(text)?))).collect()
+        };
+        if links.iter().all(|(_, other)| other == first) {
+            self.table.remove("links");
+            self.table.insert("link".to_owned(), Value::Table(keys(first)));
+            return self;
+        }
+        let places = 0..names.len();
+        let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
+        let entry = |pair: (usize, usize)| {
+            let known = links.iter().find(|(known, _)| *known == pair).map_or(first, |(_, keys)| keys);
+            let ends = [("from", pair.0), ("to", pair.1)].map(|(end, place)| (end.to_owned(), Value::from(names[place].as_str())));
+            Value::Table(ends.into_iter().chain(keys(known)).collect())
+        };
+        let entries: Vec<Value> = pairs.map(entry).collect();
+        self.table.insert("link".to_owned(), Value::Table(Table::new()));
+        self.table.insert("links".to_owned(), Value::Array(entries));
+        self
+    }
+
+    /// With everything where it stands, and hands on the devices that they hold.
+    pub(super) fn standing(mut self, peers: &[PeerStatus], scene: &Scene) -> Self {
+        let axes = scene.axes.count();
+        let numbers = |values: &[f64]| Value::Array(values.iter().copied().map(Value::Float).collect());
+        for ((table, status), spec) in self.peers.iter_mut().zip(peers).zip(&scene.peers) {
+            let state = &status.state;
+            let mut set = |key: &str, value: Value| table.insert(key.to_owned(), value);
+            set("position", numbers(&state.object.position[..axes]));
+            set("velocity", numbers(&state.object.velocity[..axes]));
+            if let Some(device) = state.device {
+                set("device-position", numbers(&device.position[..axes]));
+                set("device-velocity", numbers(&device.velocity[..axes]));
+            }
+            if let Some(turn) = state.turn {
+                set("orientation", numbers(&turn.object.orientation));
+                set("angular-velocity", numbers(&turn.object.rate));
+            }
+            if matches!(spec.kind, PeerKind::Pointer(..)) {
+                let held = matches!(state.presence, cohaptic_harness::live::Presence::Present);
+                section(table, "pointer").insert("held".to_owned(), held.into());
+            }
+        }
+        self
+    }
+
+    /// With that number of peers: the last ones go, or others like the last one come, in the middle of the copies and at rest.
+    pub(super) fn with_peers(mut self, number: usize) -> Self {
+        let names = self.names();
+        let places: Vec<Vec<f64>> = self.peers.iter().map(|peer| floats(peer.get("position"))).collect();
+        let axes = places.iter().map(Vec::len).min().unwrap_or(0);
+        #[expect(clippy::cast_precision_loss, reason = "a handful of peers")]
+        let mean = (0..axes).map(|axis| places.iter().map(|place| place[axis]).sum::<f64>() / places.len() as f64);
+        let mean = Value::Array(mean.map(Value::Float).collect());
+        self.peers.truncate(number);
+        while self.peers.len() < number {
+            let mut other = self.peers.last().cloned().unwrap_or_default();
+            let free = (self.peers.len() + 1..).map(|place| format!("peer-{place}")).find(|name| !names.contains(name));
+            for key in ["hand", "velocity", "device-position", "device-velocity", "angular-velocity"] {
+                other.remove(key);
+            }
+            other.insert("name".to_owned(), free.unwrap_or_default().into());
+            if axes > 0 {
+                other.insert("position".to_owned(), mean.clone());
+            }
+            if let Some(Value::Table(pointer)) = other.get_mut("pointer") {
+                pointer.remove("held");
+            }
+            self.peers.push(other);
+        }
+        let names = self.names();
+        if let Some(Value::Array(links)) = self.table.get_mut("links") {
+            let is_there = |end: Option<&Value>| end.and_then(Value::as_str).is_some_and(|end| names.iter().any(|name| name == end));
+            links.retain(|link| is_there(link.get("from")) && is_there(link.get("to")));
+        }
+        self
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.peers.iter().filter_map(|peer| peer.get("name").and_then(Value::as_str)).map(str::to_owned).collect()
+    }
+}
+
+/// The table below a key, which is made if it is not there.
+fn section<'a>(table: &'a mut Table, key: &str) -> &'a mut Table {
+    let entry = table.entry(key.to_owned()).or_insert_with(|| Value::Table(Table::new()));
+    if !entry.is_table() {
+        *entry = Value::Table(Table::new());
+    }
+    entry.as_table_mut().expect("it is a table")
+}
+
+fn floats(value: Option<&Value>) -> Vec<f64> {
+    value.and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_float).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use cohaptic_harness::live::{PeerState, Presence};
+    use cohaptic_peer::State;
+    use cohaptic_scene::link_keys_of_text;
+
+    use super::*;
+
+    const TEXT: &str = include_str!("../../scenarios/live/play.toml");
+
+    fn played(overrides: &[&str]) -> PlayedScene {
+        let overrides: Vec<String> = overrides.iter().map(|key| (*key).to_owned()).collect();
+        PlayedScene::read(TEXT, Path::new("play.toml"), &overrides).unwrap()
+    }
+
+    #[test]
+    fn a_part_is_the_scene_with_its_overrides_without_expectations() {
+        let scene = played(&["link.delay=8ms", "peers.third.device.mass=0.2"]).scene().unwrap();
+        let expected = ["link.delay=8ms", "peers.third.device.mass=0.2", "scene.duration=1h", "expect={}"].map(str::to_owned);
+        let expected = Scene::parse_live(TEXT, Path::new("play.toml"), &expected).unwrap();
+        assert_eq!(Scene { expect: None, ..scene }, Scene { expect: None, ..expected });
+    }
+
+    fn standing(place: usize) -> PeerStatus {
+        #[expect(clippy::cast_precision_loss, reason = "a handful of peers")]
+        let x = 0.01 * (place + 1) as f64 + 1e-17;
+        let object = State { position: [x, -x, 0.0], velocity: [0.1, x / 3.0, 0.0] };
+        let device = State { position: [x + 0.001, 0.0, 0.0], velocity: [0.0, 0.2, 0.0] };
+        let presence = if place == 0 { Presence::Present } else { Presence::Absent };
+        PeerStatus { state: PeerState { presence, heard: None, device: Some(device), object, turn: None }, force: [0.0; 3], seat: None }
+    }
+
+    #[test]
+    fn a_part_begins_to_the_bit_where_the_last_one_stood() {
+        let before = played(&[]);
+        let peers: Vec<PeerStatus> = (0..3).map(standing).collect();
+        let scene = before.clone().standing(&peers, &before.scene().unwrap()).with_strategy("proportional-derivative").scene().unwrap();
+        for (place, status) in peers.iter().enumerate() {
+            let (copy, device): (State<3>, State<3>) = (scene.initial_state(place), scene.initial_device(place));
+            assert_eq!((copy, Some(device)), (status.state.object, status.state.device));
+            let PeerKind::Pointer(_, pointer) = scene.peers[place].kind else { panic!("{scene:?}") };
+            assert_eq!(pointer.held, place == 0);
+        }
+        assert_eq!(scene.coordination.strategy.name(), "proportional-derivative");
+    }
+
+    #[test]
+    fn peers_come_in_the_middle_and_the_last_ones_go() {
+        let before = played(&["links.you.third.delay=9ms"]);
+        let peers: Vec<PeerStatus> = (0..3).map(standing).collect();
+        let stood = before.clone().standing(&peers, &before.scene().unwrap());
+        let more = stood.clone().with_peers(5).scene().unwrap();
+        let names: Vec<&str> = more.peers.iter().map(|peer| peer.name.as_str()).collect();
+        assert_eq!(names, ["you", "second", "third", "peer-4", "peer-5"]);
+        let last = &more.peers[4];
+        assert!((last.position[0] - 0.02).abs() < 1e-15 && last.velocity.iter().all(|v| v.abs() < 1e-15) && last.hand.is_none());
+        assert_eq!(more.initial_state::<3>(1), peers[1].state.object);
+        let fewer = stood.with_peers(2).scene().unwrap();
+        assert_eq!(fewer.peers.len(), 2);
+    }
+
+    #[test]
+    fn links_are_as_they_were_changed_and_new_pairs_have_the_keys_of_the_first() {
+        let before = played(&[]);
+        let keys = link_keys_of_text(&before.text(), before.file(), &[]).unwrap();
+        let mut links: Links = keys.into_iter().collect();
+        let delay = |scene: &PlayedScene, pair: (usize, usize)| {
+            let keys = link_keys_of_text(&scene.text(), scene.file(), &[]).unwrap();
+            keys[&pair].model("".as_ref()).unwrap().mean_delay()
+        };
+        for (_, keys) in &mut links {
+            *keys = keys.with("delay", "\"60ms\"");
+        }
+        assert_eq!(delay(&before.clone().with_links(&links), (2, 1)), Duration::from_millis(60));
+        links[3].1 = links[3].1.with("delay", "\"5ms\"");
+        let changed = before.with_peers(4).with_links(&links);
+        assert_eq!(delay(&changed, links[3].0), Duration::from_millis(5));
+        assert_eq!(delay(&changed, (3, 0)), Duration::from_millis(60));
+        assert_eq!(delay(&changed.without_network(), (3, 0)), Duration::ZERO);
+    }
+}

@@ -1,0 +1,261 @@
+//! What the pages of `cohaptic play` ask of the session, part by part.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant as Clock};
+
+use cohaptic_control::{LinkEditor, Role, Stage, StageFile};
+use cohaptic_harness::live::LiveDevice;
+use cohaptic_live::pointers::Pointer;
+use cohaptic_live::session::PeerStatus;
+use cohaptic_peer::Coordination;
+use cohaptic_scene::{PeerKind, Scene, SceneError};
+use serde_json::{Value, json};
+
+use super::compare;
+use super::frames::Frames;
+use super::scene::{Links, PEERS, PlayedScene};
+use crate::live::onlookers::pairs;
+use crate::realtime::KeyedLinks;
+
+/// How long a part may take to end and be written before it is compared.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// What is to be different in the next part.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Wish {
+    strategy: Option<String>,
+    peers: Option<usize>,
+    /// Everything where the scene begins, in place of where it stands.
+    reset: bool,
+}
+
+impl Wish {
+    fn read(value: &Value) -> Result<Self, String> {
+        let keys = value.as_object().ok_or("expected a JSON object such as {\"strategy\": \"average-position\"} or {\"peers\": 4}")?;
+        let mut wish = Self::default();
+        for (key, value) in keys {
+            match (key.as_str(), value) {
+                ("strategy", Value::String(name)) => wish.strategy = Some(name.clone()),
+                ("reset", Value::Bool(reset)) => wish.reset = *reset,
+                ("peers", value) => {
+                    let number = value.as_u64().and_then(|number| usize::try_from(number).ok()).filter(|number| PEERS.contains(number));
+                    wish.peers = Some(number.ok_or_else(|| format!("peers: {value}: expected {} to {}", PEERS.start(), PEERS.end()))?);
+                }
+                _ => return Err(format!("{key}: expected strategy, peers or reset")),
+            }
+        }
+        Ok(wish)
+    }
+}
+
+/// What runs now.
+pub(super) struct Part {
+    pub(super) number: usize,
+    pub(super) played: PlayedScene,
+    pub(super) scene: Scene,
+}
+
+/// A part that has ended, with what was recorded.
+pub(super) struct Finished {
+    pub(super) number: usize,
+    pub(super) scene: PlayedScene,
+    pub(super) inputs: PathBuf,
+}
+
+/// The stage of `cohaptic play`.
+pub(super) struct PlayStage {
+    pub(super) frames: Frames,
+    /// Where it begins, and where it is put back to.
+    beginning: PlayedScene,
+    pointers: Vec<Pointer>,
+    taken: Mutex<Vec<bool>>,
+    part: Mutex<Option<Arc<Part>>>,
+    links: Mutex<Option<KeyedLinks>>,
+    wish: Mutex<Option<Wish>>,
+    is_wished: AtomicBool,
+    finished: Mutex<Option<Arc<Finished>>>,
+    pub(super) join: OnceLock<String>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn said(error: &SceneError) -> String {
+    error.diagnostic().map_or_else(|| error.to_string(), |diagnostic| format!("{}: {}", diagnostic.key(), diagnostic.message()))
+}
+
+impl PlayStage {
+    pub(super) fn new(beginning: PlayedScene) -> Self {
+        Self {
+            frames: Frames::default(),
+            beginning,
+            pointers: (0..*PEERS.end()).map(|_| Pointer::default()).collect(),
+            taken: Mutex::new(vec![false; *PEERS.end()]),
+            part: Mutex::new(None),
+            links: Mutex::new(None),
+            wish: Mutex::new(None),
+            is_wished: AtomicBool::new(false),
+            finished: Mutex::new(None),
+            join: OnceLock::new(),
+        }
+    }
+
+    /// A part begins.
+    pub(super) fn begin(&self, part: Part, links: KeyedLinks) -> Arc<Part> {
+        self.frames.begin(part.number, part.scene.axes.count());
+        let part = Arc::new(part);
+        *lock(&self.part) = Some(Arc::clone(&part));
+        *lock(&self.links) = Some(links);
+        part
+    }
+
+    /// The pointer of the peer in that place.
+    pub(super) fn device(&self, place: usize) -> Option<Box<dyn LiveDevice>> {
+        self.pointers.get(place).map(Pointer::device)
+    }
+
+    /// Whether somebody wants another part; asked on the thread that has to be on time.
+    pub(super) fn is_wished(&self) -> bool {
+        self.is_wished.load(Ordering::Relaxed)
+    }
+
+    /// A part has ended: gives the scene of the next. `fell_apart`: no state of it can be gone on from.
+    pub(super) fn finish(&self, part: &Part, inputs: PathBuf, fell_apart: bool) -> PlayedScene {
+        let wish = lock(&self.wish).take().unwrap_or_default();
+        self.is_wished.store(false, Ordering::Relaxed);
+        let next = self.next(part, &Wish { reset: wish.reset || fell_apart, ..wish });
+        *lock(&self.finished) = Some(Arc::new(Finished { number: part.number, scene: part.played.clone(), inputs }));
+        next
+    }
+
+    fn next(&self, part: &Part, wish: &Wish) -> PlayedScene {
+        let peers: Vec<PeerStatus> = self.frames.last().map(|motion| motion.peers).unwrap_or_default();
+        let number = wish.peers.unwrap_or(part.scene.peers.len());
+        let stood = if wish.reset { self.beginning.clone() } else { part.played.clone().standing(&peers, &part.scene) };
+        let strategy = wish.strategy.as_deref().unwrap_or_else(|| part.scene.coordination.strategy.name());
+        let changed = lock(&self.links).as_ref().map(|links| links.keys.clone()).unwrap_or_default();
+        let links: Links = pairs(&part.scene).into_iter().zip(changed).filter(|((from, to), _)| *from < number && *to < number).collect();
+        stood.with_strategy(strategy).with_peers(number).with_links(&links)
+    }
+
+    fn running(&self) -> Result<Arc<Part>, String> {
+        lock(&self.part).clone().ok_or_else(|| "the session has not begun".to_owned())
+    }
+
+    /// The last part that ended, if one did.
+    fn last_finished(&self) -> Option<Arc<Finished>> {
+        lock(&self.finished).clone()
+    }
+}
+
+impl Stage for PlayStage {
+    fn facts(&self, role: Role) -> Value {
+        let Ok(part) = self.running() else { return json!({ "part": 0 }) };
+        let Part { number, scene, .. } = &*part;
+        let peer = |(place, peer): (usize, &cohaptic_scene::PeerSpec)| {
+            let is_pointer = matches!(peer.kind, PeerKind::Pointer(..));
+            json!({ "name": peer.name, "kind": peer.kind.name(), "hand": is_pointer, "taken": lock(&self.taken)[place] })
+        };
+        let is_host = role == Role::Host;
+        json!({
+            "part": number,
+            "title": scene.title,
+            "axes": scene.axes.count(),
+            "strategy": scene.coordination.strategy.name(),
+            "strategies": Coordination::ALL.iter().map(|strategy| strategy.name()).collect::<Vec<_>>(),
+            "peers": scene.peers.iter().enumerate().map(peer).collect::<Vec<_>>(),
+            "fewest_peers": PEERS.start(),
+            "most_peers": PEERS.end(),
+            "edges": scene.rotation.as_ref().and_then(|_| scene.even_box()),
+            "host": is_host,
+            "join": self.join.get().filter(|_| is_host),
+            "recorded": self.last_finished().map(|finished| finished.number),
+        })
+    }
+
+    fn frame(&self) -> (u64, Arc<str>) {
+        self.frames.text()
+    }
+
+    fn take_hand(&self, wanted: Option<usize>) -> Result<usize, String> {
+        let part = self.running()?;
+        let mut taken = lock(&self.taken);
+        let is_free = |place: usize, peer: &cohaptic_scene::PeerSpec| matches!(peer.kind, PeerKind::Pointer(..)) && !taken[place];
+        let free = part.scene.peers.iter().enumerate().find(|(place, peer)| wanted.is_none_or(|wanted| wanted == *place) && is_free(*place, peer));
+        let (place, _) = free.ok_or_else(|| match wanted {
+            Some(_) => "somebody has that hand, or nobody can: choose another one".to_owned(),
+            None => "every hand is taken: whoever started the session can add a peer".to_owned(),
+        })?;
+        taken[place] = true;
+        Ok(place)
+    }
+
+    fn move_hand(&self, hand: usize, position: Option<[f64; 3]>) -> Result<(), String> {
+        let pointer = self.pointers.get(hand).ok_or("there is no such hand")?;
+        pointer.tell(position).map_err(|error| error.to_string())
+    }
+
+    fn leave_hand(&self, hand: usize) {
+        if let Some(pointer) = self.pointers.get(hand) {
+            // To let go is always possible.
+            let _ = pointer.tell(None);
+            lock(&self.taken)[hand] = false;
+        }
+    }
+
+    fn begin_anew(&self, wish: &Value) -> Result<(), String> {
+        let wish = Wish::read(wish)?;
+        let part = self.running()?;
+        // What cannot begin is refused now, while the present part goes on.
+        self.next(&part, &wish).scene().map_err(|error| said(&error))?;
+        *lock(&self.wish) = Some(wish);
+        self.is_wished.store(true, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn compare(&self) -> Result<Value, String> {
+        let part = self.running()?;
+        let began = Clock::now();
+        self.begin_anew(&json!({}))?;
+        let finished = loop {
+            if let Some(finished) = self.last_finished().filter(|finished| finished.number >= part.number) {
+                break finished;
+            }
+            if began.elapsed() > PATIENCE {
+                return Err("the session does not end its part: it hangs, or it has ended".to_owned());
+            }
+            thread::sleep(Duration::from_millis(5));
+        };
+        compare::compare(&finished)
+    }
+
+    fn file(&self, name: &str) -> Option<StageFile> {
+        let finished = self.last_finished()?;
+        match name {
+            "scene.toml" => Some(StageFile { kind: "application/toml", bytes: finished.scene.text().into_bytes() }),
+            "inputs.csv" => Some(StageFile { kind: "text/csv", bytes: read(&finished.inputs)? }),
+            _ => None,
+        }
+    }
+}
+
+fn read(path: &Path) -> Option<Vec<u8>> {
+    std::fs::read(path).ok()
+}
+
+/// The links of whichever part runs.
+pub(super) struct PartLinks(pub(super) Arc<PlayStage>);
+
+impl LinkEditor for PartLinks {
+    fn keys(&self, link: usize) -> Vec<(String, String)> {
+        lock(&self.0.links).as_ref().map_or_else(Vec::new, |links| links.keys(link))
+    }
+
+    fn change(&mut self, links: &[usize], keys: &[(String, String)]) -> Result<(), String> {
+        lock(&self.0.links).as_mut().ok_or("the session has not begun")?.change(links, keys)
+    }
+}

@@ -1,0 +1,234 @@
+//! The page of `cohaptic play` in a real browser: somebody drags, the copies follow through the links, and a lost connection comes back.
+
+use serde_json::{Value, json};
+
+use super::browser::chromium::Browser;
+use super::http::Control;
+use super::records::trajectory;
+use super::session::Session;
+use crate::desk::Desk;
+
+/// The middle of the own room, where the cube is.
+fn cube(browser: &mut Browser) -> [f64; 2] {
+    let at = browser.value(
+        "(() => { const r = document.getElementById('rooms').getBoundingClientRect(); return [r.x + 0.31 * r.width, r.y + r.height / 2]; })()",
+    );
+    [at[0].as_f64().unwrap(), at[1].as_f64().unwrap()]
+}
+
+fn open(browser: &mut Browser, session: &mut Session) -> Control {
+    let url = session.told("open ");
+    browser.open(&url);
+    browser.wait("document.getElementById('server').textContent === 'connected'");
+    browser.wait("document.getElementById('law-now').textContent === 'AP, 3 peers'");
+    Control::at(&url)
+}
+
+fn end(session: Session) {
+    session.interrupt();
+    assert_eq!(session.outcome().status, Some(130));
+}
+
+fn release(browser: &mut Browser) {
+    browser.call("Input.dispatchMouseEvent", json!({ "type": "mouseReleased", "x": 5, "y": 5, "button": "left", "clickCount": 1 }));
+}
+
+fn millimetres(browser: &mut Browser, peer: usize) -> f64 {
+    let text = browser.value(&format!("document.querySelectorAll('#peers tr')[{peer}].cells[2].textContent"));
+    text.as_str().unwrap().replace('\u{2212}', "-").split(',').next().unwrap().parse().unwrap()
+}
+
+/// The first minute of somebody who has read nothing: drags, raises the delay, changes to PD, and compares.
+#[test]
+fn somebody_drags_takes_three_steps_and_compares() {
+    let Some(mut browser) = Browser::start() else { return };
+    let desk = Desk::new();
+    let mut session = Session::play(&desk, "");
+    open(&mut browser, &mut session);
+    browser.value("document.querySelector('details').open = true");
+    for step in 1..=3 {
+        let shown = format!("document.querySelectorAll('#steps li')[{}].getAttribute('aria-current') === 'step'", step - 1);
+        browser.wait(&shown);
+        if step > 1 {
+            browser.click(&format!("#steps li:nth-child({step}) button"));
+        }
+        browser.wait_for(&format!("step {step} is done"), |browser| {
+            let from = cube(browser);
+            browser.drag(from, [90.0, -20.0], 12);
+            let from = [from[0] + 90.0, from[1] - 20.0];
+            browser.drag(from, [-90.0, 20.0], 12);
+            release(browser);
+            if step > 1 {
+                // A hand that lets go leaves the copies to themselves for a while.
+                browser.press("Escape", 27);
+                std::thread::sleep(std::time::Duration::from_secs(4));
+            }
+            browser.value(&format!("!({shown})")) == json!(true)
+        });
+        browser.picture(&format!("play-step-{step}"));
+    }
+    browser.wait("!document.getElementById('why').hidden");
+    browser.wait("document.getElementById('law-now').textContent === 'PD, 3 peers'");
+    browser.wait("document.querySelector('input[name=law]:checked').value === 'proportional-derivative'");
+    browser.click("#compare");
+    browser.wait("document.querySelectorAll('#runs tr').length === 3 && !document.getElementById('curves').hidden");
+    browser.wait("document.getElementById('runs').textContent.includes('without network')");
+    browser.picture("play-compared");
+    browser.click("#more");
+    browser.wait("document.getElementById('law-now').textContent === 'PD, 4 peers'");
+    assert_eq!(browser.complaints, [""; 0]);
+    end(session);
+}
+
+/// The other copies begin to move when the first sample with a motion in it has arrived: one delay after the own copy, and at most a period of sending and a
+/// tick later.
+#[test]
+fn the_copies_follow_with_the_delay_that_was_set() {
+    let Some(mut browser) = Browser::start() else { return };
+    let desk = Desk::new();
+    let mut session = Session::play(&desk, "--out played");
+    let control = open(&mut browser, &mut session);
+    browser.value("document.getElementById('slider-delay').focus()");
+    browser.wait_for("the slider stands at 70 ms", |browser| {
+        browser.press("ArrowRight", 39);
+        browser.value("document.getElementById('slider-delay').getAttribute('aria-valuetext') === '70ms'") == json!(true)
+    });
+    browser.wait("document.getElementById('answer').textContent.includes('delay 70ms on every link')");
+    browser.click("#record");
+    browser.wait_for("part 2", |_| control.get("/api/play")["part"] == 2);
+    browser.value("document.querySelector('details').open = true");
+    let from = cube(&mut browser);
+    browser.drag(from, [120.0, 0.0], 15);
+    browser.wait_for("all copies come along", |browser| (0..3).all(|peer| millimetres(browser, peer) > 5.0));
+    release(&mut browser);
+    assert_eq!(browser.complaints, [""; 0]);
+    end(session);
+    desk.text("run played/part-2/scene.toml --inputs played/part-2/inputs.csv --out again");
+    let ticks = trajectory(&desk, "again");
+    let first = |peer: &str| ticks[peer].iter().find(|tick| tick.xo.abs() > 1e-9).unwrap().at;
+    let (own, second, third) = (first("you"), first("second"), first("third"));
+    for other in [second, third] {
+        let later = other - own;
+        assert!((70_000_000..=80_000_000).contains(&later), "{later} ns later");
+    }
+}
+
+#[test]
+fn a_lost_connection_is_shown_and_comes_back() {
+    let Some(mut browser) = Browser::start() else { return };
+    let desk = Desk::new();
+    desk.write("token", "a-token-of-our-own-0123456789\n");
+    let mut session = Session::play(&desk, "--control 127.0.0.1:0 --token-file token");
+    let control = open(&mut browser, &mut session);
+    assert_eq!(browser.complaints, [""; 0]);
+    end(session);
+    browser.wait("document.getElementById('server').textContent === 'disconnected'");
+    browser.wait("document.getElementById('trouble').textContent.includes('does not answer')");
+    let again = Session::play(&desk, &format!("--control {} --token-file token", control.host));
+    browser.wait("document.getElementById('server').textContent === 'connected' && document.getElementById('trouble').hidden");
+    let from = cube(&mut browser);
+    browser.drag(from, [60.0, 0.0], 8);
+    browser.wait_for("it is held", |_| control.get("/api/state")["peers"][0]["status"] == "present");
+    end(again);
+}
+
+#[test]
+fn the_keyboard_alone_and_a_finger_on_a_phone_will_do() {
+    let Some(mut browser) = Browser::start() else { return };
+    let desk = Desk::new();
+    let mut session = Session::play(&desk, "");
+    open(&mut browser, &mut session);
+    browser.value("document.querySelector('details').open = true");
+    every_control_has_a_name(&mut browser);
+    browser.value("document.getElementById('rooms').focus()");
+    let key = |browser: &mut Browser, kind: &str, key: &str, code: u32| {
+        browser.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code }));
+    };
+    key(&mut browser, "rawKeyDown", "ArrowRight", 39);
+    browser.wait_for("the own copy goes to the right", |browser| millimetres(browser, 0) > 10.0);
+    key(&mut browser, "keyUp", "ArrowRight", 39);
+    assert_eq!(browser.value("document.getElementById('grasp').textContent"), json!("Let go"));
+    browser.press("Escape", 27);
+    browser.wait("document.querySelector('#peers tr').cells[1].textContent === 'let go'");
+    // Who wants less motion has no flying dots, and drags all the same.
+    browser.call("Emulation.setEmulatedMedia", json!({ "features": [{ "name": "prefers-reduced-motion", "value": "reduce" }] }));
+    let phone = json!({ "width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": true });
+    browser.call("Emulation.setDeviceMetricsOverride", phone);
+    browser.call("Emulation.setTouchEmulationEnabled", json!({ "enabled": true }));
+    browser.wait("document.documentElement.scrollWidth <= innerWidth");
+    browser.value("document.getElementById('rooms').scrollIntoView()");
+    browser.picture("play-phone");
+    let middle = browser
+        .value("(() => { const r = document.getElementById('rooms').getBoundingClientRect(); return [r.x + r.width / 2, r.y + 0.3 * r.height]; })()");
+    let (x, y) = (middle[0].as_f64().unwrap(), middle[1].as_f64().unwrap());
+    let before = millimetres(&mut browser, 0);
+    browser.call("Input.dispatchTouchEvent", json!({ "type": "touchStart", "touchPoints": [{ "x": x, "y": y }] }));
+    for step in 1..=10 {
+        browser.call("Input.dispatchTouchEvent", json!({ "type": "touchMove", "touchPoints": [{ "x": x - 8.0 * f64::from(step), "y": y }] }));
+    }
+    browser.wait_for("the own copy goes to the left", |browser| millimetres(browser, 0) < before - 5.0);
+    browser.call("Input.dispatchTouchEvent", json!({ "type": "touchEnd", "touchPoints": [] }));
+    assert_eq!(browser.complaints, [""; 0]);
+    end(session);
+}
+
+/// What can be operated has a name, as a screen reader tells it.
+fn every_control_has_a_name(browser: &mut Browser) {
+    browser.call("Accessibility.enable", json!({}));
+    let tree = browser.call("Accessibility.getFullAXTree", json!({}));
+    let operated = ["button", "slider", "radio", "combobox", "textbox", "checkbox", "link", "application"];
+    let (mut named, mut nameless) = (0, Vec::new());
+    for node in tree["nodes"].as_array().unwrap() {
+        let role = node["role"]["value"].as_str().unwrap_or_default();
+        if node["ignored"] == json!(true) || !operated.contains(&role) {
+            continue;
+        }
+        if node["name"]["value"].as_str().unwrap_or_default().trim().is_empty() {
+            nameless.push(node.to_string());
+        }
+        named += 1;
+    }
+    assert!(nameless.is_empty() && named > 15, "{named}, without a name {nameless:#?}");
+}
+
+/// A measurement, not a test: ten peers and ninety links, the hand in motion. Prints pictures a second, and what the page takes of a core.
+#[test]
+#[expect(clippy::print_stdout, reason = "a measurement prints")]
+#[ignore = "a measurement of half a minute: cargo test -p cohaptic-cli --test integration play_page -- --ignored --nocapture"]
+fn measure_pictures_a_second_with_ten_peers() {
+    let Some(mut browser) = Browser::start() else { return };
+    let desk = Desk::new();
+    let mut session = Session::play(&desk, "");
+    let control = open(&mut browser, &mut session);
+    assert_eq!(control.ask("POST", "/api/play", r#"{"peers": 10}"#).0, 200);
+    browser.wait("document.getElementById('law-now').textContent === 'AP, 10 peers'");
+    browser.click("#sway");
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    browser.call("Performance.enable", json!({ "timeDomain": "threadTicks" }));
+    let measure = "new Promise((resolve) => { const at = []; requestAnimationFrame(function next(now) { at.push(now); if (now < at[0] + 10000) requestAnimationFrame(next); else resolve(at); }); })";
+    let metric = |metrics: &Value, name: &str| {
+        metrics["metrics"].as_array().unwrap().iter().find(|metric| metric["name"] == name).unwrap()["value"].as_f64().unwrap()
+    };
+    let before = browser.call("Performance.getMetrics", json!({}));
+    let times: Vec<f64> = browser.value(measure).as_array().unwrap().iter().map(|at| at.as_f64().unwrap()).collect();
+    let after = browser.call("Performance.getMetrics", json!({}));
+    let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    let seconds = (times[times.len() - 1] - times[0]) / 1e3;
+    let busy = metric(&after, "TaskDuration") - metric(&before, "TaskDuration");
+    let script = metric(&after, "ScriptDuration") - metric(&before, "ScriptDuration");
+    #[expect(clippy::cast_precision_loss, reason = "some hundred pictures")]
+    let rate = gaps.len() as f64 / seconds;
+    println!("{rate:.1} pictures a second; the longest {:.1} ms, p99 {:.1} ms", gaps[gaps.len() - 1], gaps[gaps.len() * 99 / 100]);
+    println!("the page's thread takes {:.1} % of a core, {:.1} % in scripts", 100.0 * busy / seconds, 100.0 * script / seconds);
+    let state = control.state();
+    println!(
+        "links {}, valid {}, {}; ticks {}",
+        state["links"].as_array().unwrap().len(),
+        state["valid"],
+        state["invalid"],
+        state["clocks"][0]["lateness"]
+    );
+    browser.picture("play-ten");
+    end(session);
+}

@@ -1,0 +1,79 @@
+// ---- The hand: where it wants the device to be, by mouse, pen or finger.
+
+/** No hand goes farther [m]. */
+const FARTHEST = 0.5;
+const hand = { holding: false, at: [0, 0, 0], swaying: null, touched: false };
+
+/** Takes hold of the device where it is, so that nothing jerks. */
+function takeHold() {
+  if (hand.holding || ownHand === null || !shown[ownHand]) return;
+  hand.holding = true;
+  hand.at = [...shown[ownHand].device];
+  showHolding();
+}
+
+function letGo() {
+  if (!hand.holding) return;
+  hand.holding = false;
+  hand.swaying = null;
+  tellHand(null);
+  showHolding();
+}
+
+function moveHand(by) {
+  hand.at = hand.at.map((value, axis) => (axis < facts.axes ? Math.max(-FARTHEST, Math.min(FARTHEST, value + by[axis])) : 0));
+}
+
+function showHolding() {
+  const button = $('grasp');
+  button.setAttribute('aria-pressed', String(hand.holding));
+  put(button, hand.holding ? 'Let go' : 'Take hold');
+  put($('holding'), ownHand === null ? 'you look on' : hand.holding ? 'you hold the device; it stays where your hand is' : 'nobody holds your device');
+  $('sway').setAttribute('aria-pressed', String(hand.swaying !== null));
+  $('rooms').classList.toggle('held', hand.holding);
+}
+
+function makeHand() {
+  const canvas = $('rooms');
+  let last = null;
+  canvas.addEventListener('pointerdown', (event) => {
+    if (event.button !== 0) return;
+    hand.swaying = null;
+    hand.touched = event.pointerType === 'touch';
+    takeHold();
+    showHolding();
+    last = { id: event.pointerId, x: event.clientX, y: event.clientY };
+    canvas.setPointerCapture(event.pointerId);
+    canvas.focus({ preventScroll: true });
+    event.preventDefault();
+  });
+  canvas.addEventListener('pointermove', (event) => {
+    if (!last || event.pointerId !== last.id || !rooms[ownPlace()]) return;
+    moveHand(inWorld(rooms[ownPlace()], event.clientX - last.x, event.clientY - last.y));
+    last = { ...last, x: event.clientX, y: event.clientY };
+  });
+  for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => { last = null; });
+  canvas.addEventListener('wheel', (event) => {
+    if (facts.axes < 3 || !hand.holding) return;
+    moveHand([0, 0, -event.deltaY / 10000]);
+    event.preventDefault();
+  }, { passive: false });
+  $('grasp').addEventListener('click', () => (hand.holding ? letGo() : takeHold()));
+  $('sway').addEventListener('click', () => {
+    takeHold();
+    hand.swaying = hand.swaying === null && hand.holding ? { begin: performance.now(), from: [...hand.at] } : null;
+    showHolding();
+  });
+}
+
+/** Once a picture: says where the hand is. */
+function stepHand(now) {
+  if (!hand.holding) return;
+  if (hand.swaying) {
+    // To and fro along a figure of eight, from where the hand is.
+    const t = (now - hand.swaying.begin) / 1000;
+    const [x, y] = [0.04 * Math.sin(2.2 * t), facts.axes > 1 ? 0.02 * Math.sin(4.4 * t) : 0];
+    hand.at = hand.swaying.from.map((value, axis) => value + [x, y, 0][axis]);
+  }
+  tellHand(hand.at);
+}

@@ -1,0 +1,54 @@
+// ---- All together.
+
+function onFrame(next) {
+  if (takeFrame(next)) readFacts().catch(() => {});
+}
+
+let lost = true;
+function onTrouble(text, looksOn) {
+  lost = text !== null && !looksOn;
+  put($('trouble'), text || '');
+  $('trouble').hidden = text === null;
+  document.body.classList.toggle('stale', lost);
+  put($('server'), lost ? 'disconnected' : 'connected');
+  $('server').className = 'pill ' + (lost ? 'bad' : 'good');
+  // The server may have another token now, or know more.
+  if (!lost) readFacts().catch(() => {});
+  else ask('/api/play').catch((error) => {
+    if (error.message.startsWith('no token')) put($('trouble'), 'The server has another token now: open the address that it printed.');
+  });
+}
+
+async function showValid() {
+  if (lost || document.hidden) return;
+  const state = await ask('/api/state');
+  put($('valid'), state.valid ? 'valid' : 'not valid: ' + state.invalid);
+  $('valid').className = 'pill ' + (state.valid ? 'good' : 'bad');
+}
+
+readInk();
+makeControls();
+makeHand();
+makeKeyboard();
+makeSteps();
+makeCompare();
+showHolding();
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+  readInk();
+  drawCurves();
+});
+addEventListener('resize', drawCurves);
+setInterval(showNumbers, 250);
+setInterval(() => showValid().catch(() => {}), 2000);
+let before = performance.now();
+requestAnimationFrame(function next(now) {
+  const passed = Math.min(100, Math.max(0, now - before));
+  before = now;
+  stepKeyboard(passed);
+  stepGamepad(passed, now);
+  stepHand(now);
+  watchSteps();
+  drawAll(passed, now);
+  requestAnimationFrame(next);
+});
+connect(onFrame, onTrouble);

@@ -1,0 +1,48 @@
+// ---- What moves: the pictures of the server, and the way between two of them.
+
+/** How fast the picture follows [ms]: 50 pictures a second look like 60. */
+const FOLLOWS = 18;
+/** Who wants less motion sees what was measured, without a way in between and without flying dots. */
+const still = matchMedia('(prefers-reduced-motion: reduce)');
+
+let facts = { part: 0, peers: [], axes: 1, edges: null, host: false };
+let frame = null;
+/** Each peer as it is drawn: its copy, its device, the force, its turn. */
+let shown = [];
+
+/** Three numbers, whatever the scene has. */
+const wide = (values) => [0, 1, 2].map((axis) => (values && Number.isFinite(values[axis]) ? values[axis] : 0));
+
+function takeFrame(next) {
+  const another = frame === null || next.part !== frame.part;
+  frame = next;
+  if (shown.length !== next.peers.length) shown = next.peers.map((peer) => ({ at: wide(peer.at), device: wide(peer.device || peer.at), force: wide(peer.force), turned: [1, 0, 0, 0] }));
+  takePackets(next.packets);
+  return another;
+}
+
+/** Moves what is shown towards what was measured. */
+function follow(passed) {
+  if (frame === null) return;
+  const share = still.matches ? 1 : 1 - Math.exp(-passed / FOLLOWS);
+  const between = (from, to) => from.map((value, axis) => value + (to[axis] - value) * share);
+  frame.peers.forEach((peer, i) => {
+    const body = shown[i];
+    body.at = between(body.at, wide(peer.at));
+    body.device = between(body.device, wide(peer.device || peer.at));
+    body.force = between(body.force, wide(peer.force));
+    if (peer.turned && peer.turned.every(Number.isFinite)) body.turned = towards(body.turned, peer.turned, share);
+    body.hand = peer.hand;
+  });
+}
+
+const lengthOf = (v) => Math.hypot(...v);
+/** How far out the farthest copy is [m]. */
+const farthestOut = () => Math.max(0, ...shown.map((body) => lengthOf(body.at)));
+
+/** The largest distance between two copies [m]. */
+function farthest() {
+  let most = 0;
+  shown.forEach((one, i) => shown.slice(i + 1).forEach((other) => { most = Math.max(most, lengthOf(add3(one.at, other.at, -1))); }));
+  return most;
+}

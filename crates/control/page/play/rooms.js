@@ -1,0 +1,53 @@
+// ---- Where each peer is on the canvas: a room each, that of the own hand the largest.
+
+/** Half of what a room shows [m]; grows when something goes beyond. */
+let reach = 0.12;
+const LARGEST_REACH = 2;
+
+/** The rooms in a width and a height: the own one beside the others, or above them where the canvas is upright. */
+function layRooms(width, height, number, own) {
+  const gap = 8;
+  const others = number - 1;
+  const upright = height > width;
+  const [long, short] = upright ? [height, width] : [width, height];
+  const mine = others === 0 ? long : long * (others <= 3 ? 0.62 : others <= 6 ? 0.5 : 0.42);
+  // As many columns as make the others nearly square.
+  const rest = long - mine - gap;
+  let across = 1;
+  while (across < others && (rest / across) * Math.ceil(others / across) > short) across += 1;
+  const along = Math.max(1, Math.ceil(others / across));
+  const room = (at, from, size, wideness) => (upright ? { left: from, top: at, width: wideness, height: size } : { left: at, top: from, width: size, height: wideness });
+  let k = 0;
+  return Array.from({ length: number }, (_, i) => {
+    if (i === own) return room(0, 0, mine, short);
+    const [column, row] = [k % across, Math.floor(k / across)];
+    k += 1;
+    const [size, wideness] = [(rest - gap * (across - 1)) / across, (short - gap * (along - 1)) / along];
+    return room(mine + gap + column * (size + gap), row * (wideness + gap), size, wideness);
+  });
+}
+
+/** Points of a room per metre. */
+const scaleOf = (room) => Math.min(room.width, room.height) / 2 / reach;
+const middleOf = (room) => ({ x: room.left + room.width / 2, y: room.top + room.height / 2 });
+
+/** Where a place of the world is on the canvas: x to the right, y up, z a little towards the right and down. */
+function onCanvas(room, place) {
+  const [{ x, y }, scale] = [middleOf(room), scaleOf(room)];
+  return { x: x + (place[0] - 0.35 * place[2]) * scale, y: y - (place[1] - 0.25 * place[2]) * scale };
+}
+
+/** A way on the canvas as a way in the world; scenes have one axis or more. */
+function inWorld(room, dx, dy) {
+  const scale = scaleOf(room);
+  return [dx / scale, facts.axes > 1 ? -dy / scale : 0, 0];
+}
+
+/** Wide enough for all that is shown, and steady. */
+function lookAround(passed) {
+  let most = 0.12;
+  for (const { at, device } of shown) for (const place of [at, device]) most = Math.max(most, 1.15 * Math.max(...place.map(Math.abs)));
+  most = Math.min(most, LARGEST_REACH);
+  const share = still.matches ? 1 : 1 - Math.exp(-passed / (most > reach ? 60 : 1500));
+  reach += (most - reach) * share;
+}
