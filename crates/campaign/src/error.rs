@@ -111,7 +111,7 @@ pub enum CampaignError {
     Missing {
         /// The folder.
         path: PathBuf,
-        /// What is missing.
+        /// The parts that are missing.
         missing: Missing,
     },
     /// A file cannot be read or written. Finished parts are kept.

@@ -92,7 +92,7 @@ impl FromStr for Shard {
     }
 }
 
-/// What is not done of work that is shared.
+/// The pieces of shared work that are not done.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Missing {
     /// What a piece is called: a part of a campaign, a row of a map.

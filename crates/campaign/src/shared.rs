@@ -12,7 +12,7 @@ use crate::verdicts::{Judge, Judgement};
 
 /// A campaign in its folder, in which other workers may work at the same time, on this machine and on others.
 ///
-/// No two workers write the same file, and a file gets its name when it is whole. A part is the same whoever makes it, so it does no harm if two workers make
+/// No two workers write the same file, and a file gets its name when it is whole. All workers make the same part of the same number, so it does no harm if two workers make
 /// it: locks between them only save work, and are their callers' to take ([`Shard::lease`]).
 #[derive(Debug)]
 pub struct SharedCampaign {

@@ -12,7 +12,7 @@
 //! | a lease that is lost | its owner sees that at its next heartbeat, because another one stands in the file |
 //!
 //! A process that stands still for longer than [`STALE`] can lose its lease without knowing it until its next heartbeat. So two owners can work at the same
-//! time, for a moment: a lease saves work, and what is written must be right without it.
+//! time, for a moment: a lease saves work, and the files that its owners write must be right without it.
 
 use std::fmt;
 use std::fs::{self, File, OpenOptions};

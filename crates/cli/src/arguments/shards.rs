@@ -8,14 +8,13 @@ use cohaptic_campaign::{Shard, ShardError};
 
 #[derive(Debug, Args)]
 pub(crate) struct ShardArguments {
-    /// Do one share of the work, in the folder of --out, which other processes share on any machines: 3/8 is the third of eight. auto takes it from the variables of a
-    /// scheduler or launcher, auto/8 where these do not say of how many. docs/cluster.md
+    /// Do the I-th of N shares of the work, in a folder that processes on any machines share; auto or auto/N: as a scheduler says. docs/cluster.md
     #[arg(long, value_name = "I/N", requires = "out")]
     pub(crate) shard: Option<ShardName>,
-    /// In place of --out: put together what shards did in this folder, and do nothing that is missing: then it is refused
+    /// In place of --out: put the shards in this folder together; refused while anything is missing
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "shard", "status"])]
     pub(crate) merge: Option<PathBuf>,
-    /// In place of --out: say what shards have done in this folder, by which processes, and when the rest will be done
+    /// In place of --out: say what is done in this folder, by which processes, and when the rest will be
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "shard"])]
     pub(crate) status: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! `--status`: what is done of shared work, by which workers, and when the rest will be.
+//! `--status`: which pieces of shared work are done, by which workers, and when the rest will be.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -159,11 +159,11 @@ fn peak_memory(mut child: Child) -> f64 {
 /// Merges of many shards.
 fn merges(page: &mut String) {
     let work = Work::new();
-    page.push_str("\n## The merge\n\nShards of 10,000 short runs, a combination each, put together from parts to the table on the disk, and summed up. Asked for: 100 MB/s, in memory that does not grow\nwith the number of shards.\n\n| shards | runs | table \\[MB\\] | \\[s\\] | \\[MB/s\\] | most memory \\[MB\\] |\n| ---: | ---: | ---: | ---: | ---: | ---: |\n");
+    page.push_str("\n## The merge\n\nShards of 10,000 runs with all measures, a combination each, put together from parts to the table on the disk, and summed up. Asked for: 100 MB/s, in memory that does not grow\nwith the number of shards.\n\n| shards | runs | table \\[MB\\] | \\[s\\] | \\[MB/s\\] | most memory \\[MB\\] |\n| ---: | ---: | ---: | ---: | ---: | ---: |\n");
     let most = std::env::var("COHAPTIC_SHARDS").ok().and_then(|most| most.parse().ok()).unwrap_or(1000_u64);
     for shards in [10, 100, 1000].into_iter().filter(|shards| *shards <= most) {
         let words =
-            format!("campaign scene.toml --set scene.duration=2ms --vary coordination.stiffness=1..2/{shards} --runs 10000 --part 10000 --no-plot");
+            format!("campaign scene.toml --set scene.duration=100ms --measure all --vary coordination.stiffness=1..2/{shards} --runs 10000 --part 10000 --no-plot");
         let command = |options: &str| {
             let mut command = work.command("cohaptic");
             command.args(words.split(' ')).args(options.split(' '));
@@ -189,7 +189,7 @@ fn where_and_when() -> String {
     let processor = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let processor = processor.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or_default();
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let build = if cfg!(debug_assertions) { ", built without `--release`" } else { "" };
+    let build = if cfg!(debug_assertions) { ", a debug build" } else { "" };
     let note = std::env::var("COHAPTIC_BUILD").map(|note| format!(", {note}")).unwrap_or_default();
     format!("and measured on {}, {}, {cores} cores{build}{note}.\n\n", said("date", &["-u", "+%F"]), processor.trim_start_matches([' ', '\t', ':']))
 }

@@ -126,7 +126,7 @@ fn cells(rows: &[Row]) -> Vec<(f64, Cell)> {
     rows.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect()
 }
 
-/// What is kept of a value.
+/// The numbers that are kept of a value.
 fn row(value: f64, Cell { radius, is_nominal }: &Cell) -> [f64; 4] {
     [value, radius.value, radius.error, f64::from(u8::from(*is_nominal))]
 }

@@ -1,4 +1,4 @@
-//! Shards of a boundary: the values that are looked at first. Those between them follow from what is found there, and are looked at by the merge.
+//! Shards of a boundary: the values that are looked at first. Those between them follow from the radii there, and are looked at by the merge.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -31,7 +31,7 @@ pub(super) fn pieces(order: &Order, kept: Kept<'_>) -> Result<Vec<Piece>, Failur
 
 /// Looks at the samples of a shard.
 pub(super) fn shard<'a>(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept<'a>) -> Result<Done<'a>, Failure> {
-    // What is not this work's is refused before anything is written.
+    // Rows of other work are refused before anything is written.
     kept.read()?;
     std::fs::create_dir_all(kept.folder).map_err(|error| Failure::File { verb: "create", path: kept.folder.to_path_buf(), error })?;
     let owner = owner();

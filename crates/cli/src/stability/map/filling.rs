@@ -81,7 +81,7 @@ fn on_threads<T: Send>(arguments: &MapArguments, work: impl FnOnce() -> T + Send
 pub(super) fn shard<'a>(order: &Order, arguments: &MapArguments, shard: Shard, folder: &'a Path) -> Result<Done<'a>, Failure> {
     let header = header(order, arguments)?;
     let kept = Kept { folder, name: ROWS, header: &header };
-    // What is not this work's is refused before anything is written.
+    // Rows of other work are refused before anything is written.
     kept.read()?;
     std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
     let owner = owner();

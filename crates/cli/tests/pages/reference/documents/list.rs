@@ -118,7 +118,7 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         lines: &["cohaptic campaign scenarios/network/loss-independent.toml --runs 2 --out shards --shard 1/1 --json"],
         rows: &[
             ("shard, out", "as `I/N`; the folder"),
-            ("piece, unit", "names: a `part` of runs, a `row` of cells, or a `sample`, which is one value"),
+            ("piece, unit", "`part` of `run`, `row` of `cell`, `sample` of `value`"),
             ("pieces, units, units_computed", "of the shard; computed this time"),
             ("wall_s", "of this time"),
         ],
@@ -130,12 +130,12 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         rows: &[
             ("out, piece, unit", "as of [a shard](#campaign---shard)"),
             ("pieces, pieces_done, units, units_done", "of the whole work"),
-            ("pieces_unassigned", "missing, and of no shard that a worker does now"),
-            ("ends_in_s", "the latest end of a worker; `null` if one is not known, or pieces are unassigned"),
-            ("workers[].shard, workers[].host, workers[].process", "each process that did a shard, in order of shards"),
-            ("workers[].state", "`working`, `done`, `interrupted`, `failed`, or `killed`: it neither ended nor renews its lock"),
-            ("workers[].pieces, workers[].units, workers[].units_per_s", "what it did; `null` before the first piece"),
-            ("workers[].units_left, workers[].ends_in_s", "of its shard; `null` if it is not at work, or its speed is not known"),
+            ("pieces_unassigned", "missing, and done by no worker now"),
+            ("ends_in_s", "`null` if not known"),
+            ("workers[].shard, workers[].host, workers[].process", "each process that did a shard"),
+            ("workers[].state", "`working`, `done`, `interrupted`, `failed` or `killed`"),
+            ("workers[].pieces, workers[].units, workers[].units_per_s", "its work until now"),
+            ("workers[].units_left, workers[].ends_in_s", "of its shard; `null` if not known"),
         ],
     },
     Document {
