@@ -4,24 +4,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use cohaptic_benches::Mesh;
+use cohaptic_benches::bare::{self, Queue};
+use cohaptic_benches::{LINKS, Mesh};
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_scene::{Scene, Topology};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
-/// Keys of links beside a delay of 24 ms.
-const LINKS: [(&str, &str); 6] = [
-    ("constant", ""),
-    ("jitter and loss", "jitter = \"2ms\"\nloss = \"1%\""),
-    ("rate and queue", "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"10Mbit\"\nqueue = { limit = \"100 packets\" }"),
-    ("chains", "jitter = { sd = \"2ms\", distribution = \"gamma\", correlation = 0.5 }\nloss = { gilbert-elliott = { p = 0.01, r = 0.3 } }"),
-    ("CoDel", "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"10Mbit\"\nqueue = { limit = \"100 packets\", discipline = \"codel\" }"),
-    ("token bucket", "jitter = \"2ms\"\nloss = \"1%\"\ntoken-bucket = { rate = \"10Mbit\", burst = \"3kB\", limit = \"100 packets\" }"),
-];
-
 fn scene(peers: usize, keys: &str, ticks: u64) -> Scene {
-    let text = Mesh::text_over(peers, keys, ticks, 1);
-    Scene::parse(&text, "mesh.toml".as_ref(), &[]).expect("the mesh is a scene")
+    Mesh { peers, impaired: true }.scene_over(keys, ticks, 1)
 }
 
 /// One run on one thread and on two.
@@ -44,12 +34,15 @@ fn queues(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("queues");
     group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(2));
     for peers in [10, 50, 200] {
-        let ticks = 400_000 / (peers * peers) as u64 / 8 * 8 + 400;
+        let (mesh, ticks) = (Mesh { peers, impaired: true }, 400_000 / (peers * peers) as u64 / 8 * 8 + 400);
         // Elements are packets offered.
         group.throughput(Throughput::Elements(ticks.div_ceil(8) * (peers * (peers - 1)) as u64));
         for (name, keys) in LINKS {
             let scene = scene(peers, keys, ticks);
             group.bench_function(BenchmarkId::new(name, peers), |bencher| bencher.iter(|| Mesh::run(&scene)));
+        }
+        for (name, queue) in [("bare jitter and loss", None), ("bare rate and queue", Some(Queue::OF_TABLES))] {
+            group.bench_function(BenchmarkId::new(name, peers), |bencher| bencher.iter(|| bare::run_through(queue, mesh, ticks)));
         }
     }
     group.finish();

@@ -29,6 +29,7 @@ struct Counters {
     offered: u64,
     delivered: u64,
     lost: u64,
+    found_full: u64,
     delay_nanos: u128,
 }
 
@@ -48,6 +49,20 @@ struct Held {
     x: f64,
     v: f64,
     next: u64,
+}
+
+/// A tail-drop queue before a line of one rate, for packets of one size: Lindley's recursion over the instants at which packets leave.
+#[derive(Clone, Copy, Debug)]
+pub struct Queue {
+    /// The time of a packet on the line \[ns\].
+    pub service: u64,
+    /// How many packets fit into it, the one on the line among them.
+    pub limit: u64,
+}
+
+impl Queue {
+    /// 64 bytes at 10 Mbit/s, up to 100 of them.
+    pub const OF_TABLES: Self = Self { service: 51_200, limit: 100 };
 }
 
 /// Coefficients of the motion of a free damped mass over a tick, from the closed form.
@@ -73,6 +88,12 @@ impl Motion {
 /// Runs the mesh for a number of ticks.
 #[must_use]
 pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
+    run_through(None, mesh, ticks)
+}
+
+/// Runs the mesh for a number of ticks, each link with such a queue.
+#[must_use]
+pub fn run_through(queue: Option<Queue>, mesh: Mesh, ticks: u64) -> Outcome {
     let n = mesh.peers;
     let others = (n - 1) as f64;
     let device = Motion::new(DEVICE.mass, DEVICE.damping);
@@ -90,8 +111,9 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
     let mut held = vec![Held { x: 0.0, v: 0.0, next: 0 }; n * n];
     let (mut mean_x, mut mean_v, mut stale) = (vec![0.0; n], vec![0.0; n], vec![false; n]);
     let mut counters = vec![Counters::default(); n * n];
+    let mut leaves = vec![0_u64; if queue.is_some() { n * n } else { 0 }];
     let mut ring: VecDeque<Packet> = VecDeque::new();
-    let mut wheel: Vec<Vec<Packet>> = vec![Vec::new(); 64];
+    let mut wheel: Vec<Vec<Packet>> = vec![Vec::new(); 128];
     let mut max_discrepancy = 0.0_f64;
 
     for tick in 0..ticks {
@@ -113,10 +135,19 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
                             counters[link].lost += 1;
                             continue;
                         }
+                        if let Some(Queue { service, limit }) = queue {
+                            // The latest departure says how many wait.
+                            if leaves[link].saturating_sub(now) > service * limit {
+                                counters[link].found_full += 1;
+                                continue;
+                            }
+                            leaves[link] = leaves[link].max(now) + service;
+                            packet.arrival = leaves[link] + DELAY_NANOS;
+                        }
                         let mut more = words.more(Purpose::Jitter);
                         let z = standard_normal(jitter_word, || more.next_word());
                         packet.arrival = packet.arrival.saturating_add_signed((z * SD_NANOS).round_ties_even() as i64);
-                        wheel[packet.arrival.div_ceil(TICK_NANOS).max(tick) as usize % 64].push(packet);
+                        wheel[packet.arrival.div_ceil(TICK_NANOS).max(tick) as usize % 128].push(packet);
                     } else {
                         ring.push_back(packet);
                     }
@@ -134,7 +165,7 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
             }
         };
         if mesh.impaired {
-            wheel[tick as usize % 64].drain(..).for_each(&mut receive);
+            wheel[tick as usize % 128].drain(..).for_each(&mut receive);
         } else {
             while ring.front().is_some_and(|packet| packet.arrival <= now) {
                 if let Some(packet) = ring.pop_front() {

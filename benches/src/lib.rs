@@ -25,27 +25,52 @@ pub use cohaptic_benches_common::mesh::Mesh;
 /// The damping of every copy [N·s/m].
 pub const COPY_DAMPING: f64 = 0.0;
 
+/// Links by name: their keys beside a delay of 24 ms.
+pub const LINKS: [(&str, &str); 6] = [
+    ("constant", ""),
+    ("jitter and loss", Mesh::IMPAIRMENTS),
+    ("rate and queue", "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"10Mbit\"\nqueue = { limit = \"100 packets\" }"),
+    ("chains", "jitter = { sd = \"2ms\", distribution = \"gamma\", correlation = 0.5 }\nloss = { gilbert-elliott = { p = 0.01, r = 0.3 } }"),
+    ("CoDel", "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"10Mbit\"\nqueue = { limit = \"100 packets\", discipline = \"codel\" }"),
+    ("token bucket", "jitter = \"2ms\"\nloss = \"1%\"\ntoken-bucket = { rate = \"10Mbit\", burst = \"3kB\", limit = \"100 packets\" }"),
+];
+
 #[cfg(test)]
 mod tests {
     use cohaptic_benches_common::mesh::SEED;
+    use cohaptic_scene::Scene;
 
     use super::*;
 
     /// The loop and the program do the same work: same packets, same motion. The loop adds up increments in another order, so positions agree to
     /// rounding: 1000 ticks of motions below 1 m, each rounded to 2^-53, in a damped system that forgets them.
+    fn compare(mesh: Mesh, bare: &bare::Outcome, scene: &Scene) {
+        let summary = Mesh::run(scene);
+        for (peer, position) in summary.peers.iter().zip(&bare.positions) {
+            assert!((peer.position[0] - position).abs() < 1e-11, "{mesh:?}: {} is not {position}", peer.position[0]);
+        }
+        assert!((summary.max_discrepancy - bare.max_discrepancy).abs() < 1e-11);
+        let delivered: u64 = summary.links.iter().map(|link| link.stats.delivered()).sum();
+        // The program also delivers what arrives after the last tick, up to the end of the scene.
+        let last_millisecond = (mesh.peers * mesh.peers) as u64;
+        assert!((bare.delivered..bare.delivered + last_millisecond).contains(&delivered), "{mesh:?}");
+    }
+
     #[test]
     fn the_bare_loop_and_the_program_agree() {
         for mesh in Mesh::ALL {
-            let bare = bare::run(mesh, 1000);
-            let summary = Mesh::run(&mesh.scene(1000, SEED));
-            for (peer, position) in summary.peers.iter().zip(&bare.positions) {
-                assert!((peer.position[0] - position).abs() < 1e-11, "{mesh:?}: {} is not {position}", peer.position[0]);
+            compare(mesh, &bare::run(mesh, 1000), &mesh.scene(1000, SEED));
+        }
+    }
+
+    /// The queue of the tables, in which nobody waits, and one that is full most of the time: 64 bytes take 10.24 ms, and come every 8 ms.
+    #[test]
+    fn the_bare_queue_and_that_of_the_program_agree() {
+        for mesh in Mesh::ALL.into_iter().filter(|mesh| mesh.impaired) {
+            for (queue, rate) in [(bare::Queue::OF_TABLES, "10Mbit"), (bare::Queue { service: 10_240_000, limit: 2 }, "50kbit")] {
+                let keys = format!("{}\nrate = \"{rate}\"\nqueue = {{ limit = \"{} packets\" }}", Mesh::IMPAIRMENTS, queue.limit);
+                compare(mesh, &bare::run_through(Some(queue), mesh, 1000), &mesh.scene_over(&keys, 1000, SEED));
             }
-            assert!((summary.max_discrepancy - bare.max_discrepancy).abs() < 1e-11);
-            let delivered: u64 = summary.links.iter().map(|link| link.stats.delivered()).sum();
-            // The program also delivers what arrives after the last tick, up to the end of the scene.
-            let last_millisecond = (mesh.peers * mesh.peers) as u64;
-            assert!((bare.delivered..bare.delivered + last_millisecond).contains(&delivered), "{mesh:?}");
         }
     }
 }

@@ -5,11 +5,12 @@
 use std::hint::black_box;
 use std::time::Duration;
 
+use cohaptic_benches::bare::Queue;
 use cohaptic_benches::effort::Effort;
 use cohaptic_benches::machine::{medians_in_turn, peak_memory, time};
 use cohaptic_benches::scaling::{THREADS, Window};
 use cohaptic_benches::watched::{Onlooker, with_all_measures};
-use cohaptic_benches::{Mesh, bare};
+use cohaptic_benches::{LINKS, Mesh, bare};
 use cohaptic_harness::measures::Measures;
 use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side};
 use cohaptic_peer::coordination::BuiltInStrategy;
@@ -60,6 +61,7 @@ fn main() -> Result<(), String> {
     // The most memory is that of all before.
     let memory = memory(work);
     one_run(work);
+    queues(work);
     many_runs(work);
     threads(work);
     measured_runs(work);
@@ -101,6 +103,45 @@ fn one_run(work: Work) {
     );
     println!("these scenes, all in one run: [measured-peers.md](measured-peers.md).");
     println!("The same cells as criterion benches: `cargo bench -p cohaptic-benches --bench mesh`.\n");
+}
+
+/// How many times as long a packet may take over such links as over those with jitter and loss.
+const ASKED_OF_LINKS: [(&str, f64); 3] = [("rate and queue", 1.6), ("chains", 1.2), ("CoDel", 4.0)];
+
+/// Links that have queues or memory, beside links without, in the program and, as far as they have one, in the bare loop.
+fn queues(work: Work) {
+    println!("## Queues and chains\n");
+    println!(
+        "The mesh above with jitter and loss, and over links that have a line of 10 Mbit/s with a queue of 100 packets besides, dropped from its tail (*rate and queue*) or by"
+    );
+    println!(
+        "CoDel, or gamma jitter with a correlation of 0.5 and Gilbert-Elliott loss (*chains*): processor time a packet offered, and as a multiple of jitter and loss. The"
+    );
+    println!(
+        "bare loop of the first two is the one above, with Lindley's recursion over departures for the queue. The median of {} rounds in which all alternate.\n",
+        work.rounds
+    );
+    println!("| peers | links | a packet \\[ns\\] | of jitter and loss | asked for | bare loop \\[ns\\] | ratio |");
+    println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: |");
+    for peers in [10, 50, 200] {
+        let square = (peers * peers) as u64;
+        let (mesh, ticks) = (Mesh { peers, impaired: true }, work.most * 20 / square / 8 * 8 + 400);
+        let packets = (ticks / 8 * (square - peers as u64)) as f64;
+        let keys = |name: &str| LINKS.iter().find(|(other, _)| *other == name).map_or("", |(_, keys)| keys);
+        let rows = [("jitter and loss", 1.0)].into_iter().chain(ASKED_OF_LINKS);
+        let scenes: Vec<Scene> = rows.clone().map(|(name, _)| mesh.scene_over(keys(name), ticks, 1)).collect();
+        let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
+        works.extend(scenes.iter().map(|scene| Box::new(move || drop(black_box(Mesh::run(scene)))) as Box<dyn Fn()>));
+        for queue in [None, Some(Queue::OF_TABLES)] {
+            works.push(Box::new(move || drop(black_box(bare::run_through(queue, mesh, ticks)))));
+        }
+        let nanos: Vec<f64> = medians_in_turn(&works, work.rounds).iter().map(|time| 1e9 * time.as_secs_f64() / packets).collect();
+        for (place, (name, asked)) in rows.enumerate() {
+            let bare = nanos[scenes.len()..].get(place).map_or("|".to_owned(), |bare| format!("{bare:.0} | {:.2}", nanos[place] / bare));
+            println!("| {peers} | {name} | {:.0} | {:.2} | {asked} | {bare} |", nanos[place], nanos[place] / nanos[0]);
+        }
+    }
+    println!();
 }
 
 /// Runs one after the other, and the same runs side by side.

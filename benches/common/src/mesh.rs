@@ -38,6 +38,9 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// The keys of impaired links beside the delay.
+    pub const IMPAIRMENTS: &str = "jitter = \"2ms\"\nloss = \"1%\"";
+
     /// The cells of the tables.
     pub const ALL: [Self; 6] = [
         Self { peers: 3, impaired: false },
@@ -65,16 +68,30 @@ impl Mesh {
     ///
     /// # Panics
     ///
-    /// If [`Mesh::text`] is no scene, which a test would show.
+    /// If it is no scene, which a test would show.
     #[must_use]
     pub fn scene(self, ticks: u64, seed: u64) -> Scene {
-        Scene::parse(&self.text(ticks, seed), "mesh.toml".as_ref(), &[]).expect("the mesh is a scene")
+        self.scene_over(self.keys(), ticks, seed)
+    }
+
+    /// The scene, of a number of ticks, with these keys of links beside the delay.
+    ///
+    /// # Panics
+    ///
+    /// If they are no keys of links.
+    #[must_use]
+    pub fn scene_over(self, links: &str, ticks: u64, seed: u64) -> Scene {
+        Scene::parse(&Self::text_over(self.peers, links, ticks, seed), "mesh.toml".as_ref(), &[]).expect("the mesh is a scene")
     }
 
     /// The scene as a file.
     #[must_use]
     pub fn text(self, ticks: u64, seed: u64) -> String {
-        Self::text_over(self.peers, if self.impaired { "jitter = \"2ms\"\nloss = \"1%\"" } else { "" }, ticks, seed)
+        Self::text_over(self.peers, self.keys(), ticks, seed)
+    }
+
+    const fn keys(self) -> &'static str {
+        if self.impaired { Self::IMPAIRMENTS } else { "" }
     }
 
     /// The scene of that number of peers as a file, with these keys of links beside the delay.
