@@ -16,7 +16,7 @@ use crate::context;
 pub struct AddressPlan {
     names: Vec<String>,
     current: Vec<Addresses>,
-    /// By number, from 1: who has the addresses of that number. Those behind the last one nobody has had.
+    /// By number, from 1: the host that has the addresses of that number. Those behind the last one no host has had.
     owners: Vec<Option<NodeId>>,
 }
 

@@ -27,9 +27,9 @@ const QUESTION: usize = 100;
 /// What the server does with a connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Work {
-    /// It writes so many octets at once.
+    /// It writes this number of octets at once.
     Gives(usize),
-    /// It answers so many questions, each with as many octets.
+    /// It answers this number of questions, each with as many octets.
     Answers(u32),
 }
 

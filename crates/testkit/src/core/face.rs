@@ -1,11 +1,11 @@
-//! What is read of the state without its lock: the time, and how often a program has called at one instant.
+//! The part of the state that is read without its lock: the time, and how often a program has called at one instant.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 
-/// The time, and the calls since it last passed. Whoever holds the state writes the time; a call that is lost between two threads counts for nothing.
+/// The time, and the calls since it last passed. The holder of the state writes the time; a call that is lost between two threads counts for nothing.
 #[derive(Debug)]
 pub(crate) struct Face {
     now: AtomicU64,
