@@ -1,6 +1,5 @@
 //! Names and addresses: which host has which.
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -17,9 +16,8 @@ use crate::context;
 pub struct AddressPlan {
     names: Vec<String>,
     current: Vec<Addresses>,
-    owners: BTreeMap<IpAddr, NodeId>,
-    /// The number of the next addresses that nobody has had.
-    next: u32,
+    /// By number, from 1: the host that has the addresses of that number. Those behind the last one no host has had.
+    owners: Vec<Option<NodeId>>,
 }
 
 /// The addresses of one host.
@@ -31,11 +29,20 @@ pub struct Addresses {
     pub v6: Ipv6Addr,
 }
 
+/// The addresses of number 0.
+const FIRST: (u32, u128) = (Ipv4Addr::new(10, 0, 0, 0).to_bits(), 0xfd00 << 112);
+
 impl Addresses {
     pub(crate) fn numbered(number: u32) -> Self {
-        Self {
-            v4: Ipv4Addr::from_bits(u32::from(Ipv4Addr::new(10, 0, 0, 0)) + number),
-            v6: Ipv6Addr::from_bits((0xfd00 << 112) + u128::from(number)),
+        Self { v4: Ipv4Addr::from_bits(FIRST.0 + number), v6: Ipv6Addr::from_bits(FIRST.1 + u128::from(number)) }
+    }
+
+    /// The number of an address, if it has one.
+    #[inline]
+    pub(crate) fn number(address: IpAddr) -> Option<u32> {
+        match address {
+            IpAddr::V4(v4) => v4.to_bits().checked_sub(FIRST.0),
+            IpAddr::V6(v6) => v6.to_bits().checked_sub(FIRST.1).and_then(|number| number.try_into().ok()),
         }
     }
 
@@ -57,7 +64,7 @@ impl Addresses {
 
 impl AddressPlan {
     pub(crate) fn new(names: Vec<String>) -> Self {
-        let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: BTreeMap::new(), next: 1 };
+        let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: Vec::new() };
         for host in 0..plan.names.len() {
             let addresses = plan.fresh(NodeId::new(host));
             plan.current.push(addresses);
@@ -66,18 +73,14 @@ impl AddressPlan {
     }
 
     fn fresh(&mut self, host: NodeId) -> Addresses {
-        let addresses = Addresses::numbered(self.next);
-        self.next += 1;
-        self.owners.insert(addresses.v4.into(), host);
-        self.owners.insert(addresses.v6.into(), host);
-        addresses
+        self.owners.push(Some(host));
+        Addresses::numbered(u32::try_from(self.owners.len()).unwrap_or(u32::MAX))
     }
 
     /// Gives a host addresses that nobody has had. Those that it had belong to nobody from now on.
     pub(crate) fn change(&mut self, host: NodeId) -> Addresses {
-        let before = self.current[host.index()];
-        self.owners.remove(&before.v4.into());
-        self.owners.remove(&before.v6.into());
+        let before = self.current[host.index()].v4.into();
+        self.owners.iter_mut().skip(Self::place(before)).take(1).for_each(|owner| *owner = None);
         let addresses = self.fresh(host);
         self.current[host.index()] = addresses;
         addresses
@@ -103,7 +106,7 @@ impl AddressPlan {
 
     /// Whether any host has or had that address.
     pub(crate) fn was_given(&self, address: IpAddr) -> bool {
-        (1..self.next).any(|number| Addresses::numbered(number).has(address))
+        Self::place(address) < self.owners.len()
     }
 
     pub(crate) fn node(&self, name: &str) -> Option<NodeId> {
@@ -111,7 +114,13 @@ impl AddressPlan {
     }
 
     pub(crate) fn owner_node(&self, address: IpAddr) -> Option<NodeId> {
-        self.owners.get(&address).copied()
+        self.owners.get(Self::place(address)).copied().flatten()
+    }
+
+    /// Where an address stands among the owners; behind them all if nobody can have had it.
+    #[inline]
+    fn place(address: IpAddr) -> usize {
+        Addresses::number(address).and_then(|number| number.checked_sub(1)).map_or(usize::MAX, |place| place as usize)
     }
 
     pub(crate) fn of(&self, host: NodeId) -> Addresses {

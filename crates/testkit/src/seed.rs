@@ -86,7 +86,8 @@ fn file(path: &str) -> String {
 /// The function of a type: that in which a closure stands, or the function itself.
 fn function(name: &str) -> String {
     let path = name.split('{').next().unwrap_or(name);
-    let identifiers: Vec<_> = path.split(|character: char| !character.is_alphanumeric() && character != '_').filter(|part| !part.is_empty()).collect();
+    let identifiers: Vec<_> =
+        path.split(|character: char| !character.is_alphanumeric() && character != '_').filter(|part| !part.is_empty()).collect();
     identifiers.join("::")
 }
 

@@ -5,7 +5,7 @@
 use std::future::{Future, poll_fn};
 use std::pin::{Pin, pin};
 use std::sync::Arc;
-use std::task::{Context, Poll};
+use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
 use cohaptic_units::Instant;
@@ -21,9 +21,8 @@ use crate::core::{Shared, TimerId};
 #[must_use]
 pub fn now() -> Instant {
     context::ask("time is known", |shared| {
-        let mut core = shared.lock();
-        core.note_call();
-        core.now()
+        shared.note_call();
+        shared.now()
     })
 }
 
@@ -35,7 +34,7 @@ pub fn now() -> Instant {
 #[must_use = "futures do nothing unless they are awaited"]
 pub fn sleep(span: Duration) -> Sleep {
     let shared = context::ask("time passes", Arc::clone);
-    let deadline = shared.lock().now().saturating_add(span);
+    let deadline = shared.now().saturating_add(span);
     Sleep { shared, deadline, timer: None }
 }
 
@@ -53,7 +52,14 @@ pub fn sleep_until(deadline: Instant) -> Sleep {
 pub struct Sleep {
     shared: Arc<Shared>,
     deadline: Instant,
-    timer: Option<TimerId>,
+    timer: Option<(TimerId, Registered)>,
+}
+
+/// The waker that a timer has, by the addresses of its parts. They are those of no other waker as long as the timer keeps it.
+type Registered = [usize; 2];
+
+fn registered(waker: &Waker) -> Registered {
+    [waker.data().addr(), std::ptr::from_ref(waker.vtable()).addr()]
 }
 
 impl Sleep {
@@ -70,7 +76,7 @@ impl Sleep {
 
     /// Waits until another instant from now on.
     pub fn reset(&mut self, deadline: Instant) {
-        if let Some(timer) = self.timer.take() {
+        if let Some((timer, _)) = self.timer.take() {
             self.shared.lock().timers.cancel(timer);
         }
         self.deadline = deadline;
@@ -88,18 +94,21 @@ impl Future for Sleep {
 
     fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<()> {
         let this = &mut *self;
-        let mut core = this.shared.lock();
-        if core.now() >= this.deadline {
-            match this.timer.take() {
-                Some(timer) => core.timers.cancel(timer),
-                // It has not waited.
-                None => core.note_call(),
+        if this.shared.now() >= this.deadline {
+            // The timer is gone: it goes off in the moment in which time passes to it. Without one it has not waited.
+            if this.timer.take().is_none() {
+                this.shared.note_call();
             }
             return Poll::Ready(());
         }
-        match this.timer {
-            Some(timer) => core.timers.renew(timer, cx.waker()),
-            None => this.timer = Some(core.timers.set(this.deadline, cx.waker().clone())),
+        let registered = registered(cx.waker());
+        match &mut this.timer {
+            Some((_, known)) if *known == registered => {}
+            Some((timer, known)) => {
+                this.shared.lock().timers.renew(*timer, cx.waker());
+                *known = registered;
+            }
+            None => this.timer = Some((this.shared.lock().timers.set(this.deadline, cx.waker().clone()), registered)),
         }
         Poll::Pending
     }
@@ -107,7 +116,7 @@ impl Future for Sleep {
 
 impl Drop for Sleep {
     fn drop(&mut self) {
-        if let Some(timer) = self.timer.take() {
+        if let Some((timer, _)) = self.timer.take() {
             self.shared.lock().timers.cancel(timer);
         }
     }
@@ -153,7 +162,7 @@ pub async fn timeout<F: Future>(span: Duration, future: F) -> Result<F::Output, 
 pub fn interval(period: Duration) -> Interval {
     assert!(!period.is_zero(), "an interval of no time would never let time pass; expected one longer than zero");
     let shared = context::ask("time passes", Arc::clone);
-    let next = shared.lock().now();
+    let next = shared.now();
     Interval { shared, next, period }
 }
 

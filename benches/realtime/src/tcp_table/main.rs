@@ -27,9 +27,9 @@ const QUESTION: usize = 100;
 /// What the server does with a connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Work {
-    /// It writes so many octets at once.
+    /// It writes this number of octets at once.
     Gives(usize),
-    /// It answers so many questions, each with as many octets.
+    /// It answers this number of questions, each with as many octets.
     Answers(u32),
 }
 
@@ -86,7 +86,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     long(most)?;
     questions(most)?;
     explain();
+    let load = fs::read_to_string("/proc/loadavg")?;
     println!("\nThe host of the virtual machine gave {:.1} % of the processors' time to others meanwhile.", before.stolen_since() * 100.0);
+    println!(
+        "The load of the machine was {} (the average of the last minute): above its number of cores, the router is late.",
+        load.split(' ').next().unwrap_or_default()
+    );
     Ok(())
 }
 
@@ -167,12 +172,22 @@ fn questions(most: u32) -> Result<(), Box<dyn Error>> {
 
 fn explain() {
     println!("## What makes the difference\n");
-    println!("- **Lateness.** The router is never early; how late it is, [measured-router.md](measured-router.md) tells. The test kit is exact.");
+    println!(
+        "- **Lateness.** The router is never early; how late it is, [measured-router.md](measured-router.md) tells. Packets of a link with jitter that leave"
+    );
+    println!("  late together leave in another order and in bursts, so that a busy machine makes Linux slower there. The test kit is exact.");
     println!("- **Ticks.** The kernel rounds its timers up to its ticks, of up to 4 ms, and its round trips to 1 ms on timestamps.");
     println!(
         "- **Large segments.** Between the kernel and the device one segment may stand for many packets. The router cuts it before the link and joins"
     );
-    println!("  what leaves together, so that a receiver acknowledges less often than the test kit's, which sees every packet.");
+    println!(
+        "  what leaves together, so that a receiver acknowledges less often than the test kit's, which sees every packet. The packets of one segment come in a"
+    );
+    println!("  burst, which a short queue (`limit 50`) drops.");
+    println!(
+        "- **Send buffers.** The test kit's counts octets, the kernel's the memory that holds them. Where a write of more than the buffer is cut, a segment that is not"
+    );
+    println!("  full may leave in the middle, and Nagle's algorithm holds the last one back for a round trip, in one of them and not in the other.");
     println!("- **HyStart.** Linux's CUBIC may leave slow start when round trips grow, before anything is lost. The test kit has no HyStart.");
     println!("- **Memory of a host.** *Kept* connections begin with the threshold of one before them, often one that lost packets at the beginning.");
     println!("- **Chance.** Links of both lose at random, not the same packets. With losses a row has the spread that its quartiles show.");

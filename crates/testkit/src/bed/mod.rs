@@ -366,8 +366,10 @@ where
     F: Future<Output = T> + 'static,
     T: 'static,
 {
+    let executor = Executor::new();
+    let mut core = core;
+    core.woken.trust(&executor.waker());
     let shared = Arc::new(Shared::new(core, Clock::Own));
-    let executor = Executor::default();
     let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
     watched.is_of(&shared);
     let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();

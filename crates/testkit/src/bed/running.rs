@@ -65,9 +65,8 @@ impl Bed {
     /// As [`time::now`](crate::time::now): if it is asked again and again without letting time pass.
     #[must_use]
     pub fn now(&self) -> Instant {
-        let mut core = self.shared.lock();
-        core.note_call();
-        core.now()
+        self.shared.note_call();
+        self.shared.now()
     }
 
     /// Starts a task that lives on no host: it survives all crashes, and binds sockets by [`Host::bind`].

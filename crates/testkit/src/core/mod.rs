@@ -1,25 +1,30 @@
 //! The hosts, their sockets and the network between them, as one state machine: it is told the time.
 
+mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
+mod face;
 mod passing;
 mod sockets;
 #[cfg(feature = "tcp")]
 mod tcp;
+mod waking;
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::task::Waker;
 
 use cohaptic_units::Instant;
-use cohaptic_units::print::Seconds;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
 use crate::address::{self, AddressPlan};
 use crate::file::LinkChange;
 use crate::trace::Happening;
 use crate::wire::{self, Recorded, Settings, Wire};
+use ends::{Ends, Kind};
+use face::Face;
 use sockets::Sockets;
+use waking::Woken;
 
 pub(crate) use passing::Outgoing;
 pub(crate) use sockets::{Datagram, SocketId};
@@ -29,7 +34,7 @@ pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
 pub(crate) struct Core {
     pub(crate) plan: AddressPlan,
     pub(crate) settings: Settings,
-    pub(crate) wire: Wire<Addresses>,
+    pub(crate) wire: Wire<Ends>,
     pub(crate) timers: Timers,
     #[cfg(feature = "quinn")]
     pub(crate) entropy: entropy::Entropy,
@@ -37,35 +42,11 @@ pub(crate) struct Core {
     sockets: Sockets,
     #[cfg(feature = "tcp")]
     tcp: tcp::Tcp,
-    /// To be woken when the state is not held any more.
-    pub(crate) woken: Vec<Waker>,
-    /// How often the program has called without waiting since time last passed.
-    calls: u64,
-    /// How often tasks were polled since it last passed, as far as they are counted here.
-    #[cfg(feature = "tokio")]
-    polled: u64,
+    pub(crate) woken: Woken,
+    face: Arc<Face>,
 }
 
-pub(crate) type Parcel = wire::Parcel<Addresses>;
-
-/// The two ends of a packet, and its kind.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Addresses {
-    from: std::net::SocketAddr,
-    to: std::net::SocketAddr,
-    kind: Kind,
-}
-
-/// What a packet is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Kind {
-    Datagram,
-    /// "There is no socket at that port", which IP tells a sender.
-    Unreachable,
-    /// A segment of TCP: the bytes are the whole IP packet.
-    #[cfg(feature = "tcp")]
-    Segment,
-}
+pub(crate) type Parcel = wire::Parcel<Ends>;
 
 impl Core {
     pub(crate) fn new(
@@ -78,6 +59,7 @@ impl Core {
         Self {
             plan: AddressPlan::new(names.to_vec()),
             wire: Wire::new(names, seed, &settings, changes, link),
+            face: Arc::new(Face::new(settings.patience)),
             settings,
             timers: Timers::default(),
             #[cfg(feature = "quinn")]
@@ -86,10 +68,7 @@ impl Core {
             sockets: Sockets::default(),
             #[cfg(feature = "tcp")]
             tcp: tcp::Tcp::new(seed, names.len()),
-            woken: Vec::new(),
-            calls: 0,
-            #[cfg(feature = "tokio")]
-            polled: 0,
+            woken: Woken::default(),
         }
     }
 
@@ -109,11 +88,7 @@ impl Core {
     /// Lets time pass: what arrives until then arrives, and then timers go off.
     pub(crate) fn pass(&mut self, now: Instant) {
         if self.wire.set_now(now) {
-            self.calls = 0;
-            #[cfg(feature = "tokio")]
-            {
-                self.polled = 0;
-            }
+            self.face.pass(now);
         }
         while self.wire.change_next() {
             self.take_arrivals();
@@ -135,35 +110,10 @@ impl Core {
         self.pass(now);
     }
 
-    /// The program asks for something that takes no time.
-    ///
-    /// # Panics
-    ///
-    /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass.
+    /// See [`Face::note_call`].
     #[inline]
-    pub(crate) fn note_call(&mut self) {
-        self.calls += 1;
-        if self.calls > self.settings.patience.saturating_mul(10) {
-            self.lose_patience();
-        }
-    }
-
-    #[cold]
-    #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
-    fn lose_patience(&mut self) -> ! {
-        // A value that is dropped while it unwinds may ask again.
-        self.calls = 0;
-        panic!(
-            "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass",
-            Seconds(self.now())
-        );
-    }
-
-    /// A task is polled; says whether time has stood still for too long.
-    #[cfg(feature = "tokio")]
-    pub(crate) const fn count_poll(&mut self) -> bool {
-        self.polled += 1;
-        self.polled > self.settings.patience
+    pub(crate) fn note_call(&self) {
+        self.face.note_call();
     }
 
     pub(crate) fn set_link(&mut self, path: Path, link: LinkModel) {
@@ -176,6 +126,7 @@ impl Core {
 pub(crate) struct Shared {
     core: Mutex<Core>,
     clock: Clock,
+    face: Arc<Face>,
 }
 
 /// The source of the time.
@@ -191,8 +142,30 @@ pub(crate) enum Clock {
 }
 
 impl Shared {
-    pub(crate) const fn new(core: Core, clock: Clock) -> Self {
-        Self { core: Mutex::new(core), clock }
+    pub(crate) fn new(core: Core, clock: Clock) -> Self {
+        Self { face: Arc::clone(&core.face), core: Mutex::new(core), clock }
+    }
+
+    /// The time.
+    #[inline]
+    pub(crate) fn now(&self) -> Instant {
+        match self.clock {
+            Clock::Own => self.face.now(),
+            #[cfg(feature = "tokio")]
+            Clock::Tokio { .. } => self.lock().now(),
+        }
+    }
+
+    /// See [`Face::note_call`].
+    #[inline]
+    pub(crate) fn note_call(&self) {
+        self.face.note_call();
+    }
+
+    /// See [`Face::count_poll`].
+    #[cfg(feature = "tokio")]
+    pub(crate) fn count_poll(&self) -> Option<u64> {
+        self.face.count_poll()
     }
 
     /// The time, unless the state is held: for a look from another thread.
@@ -256,11 +229,7 @@ impl std::ops::DerefMut for Guard<'_> {
 impl Drop for Guard<'_> {
     fn drop(&mut self) {
         let Some(mut core) = self.core.take() else { return };
-        if core.woken.is_empty() {
-            return;
-        }
-        // A waker may run anything, what asks for this state included: nobody may hold it then.
-        let woken = std::mem::take(&mut core.woken);
+        let Some(woken) = core.woken.take() else { return };
         drop(core);
         woken.into_iter().for_each(Waker::wake);
     }
@@ -300,9 +269,9 @@ impl Timers {
     }
 
     /// Takes out those that are due.
-    pub(crate) fn fire(&mut self, now: Instant, woken: &mut Vec<Waker>) {
+    pub(crate) fn fire(&mut self, now: Instant, woken: &mut Woken) {
         while let Some(first) = self.wakers.first_entry().filter(|first| first.key().0 <= now) {
-            woken.push(first.remove());
+            woken.wake(first.remove());
         }
     }
 }

@@ -6,7 +6,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use bytes::Bytes;
 use cohaptic_wan::{NodeId, Path};
 
-use super::{Addresses, Core, Datagram, Kind, Parcel, SocketId};
+use super::{Core, Datagram, Ends, Kind, Parcel, SocketId};
 use crate::trace::Lost;
 use crate::wire::Arrival;
 
@@ -58,7 +58,7 @@ impl Core {
             to.set_ip(loopback);
         }
         let from = SocketAddr::new(self.source(host, local.ip(), to.ip())?, local.port());
-        let addresses = Addresses { from, to, kind: Kind::Datagram };
+        let addresses = Ends::new(from, to, Kind::Datagram);
         let parcel = Parcel { addresses, bytes: outgoing.bytes, ecn_capable: outgoing.ecn_capable };
         if to.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
             if !may_broadcast {
@@ -138,12 +138,13 @@ impl Core {
         if state.is_down {
             return Err(Lost::HostDown);
         }
-        let ip = parcel.addresses.to.ip();
+        let (from_address, to_address) = (parcel.addresses.from(), parcel.addresses.to());
+        let ip = to_address.ip();
         let is_for_all = ip == IpAddr::V4(Ipv4Addr::BROADCAST);
         if !(is_for_all || ip.is_loopback() || self.plan.of(host).has(ip)) {
             return Err(Lost::NoSuchAddress);
         }
-        let Some(id) = self.socket_for(host, &parcel) else {
+        let Some(id) = self.socket_for(host, from_address, to_address) else {
             if parcel.addresses.kind == Kind::Datagram && !is_for_all {
                 self.tell_unreachable(host, from, &parcel);
             }
@@ -155,7 +156,7 @@ impl Core {
             Kind::Segment => {}
             // Only a connected socket is told, as with Linux: another one could not know of whom it speaks.
             Kind::Unreachable => {
-                if socket.peer == Some(parcel.addresses.from) {
+                if socket.peer == Some(from_address) {
                     socket.refused = true;
                     socket.wake_readers(&mut self.woken);
                 }
@@ -165,14 +166,7 @@ impl Core {
                     return Err(Lost::BufferFull);
                 }
                 socket.held += parcel.bytes.len();
-                socket.inbox.push_back(Datagram {
-                    from: parcel.addresses.from,
-                    bytes: parcel.bytes,
-                    at,
-                    ecn_capable: parcel.ecn_capable,
-                    marked,
-                    to: ip,
-                });
+                socket.inbox.push_back(Datagram { from: from_address, bytes: parcel.bytes, at, ecn_capable: parcel.ecn_capable, marked, to: ip });
                 socket.wake_readers(&mut self.woken);
             }
         }
@@ -181,15 +175,18 @@ impl Core {
 
     /// The socket of a host for which a packet is: one that is connected to its sender before one that is not, one that is bound to its address before one that
     /// is bound to all.
-    fn socket_for(&self, host: NodeId, parcel: &Parcel) -> Option<SocketId> {
-        let bound = self.hosts[host.index()].ports.get(&(parcel.addresses.to.is_ipv6(), parcel.addresses.to.port()))?;
+    fn socket_for(&self, host: NodeId, from: SocketAddr, to: SocketAddr) -> Option<SocketId> {
+        let bound = self.hosts[host.index()].ports.get(&(to.is_ipv6(), to.port()))?;
         let rank = |id: &&SocketId| {
             let socket = self.sockets.get(**id);
-            let at_address = socket.local.ip() == parcel.addresses.to.ip();
+            let at_address = socket.local.ip() == to.ip();
             let fits = at_address || socket.local.ip().is_unspecified();
-            let hears = socket.peer.is_none_or(|peer| peer == parcel.addresses.from);
+            let hears = socket.peer.is_none_or(|peer| peer == from);
             (fits && hears).then_some((socket.peer.is_some(), at_address))
         };
+        if let [id] = bound.as_slice() {
+            return rank(&id).map(|_| *id);
+        }
         bound.iter().filter(|id| rank(id).is_some()).max_by_key(rank).copied()
     }
 
@@ -197,7 +194,7 @@ impl Core {
     fn tell_unreachable(&mut self, host: NodeId, sender: NodeId, parcel: &Parcel) {
         // As long as that of ICMP (RFC 792): its header, and the header and the first eight bytes of what could not be delivered. The addresses say all that is
         // needed here.
-        let addresses = Addresses { from: parcel.addresses.to, to: parcel.addresses.from, kind: Kind::Unreachable };
+        let addresses = parcel.addresses.back(Kind::Unreachable);
         let answer = Parcel { addresses, bytes: Bytes::from_static(&[0; 36]), ecn_capable: false };
         if host == sender { self.hand_over(host, answer) } else { self.offer(Path { from: host, to: sender }, answer) }
     }

@@ -10,6 +10,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
 use super::Core;
+use super::waking::{Waiters, Woken};
 
 /// A socket, until it is closed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -39,7 +40,7 @@ pub(crate) struct SocketState {
     pub(super) inbox: VecDeque<Datagram>,
     /// The bytes of the datagrams in `inbox`.
     pub(super) held: usize,
-    readers: Vec<Waker>,
+    readers: Waiters,
     /// What IP told about something that was sent, until the program is told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
@@ -47,11 +48,11 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
-    pub(super) fn wake_readers(&mut self, woken: &mut Vec<Waker>) {
-        woken.append(&mut self.readers);
+    pub(super) fn wake_readers(&mut self, woken: &mut Woken) {
+        self.readers.wake(woken);
     }
 
-    pub(super) fn die(&mut self, at: Instant, woken: &mut Vec<Waker>) {
+    pub(super) fn die(&mut self, at: Instant, woken: &mut Woken) {
         self.died = Some(at);
         self.inbox.clear();
         self.held = 0;
@@ -106,7 +107,7 @@ impl Core {
             port => port,
         };
         let local = SocketAddr::new(ip, port);
-        let (readers, inbox) = (Vec::new(), VecDeque::new());
+        let (readers, inbox) = (Waiters::default(), VecDeque::new());
         let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
         let id = self.sockets.insert(state);
         self.hosts[host.index()].ports.entry((six, port)).or_default().push(id);
@@ -235,9 +236,6 @@ impl Core {
 
     /// Somebody wants to be woken when the socket becomes readable.
     pub(crate) fn wait_to_read(&mut self, id: SocketId, waker: &Waker) {
-        let readers = &mut self.sockets.get_mut(id).readers;
-        if !readers.iter().any(|known| known.will_wake(waker)) {
-            readers.push(waker.clone());
-        }
+        self.sockets.get_mut(id).readers.wait(waker);
     }
 }

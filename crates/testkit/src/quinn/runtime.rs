@@ -53,7 +53,7 @@ impl Runtime for OnHost {
     }
 
     fn now(&self) -> StdInstant {
-        to_std(self.shared.lock().now())
+        to_std(self.shared.now())
     }
 }
 

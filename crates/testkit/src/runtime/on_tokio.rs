@@ -11,8 +11,8 @@
 //!                let tokio jump: a timer of ours stands at the millisecond in which the next event is
 //! ```
 //!
-//! That all wait, tokio tells by the hook that it calls before it parks its thread. The hook only wakes a task of ours, the pump, which moves the clock; so tokio
-//! does not park then.
+//! That all wait, tokio tells by the hook that it calls before it parks its thread. The hook moves the clock, from event to event as long as none of them
+//! wakes a task; so tokio does not park then. Where tokio is to jump, the hook wakes a task of ours, the pump, which sets the timer.
 
 use std::cell::RefCell;
 use std::future::{Future, poll_fn};
@@ -46,8 +46,6 @@ struct Idle(Mutex<IdleState>);
 
 #[derive(Default)]
 struct IdleState {
-    /// All tasks wait.
-    is_idle: bool,
     /// The instant for which the pump has set its timer.
     armed: Option<Instant>,
     /// Wakes the pump.
@@ -61,17 +59,39 @@ impl Idle {
 
     /// Tokio is about to park its thread: all wait.
     fn notice(&self, shared: &Shared) {
-        let (now, next) = {
+        loop {
             let mut core = shared.lock();
-            (core.now(), core.next_event())
-        };
-        let mut state = self.lock();
-        if state.armed == Some(armed(next)) && step(now, next).is_none() {
-            return;
-        }
-        state.is_idle = true;
-        if let Some(pump) = &state.pump {
-            pump.wake_by_ref();
+            let (now, next) = (core.now(), core.next_event());
+            // Tokio has jumped over it.
+            let is_due = next.is_some_and(|next| next <= now);
+            if is_due {
+                core.pass(now);
+            }
+            if core.woken.is_any() {
+                return;
+            }
+            drop(core);
+            if is_due {
+                continue;
+            }
+            match step(now, next) {
+                Some(to) => {
+                    advance(to.saturating_duration_since(now));
+                    if floor(to) == to {
+                        // What tokio has for this millisecond goes off first.
+                        return;
+                    }
+                }
+                None => {
+                    let state = self.lock();
+                    if state.armed != Some(armed(next))
+                        && let Some(pump) = &state.pump
+                    {
+                        pump.wake_by_ref();
+                    }
+                    return;
+                }
+            }
         }
     }
 }
@@ -116,9 +136,7 @@ impl Spawner for Local {
         self.set.spawn_local(poll_fn(move |cx| {
             // Tokio would keep a panic until the task is joined; a test is to fail.
             let poll = || {
-                let is_too_often = shared.lock().count_poll();
-                if is_too_often {
-                    let patience = shared.lock().settings.patience;
+                if let Some(patience) = shared.count_poll() {
                     time_stands_still(&shared, patience, Some(&task));
                 }
                 task.poll(cx)
@@ -216,7 +234,7 @@ where
     }))
 }
 
-/// Moves the clock.
+/// Sets the timer to which tokio may jump, and tells when nothing will ever happen.
 async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::Instant) {
     let mut timer = pin!(tokio::time::sleep_until(origin + NEVER));
     let mut deadline = origin + NEVER;
@@ -246,13 +264,6 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
                     };
                     timer.as_mut().reset(deadline);
                 }
-                if std::mem::take(&mut state.is_idle)
-                    && let Some(to) = step(now, next)
-                {
-                    drop(state);
-                    advance(cx, to.saturating_duration_since(now));
-                    continue;
-                }
             }
             if timer.as_mut().poll(cx).is_ready() {
                 if next.is_none() {
@@ -268,9 +279,9 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
     .await
 }
 
-/// Moves tokio's clock, now.
-fn advance(cx: &mut Context<'_>, span: Duration) {
+/// Moves tokio's clock, now. Tokio does not park before it has looked at its timers.
+fn advance(span: Duration) {
     // It moves the clock when it is polled first, and then only lets others go first.
     let mut moved = pin!(tokio::time::advance(span));
-    let _: Poll<()> = Pin::as_mut(&mut moved).poll(cx);
+    let _: Poll<()> = Pin::as_mut(&mut moved).poll(&mut Context::from_waker(Waker::noop()));
 }

@@ -7,7 +7,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::rc::Rc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Wake, Waker};
 
@@ -16,15 +16,24 @@ use cohaptic_units::print::Seconds;
 use crate::core::Shared;
 use crate::task::{Named, Spawner, Task, Tasks};
 
-/// The tasks that can go on.
+thread_local! {
+    /// The tasks that can go on of the executor that runs on this thread, and its number.
+    static HERE: (Cell<u64>, RefCell<VecDeque<usize>>) = const { (Cell::new(0), RefCell::new(VecDeque::new())) };
+}
+
+/// The tasks that other threads have woken.
 #[derive(Default)]
-struct Ready(Mutex<VecDeque<Arc<Place>>>);
+struct Elsewhere {
+    is_any: AtomicBool,
+    numbers: Mutex<Vec<usize>>,
+}
 
 /// Where a task is.
 struct Place {
     number: usize,
     is_queued: AtomicBool,
-    ready: Arc<Ready>,
+    executor: u64,
+    elsewhere: Arc<Elsewhere>,
 }
 
 impl Wake for Place {
@@ -33,16 +42,27 @@ impl Wake for Place {
     }
 
     fn wake_by_ref(self: &Arc<Self>) {
-        if !self.is_queued.swap(true, Ordering::Relaxed) {
-            self.ready.0.lock().unwrap_or_else(PoisonError::into_inner).push_back(Arc::clone(self));
+        let is_here = HERE.try_with(|(executor, ready)| {
+            let is_here = executor.get() == self.executor;
+            // What another thread does meanwhile to the mark polls the task once in vain, and not too seldom.
+            if is_here && !self.is_queued.load(Ordering::Relaxed) {
+                self.is_queued.store(true, Ordering::Relaxed);
+                ready.borrow_mut().push_back(self.number);
+            }
+            is_here
+        });
+        if is_here != Ok(true) && !self.is_queued.swap(true, Ordering::Relaxed) {
+            self.elsewhere.numbers.lock().unwrap_or_else(PoisonError::into_inner).push(self.number);
+            self.elsewhere.is_any.store(true, Ordering::Relaxed);
         }
     }
 }
 
 /// The executor.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub(crate) struct Executor {
-    ready: Arc<Ready>,
+    number: u64,
+    elsewhere: Arc<Elsewhere>,
     slots: Rc<RefCell<Vec<Option<Slot>>>>,
     free: Rc<RefCell<Vec<usize>>>,
     last: Rc<Cell<usize>>,
@@ -51,6 +71,7 @@ pub(crate) struct Executor {
 #[derive(Clone)]
 struct Slot {
     task: Rc<Task>,
+    place: Arc<Place>,
     waker: Waker,
 }
 
@@ -61,15 +82,29 @@ impl Spawner for Executor {
             slots.push(None);
             slots.len() - 1
         });
-        let place = Arc::new(Place { number, is_queued: AtomicBool::new(false), ready: Arc::clone(&self.ready) });
+        let place = self.place(number);
         let waker = Waker::from(Arc::clone(&place));
-        slots[number] = Some(Slot { task, waker });
-        drop(slots);
-        place.wake();
+        waker.wake_by_ref();
+        slots[number] = Some(Slot { task, place, waker });
     }
 }
 
 impl Executor {
+    pub(crate) fn new() -> Self {
+        static NUMBERS: AtomicU64 = AtomicU64::new(1);
+        let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
+        Self { number, elsewhere: Arc::default(), slots: Rc::default(), free: Rc::default(), last: Rc::default() }
+    }
+
+    fn place(&self, number: usize) -> Arc<Place> {
+        Arc::new(Place { number, is_queued: AtomicBool::new(false), executor: self.number, elsewhere: Arc::clone(&self.elsewhere) })
+    }
+
+    /// A waker as tasks have: it only notes that a task goes on, and calls nothing.
+    pub(crate) fn waker(&self) -> Waker {
+        Waker::from(self.place(usize::MAX))
+    }
+
     /// Polls tasks and lets time pass until `is_over`.
     ///
     /// # Panics
@@ -77,7 +112,11 @@ impl Executor {
     /// If nothing will ever happen any more, or if time cannot pass because tasks are polled again and again.
     pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
         let patience = shared.lock().settings.patience;
-        let (mut polls, mut woken) = (0, Vec::new());
+        let mut polls = 0;
+        HERE.with(|(executor, ready)| {
+            executor.set(self.number);
+            ready.borrow_mut().clear();
+        });
         while !is_over() {
             tasks.turns();
             if self.poll_one() {
@@ -96,21 +135,21 @@ impl Executor {
                 polls = 0;
             }
             core.pass(next);
-            // As the guard does it, without a new list each time.
-            std::mem::swap(&mut core.woken, &mut woken);
-            drop(core);
-            woken.drain(..).for_each(Waker::wake);
         }
     }
 
     /// Polls the task that has waited longest; says whether there was one.
     fn poll_one(&self) -> bool {
-        let Some(place) = self.ready.0.lock().unwrap_or_else(PoisonError::into_inner).pop_front() else { return false };
-        place.is_queued.store(false, Ordering::Relaxed);
-        let number = place.number;
+        if self.elsewhere.is_any.load(Ordering::Relaxed) {
+            self.elsewhere.is_any.store(false, Ordering::Relaxed);
+            let numbers = std::mem::take(&mut *self.elsewhere.numbers.lock().unwrap_or_else(PoisonError::into_inner));
+            HERE.with(|(_, ready)| ready.borrow_mut().extend(numbers));
+        }
+        let Some(number) = HERE.with(|(_, ready)| ready.borrow_mut().pop_front()) else { return false };
         self.last.set(number);
         // The task may start others while it is polled, which get other places.
-        let Some(slot) = self.slots.borrow_mut()[number].take() else { return true };
+        let Some(slot) = self.slots.borrow_mut().get_mut(number).and_then(Option::take) else { return true };
+        slot.place.is_queued.store(false, Ordering::Relaxed);
         // A place that was given to another task wakes that one in vain, once.
         if slot.task.poll(&mut Context::from_waker(&slot.waker)).is_ready() {
             self.free.borrow_mut().push(number);

@@ -50,7 +50,7 @@ fn refusals_count_from_the_syns_of_what_they_refuse() {
         lines,
         [
             "0.05 s  b -> a  packet 0 is RST|ACK 81 > 49152, sequence 0, 0 octets, acknowledges 1, window 0",
-            "0.65 s  b -> a  packet 2 is RST 80 > 49153, sequence 1, 0 octets, window 0",
+            "0.55 s  b -> a  packet 2 is RST 80 > 49153, sequence 1, 0 octets, window 0",
         ]
     );
 }

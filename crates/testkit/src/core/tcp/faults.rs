@@ -22,7 +22,7 @@ impl Core {
             let listener = self.tcp.listeners.get_mut(id.0);
             (listener.half_open, listener.waiting, listener.gone) = Default::default();
             listener.gone = Some(gone);
-            self.woken.append(&mut listener.wakers);
+            listener.wakers.wake(&mut self.woken);
             let hold = listener.hold;
             self.tcp.ports.release(hold);
         }
@@ -32,9 +32,8 @@ impl Core {
             end.listener = None;
             silence(&mut end.machine, gone.at);
             let hold = end.hold.take();
-            let (mut readers, mut writers) = (std::mem::take(&mut end.readers), std::mem::take(&mut end.writers));
-            self.woken.append(&mut readers);
-            self.woken.append(&mut writers);
+            end.readers.wake(&mut self.woken);
+            end.writers.wake(&mut self.woken);
             self.tcp.set_timer(id, None);
             self.tcp.unroute(id);
             hold.into_iter().for_each(|hold| self.tcp.ports.release(hold));
@@ -51,8 +50,7 @@ impl Core {
         for id in self.listeners_of(host) {
             let listener = self.tcp.listeners.get_mut(id.0);
             if listener.gone.replace(gone).is_none() {
-                let mut wakers = std::mem::take(&mut listener.wakers);
-                self.woken.append(&mut wakers);
+                listener.wakers.wake(&mut self.woken);
                 self.stop_listening(id);
             }
         }
@@ -62,10 +60,9 @@ impl Core {
                 continue;
             }
             end.gone = Some(gone);
-            let (mut readers, mut writers) = (std::mem::take(&mut end.readers), std::mem::take(&mut end.writers));
+            end.readers.wake(&mut self.woken);
+            end.writers.wake(&mut self.woken);
             end.machine.close(gone.at);
-            self.woken.append(&mut readers);
-            self.woken.append(&mut writers);
             self.after_call(id);
         }
     }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use cohaptic_tcp::{Connection, Segment, TcpConfig};
 use cohaptic_wan::NodeId;
 
+use super::super::waking::Waiters;
 use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener};
 use crate::trace::Lost;
 
@@ -37,7 +38,7 @@ impl Core {
             backlog,
             half_open: BTreeSet::new(),
             waiting: VecDeque::new(),
-            wakers: Vec::new(),
+            wakers: Waiters::default(),
             hold,
             gone: None,
         }));
@@ -131,7 +132,7 @@ impl Core {
         let listener = self.tcp.listeners.get_mut(id.0);
         if listener.half_open.remove(&conn) {
             listener.waiting.push_back(conn);
-            self.woken.append(&mut listener.wakers);
+            listener.wakers.wake(&mut self.woken);
         }
     }
 
@@ -148,7 +149,7 @@ impl Core {
 
     /// A task wants to be woken when there is a connection to take.
     pub(crate) fn wait_to_accept(&mut self, id: ListenId, waker: &Waker) {
-        super::program::wait(&mut self.tcp.listeners.get_mut(id.0).wakers, waker);
+        self.tcp.listeners.get_mut(id.0).wakers.wait(waker);
     }
 
     pub(crate) fn listener_address(&self, id: ListenId) -> SocketAddr {

@@ -14,7 +14,6 @@ mod waits;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{IpAddr, SocketAddr};
-use std::task::Waker;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -24,6 +23,7 @@ use cohaptic_wan::NodeId;
 
 use super::Core;
 use super::entropy::Entropy;
+use super::waking::Waiters;
 use slots::Slots;
 
 pub(crate) use listeners::Inherited;
@@ -70,8 +70,8 @@ pub(super) struct Tcp {
 struct End {
     host: NodeId,
     machine: Connection,
-    readers: Vec<Waker>,
-    writers: Vec<Waker>,
+    readers: Waiters,
+    writers: Waiters,
     /// A stream of a program is this end.
     is_held: bool,
     /// The last write found the buffer full, or the handshake is not over.
@@ -109,7 +109,7 @@ struct Listener {
     backlog: usize,
     half_open: BTreeSet<ConnId>,
     waiting: VecDeque<ConnId>,
-    wakers: Vec<Waker>,
+    wakers: Waiters,
     hold: HoldId,
     gone: Option<Gone>,
 }
@@ -144,8 +144,8 @@ impl Tcp {
         let id = ConnId(self.connections.insert(Box::new(End {
             host,
             machine,
-            readers: Vec::new(),
-            writers: Vec::new(),
+            readers: Waiters::default(),
+            writers: Waiters::default(),
             is_held: false,
             is_write_blocked: true,
             linger: None,

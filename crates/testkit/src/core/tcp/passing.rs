@@ -5,7 +5,7 @@ use cohaptic_tcp::{Ecn, Flags, Segment, State};
 use cohaptic_wan::{NodeId, Path};
 
 use super::{ConnId, Core};
-use crate::core::{Addresses, Kind, Parcel};
+use crate::core::{Ends, Kind, Parcel};
 use crate::trace::{Happening, Lost, PacketName};
 
 impl Core {
@@ -58,7 +58,7 @@ impl Core {
         let Some(receiver) = self.plan.owner_node(to).filter(|_| self.plan.of(host).has(from)) else { return };
         let path = Path { from: host, to: receiver };
         let packet = self.wire.next_packet(path);
-        let addresses = Addresses { from: segment.source, to: segment.destination, kind: Kind::Segment };
+        let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
         let parcel = Parcel { addresses, bytes: segment.to_packet().into(), ecn_capable: segment.ecn != Ecn::NotCapable };
         // Over a way that is cut it is lost, as others are.
         let _ = self.wire.offer(path, parcel);
@@ -108,11 +108,11 @@ impl Core {
         }
         let end = self.tcp.connections.get_mut(id.0);
         if !end.readers.is_empty() && end.machine.is_readable() {
-            self.woken.append(&mut end.readers);
+            end.readers.wake(&mut self.woken);
         }
         if end.is_write_blocked && end.machine.is_writable() {
             end.is_write_blocked = false;
-            self.woken.append(&mut end.writers);
+            end.writers.wake(&mut self.woken);
         }
         let (state, listener) = (end.machine.state(), end.listener);
         let due = if state == State::TimeWait { None } else { end.machine.poll_timeout() };

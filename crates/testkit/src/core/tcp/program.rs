@@ -11,13 +11,6 @@ use cohaptic_wan::NodeId;
 
 use super::{ConnId, Core, End, Gone};
 
-/// Adds a task to those that wait, once.
-pub(super) fn wait(wakers: &mut Vec<Waker>, waker: &Waker) {
-    if !wakers.iter().any(|known| known.will_wake(waker)) {
-        wakers.push(waker.clone());
-    }
-}
-
 impl End {
     /// An error as programs see it.
     fn explain(&self, error: Error) -> io::Error {
@@ -142,12 +135,12 @@ impl Core {
 
     /// A task wants to be woken when the connection can be read.
     pub(crate) fn wait_to_read_from(&mut self, id: ConnId, waker: &Waker) {
-        wait(&mut self.tcp.end_mut(id).readers, waker);
+        self.tcp.end_mut(id).readers.wait(waker);
     }
 
     /// A task wants to be woken when the connection can be written, or is established.
     pub(crate) fn wait_to_write_to(&mut self, id: ConnId, waker: &Waker) {
-        wait(&mut self.tcp.end_mut(id).writers, waker);
+        self.tcp.end_mut(id).writers.wait(waker);
     }
 
     /// The error that the next call would give otherwise.

@@ -58,6 +58,9 @@ impl Core {
     /// The timers that are due go off, in the order of hosts and connections.
     pub(in crate::core) fn fire_tcp_timers(&mut self) {
         let now = self.now();
+        if self.tcp.timers.first().is_none_or(|(at, ..)| *at > now) {
+            return;
+        }
         // Tokio's clock may have jumped to a timer of its own: connections that are stuck stay so until a program calls.
         if self.wire.next().is_none() && self.timers.next().is_none() && self.is_stuck() {
             return;

@@ -1,0 +1,77 @@
+//! The part of the state that is read without its lock: the time, and how often a program has called at one instant.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
+
+/// The time, and the calls since it last passed. The holder of the state writes the time; a call that is lost between two threads counts for nothing.
+#[derive(Debug)]
+pub(crate) struct Face {
+    now: AtomicU64,
+    calls: AtomicU64,
+    /// How often tasks were polled since it last passed, as far as they are counted here.
+    #[cfg(feature = "tokio")]
+    polled: AtomicU64,
+    /// How often tasks may be polled at one instant; calls may be ten times as many.
+    patience: u64,
+}
+
+impl Face {
+    pub(super) const fn new(patience: u64) -> Self {
+        Self {
+            now: AtomicU64::new(0),
+            calls: AtomicU64::new(0),
+            #[cfg(feature = "tokio")]
+            polled: AtomicU64::new(0),
+            patience,
+        }
+    }
+
+    #[inline]
+    pub(crate) fn now(&self) -> Instant {
+        Instant::from_nanos(self.now.load(Ordering::Relaxed))
+    }
+
+    /// Time passes.
+    #[inline]
+    pub(super) fn pass(&self, now: Instant) {
+        self.now.store(now.as_nanos(), Ordering::Relaxed);
+        self.calls.store(0, Ordering::Relaxed);
+        #[cfg(feature = "tokio")]
+        self.polled.store(0, Ordering::Relaxed);
+    }
+
+    /// A task is polled. Gives the patience if time has stood still for too long.
+    #[cfg(feature = "tokio")]
+    pub(super) fn count_poll(&self) -> Option<u64> {
+        let polled = self.polled.load(Ordering::Relaxed) + 1;
+        self.polled.store(polled, Ordering::Relaxed);
+        (polled > self.patience).then_some(self.patience)
+    }
+
+    /// The program asks for something that takes no time.
+    ///
+    /// # Panics
+    ///
+    /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass.
+    #[inline]
+    pub(crate) fn note_call(&self) {
+        let calls = self.calls.load(Ordering::Relaxed) + 1;
+        self.calls.store(calls, Ordering::Relaxed);
+        if calls > self.patience.saturating_mul(10) {
+            self.lose_patience();
+        }
+    }
+
+    #[cold]
+    #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
+    fn lose_patience(&self) -> ! {
+        // A value that is dropped while it unwinds may ask again.
+        self.calls.store(0, Ordering::Relaxed);
+        panic!(
+            "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass",
+            Seconds(self.now())
+        );
+    }
+}
