@@ -50,6 +50,7 @@ mod scene_radius;
 mod spectrum;
 mod stack_frame;
 mod structure;
+mod switching;
 mod timetable;
 mod turning;
 mod unseen;
@@ -76,6 +77,7 @@ pub use proof::{
 };
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
+pub use switching::{GrowingMotion, Switching, SwitchingError, SwitchingMotion, prove_switching};
 pub use watch::{Limits, Unwatched, Watch};
 pub use worst_case::{
     Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Links, Pattern, PatternError, Patterns, SceneWorstCase,

@@ -191,6 +191,25 @@ fn losing_together_the_parts_are_the_whole() {
     }
 }
 
+/// The parts have the same size at any number of equal peers, and are the whole.
+#[test]
+fn losing_together_any_number_of_equal_peers_costs_the_same() {
+    let patterns = patterns(2, None, Links::Together);
+    let sizes = |count: usize| {
+        let parts = prepared(&scene(&[&format!("scene.count={count}"), "coordination.stiffness=300"]), &patterns, true);
+        parts.searches.iter().map(|search| (search.automaton.size(), search.automaton.matrices().len())).collect::<Vec<_>>()
+    };
+    assert!(sizes(3).len() == 2 && [10, 50, 200].iter().all(|count| sizes(*count) == sizes(3)));
+    let ten = scene(&["scene.count=10", "coordination.stiffness=300"]);
+    let (parts, whole) = (prepared(&ten, &patterns, true), prepared(&ten, &patterns, false));
+    for cycle in [&[0, 1][..], &[0, 0, 1], &[0, 1, 1]] {
+        let (one, other) = (radius_along(&parts, cycle), radius_along(&whole, cycle));
+        assert!((one - other).abs() < 1e-8 * one.max(1.0), "{cycle:?}: {one} {other}");
+    }
+    let many = worst_case(&scene(&["scene.count=200", "coordination.stiffness=300"]), &patterns, &Effort::default()).unwrap();
+    assert!(many.verdict() != WorstVerdict::Undecided && many.upper - many.lower < 0.01 * many.lower, "{many:?}");
+}
+
 /// The second moment under losses of all links together, each frame by itself with that probability: the radius of the mean of A ⊗ A.
 fn mean_square(prepared: &Prepared, chance: f64) -> f64 {
     let of = |automaton: &Automaton| {
