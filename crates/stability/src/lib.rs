@@ -34,6 +34,7 @@ mod error;
 mod family;
 mod full;
 mod graph;
+mod inequality;
 mod judgement;
 mod lifted;
 mod linear_form;

@@ -35,13 +35,11 @@
 //!
 //! What is found is checked with bounds of all rounding errors. Where nothing is found a motion that grows is looked for.
 
-mod barrier;
 mod contact_frame;
 mod growing;
-mod inequality;
+mod products;
 #[cfg(test)]
 mod tests;
-mod verified;
 
 pub use growing::GrowingMotion;
 
@@ -52,7 +50,8 @@ use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
 use self::contact_frame::{Contact, ContactFrame, Kind};
-use self::inequality::{Group, Inequality, PartFrame, Solution};
+use self::products::{Group, PartFrame, inequality};
+use crate::inequality::{Inequality, rate, search};
 use crate::lifted::{Lifted, Node};
 use crate::network::NominalNetwork;
 use crate::parts::lifted_part;
@@ -247,8 +246,7 @@ fn of_axis(
     let nodes = walled(&along, structure.nodes(along.scene));
     let asked = Asked::of(&along, &structure, &nodes, watch)?;
     let takes_rest = asked.takes_rest();
-    let proven =
-        asked.inequality().and_then(|inequality| barrier::search(&inequality, watch, |solution: &Solution| verified::rate(&inequality, solution)));
+    let proven = asked.inequality().and_then(|inequality| search(&inequality, watch, |solution| rate(&inequality, solution)));
     if watch.stops() {
         return Err(AnalysisError::Stopped.into());
     }
@@ -324,7 +322,7 @@ impl Asked {
     fn inequality(&self) -> Option<Inequality> {
         let parts: Vec<PartFrame<'_>> =
             self.frames.iter().map(|(frame, groups, is_apart)| PartFrame { frame, groups, is_apart: *is_apart }).collect();
-        self.rest_is_stable.then(|| Inequality::of(&parts, &self.groups)).flatten()
+        self.rest_is_stable.then(|| inequality(&parts, &self.groups)).flatten()
     }
 }
 

@@ -2,8 +2,8 @@
 
 use cohaptic_scene::Scene;
 
-use super::inequality::{Part, Row};
 use super::*;
+use crate::inequality::{Measured, Part, Row, Solution};
 use crate::{Unwatched, Verdict, analyse};
 
 const PUSHED: &str = r#"
@@ -136,8 +136,8 @@ fn value(row: &Row, unknowns: &[f64]) -> f64 {
     row.entries.iter().zip(unknowns).map(|(by, value)| by * value).sum()
 }
 
-fn norm(shape: &Matrix, part: &Part, places: &[usize], unknowns: &[f64]) -> f64 {
-    let values: Vec<f64> = places.iter().map(|place| value(&part.rows[*place], unknowns)).collect();
+fn norm(shape: &Matrix, part: &Part, of: &Measured, unknowns: &[f64]) -> f64 {
+    let values: Vec<f64> = of.rows.iter().map(|place| value(&part.rows[*place], unknowns)).collect();
     shape.times_column(&values).iter().zip(&values).map(|(one, other)| one * other).sum()
 }
 
@@ -147,7 +147,7 @@ fn motions_keep_to_the_products_and_to_the_rate() {
     for overrides in STABLE {
         let mut pressed = 0;
         let (parts, inequality) = asked(&scene(overrides));
-        let (solution, rate) = barrier::search(&inequality, &Unwatched, |solution| verified::rate(&inequality, solution)).unwrap();
+        let (solution, rate) = search(&inequality, &Unwatched, |solution| rate(&inequality, solution)).unwrap();
         assert!(rate < 1.0);
         for ((part, frame), shape) in inequality.parts.iter().zip(&parts).zip(&solution.shapes) {
             for beginning in [0.3, 1.7, 2.4, 4.1, 5.9] {
@@ -160,7 +160,7 @@ fn motions_keep_to_the_products_and_to_the_rate() {
                         assert!(if equal { found.abs() <= 1e-12 * size } else { found >= -1e-12 * size }, "{overrides:?}: {found} {product:?}");
                         pressed += usize::from(one != 0.0 && other != 0.0);
                     }
-                    let [before, after] = [&part.before, &part.after].map(|places| norm(shape, part, places, &unknowns));
+                    let [before, after] = [&part.before, &part.after].map(|of| norm(shape, part, of, &unknowns));
                     assert!(after <= rate * rate * before * (1.0 + 1e-9) + 1e-20, "{overrides:?}: {after} after {before}, {rate}");
                 }
             }
@@ -173,11 +173,11 @@ fn motions_keep_to_the_products_and_to_the_rate() {
 #[test]
 fn shapes_and_multipliers_that_are_changed_are_refused() {
     let (_, inequality) = asked(&scene(&[]));
-    let (solution, _) = barrier::search(&inequality, &Unwatched, |solution| verified::rate(&inequality, solution)).unwrap();
+    let (solution, _) = search(&inequality, &Unwatched, |solution| rate(&inequality, solution)).unwrap();
     let refused = |change: &dyn Fn(&mut Solution)| {
         let mut changed = solution.clone();
         change(&mut changed);
-        verified::rate(&inequality, &changed).is_none()
+        rate(&inequality, &changed).is_none()
     };
     assert!(!refused(&|_| {}));
     assert!(refused(&|changed| changed.shapes[0] = changed.shapes[0].scaled(30.0)));
@@ -188,7 +188,7 @@ fn shapes_and_multipliers_that_are_changed_are_refused() {
     assert!(refused(&|changed| changed.multipliers[signed] = -1e-12));
     let mut wide = inequality.clone();
     wide.parts[0].rows.iter_mut().filter(|row| row.error > 0.0).for_each(|row| row.error = 0.05);
-    assert!(verified::rate(&wide, &solution).is_none());
+    assert!(rate(&wide, &solution).is_none());
 }
 
 /// Every combination of contacts is stable, and a motion that opens and closes one grows.

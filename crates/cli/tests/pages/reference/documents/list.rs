@@ -157,6 +157,8 @@ pub(super) const DOCUMENTS: [Document; 21] = [
         lines: &[
             "cohaptic stability point scenarios/network/loss-independent.toml --json",
             "cohaptic stability point scenarios/paper/5-1-pd-1000.toml --losses-in-a-row 1 --json",
+            "cohaptic stability point scenarios/network/push-contact.toml --switching --json",
+            "cohaptic stability point scenarios/counterexamples/two-fingers.toml --switching --json",
         ],
         rows: &[
             ("title", "of the scene"),

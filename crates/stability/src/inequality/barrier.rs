@@ -1,4 +1,4 @@
-//! The search for shapes and multipliers: the method of barriers. Nothing here has to be right: what it finds is checked ([`super::verified`]).
+//! The search for shapes and multipliers by the method of barriers. Nothing here has to be right: what it finds is checked ([`super::verified`]).
 //!
 //! The margin t of −M(V, m) >= t·I is made as large as it goes, with V > 0, m > 0 and a bound of the sum of all, from the minimum of
 //!
@@ -8,7 +8,7 @@
 //!
 //! for a growing η (Nesterov & Nemirovskii 1994). With W = S⁻¹, the derivatives of −ln det S along sums of (u·vᵀ + v·uᵀ)/2 take nothing but the numbers uᵀWv.
 
-use super::inequality::{Inequality, Part, Solution};
+use super::{Inequality, Measured, Part, Solution};
 use crate::worst_case::rounding::real;
 use crate::worst_case::symmetric::{cholesky, solve, triangle_inverse};
 use crate::{Matrix, Watch};
@@ -23,7 +23,7 @@ const CENTRED: f64 = 0.2;
 const NOTHING: f64 = 1e-7;
 
 /// Searches until `checked` accepts; `None` if the watch ends it or nothing is left to find.
-pub(super) fn search<T>(inequality: &Inequality, watch: &dyn Watch, checked: impl Fn(&Solution) -> Option<T>) -> Option<(Solution, T)> {
+pub(crate) fn search<T>(inequality: &Inequality, watch: &dyn Watch, checked: impl Fn(&Solution) -> Option<T>) -> Option<(Solution, T)> {
     let barrier = Barrier::new(inequality);
     let mut point = barrier.start();
     let mut pull = 1.0;
@@ -74,50 +74,50 @@ impl<'a> Barrier<'a> {
     fn new(inequality: &'a Inequality) -> Self {
         let mut first = Vec::new();
         let mut next = 0;
-        for part in &inequality.parts {
+        for size in &inequality.shapes {
             first.push(next);
-            let size = part.before.len();
             next += size * (size + 1) / 2;
         }
         let multipliers = next;
-        let slopes = inequality.parts.iter().zip(&first).map(|(part, first)| {
-            let shape = upper(part.before.len()).enumerate().map(|(number, (i, j))| {
-                let by = if i == j { 1.0 } else { 2.0 };
-                (first + number, vec![(by, part.after[i], part.after[j]), (-by, part.before[i], part.before[j])])
-            });
-            let mut all: Vec<(usize, Slope)> = shape.collect();
-            for product in &part.products {
-                let number = multipliers + product.multiplier;
-                let term = (product.weight, product.factors[0], product.factors[1]);
-                match all.iter_mut().find(|(own, _)| *own == number) {
-                    Some((_, slope)) => slope.push(term),
-                    None => all.push((number, vec![term])),
+        let slopes = inequality.parts.iter().map(|part| {
+            let mut all: Vec<(usize, Slope)> = Vec::new();
+            let mut add = |number: usize, term: (f64, usize, usize)| match all.iter_mut().find(|(own, _)| *own == number) {
+                Some((_, slope)) => slope.push(term),
+                None => all.push((number, vec![term])),
+            };
+            for (measured, sign) in [(&part.after, 1.0), (&part.before, -1.0)] {
+                for (number, (i, j)) in upper(measured.rows.len()).enumerate() {
+                    let by = if i == j { sign } else { 2.0 * sign };
+                    add(first[measured.shape] + number, (by, measured.rows[i], measured.rows[j]));
                 }
+            }
+            for product in &part.products {
+                add(multipliers + product.multiplier, (product.weight, product.factors[0], product.factors[1]));
             }
             all
         });
         let slopes = slopes.collect();
-        let sizes: usize = inequality.parts.iter().map(|part| part.unknowns + part.before.len()).sum();
+        let shapes: usize = inequality.shapes.iter().sum();
+        let sizes: usize = inequality.parts.iter().map(|part| part.unknowns).sum::<usize>() + shapes;
         let signed = inequality.free.iter().filter(|free| !**free).count();
         let unknowns = multipliers + inequality.free.len() + 1;
-        let shapes: usize = inequality.parts.iter().map(|part| part.before.len()).sum();
         Self { inequality, slopes, first, multipliers, unknowns, bound: 2.0 * real(shapes + signed), parameter: real(sizes + signed + 1) }
     }
 
     fn start(&self) -> Point {
-        let shapes = self.inequality.parts.iter().map(|part| Matrix::identity(part.before.len())).collect();
+        let shapes = self.inequality.shapes.iter().map(|size| Matrix::identity(*size)).collect();
         let multipliers = self.inequality.free.iter().map(|free| f64::from(u8::from(!free))).collect();
         let solution = Solution { shapes, multipliers };
-        let largest = self.inequality.parts.iter().enumerate().map(|(part, _)| self.middle(part, &solution).frobenius_norm()).fold(0.0, f64::max);
+        let largest = (0..self.inequality.parts.len()).map(|part| self.middle(part, &solution).frobenius_norm()).fold(0.0, f64::max);
         Point { solution, margin: -1.0 - largest }
     }
 
     /// M of a part.
     fn middle(&self, number: usize, solution: &Solution) -> Matrix {
         let part = &self.inequality.parts[number];
-        let measured = |places: &[usize]| {
-            let rows = Matrix::from_fn(places.len(), part.unknowns, |row, column| part.rows[places[row]].entries[column]);
-            rows.transposed().times(&solution.shapes[number].times(&rows))
+        let measured = |of: &Measured| {
+            let rows = Matrix::from_fn(of.rows.len(), part.unknowns, |row, column| part.rows[of.rows[row]].entries[column]);
+            rows.transposed().times(&solution.shapes[of.shape].times(&rows))
         };
         let (after, before) = (measured(&part.after), measured(&part.before));
         let mut middle = Matrix::from_fn(part.unknowns, part.unknowns, |i, j| after[(i, j)] - before[(i, j)]);
@@ -151,8 +151,11 @@ impl<'a> Barrier<'a> {
     fn value(&self, point: &Point, pull: f64) -> Option<f64> {
         let logarithm = |factor: &Matrix| 2.0 * (0..factor.rows()).map(|place| libm::log(factor[(place, place)])).sum::<f64>();
         let mut value = -pull * point.margin;
-        for (part, shape) in point.solution.shapes.iter().enumerate() {
-            value -= logarithm(&self.slack(part, point)?) + logarithm(&cholesky(shape)?);
+        for part in 0..self.inequality.parts.len() {
+            value -= logarithm(&self.slack(part, point)?);
+        }
+        for shape in &point.solution.shapes {
+            value -= logarithm(&cholesky(shape)?);
         }
         let signed = self.inequality.free.iter().zip(&point.solution.multipliers).filter(|(free, _)| !**free).map(|(_, multiplier)| *multiplier);
         for positive in signed.chain([self.left(&point.solution)]) {
@@ -219,8 +222,10 @@ impl<'a> Barrier<'a> {
         for (number, part) in self.inequality.parts.iter().enumerate() {
             let inverse = triangle_inverse(&self.slack(number, point)?);
             self.of_slack(number, part, &inverse, &mut gradient, &mut hessian);
-            let shape = triangle_inverse(&cholesky(&point.solution.shapes[number])?);
-            let inverse = shape.times(&shape.transposed());
+        }
+        for (number, shape) in point.solution.shapes.iter().enumerate() {
+            let triangle = triangle_inverse(&cholesky(shape)?);
+            let inverse = triangle.times(&triangle.transposed());
             let places: Vec<(usize, usize)> = upper(inverse.rows()).collect();
             let by = |(i, j): (usize, usize)| if i == j { 1.0 } else { 2.0 };
             for (one, (i, j)) in places.iter().copied().enumerate() {

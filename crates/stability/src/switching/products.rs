@@ -1,57 +1,7 @@
-//! The matrix inequality of a scene: a shape for each part, and multipliers of the contacts, which parts share.
-//!
-//! A part asks for a shape V and multipliers m with
-//!
-//! ```text
-//! M(V, m) = Z₁ᵀ·V·Z₁ − Z₀ᵀ·V·Z₀ + Σ m·w·(u·vᵀ + v·uᵀ)/2  < 0
-//! ```
-//!
-//! in which Z₀ and Z₁ give what V measures before and after a frame, as rows over the same unknowns, and u and v the factors of a product.
+//! The inequality of contacts: what is measured are states and depths, and the products are those of [`super`], with multipliers that equal contacts share.
 
 use super::contact_frame::ContactFrame;
-use crate::Matrix;
-
-/// A row over the unknowns of a part.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) struct Row {
-    pub(super) entries: Vec<f64>,
-    /// A bound of the sum of the sizes of its entries' errors.
-    pub(super) error: f64,
-}
-
-/// A product of two rows, of which a multiplier is taken times a weight.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) struct Product {
-    pub(super) factors: [usize; 2],
-    pub(super) multiplier: usize,
-    pub(super) weight: f64,
-}
-
-/// A part of a scene.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) struct Part {
-    pub(super) rows: Vec<Row>,
-    /// The rows that the shape measures before the frame and after it.
-    pub(super) before: Vec<usize>,
-    pub(super) after: Vec<usize>,
-    pub(super) products: Vec<Product>,
-    /// The number of unknowns.
-    pub(super) unknowns: usize,
-}
-
-/// All parts, and for each multiplier whether it may be below zero.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) struct Inequality {
-    pub(super) parts: Vec<Part>,
-    pub(super) free: Vec<bool>,
-}
-
-/// Shapes by part, and multipliers.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) struct Solution {
-    pub(super) shapes: Vec<Matrix>,
-    pub(super) multipliers: Vec<f64>,
-}
+use crate::inequality::{Inequality, Measured, Part, Product, Row};
 
 /// Contacts that are equal.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -88,26 +38,25 @@ struct Tick {
     inside: Row,
 }
 
-impl Inequality {
-    /// The inequality of those parts; `None` if a position that must not matter does.
-    pub(super) fn of(parts: &[PartFrame<'_>], groups: &[Group]) -> Option<Self> {
-        let mut multipliers = Multipliers { first: Vec::new(), shared: Vec::new(), free: Vec::new(), groups };
-        for group in groups {
-            multipliers.first.push(multipliers.free.len());
-            let free = (0..group.ticks * PRODUCTS).map(|number| number % PRODUCTS == 0);
-            multipliers.free.extend(free);
-        }
-        for (one, first) in groups.iter().enumerate() {
-            for (other, second) in groups.iter().enumerate() {
-                if first.is_wall && second.is_wall && !first.has_rest && (one != other || first.members > 1.0) {
-                    multipliers.shared.push((one, other, multipliers.free.len()));
-                    multipliers.free.extend(std::iter::repeat_n(false, 2 * first.ticks.min(second.ticks)));
-                }
+/// The inequality of those parts; `None` if a position that must not matter does.
+pub(super) fn inequality(parts: &[PartFrame<'_>], groups: &[Group]) -> Option<Inequality> {
+    let mut multipliers = Multipliers { first: Vec::new(), shared: Vec::new(), free: Vec::new(), groups };
+    for group in groups {
+        multipliers.first.push(multipliers.free.len());
+        let free = (0..group.ticks * PRODUCTS).map(|number| number % PRODUCTS == 0);
+        multipliers.free.extend(free);
+    }
+    for (one, first) in groups.iter().enumerate() {
+        for (other, second) in groups.iter().enumerate() {
+            if first.is_wall && second.is_wall && !first.has_rest && (one != other || first.members > 1.0) {
+                multipliers.shared.push((one, other, multipliers.free.len()));
+                multipliers.free.extend(std::iter::repeat_n(false, 2 * first.ticks.min(second.ticks)));
             }
         }
-        let parts = parts.iter().map(|part| part_of(part, &multipliers)).collect::<Option<_>>()?;
-        Some(Self { parts, free: multipliers.free })
     }
+    let parts = parts.iter().enumerate().map(|(shape, part)| part_of(part, shape, &multipliers)).collect::<Option<Vec<_>>>()?;
+    let shapes = parts.iter().map(|part| part.before.rows.len()).collect();
+    Some(Inequality { shapes, parts, free: multipliers.free })
 }
 
 /// Where the multipliers of groups stand.
@@ -119,7 +68,7 @@ struct Multipliers<'a> {
     free: Vec<bool>,
 }
 
-fn part_of(part: &PartFrame<'_>, multipliers: &Multipliers<'_>) -> Option<Part> {
+fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) -> Option<Part> {
     let frame = part.frame;
     let states: Vec<usize> = (0..frame.next.rows()).filter(|row| !frame.loose.contains(row)).collect();
     let columns: Vec<usize> = states.iter().copied().chain(frame.next.rows()..frame.next.columns()).collect();
@@ -204,5 +153,6 @@ fn part_of(part: &PartFrame<'_>, multipliers: &Multipliers<'_>) -> Option<Part> 
             products.push(Product { factors: [own.force, row], multiplier: start + 2 * tick + 1, weight });
         }
     }
-    Some(Part { rows, before, after, products, unknowns })
+    let of = |rows| Measured { shape, rows };
+    Some(Part { rows, before: of(before), after: of(after), products, unknowns })
 }
