@@ -69,7 +69,7 @@ fn real_peers_come_to_rest_by_the_rate_that_is_proven() {
         &[][..],
         &["coordination.strategy=proportional-derivative", "coordination.stiffness=300"],
         &["peer.contact=grasp", walls],
-        &["peers.b.contact={ push = \"-x\" }", "coordination.stiffness=500"],
+        &["peers.b.contact={ push = \"-x\" }", "coordination.stiffness=300"],
         &["peers.b.contact=none", "peers.c.contact=none", "link.delay=24ms", "coordination.damping=20"],
     ] {
         let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
@@ -90,11 +90,11 @@ fn two_fingers_bounce_higher_as_the_motion_that_is_found() {
     let shipped = scene(&[]);
     assert_eq!(analyse(&shipped, Method::Reduced).unwrap().verdict(), Verdict::Stable);
     let growth = prove_switching(&shipped, &Unwatched).unwrap().motions[0].growing.unwrap().growth;
-    let seen = factor(&shipped, 80, 240);
+    let seen = factor(&shipped, 20, 240);
     // Bounces are irregular: the growth of a piece of a motion varies.
-    assert!(seen > 1.02 && (libm::log(seen) / libm::log(growth) - 1.0).abs() < 0.3, "{seen} a frame, found {growth}");
+    assert!(seen > 1.02 && (libm::log(seen) / libm::log(growth) - 1.0).abs() < 0.4, "{seen} a frame, found {growth}");
     // With contacts that pull too it comes to rest.
     let grasped = scene(&["peers.left.contact=grasp".to_owned(), "peers.right.contact=grasp".to_owned()]);
     assert_eq!(prove_switching(&grasped, &Unwatched), Err(SwitchingError::NoContact));
-    assert!(factor(&grasped, 80, 240) < 1.0);
+    assert!(factor(&grasped, 20, 240) < 1.0);
 }
