@@ -160,7 +160,7 @@ impl<'a> Barrier<'a> {
         let signed = self.inequality.free.iter().zip(&point.solution.multipliers).filter(|(free, _)| !**free).map(|(_, multiplier)| *multiplier);
         for positive in signed.chain([self.left(&point.solution)]) {
             // Written so that NaN fails.
-            if !(positive > 0.0) {
+            if !(positive > 0.0 && positive.is_finite()) {
                 return None;
             }
             value -= libm::log(positive);
