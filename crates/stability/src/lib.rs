@@ -34,6 +34,7 @@ mod error;
 mod family;
 mod full;
 mod graph;
+mod inequality;
 mod judgement;
 mod lifted;
 mod linear_form;
@@ -50,6 +51,7 @@ mod scene_radius;
 mod spectrum;
 mod stack_frame;
 mod structure;
+mod switching;
 mod timetable;
 mod turning;
 mod unseen;
@@ -76,6 +78,7 @@ pub use proof::{
 };
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
+pub use switching::{GrowingMotion, Switching, SwitchingError, SwitchingMotion, prove_switching};
 pub use watch::{Limits, Unwatched, Watch};
 pub use worst_case::{
     Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Links, Pattern, PatternError, Patterns, SceneWorstCase,

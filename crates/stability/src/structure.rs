@@ -53,11 +53,21 @@ pub(crate) struct Structure {
 impl Structure {
     /// The classes of peers that are equal in every one of the scenes, which differ in numbers only.
     pub(crate) fn of(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
-        Self::with_alone(scenes, network, contacts, None)
+        Self::with_apart(scenes, network, contacts, |_, _| false)
     }
 
     /// The same with one peer in a class of its own, also if others are equal to it: that which is pushed moves unlike those that are not.
     pub(crate) fn with_alone(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, alone: Option<usize>) -> Result<Self, AnalysisError> {
+        Self::with_apart(scenes, network, contacts, |one, other| Some(one) == alone || Some(other) == alone)
+    }
+
+    /// The same where some pairs of peers are in one class in no case.
+    pub(crate) fn with_apart(
+        scenes: &[&Scene],
+        network: &NominalNetwork,
+        contacts: &Contacts,
+        apart: impl Fn(usize, usize) -> bool,
+    ) -> Result<Self, AnalysisError> {
         let scene = scenes[0];
         let peers = scene.peers.len();
         for scene in scenes {
@@ -66,8 +76,7 @@ impl Structure {
         let mut classes: Vec<Vec<usize>> = Vec::new();
         for place in 0..peers {
             let found = classes.iter().position(|class| {
-                Some(place) != alone
-                    && Some(class[0]) != alone
+                !apart(class[0], place)
                     && contacts.touching[class[0]] == contacts.touching[place]
                     && contacts.absent[class[0]] == contacts.absent[place]
                     && scenes.iter().all(|scene| {

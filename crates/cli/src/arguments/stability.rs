@@ -48,6 +48,9 @@ pub(crate) struct PointArguments {
     /// The verdict for every number of equal peers too, proven: of those from 2 on, or FROM.., or FROM..TO
     #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, conflicts_with_all = ["graph", "method", "about"])]
     pub(crate) every_number: Option<(u64, Option<u64>)>,
+    /// Whether the scene is stable however its one-sided contacts and walls open and close, proven; or else a motion that grows
+    #[arg(long, conflicts_with_all = ["graph", "method", "about"])]
+    pub(crate) switching: bool,
     /// The worst case too: at most this number of samples lost in a row
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u32>(0, u32::MAX.into()))]
     pub(crate) losses_in_a_row: Option<u32>,

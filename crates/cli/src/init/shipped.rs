@@ -128,6 +128,7 @@ shipped![
     "counterexamples/stability-tests",
     "counterexamples/tick-counts",
     "counterexamples/turning-half-damping",
+    "counterexamples/two-fingers",
     "counterexamples/wave-held",
 ];
 

@@ -54,6 +54,7 @@ mod stability_chance;
 mod stability_map;
 mod stability_point;
 mod stability_proofs;
+mod stability_switching;
 mod standard_input;
 #[cfg(target_os = "linux")]
 mod stop;

@@ -1,6 +1,6 @@
 //! One frame of the lifted system: where it leads, as a linear function of where it began.
 
-use super::node::{Node, Rows, Scale, Scratch};
+use super::node::{External, Node, Rows, Scale, Scratch};
 use super::rounding::Rounding;
 use super::{Sampling, majorant};
 use crate::timetable::{Event, Instants, Timetable};
@@ -36,6 +36,12 @@ pub(crate) trait Instrument {
 
     /// Sees the velocity of the device of a node at a tick, before it moves; multiplied by the common time.
     fn see(&mut self, _node: usize, _at: u64, _velocity: &[f64]) {}
+
+    /// Sees all rows at a tick of a node, whose own are `rows`, before it moves. Sets what replaces the force of its coupling (first) and of its wall on the
+    /// copy, as functions of the inputs \[N\]; answers which of them are replaced.
+    fn touch(&mut self, _node: usize, _z: &Matrix, _rows: Rows, _inputs: [&mut [f64]; 2]) -> [bool; 2] {
+        [false; 2]
+    }
 }
 
 /// Nothing is pushed or looked at.
@@ -79,12 +85,8 @@ impl Lifted<'_> {
     /// [`Lifted::frame`]; `None` if the watch ends it.
     pub(crate) fn frame_watched(&self, instrument: &mut impl Instrument, watch: &dyn Watch) -> Option<FrameMap> {
         let (channels, silent) = (self.sampling.channels(), self.sampling.is_silent(self.time));
-        let mut rows: Vec<Rows> = Vec::with_capacity(self.nodes.len());
-        let mut count = 0;
-        for node in self.nodes {
-            rows.push(node.rows(count));
-            count += node.states();
-        }
+        let rows = self.rows();
+        let count = self.nodes.iter().map(Node::states).sum::<usize>();
         let reference = (!self.tied).then(|| rows[0].object);
         let used = if silent { Vec::new() } else { self.used() };
         let states = count - usize::from(reference.is_some());
@@ -132,6 +134,7 @@ impl Lifted<'_> {
         let mut scratch = Scratch::default();
         scratch.resize(columns);
         let mut push = vec![0.0; columns];
+        let [mut coupling, mut wall] = [vec![0.0; columns], vec![0.0; columns]];
         let step = self.nodes.iter().map(|node| node.step_norm(scale)).fold(1.0, f64::max);
         let mut rounding = Rounding::new(step);
         let mut since = 0;
@@ -185,9 +188,14 @@ impl Lifted<'_> {
                         }
                         None => false,
                     };
-                    let hand = pushed.then_some(push.as_slice());
+                    let [touches, stands] = instrument.touch(node, &z, rows[node], [&mut coupling[inputs..], &mut wall[inputs..]]);
+                    let external = External {
+                        hand: pushed.then_some(push.as_slice()),
+                        coupling: touches.then_some(coupling.as_slice()),
+                        wall: stands.then_some(wall.as_slice()),
+                    };
                     let heard = |row: usize| heard.row(node * law_rows + row);
-                    self.nodes[node].tick(&mut z, rows[node], heard, hand, span, scale, &mut scratch);
+                    self.nodes[node].tick(&mut z, rows[node], heard, external, span, scale, &mut scratch);
                     rounding.tick(norm(&z, rows[node], self.nodes[node].states()));
                 }
             }
@@ -213,6 +221,28 @@ impl Lifted<'_> {
                 rounding.bound(|| f64::INFINITY)
             },
         })
+    }
+
+    /// The rows of each node.
+    pub(crate) fn rows(&self) -> Vec<Rows> {
+        let mut count = 0;
+        let rows = self.nodes.iter().map(|node| {
+            let rows = node.rows(count);
+            count += node.states();
+            rows
+        });
+        rows.collect()
+    }
+
+    /// How often each node ticks in a frame.
+    pub(crate) fn ticks(&self) -> Vec<usize> {
+        let mut ticks = vec![0; self.nodes.len()];
+        for event in &self.timetable.events {
+            if let Event::Tick { node, .. } = event {
+                ticks[*node] += 1;
+            }
+        }
+        ticks
     }
 
     /// A bound of the rounding errors of a frame: see [`majorant`].
@@ -252,26 +282,24 @@ impl FrameMap {
     /// The matrix that one frame multiplies the relative state by: states but for the reference, then for each node the samples of earlier frames, the
     /// newest first.
     pub(crate) fn monodromy(&self) -> Matrix {
+        self.driven(0)
+    }
+
+    /// The same with a column for each of the first `inputs` inputs behind.
+    pub(crate) fn driven(&self, inputs: usize) -> Matrix {
         let count = self.states.rows();
         let kept: Vec<usize> = (0..count).filter(|row| Some(*row) != self.reference).collect();
         let states = kept.len();
-        let mut first = Vec::with_capacity(self.depth.len());
-        let mut size = states;
-        for depth in &self.depth {
-            first.push(size);
-            size += depth;
-        }
-        // Where the unknowns of the frame stand among the states.
-        let place = |column: usize| if column < states { column } else { self.used_place(column - states, &first) };
-        let columns = states + self.used.len();
-        let mut matrix = Matrix::zeros(size, size);
+        let (places, first) = self.places(inputs);
+        let size = states + self.history();
+        let mut matrix = Matrix::zeros(size, size + inputs);
         let mut put = |row: usize, source: &[f64], moved: f64| {
-            for (column, entry) in source.iter().enumerate().take(columns) {
-                matrix[(row, place(column))] += entry;
+            for (place, entry) in places.iter().zip(source) {
+                matrix[(row, *place)] += entry;
             }
             if let Some(reference) = self.reference {
-                for (column, entry) in self.states.row(reference).iter().enumerate().take(columns) {
-                    matrix[(row, place(column))] -= moved * entry;
+                for (place, entry) in places.iter().zip(self.states.row(reference)) {
+                    matrix[(row, *place)] -= moved * entry;
                 }
             }
         };
@@ -324,14 +352,28 @@ impl FrameMap {
         self.reference
     }
 
+    /// A translation leaves a row as it is: that of a body which something ties to ground and nothing to the others.
+    pub(crate) fn tie(&mut self, row: usize) {
+        self.displacements[row] = 0.0;
+    }
+
     /// How far a translation by 1 moves a row.
     pub(crate) fn displacement(&self, row: usize) -> f64 {
         self.displacements[row]
     }
 
-    fn used_place(&self, number: usize, first: &[usize]) -> usize {
-        let (node, age) = self.used[number];
-        first[node] + age - 1
+    /// Where the unknowns of the frame, and of the inputs so many, stand among the columns of [`FrameMap::driven`]; and where the samples of each node do.
+    pub(crate) fn places(&self, inputs: usize) -> (Vec<usize>, Vec<usize>) {
+        let states = self.state_unknowns();
+        let mut first = Vec::with_capacity(self.depth.len());
+        let mut size = states;
+        for depth in &self.depth {
+            first.push(size);
+            size += depth;
+        }
+        let used = self.used.iter().map(|(node, age)| first[*node] + age - 1);
+        let places = (0..states).chain(used).chain(size..size + inputs).collect();
+        (places, first)
     }
 }
 

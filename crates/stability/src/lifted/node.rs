@@ -98,6 +98,17 @@ impl Scale {
     }
 }
 
+/// Forces of a tick that do not follow from the states, each a function of the unknowns \[N\].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct External<'a> {
+    /// The force of the hand on the device.
+    pub(crate) hand: Option<&'a [f64]>,
+    /// In place of the coupling's.
+    pub(crate) coupling: Option<&'a [f64]>,
+    /// On the copy, in place of the wall's.
+    pub(crate) wall: Option<&'a [f64]>,
+}
+
 /// Rows that a tick works with, kept from tick to tick.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch {
@@ -190,19 +201,20 @@ impl Node {
     }
 
     /// One tick: forces from the rows as they are, `heard` what each row of the law hears of the samples held \[N\], FT's first, which pulls the copy there;
-    /// `hand` the force of the hand on the device \[N\]. Every row is a linear function of the same unknowns, one column each.
+    /// `external` what else acts. Every row is a linear function of the same unknowns, one column each.
     #[expect(clippy::too_many_arguments, reason = "what a tick needs, each of its own kind")]
     pub(crate) fn tick<'a>(
         &self,
         z: &mut Matrix,
         rows: Rows,
         heard: impl Fn(usize) -> &'a [f64],
-        hand: Option<&[f64]>,
+        external: External<'_>,
         span: Duration,
         scale: Scale,
         scratch: &mut Scratch,
     ) {
-        let own = scale.gains(coordination_of(self.law.force.own, self.wall));
+        let wall = self.wall.filter(|_| external.wall.is_none());
+        let own = scale.gains(coordination_of(self.law.force.own, wall));
         let columns = z.columns();
         let Scratch { coupling, on_object, memory } = scratch;
         {
@@ -217,9 +229,13 @@ impl Node {
                 let gains = scale.gains(self.coupling);
                 for column in 0..columns {
                     let copy = Motion { position: x[column], velocity: v[column] };
-                    coupling[column] = tick::grasp(&gains, Motion { position: xh[column], velocity: vh[column] }.relative_to(copy));
+                    let grasp = || tick::grasp(&gains, Motion { position: xh[column], velocity: vh[column] }.relative_to(copy));
+                    coupling[column] = external.coupling.map_or_else(grasp, |force| force[column]);
                     on_object[column] += coupling[column];
                 }
+            }
+            for (force, wall) in on_object.iter_mut().zip(external.wall.unwrap_or_default()) {
+                *force += wall;
             }
         }
         if self.looks_back() > 0 {
@@ -237,7 +253,7 @@ impl Node {
         advance(z, rows.object, &self.object.scaled_map(span, scale.time), on_object);
         if let (Some(first), Some(device)) = (rows.device, &self.device) {
             for (column, force) in coupling.iter_mut().enumerate() {
-                *force = tick::on_device(hand.map_or(0.0, |hand| hand[column]), *force);
+                *force = tick::on_device(external.hand.map_or(0.0, |hand| hand[column]), *force);
             }
             advance(z, first, &device.scaled_map(span, scale.time), coupling);
         }

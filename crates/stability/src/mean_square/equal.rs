@@ -28,7 +28,7 @@ use super::arrivals::Hazards;
 use super::variance::Variance;
 use crate::Matrix;
 use crate::lifted::Lifted;
-use crate::lifted::node::{Scale, Scratch};
+use crate::lifted::node::{External, Scale, Scratch};
 use crate::spectrum::{Schur, Workspace};
 use crate::structure::count;
 use crate::timetable::{Event, Timetable};
@@ -188,7 +188,7 @@ impl Equal {
                             *heard = by * (weight * rows[(mean, column)] + rows[(noise, column)]);
                         }
                     }
-                    node.tick(rows, own, |row| heard.row(row), None, span, scale, scratch);
+                    node.tick(rows, own, |row| heard.row(row), External::default(), span, scale, scratch);
                     tick += 1;
                 }
             }

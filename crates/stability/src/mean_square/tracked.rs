@@ -13,7 +13,7 @@
 use std::time::Duration;
 
 use crate::Matrix;
-use crate::lifted::node::{Scale, Scratch};
+use crate::lifted::node::{External, Scale, Scratch};
 use crate::lifted::{Lifted, Node};
 
 /// The roundings of a term in a tick: a dozen of the operations, and room for coefficients that are good to some units in the last place.
@@ -49,7 +49,7 @@ impl Tracked {
             let columns = matrix.columns() - held;
             let of = |row: usize, column: usize| column.checked_sub(columns).map_or(0.0, |number| heard[number][row]);
             let heard = Matrix::from_fn(1 + node.law.memory.len(), columns + held, of);
-            node.tick(matrix, node.rows(0), |row| heard.row(row), None, span, scale, &mut scratch);
+            node.tick(matrix, node.rows(0), |row| heard.row(row), External::default(), span, scale, &mut scratch);
         };
         let mut single = Self::new(states, states, held).value;
         turn(&mut single);

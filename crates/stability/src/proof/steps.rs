@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use crate::Matrix;
-use crate::lifted::node::{Rows, Scale, Scratch};
+use crate::lifted::node::{External, Rows, Scale, Scratch};
 use crate::lifted::{Node, Sampling};
 use crate::timetable::{Event, Timetable};
 
@@ -209,7 +209,7 @@ impl Plan {
                     }
                 }
             }
-            nodes[*node].tick(&mut z, rows[*node], |row| heard.row(row), None, *span, scale, &mut scratch);
+            nodes[*node].tick(&mut z, rows[*node], |row| heard.row(row), External::default(), *span, scale, &mut scratch);
         }
         let moved = |by: f64, column: usize| reference.map_or(0.0, |reference| by * z[(reference, column)]);
         let mut matrix = Matrix::zeros(states + after.len() * channels, columns);

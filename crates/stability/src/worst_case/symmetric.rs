@@ -49,7 +49,7 @@ pub(crate) fn triangle_inverse(upper: &Matrix) -> Matrix {
 }
 
 /// Solves RᵀR·x = b.
-pub(super) fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
+pub(crate) fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
     let size = upper.rows();
     let mut x = right.to_vec();
     for row in 0..size {

@@ -2,17 +2,25 @@
 
 use cohaptic_answers::notes;
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Analysis, ContactMode, EveryNumber, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
+use cohaptic_stability::{
+    Analysis, ContactMode, EveryNumber, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Switching, Verdict, WorstVerdict,
+};
 use cohaptic_units::print::Span;
 use serde::Serialize;
 
 use super::speed::{self, Bounded, per_second, time_constant};
-use super::{every_number, worst};
+use super::{every_number, switching, worst};
 use crate::document_schema::document;
 use crate::output::figure;
 
 /// The answer of `cohaptic stability point --json`.
-pub(super) fn of(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>, every: Option<&EveryNumber>) -> impl Serialize {
+pub(super) fn of(
+    scene: &Scene,
+    judgement: &Judgement,
+    worst: Option<&SceneWorstCase>,
+    every: Option<&EveryNumber>,
+    contacts: Option<&Switching>,
+) -> impl Serialize {
     let Judgement { verdict, analysis, mean_square } = judgement;
     let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);
     let constant = time_constant(analysis);
@@ -52,6 +60,8 @@ pub(super) fn of(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorst
         worst: worst.map(|worst| document! { worst_case: worst::document(worst) }),
         #[serde(flatten)]
         every: every.map(|every| document! { every_number: every_number::document(scene, every) }),
+        #[serde(flatten)]
+        switching: contacts.map(|contacts| document! { switching: switching::document(contacts) }),
         notes: notes(judgement),
     }
 }

@@ -3,6 +3,7 @@
 mod answer;
 mod every_number;
 mod speed;
+mod switching;
 mod worst;
 
 use std::path::Path;
@@ -44,11 +45,17 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     };
     let worst = worst::of(&scene, arguments, path)?;
     let every = every_number::of(&scene, arguments, path)?;
+    let switching = switching::of(&scene, arguments, path)?;
+    let more = || {
+        let every = every.as_ref().map(|every| every_number::words(&scene, every));
+        let switching = switching.as_ref().map(|switching| switching::words(switching, &answer::notes(&judgement)));
+        every.unwrap_or_default() + &switching.unwrap_or_default()
+    };
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_POINT,
-        &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref()),
-        || answer::describe(&scene, &judgement, worst.as_ref()) + &every.as_ref().map(|every| every_number::words(&scene, every)).unwrap_or_default(),
+        &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref(), switching.as_ref()),
+        || answer::describe(&scene, &judgement, worst.as_ref()) + &more(),
         output::NO_FILES,
     )?;
     Ok(ExitCode::SUCCESS)

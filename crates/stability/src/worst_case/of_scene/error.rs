@@ -62,7 +62,7 @@ pub enum SceneWorstCaseError {
         to: String,
     },
     /// There are too many kinds of frame.
-    #[error("{} kinds of frame with {links} links: expected at most {most}; let links lose together, or narrow the interval of delays", Count(*.symbols))]
+    #[error("{} kinds of frame with {links} links: expected at most {most}, or peers and links that are all equal; let links lose together, or narrow the interval of delays", Count(*.symbols))]
     TooMany {
         /// How many links.
         links: usize,
@@ -73,7 +73,7 @@ pub enum SceneWorstCaseError {
     },
     /// The pattern is too large for states of that size.
     #[error(
-        "{edges} steps between {nodes} states of the network with {dimension} states of the scene: expected fewer losses in a row, or links that lose together"
+        "{edges} steps between {nodes} states of the network with {dimension} states of the scene: expected fewer losses in a row, links that lose together, or peers and links that are all equal"
     )]
     TooLarge {
         /// The edges of the pattern.

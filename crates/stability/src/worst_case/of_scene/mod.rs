@@ -8,7 +8,8 @@
 //! every product, and the norm of a block-diagonal matrix, with the largest of norms of its parts as the norm of the state, is the largest norm of
 //! a block. The joint spectral radius, the limit of the largest norm of a product of k factors to the power of 1/k, is therefore the largest
 //! of those of the blocks, and each is looked at by itself. Where each link loses on its own, peers do not stay equal, and the
-//! scene is looked at as a whole: 2 kinds of frame for each link, 64 for three peers, beyond which it is refused.
+//! scene is looked at as a whole: 2 kinds of frame for each link, 64 for three peers. Beyond, equal peers have a bound from above that does not depend on their
+//! number ([`each`]), and others are refused.
 //!
 //! # An example
 //!
@@ -42,6 +43,7 @@
 //! arrive in one frame, which were not sent in one.
 
 mod channel;
+mod each;
 mod error;
 mod frames;
 mod prepared;
@@ -49,6 +51,7 @@ mod prepared;
 mod tests;
 mod words;
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use cohaptic_scene::Scene;
@@ -81,7 +84,7 @@ pub struct Patterns {
 pub enum Links {
     /// In every frame all links lose the samples that are due, or none does, and all delay it alike: an outage of something that they share.
     Together,
-    /// Each link in each direction on its own. For up to three peers.
+    /// Each link in each direction on its own. For up to three peers, or any number of equal ones.
     Each,
 }
 
@@ -211,9 +214,19 @@ pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, w
     let network = patterns.network(scene)?;
     let pieces = pieces(scene, "the worst case")?;
     let mut combines = false;
+    let is_open = AtomicBool::new(false);
     let found: Vec<Vec<WorstPart>> = pairs(&pieces, &mut combines)?
         .par_iter()
-        .map(|(piece, combination)| of_combination(&piece.scene, &network, combination, patterns, (effort, watch)))
+        .map(|(piece, combination)| {
+            let found = of_combination(&piece.scene, &network, combination, patterns, (effort, watch));
+            match found {
+                Err(error @ (SceneWorstCaseError::TooMany { .. } | SceneWorstCaseError::TooLarge { .. })) if patterns.links == Links::Each => {
+                    is_open.store(true, Ordering::Relaxed);
+                    each::bounds(&piece.scene, &network, combination, patterns, (effort, watch))?.ok_or(error)
+                }
+                found => found,
+            }
+        })
         .collect::<Result<_, _>>()?;
     let parts: Vec<WorstPart> = found.into_iter().flatten().collect();
     let largest = |value: fn(&WorstPart) -> f64| parts.iter().map(value).fold(0.0, f64::max);
@@ -223,6 +236,12 @@ pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, w
     let mut said = network.notes.clone();
     if patterns.delay.is_some() {
         said.push("what the links of the scene do is replaced by the interval of delays".to_owned());
+    }
+    if is_open.into_inner() {
+        said.push(
+            "each link on its own: the lower bound is that of all links together, the upper one that of a norm for equal peers; what is between them stays open"
+                .to_owned(),
+        );
     }
     let notes = notes(&said, combines, scene);
     Ok(SceneWorstCase { lower, upper, certificate, links: patterns.links, step: scene.coordination.update, parts, part, notes })

@@ -191,6 +191,62 @@ fn losing_together_the_parts_are_the_whole() {
     }
 }
 
+/// The parts have the same size at any number of equal peers, and are the whole.
+#[test]
+fn losing_together_any_number_of_equal_peers_costs_the_same() {
+    let patterns = patterns(2, None, Links::Together);
+    let sizes = |count: usize| {
+        let parts = prepared(&scene(&[&format!("scene.count={count}"), "coordination.stiffness=300"]), &patterns, true);
+        parts.searches.iter().map(|search| (search.automaton.size(), search.automaton.matrices().len())).collect::<Vec<_>>()
+    };
+    assert!(sizes(3).len() == 2 && [10, 50, 200].iter().all(|count| sizes(*count) == sizes(3)));
+    let ten = scene(&["scene.count=10", "coordination.stiffness=300"]);
+    let (parts, whole) = (prepared(&ten, &patterns, true), prepared(&ten, &patterns, false));
+    for cycle in [&[0, 1][..], &[0, 0, 1], &[0, 1, 1]] {
+        let (one, other) = (radius_along(&parts, cycle), radius_along(&whole, cycle));
+        assert!((one - other).abs() < 1e-8 * one.max(1.0), "{cycle:?}: {one} {other}");
+    }
+    let many = worst_case(&scene(&["scene.count=200", "coordination.stiffness=300"]), &patterns, &Effort::default()).unwrap();
+    assert!(many.verdict() != WorstVerdict::Undecided && many.upper - many.lower < 0.01 * many.lower, "{many:?}");
+}
+
+/// For three peers, each kind of frame by itself says how near the bound for equal peers is.
+#[test]
+fn each_link_on_its_own_is_bounded_as_by_all_kinds_of_frame() {
+    for (overrides, patterns, most) in [
+        (&["scene.count=3"][..], patterns(1, None, Links::Each), 0.06),
+        (&["scene.count=3", "coordination.stiffness=300", "link.delay=3ms"], patterns(1, None, Links::Each), 0.08),
+        (&["scene.count=3", "coordination.stiffness=300"], patterns(0, Some((7, 8)), Links::Each), 0.08),
+    ] {
+        let scene = scene(overrides);
+        let effort = Effort { accuracy: 1e-2, products: 2_000 };
+        let exact = worst_case(&scene, &patterns, &effort).unwrap();
+        let network = patterns.network(&scene).unwrap();
+        let combination = crate::analysis::whole(&scene).unwrap().swap_remove(0);
+        let bounds = each::bounds(&scene, &network, &combination, &patterns, (&effort, &Unwatched)).unwrap().unwrap();
+        let bound = &bounds[0];
+        assert!(bound.lower <= exact.upper && exact.lower <= bound.upper, "{overrides:?}: {bound:?} {exact:?}");
+        assert!(bound.upper < exact.lower + most && bound.upper < 1.0, "{overrides:?}: {bound:?} {exact:?}");
+    }
+}
+
+/// What was refused for more than three peers costs the same for any number of them.
+#[test]
+fn each_link_on_its_own_is_bounded_at_any_number_of_equal_peers() {
+    for (overrides, patterns) in [
+        (&["scene.count=10", "coordination.stiffness=300"][..], patterns(2, None, Links::Each)),
+        (&["scene.count=50", "coordination.stiffness=100"], patterns(1, None, Links::Each)),
+        (&["scene.count=200", "object.split-mass=false", "coordination.stiffness=300"], patterns(1, None, Links::Each)),
+        (&["scene.count=5", "coordination.stiffness=300"], patterns(0, Some((6, 8)), Links::Each)),
+    ] {
+        let scene = scene(overrides);
+        let found = worst_case(&scene, &patterns, &Effort::default()).unwrap();
+        let together = worst_case(&scene, &Patterns { links: Links::Together, ..patterns }, &Effort::default()).unwrap();
+        assert_eq!((found.verdict(), found.lower.to_bits()), (WorstVerdict::Stable, together.lower.to_bits()), "{overrides:?}: {found:?}");
+        assert!(found.lower < found.upper && found.notes.last().is_some_and(|note| note.ends_with("stays open")), "{found:?}");
+    }
+}
+
 /// The second moment under losses of all links together, each frame by itself with that probability: the radius of the mean of A ⊗ A.
 fn mean_square(prepared: &Prepared, chance: f64) -> f64 {
     let of = |automaton: &Automaton| {
@@ -244,15 +300,16 @@ fn what_cannot_be_looked_at_is_refused() {
     assert!(matches!(drift, SceneWorstCaseError::Frame { .. }), "{drift}");
     let pattern = refused(&["link.loss={ packets = [0], every = 3 }"], patterns(1, None, Links::Together));
     assert_eq!(pattern, SceneWorstCaseError::Pattern { from: "peer2".to_owned(), to: "peer1".to_owned() });
-    let many = refused(&["scene.count=4"], patterns(1, None, Links::Each));
+    let unlike = "peers=[{ name = \"peer1\", contact = \"none\" }]";
+    let many = refused(&["scene.count=4", unlike], patterns(1, None, Links::Each));
     assert_eq!(many, SceneWorstCaseError::TooMany { links: 12, symbols: Some(4096), most: 64 });
-    let beyond = refused(&["scene.count=1000"], patterns(1, None, Links::Each));
+    let beyond = refused(&["scene.count=1000", unlike], patterns(1, None, Links::Each));
     assert!(beyond.to_string().starts_with("more than 10^38 kinds of frame with 999000 links"), "{beyond}");
     // Nine ticks to arrive at, on each of two links.
     let wide = refused(&[], patterns(1, Some((0, 7)), Links::Each));
     assert_eq!(wide, SceneWorstCaseError::TooMany { links: 2, symbols: Some(81), most: 64 });
-    let long = refused(&["scene.count=3"], patterns(2, None, Links::Each));
-    assert_eq!(long, SceneWorstCaseError::TooLarge { edges: 15_625, nodes: 729, dimension: 20 });
+    let long = refused(&["scene.count=3", unlike], patterns(2, None, Links::Each));
+    assert_eq!(long, SceneWorstCaseError::TooLarge { edges: 15_625, nodes: 729, dimension: 18 });
     assert!(matches!(refused(&[], patterns(u32::MAX, None, Links::Together)), SceneWorstCaseError::Automaton(_)));
     let queue = refused(&["link.rate=1kbit", "link.queue={ limit = \"unlimited\" }"], patterns(1, None, Links::Together));
     assert!(matches!(queue, SceneWorstCaseError::Analysis(AnalysisError::Overloaded { .. })), "{queue}");

@@ -182,6 +182,8 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         lines: &[
             "cohaptic stability point scenarios/network/loss-independent.toml --json",
             "cohaptic stability point scenarios/paper/5-1-pd-1000.toml --losses-in-a-row 1 --json",
+            "cohaptic stability point scenarios/network/push-contact.toml --switching --json",
+            "cohaptic stability point scenarios/counterexamples/two-fingers.toml --switching --json",
         ],
         rows: &[
             ("title", "of the scene"),
@@ -208,6 +210,13 @@ pub(super) const DOCUMENTS: [Document; 23] = [
             ("worst_case.lower, worst_case.upper, worst_case.certificate", "bounds of the growth in `worst_case.step_s`"),
             ("worst_case.links, worst_case.step_s, worst_case.dimension, worst_case.products, worst_case.notes", "what was searched, and how far"),
             ("worst_case.sequence, worst_case.period", "the pattern that grows as the lower bound"),
+            ("switching.verdict, switching.notes", "if asked for: `stable`, `unstable` or `undecided`, and what it takes for granted"),
+            ("switching.motions[].motion, switching.motions[].verdict", "each motion that has contacts, in words (empty: the only one)"),
+            ("switching.motions[].rate", "the factor by which a norm is proven to shrink in a frame; `null` unless stable"),
+            (
+                "switching.motions[].growth, switching.motions[].frames, switching.motions[].changes",
+                "of a motion that was found: by which factor it grows in a frame, over how many, with how many changes of contacts; `null` unless unstable",
+            ),
             ("notes", "what the verdict leaves out; where there are two radii, each note names its own"),
         ],
     },

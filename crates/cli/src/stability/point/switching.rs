@@ -1,0 +1,89 @@
+//! Contacts that open and close.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{AnalysisError, Guarantee, Switching, SwitchingError, SwitchingMotion, prove_switching};
+use cohaptic_units::print::Span;
+use serde::Serialize;
+
+use super::ended;
+use crate::analysis_watch::Interruptible;
+use crate::arguments::PointArguments;
+use crate::document_schema::document;
+use crate::failure::{Failure, not_analysed};
+use crate::input;
+use crate::output::{self, figure};
+
+/// What is known of contacts that open and close, if it is asked for.
+pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Switching>, Failure> {
+    if !arguments.switching {
+        return Ok(None);
+    }
+    prove_switching(scene, &Interruptible).map(Some).map_err(|error| match error {
+        SwitchingError::Analysis(AnalysisError::Stopped) => ended(),
+        SwitchingError::Analysis(error) => not_analysed(path, &error),
+        SwitchingError::NoContact | SwitchingError::Chance | SwitchingError::NoSpring { .. } | SwitchingError::TooLarge { .. } => {
+            Failure::Input(format!("{}: --switching: {error}", output::path(input::named(path))))
+        }
+    })
+}
+
+/// The part of the JSON document.
+pub(super) fn document(switching: &Switching) -> impl Serialize + use<> {
+    let motions = switching.motions.iter().map(|motion| {
+        document! {
+            // Which motion; empty if there is but one.
+            motion: motion.name.clone(),
+            verdict: motion.guarantee.word(),
+            // The factor by which a norm is proven to shrink in a frame; `null` unless stable.
+            rate: motion.rate,
+            // The factor by which a motion that was found grows in a frame; `null` unless unstable.
+            growth: motion.growing.map(|growing| growing.growth),
+            // Over how many frames it was followed, and how often contacts opened or closed in them.
+            frames: motion.growing.map(|growing| growing.frames),
+            changes: motion.growing.map(|growing| growing.changes),
+        }
+    });
+    document! {
+        verdict: switching.guarantee().word(),
+        motions: motions.collect::<Vec<_>>(),
+        notes: switching.notes.clone(),
+    }
+}
+
+/// The lines below the verdict; `said` are the notes that stand there already.
+pub(super) fn words(switching: &Switching, said: &[String]) -> String {
+    let mut text = "\n  contacts that open and close:\n".to_owned();
+    for motion in &switching.motions {
+        let name = if motion.name.is_empty() { String::new() } else { format!("{}: ", motion.name) };
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "    {name}{}", verdict(motion));
+    }
+    for note in switching.notes.iter().filter(|note| !said.contains(note)) {
+        let _ = writeln!(text, "    note: {note}");
+    }
+    text
+}
+
+fn verdict(motion: &SwitchingMotion) -> String {
+    let frame = Span(motion.frame);
+    match (motion.guarantee, motion.rate, motion.growing) {
+        (Guarantee::Stable, Some(rate), _) => {
+            format!(
+                "stable however they do, proven: a norm of motion and contact forces shrinks to {} of itself or less in a frame of {frame}",
+                figure(rate, 6)
+            )
+        }
+        (Guarantee::Unstable, _, Some(growing)) => format!(
+            "unstable: a motion was found that grows by a factor of {} a frame of {frame}, with {} changes of contacts in {} frames",
+            figure(growing.growth, 6),
+            growing.changes,
+            growing.frames
+        ),
+        (Guarantee::Stable | Guarantee::Unstable | Guarantee::Undecided, _, _) => {
+            "undecided: no norm was found that shrinks whatever they do, and no motion that grows".to_owned()
+        }
+    }
+}
