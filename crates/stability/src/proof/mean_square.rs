@@ -50,7 +50,7 @@ impl<'a> GrowingMoments<'a> {
     pub(super) fn decide(&self, low: u64, high: u64) -> Result<Option<Proven>, ProofError> {
         let mut all = Some(Proven::Stable);
         for (motion, independent) in &self.motions {
-            let found = if high == 2 { Some(of_two(motion, independent)).flatten() } else { Frame { motion, independent }.decide(low, high)? };
+            let found = if high == 2 { of_two(motion, independent) } else { Frame { motion, independent }.decide(low, high)? };
             match found {
                 Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
                 Some(Proven::Stable) => {}
@@ -374,7 +374,7 @@ fn delivered(moment: &Moment, (held, sample): (usize, usize), probability: f64, 
         let entry = |list: &[(usize, usize, f64)], i: usize, j: usize| {
             list.iter().find(|(row, column, _)| (*row, *column) == (i, j)).map(|(.., entry)| *entry)
         };
-        let constant = Matrix::from_fn(size, size, |i, j| entry(entries, i, j).unwrap_or(f64::from(u8::from(i == j))));
+        let constant = Matrix::from_fn(size, size, |i, j| entry(entries, i, j).unwrap_or_else(|| f64::from(u8::from(i == j))));
         numbers.of_nu(&constant, &Matrix::from_fn(size, size, |i, j| entry(slope, i, j).unwrap_or(0.0)))
     };
     let common = taken(sizes.0, &[(held, held, q), (held, sample, p)], &[]);

@@ -1,7 +1,7 @@
 //! A verdict as a JSON document and in words.
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Analysis, ContactMode, EveryNumber, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
+use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
 use cohaptic_units::print::Span;
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use crate::document_schema::document;
 use crate::output::figure;
 
 /// The answer of `cohaptic stability point --json`.
-pub(super) fn of(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>, every: Option<&EveryNumber>) -> impl Serialize {
+pub(super) fn of(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>, every: Option<&every_number::Proof>) -> impl Serialize {
     let Judgement { verdict, analysis, mean_square } = judgement;
     let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);
     let constant = time_constant(analysis);

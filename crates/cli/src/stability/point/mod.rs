@@ -49,7 +49,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         DocumentSchema::STABILITY_POINT,
         &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref()),
         || answer::describe(&scene, &judgement, worst.as_ref()) + &every.as_ref().map(|every| every_number::words(&scene, every)).unwrap_or_default(),
-        output::NO_FILES,
+        every.iter().filter_map(|every| every.file.as_ref()),
     )?;
     Ok(ExitCode::SUCCESS)
 }
