@@ -119,9 +119,9 @@ class Frame:
 def step(mass, damping, stiffness, span):
     """Increments of one step of m·a = f − b·v − k·x with f held: e00, e01, e10, e11, g0, g1, exact but for 10⁻⁴⁰ of what they are at most."""
     h = Fraction(span, 10**9)
-    x = [[Fraction(0), h, Fraction(0)], [-stiffness / mass * h, -damping / mass * h, h / mass], [Fraction(0)] * 3]
+    x = [[Fraction(0), h, Fraction(0)], [-stiffness / mass * h, -damping / mass * h, h], [Fraction(0)] * 3]
     norm = max(sum(map(abs, row)) for row in x)
-    if norm > 20:
+    if norm > 60:
         raise NotCovered("a body that moves by far within a tick")
     grid = 2**400
     short = lambda number: Fraction(round(number * grid), grid)
@@ -132,7 +132,8 @@ def step(mass, damping, stiffness, span):
         term = [[short(sum(term[i][k] * x[k][j] for k in range(3)) / number) for j in range(3)] for i in range(3)]
         total = [[a + b for a, b in zip(*rows)] for rows in zip(total, term)]
         bound = bound * norm / number
-    return total[0][0], total[0][1], total[1][0], total[1][1], total[0][2], total[1][2]
+    # The last column is for a force of the mass times 1 m/s².
+    return total[0][0], total[0][1], total[1][0], total[1][1], total[0][2] / mass, total[1][2] / mass
 
 
 def refuse(scene):
@@ -447,10 +448,13 @@ class Part:
         ticks = [self.tick(c, senders[c], heard_by[c]) for c in classes]
         peer = self.first[0]
         for instant in range(timing.first_tick(peer, timing.t0), timing.t1, scene.peers[peer].tick):
+            # Samples of this instant, of where everything is.
+            fresh = {}
             for c in classes:
                 if instant in timing.sends(self.first[c], timing.t0, timing.t1):
                     x, v, *_ = bodies[c]
                     samples[c, number_of(c, instant)] = [x.times(share.entry(0)) + v.times(share.entry(1)) for share in shares]
+                    fresh[c, number_of(c, instant)] = [{(c, 0): share.entry(0), (c, 1): share.entry(1)} for share in shares]
             for pair, arrivals in due.items():
                 for tick, sent in arrivals:
                     if tick == instant:
@@ -466,8 +470,7 @@ class Part:
             shift = moved[0][0] if self.reference else {}
             bodies = [[combination(difference(row, {} if place % 2 else shift), seen) for place, row in enumerate(moved[c])] for c in classes]
             if shift:
-                by = combination(shift, seen)
-                samples = {name: [row - by.times(share.entry(0)) for row, share in zip(rows, shares)] for name, rows in samples.items()}
+                samples = {name: self.shifted(name, rows, fresh.get(name), shift, seen, shares) for name, rows in samples.items()}
         final = []
         for kind, c, *which in self.states:
             if kind == "sample":
@@ -477,6 +480,15 @@ class Part:
         if taken != set(place_of):
             raise NotCovered(f"states that nothing begins with: {sorted(map(str, set(place_of) - taken))}")
         return Frame([row.mean for row in final], [[row.slopes[k] for row in final] for k in range(self.box.count)], [row.radius for row in final])
+
+    def shifted(self, name, rows, fresh, shift, seen, shares):
+        """The numbers of a sample, from where the first copy is after the move."""
+        shifted = []
+        for channel, (row, share) in enumerate(zip(rows, shares)):
+            own = ("sample", *name, channel)
+            of_shift = {of: times(by, share.entry(0)) for of, by in shift.items()}
+            shifted.append(combination(difference(fresh[channel] if fresh else {own: self.constant(1)}, of_shift), {**seen, own: row}))
+        return shifted
 
     def tick(self, c, senders, heard_by):
         """Where a class moves in a tick, copy and device: what each is of where they are and of the samples held, for velocities multiplied by the time of the part."""
@@ -524,3 +536,6 @@ def difference(one, other):
 def row_of(*scalars) -> Row:
     return Row([s.mean for s in scalars], [list(slopes) for slopes in zip(*(s.slopes for s in scalars))], [s.radius for s in scalars])
 
+
+def times(one: Scalar, other: Scalar) -> Scalar:
+    return row_of(one).times(other).entry(0)
