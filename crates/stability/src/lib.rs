@@ -73,8 +73,8 @@ pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square,
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use proof::{
-    BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, MOST_FOLLOWED, MOST_HALVINGS, NumberSpan, PartCertificate, ProofError, ProvenBox,
-    ProvenLine, ProvenRegion, ProvenStretch, prove_every_number,
+    BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, MOST_FOLLOWED, MOST_HALVINGS, NumberCertificate, NumberSpan, PartCertificate,
+    ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch, prove_every_number,
 };
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};

@@ -48,6 +48,9 @@ pub(crate) struct PointArguments {
     /// The verdict for every number of equal peers too, proven: of those from 2 on, or FROM.., or FROM..TO
     #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, conflicts_with_all = ["graph", "method", "about"])]
     pub(crate) every_number: Option<(u64, Option<u64>)>,
+    /// With --every-number, write into this file all by which the verdicts can be checked without this program
+    #[arg(long, value_name = "FILE", requires = "every_number")]
+    pub(crate) certificate: Option<PathBuf>,
     /// Whether the scene is stable however its one-sided contacts and walls open and close, proven; or else a motion that grows
     #[arg(long, conflicts_with_all = ["graph", "method", "about"])]
     pub(crate) switching: bool,
@@ -199,6 +202,9 @@ pub(crate) struct BoundaryArguments {
     /// Prove which stretches are stable and which unstable, and enclose every crossing between them. A key that does nothing but set gains, masses and dampings
     #[arg(long, conflicts_with = "samples")]
     pub(crate) prove: bool,
+    /// With --prove, write certificate.json into the folder of --out too: all by which the verdicts can be checked without this program
+    #[arg(long, requires = "prove", requires = "out")]
+    pub(crate) certificate: bool,
     /// How many values are looked at first, the ends among them [default: 400]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(0, u64::MAX))]
     pub(crate) samples: Option<usize>,

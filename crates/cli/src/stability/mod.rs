@@ -1,6 +1,7 @@
 //! `cohaptic stability`: what can be said about a scene without simulating it.
 
 mod boundary;
+mod certificate;
 mod guarantee;
 mod map;
 mod point;

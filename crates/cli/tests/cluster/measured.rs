@@ -162,8 +162,9 @@ fn merges(page: &mut String) {
     page.push_str("\n## The merge\n\nShards of 10,000 runs with all measures, a combination each, put together from parts to the table on the disk, and summed up. Asked for: 100 MB/s, in memory that does not grow\nwith the number of shards.\n\n| shards | runs | table \\[MB\\] | \\[s\\] | \\[MB/s\\] | most memory \\[MB\\] |\n| ---: | ---: | ---: | ---: | ---: | ---: |\n");
     let most = std::env::var("COHAPTIC_SHARDS").ok().and_then(|most| most.parse().ok()).unwrap_or(1000_u64);
     for shards in [10, 100, 1000].into_iter().filter(|shards| *shards <= most) {
-        let words =
-            format!("campaign scene.toml --set scene.duration=100ms --measure all --vary coordination.stiffness=1..2/{shards} --runs 10000 --part 10000 --no-plot");
+        let words = format!(
+            "campaign scene.toml --set scene.duration=100ms --measure all --vary coordination.stiffness=1..2/{shards} --runs 10000 --part 10000 --no-plot"
+        );
         let command = |options: &str| {
             let mut command = work.command("cohaptic");
             command.args(words.split(' ')).args(options.split(' '));

@@ -1,4 +1,4 @@
-//! Certificates of `stability map --prove`, checked by a program that shares no code with this one: `crates/stability/tests/reference/check_certificate.py`.
+//! Certificates of `stability map --prove`, `boundary --prove` and `point --every-number`, checked by a program that shares no code with this one: `crates/stability/tests/reference/check_certificate.py`.
 
 use std::process::{Command, Output};
 
@@ -54,6 +54,9 @@ fn certificates_hold_for_a_checker_that_shares_no_code() {
         (EQUAL, "--x coordination.stiffness=50..300 --y peer.coupling.damping=0..20 --prove 3 --set coordination.damping=0 --set object.damping=15"),
         (UNEQUAL, "--x coordination.stiffness=20..400 --y peer.coupling.stiffness=500..2500 --prove 3"),
         (UNEQUAL, "--x coordination.stiffness=20..3000 --y peer.coupling.stiffness=500..2500 --prove 3"),
+        (EQUAL, "--x object.mass=0.3..2 --y coordination.stiffness=100..1000 --prove 3 --set coordination.strategy=average-position"),
+        (EQUAL, "--x object.mass=0.1..2 --y object.damping=0..5 --prove 3"),
+        (EQUAL, "--x peer.device.mass=0.05..0.5 --y peer.device.damping=0..20 --prove 3"),
     ] {
         let desk = Desk::with("scene.toml", scene);
         let document = desk.json(&format!("stability map scene.toml {options} --certificate --out out --json"));
@@ -64,6 +67,88 @@ fn certificates_hold_for_a_checker_that_shares_no_code() {
         let share = |key: &str| format!("{key} {:.3} %", 100.0 * region[key].as_f64().unwrap());
         assert!(["stable", "unstable", "undecided"].iter().all(|key| text.contains(&share(key))), "{text} {region}");
         assert!(region["undecided"].as_f64().unwrap() < 0.9, "{region}");
+    }
+}
+
+/// A line and spans of numbers are checked as regions are: the checker says the same stretches of numbers.
+#[test]
+fn certificates_of_lines_and_numbers_hold_too() {
+    if !can_check() {
+        return;
+    }
+    let desk = Desk::with("scene.toml", EQUAL);
+    let document =
+        desk.json("stability boundary scene.toml --along coordination.stiffness=100..6000 --prove --tolerance 1 --certificate --out out --json");
+    let output = check(&desk, "out/certificate.json");
+    let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert!(output.status.success() && text.contains(" boxes hold: stable "), "{refusal}");
+    let open: f64 = document["stretches"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|one| one["verdict"] == "undecided")
+        .map(|one| one["high"].as_f64().unwrap() - one["low"].as_f64().unwrap())
+        .sum();
+    assert!(text.contains(&format!("undecided {:.3} %", 100.0 * open / 5900.0)), "{text} {document}");
+    for (scene, options, without_end) in [
+        (EQUAL, "--set object.split-mass=false --set coordination.strategy=average-position --set object.damping=0", true),
+        (EQUAL, "--set object.split-mass=false", false),
+        (EQUAL, "--set coordination.strategy=average-position --set object.damping=0", false),
+        (
+            EQUAL,
+            "--set coordination.strategy=average-position --set coordination.scaling=inverse-n --set peer.coupling.scaling=inverse-n --set object.damping=0",
+            false,
+        ),
+        (UNEQUAL, "--set object.split-mass=false", false),
+        (UNEQUAL, "--set object.damping=0 --set peer.coupling.scaling=inverse-n", false),
+    ] {
+        let desk = Desk::with("scene.toml", scene);
+        let document = desk.json(&format!("stability point scene.toml {options} --every-number --certificate numbers.json --json"));
+        let output = check(&desk, "numbers.json");
+        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+        assert!(output.status.success(), "{options}: {refusal}");
+        let spans = document["every_number"]["spans"].as_array().unwrap();
+        assert_eq!(document["every_number"]["without_limit"].is_null(), without_end, "{document:#}");
+        for span in spans.iter().filter(|span| !span["to"].is_null() && span["to"].as_u64().unwrap() < 100_000) {
+            let words = format!("{} from {} to {}", span["verdict"].as_str().unwrap(), span["from"], span["to"]);
+            assert!(text.contains(&words), "{options}: {words}: {text}");
+        }
+        let last = spans.last().unwrap();
+        assert!(!without_end || text.contains(&format!("{} from {} on", last["verdict"].as_str().unwrap(), last["from"])), "{options}: {text}");
+    }
+}
+
+/// Spans that leave a number out, or say more than their numbers show.
+#[test]
+fn a_certificate_of_numbers_that_says_more_than_it_shows_is_refused() {
+    if !can_check() {
+        return;
+    }
+    let desk = Desk::with("scene.toml", EQUAL);
+    desk.text("stability point scene.toml --every-number 2..60 --certificate numbers.json --set object.split-mass=false");
+    let whole: Value = serde_json::from_str(&desk.read("numbers.json")).unwrap();
+    let spans = whole["spans"].as_array().unwrap();
+    let of = |verdict: &str| spans.iter().position(|one| one["verdict"] == verdict).unwrap();
+    let (stable, unstable) = (of("stable"), of("unstable"));
+    let at = |place: usize, key: &str| format!("/spans/{place}{key}");
+    let mut fewer = spans.clone();
+    fewer.remove(1);
+    for (place, value, words) in [
+        (at(stable, "/verdict"), "unstable".into(), "no eigenvalue is shown"),
+        (at(unstable, "/verdict"), "stable".into(), "not all eigenvalues"),
+        ("/spans".to_owned(), fewer.into(), "left out"),
+        (at(spans.len() - 1, "/to"), Value::Null, "without a limit"),
+        (at(spans.len() - 1, "/to"), 5_000_000.into(), "not dominant|no eigenvalue is shown"),
+        (at(stable, "/parts/0/weights"), "".into(), "expected"),
+        ("/scene".to_owned(), whole["scene"].as_str().unwrap().replace("8ms\" }", "80ms\" }").into(), "not dominant|sample that is missing"),
+        ("/growing".to_owned(), 7.into(), "not in list"),
+    ] {
+        let mut changed = whole.clone();
+        *changed.pointer_mut(&place).unwrap() = value;
+        desk.write("changed.json", changed.to_string());
+        let output = check(&desk, "changed.json");
+        let refusal = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");
     }
 }
 

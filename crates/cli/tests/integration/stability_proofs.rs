@@ -34,6 +34,8 @@ fn spans_of_numbers_change_where_single_verdicts_do() {
     assert_eq!((&without_end["every_number"]["spans"], &without_end["every_number"]["without_limit"]), (&expected, &serde_json::Value::Null));
     let text = desk.text("stability point equal.toml --every-number");
     assert!(text.contains("note: as N grows, the gains of the coordination grow with N") && text.contains("unstable  for N >= 180\n"), "{text}");
+    let text = desk.text("stability point equal.toml --every-number 2..9 --set link.loss=5%");
+    assert!(text.contains("equal to peer1, proven in the mean square:\n    stable    for 2 <= N <= 9\n"), "{text}");
 }
 
 #[test]
@@ -99,7 +101,9 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
         ("stability point equal.toml --every-number 1..", "at least 2 peers"),
         ("stability point equal.toml --every-number 9..8", "the smaller number comes first"),
         ("stability point equal.toml --every-number some", "expected FROM.. or FROM..TO"),
-        ("stability point equal.toml --every-number --set link.loss=5%", "leave something to chance"),
+        ("stability point equal.toml --every-number --set link.loss=5% --set peers.peer1.contact=none", "leave something to chance"),
+        ("stability point equal.toml --every-number --set link.loss=5% --certificate numbers.json", "has no certificate"),
+        ("stability point equal.toml --certificate numbers.json", "--every-number"),
         ("stability map equal.toml --x link.delay=0ms..9ms --y coordination.damping=0..9 --prove", "link.delay does more than to set"),
         ("stability boundary equal.toml --along link.delay=0ms..9ms --prove", "link.delay does more than to set"),
         ("stability map equal.toml --x link.loss=0%..9% --y coordination.damping=0..9 --prove", "link.loss does more than to set"),

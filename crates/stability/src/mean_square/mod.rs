@@ -15,14 +15,14 @@
 //! counted among the roundings on the assumption that each term of a tick has no more than 48 of them, coefficients included (`tracked`). Not
 //! counted: rounding errors of the probabilities themselves, and numbers that underflow.
 
-mod arrivals;
+pub(crate) mod arrivals;
 mod build;
 mod equal;
 mod events;
 mod held;
 mod law;
-mod positive;
-mod symmetric;
+pub(crate) mod positive;
+pub(crate) mod symmetric;
 #[cfg(test)]
 mod tests;
 mod tracked;
@@ -398,15 +398,32 @@ impl Followed {
         if random_links(scene)?.is_empty() {
             return Ok(Self::Certain);
         }
-        if !alike(scene, structure) {
-            return Ok(Self::Anew);
+        Ok(Independent::of(scene, network, structure)?.map_or(Self::Anew, |Independent { timetable, hazards, held }| Self::Equal {
+            frame: Equal::new(scene.peers.len(), timetable, &hazards),
+            held: held.value,
+        }))
+    }
+}
+
+/// When samples of equal peers arrive over equal links that lose independently, and on which nothing overtakes.
+#[derive(Clone, Debug)]
+pub(crate) struct Independent {
+    /// Of one peer, without deliveries.
+    pub(crate) timetable: Timetable,
+    pub(crate) hazards: Hazards,
+    /// The probability, per frame, that nothing arrives on a link.
+    pub(crate) held: Radius,
+}
+
+impl Independent {
+    /// `None` if peers or links differ, or links do something else.
+    pub(crate) fn of(scene: &Scene, network: &NominalNetwork, structure: &Structure) -> Result<Option<Self>, AnalysisError> {
+        if random_links(scene)?.is_empty() || !alike(scene, structure) {
+            return Ok(None);
         }
         let alike = Alike::of(scene, network, &mut Vec::new())?;
-        let Some(hazards) = alike.independent(structure) else {
-            return Ok(Self::Anew);
-        };
-        let held = alike.held(hazards).value;
-        Ok(Self::Equal { frame: Equal::new(scene.peers.len(), alike.timetable.clone(), hazards), held })
+        let hazards = alike.independent(structure).cloned();
+        Ok(hazards.map(|hazards| Self { held: alike.held(&hazards), hazards, timetable: alike.timetable }))
     }
 }
 

@@ -74,6 +74,28 @@ pub(crate) fn radius_watched(operator: &impl Positive, operations: f64, watch: &
     }
 }
 
+/// γ as it is chosen for a spectral radius, nearly that of the operator, and some Y for which γY − L(Y) is nearly the base; whether it is has to be checked.
+pub(crate) fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> Option<(f64, Vec<f64>)> {
+    let mut krylov = Krylov::new(operator.base());
+    let most = MOST_STEPS.min(operator.unknowns());
+    let mut next = 8;
+    loop {
+        let going = krylov.steps() < most && krylov.step(operator);
+        if going && krylov.steps() < next {
+            continue;
+        }
+        next = krylov.steps() + krylov.steps() / 4 + 2;
+        let gamma = gamma(krylov.largest_real()?);
+        let (solution, left) = krylov.solve(gamma)?;
+        if !going || left <= NEARLY * krylov.norm {
+            return Some((gamma, solution));
+        }
+    }
+}
+
+/// As near as this to the base, relative to it, is near enough for a solution that is checked over a box.
+const NEARLY: f64 = 1e-6;
+
 /// Why there is no radius.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Ended {
@@ -262,7 +284,7 @@ impl Krylov {
 
     /// Whether this space has a Y of that kind for which γY − L(Y) is positive definite whatever was rounded.
     fn check(&self, operator: &impl Positive, candidate: f64, kind: &dyn Fn(&[Matrix]) -> bool) -> bool {
-        let Some(solution) = self.solve(candidate) else {
+        let Some((solution, _)) = self.solve(candidate) else {
             return false;
         };
         if !kind(&operator.matrices(&solution)) {
@@ -279,8 +301,8 @@ impl Krylov {
         left.iter().zip(&error).all(|(left, error)| is_positive(left, error))
     }
 
-    /// The combination of the basis for which γY − L(Y) − E is least: a least-squares problem with a Hessenberg matrix, by rotations.
-    fn solve(&self, candidate: f64) -> Option<Vec<f64>> {
+    /// The combination of the basis for which γY − L(Y) − E is least, and how large that is: a least-squares problem with a Hessenberg matrix, by rotations.
+    fn solve(&self, candidate: f64) -> Option<(Vec<f64>, f64)> {
         let size = self.columns.len();
         let mut matrix = Matrix::from_fn(size + 1, size, |row, column| {
             let entry = -self.columns[column].get(row).copied().unwrap_or(0.0);
@@ -309,13 +331,14 @@ impl Krylov {
             let known: f64 = (row + 1..size).map(|column| matrix[(row, column)] * weights[column]).sum();
             weights[row] = (right[row] - known) / matrix[(row, row)];
         }
+        let left = right[size].abs();
         let mut solution = vec![0.0; self.base.len()];
         for (weight, direction) in weights.iter().zip(&self.basis) {
             for (sum, entry) in solution.iter_mut().zip(direction) {
                 *sum += weight * entry;
             }
         }
-        Some(solution)
+        Some((solution, left))
     }
 }
 

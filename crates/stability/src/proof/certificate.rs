@@ -1,16 +1,16 @@
 //! Certificates: the numbers by which anybody can check a proof without the program that found it.
 //!
-//! A certificate names the states of each part of a scene, and for each box of it the coordinates V, the weights d and the circle of [`super::discs`]. A reader with the scene can write down its matrices and
+//! A certificate names the states of each part of a scene, and for each box of it, or for each span of numbers of peers, the coordinates V, the weights d and the circle of [`super::discs`]. A reader with the scene can write down its matrices and
 //! check inequality (1) there; `crates/stability/tests/reference/check_certificate.py` does.
 
 use std::fmt::Write as _;
 
 use cohaptic_peer::Gains;
 
-use super::Guarantee;
 use super::corners::States;
 use super::discs::{FreeCircle, Witness};
 use super::steps::FrameState;
+use super::{Guarantee, Proven};
 
 /// A box of keys, and the numbers by which its verdict can be checked.
 #[derive(Clone, Debug)]
@@ -21,6 +21,31 @@ pub struct BoxCertificate {
     pub guarantee: Guarantee,
     /// Of a stable box all parts of the motion but devices that touch nothing; of an unstable one the part that grows; else none.
     pub parts: Vec<PartCertificate>,
+}
+
+/// Numbers of equal peers, and the numbers by which the verdict on them can be checked.
+#[derive(Clone, Debug)]
+pub struct NumberCertificate {
+    /// The least.
+    pub from: u64,
+    /// The greatest; `None`: all beyond.
+    pub to: Option<u64>,
+    /// The verdict on each.
+    pub guarantee: Guarantee,
+    /// As those of [`BoxCertificate`].
+    pub parts: Vec<PartCertificate>,
+}
+
+/// Parts of a scene with their verdicts, where they are asked for.
+pub(super) type Certified<'a> = Option<&'a mut Vec<(Proven, PartCertificate)>>;
+
+/// The parts that a verdict needs: all, or one that grows.
+pub(super) fn needed(verdict: Option<Proven>, mut parts: Vec<(Proven, PartCertificate)>) -> Vec<PartCertificate> {
+    if verdict != Some(Proven::Stable) {
+        parts.retain(|(of, _)| Some(*of) == verdict);
+        parts.truncate(1);
+    }
+    parts.into_iter().map(|(_, part)| part).collect()
 }
 
 /// A part of the motion of a scene over a box: the averages of its classes of equal peers, or how the members of one of them differ.

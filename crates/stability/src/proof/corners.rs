@@ -58,7 +58,15 @@ impl Frame {
 /// the points are.
 pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
     let frame = Frame::of(points, common)?;
-    let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(|point| frame.matrices(point)).collect();
+    let steps = enclosed(points, ends, |point| frame.matrices(point))?;
+    #[cfg(test)]
+    let steps = super::mutation::of_steps(steps);
+    Ok(steps)
+}
+
+/// Matrices over the box that points enclose, from those at each corner. Bodies are between those of `ends`, whatever those of the points are.
+pub(super) fn enclosed(points: &[Point], ends: &[Vec<Node>], matrices: impl Fn(&Point) -> Vec<StepMatrix>) -> Result<Vec<StepSpan>, ProofError> {
+    let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(matrices).collect();
     Ok((0..corners[0].len()).map(|step| StepSpan::of(corners.iter().map(|steps| &steps[step]))).collect())
 }
 
@@ -106,7 +114,7 @@ pub(super) fn doubled(points: &[Point], at: impl Fn(&Point, bool) -> Point) -> V
 }
 
 /// Refuses laws whose states mean something else at each corner: numbers that are remembered in units of gains that vary, and ages.
-fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
+pub(super) fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
     let units = |point: &Point| -> Vec<u64> {
         let of = |node: &Node| {
             let remembered = (0..node.law.memory.len()).map(|place| node.memory_unit(place, scale));
@@ -123,38 +131,64 @@ fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
     Ok(())
 }
 
-/// The points with one more number for each coefficient of a step map that varies between the ends.
+/// The points with one more number for each coefficient of a step map that varies between the ends. Bodies that are equal at all ends vary together: their coefficients are the same functions of what varies.
 fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, ProofError> {
-    type Access = fn(&mut Node) -> Option<&mut Body>;
-    let bodies: [Access; 2] = [|node| Some(&mut node.object), |node| node.device.as_mut()];
-    let mut all = points.to_vec();
+    let mut groups: Vec<(Vec<Body>, Vec<(usize, BodyOf)>)> = Vec::new();
     for node in 0..points[0].nodes.len() {
-        for body in bodies {
-            let found: Vec<Body> = ends.iter().filter_map(|nodes| body(&mut nodes[node].clone()).copied()).collect();
+        for body in [BodyOf::Copy, BodyOf::Device] {
+            let found: Vec<Body> = ends.iter().filter_map(|nodes| body.of(&mut nodes[node].clone()).copied()).collect();
             if found.iter().all(|other| *other == found[0]) {
                 continue;
             }
-            let ranges = ranges(&found)?;
-            let set = |point: &Point, values: &dyn Fn([f64; 6]) -> [f64; 6]| {
-                let mut point = point.clone();
-                if let Some(place) = body(&mut point.nodes[node]) {
-                    *place = place.with_map(map_of(values(coefficients(&place.only_map().unwrap_or_else(|| map_of([0.0; 6]))))));
-                }
-                point
-            };
-            all = all.iter().map(|point| set(point, &|_| ranges.map(|(low, _)| low))).collect();
-            for places in together(&ranges) {
-                all = doubled(&all, |point, upper| {
-                    let high = |mut values: [f64; 6]| {
-                        places.iter().for_each(|place| values[*place] = ranges[*place].1);
-                        values
-                    };
-                    set(point, &|values| if upper { high(values) } else { values })
-                });
+            match groups.iter_mut().find(|(bodies, _)| *bodies == found) {
+                Some((_, places)) => places.push((node, body)),
+                None => groups.push((found, vec![(node, body)])),
             }
         }
     }
-    if all.len() > 1 << MOST_NUMBERS { Err(ProofError::Numerous { most: MOST_NUMBERS }) } else { Ok(all) }
+    let mut all = points.to_vec();
+    for (found, bodies) in groups {
+        let ranges = ranges(&found)?;
+        let set = |point: &Point, values: &dyn Fn([f64; 6]) -> [f64; 6]| {
+            let mut point = point.clone();
+            for (node, body) in &bodies {
+                if let Some(place) = body.of(&mut point.nodes[*node]) {
+                    *place = place.with_map(map_of(values(coefficients(&place.only_map().unwrap_or_else(|| map_of([0.0; 6]))))));
+                }
+            }
+            point
+        };
+        all = all.iter().map(|point| set(point, &|_| ranges.map(|(low, _)| low))).collect();
+        for places in together(&ranges) {
+            all = doubled(&all, |point, upper| {
+                let high = |mut values: [f64; 6]| {
+                    places.iter().for_each(|place| values[*place] = ranges[*place].1);
+                    values
+                };
+                set(point, &|values| if upper { high(values) } else { values })
+            });
+        }
+        if all.len() > 1 << MOST_NUMBERS {
+            return Err(ProofError::Numerous { most: MOST_NUMBERS });
+        }
+    }
+    Ok(all)
+}
+
+/// Which body of a node.
+#[derive(Clone, Copy)]
+enum BodyOf {
+    Copy,
+    Device,
+}
+
+impl BodyOf {
+    const fn of(self, node: &mut Node) -> Option<&mut Body> {
+        match self {
+            Self::Copy => Some(&mut node.object),
+            Self::Device => node.device.as_mut(),
+        }
+    }
 }
 
 fn coefficients(map: &StepMap) -> [f64; 6] {

@@ -48,6 +48,8 @@ pub enum FreeCircle {
 /// The verdict on all matrices of a box.
 pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     let near = NearlyDiagonal::of(span)?;
+    #[cfg(test)]
+    let near = super::mutation::of_discs(near);
     let reaches: Vec<(f64, f64)> =
         (0..near.size()).map(|place| near.reach(near.mean[(place, place)], |slope| slope[(place, place)], near.wide[(place, place)])).collect();
     let (proven, circle, weights) = if reaches.iter().all(|(_, high)| *high < 1.0) {
@@ -61,13 +63,13 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
 }
 
 /// W·M·V over a box, nearly diagonal, and W·V, nearly 1.
-struct NearlyDiagonal {
+pub(super) struct NearlyDiagonal {
     /// V.
     coordinates: faer::Mat<c64>,
     mean: faer::Mat<c64>,
-    slopes: Vec<faer::Mat<c64>>,
+    pub(super) slopes: Vec<faer::Mat<c64>>,
     /// How far an entry of W·M·V may be from its mean and slopes.
-    wide: Matrix,
+    pub(super) wide: Matrix,
     /// How far an entry of W·V may be from that of 1.
     off_unit: Matrix,
 }

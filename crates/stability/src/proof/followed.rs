@@ -1,12 +1,13 @@
 //! A family of scenes with open keys, and the verdict on all of them in a box of values.
 
 use cohaptic_scene::Scene;
+use rayon::prelude::*;
 
-use super::certificate::{BoxCertificate, PartCertificate};
+use super::certificate::{BoxCertificate, Certified, PartCertificate, needed};
 use super::corners::{Common, Point, states, steps};
 use super::discs::decide;
 use super::span::StepSpan;
-use super::{ProofError, Proven};
+use super::{Guarantee, ProofError, Proven};
 use crate::analysis::pairs;
 use crate::lifted::Node;
 use crate::network::NominalNetwork;
@@ -14,19 +15,20 @@ use crate::parts::alone;
 use crate::pieces::pieces;
 use crate::structure::Structure;
 use crate::timetable::Timetable;
-use crate::{Family, FamilyError, Matrix, Verdict};
+use crate::worst_case::rounding::real;
+use crate::{AnalysisError, Family, FamilyError, Matrix, Verdict, Watch};
 
 /// One motion in one combination of contacts: the classes of its peers, for all values of the keys.
-struct Motion {
+pub(super) struct Motion {
     /// Which of the pieces of a scene it is.
     piece: usize,
-    structure: Structure,
+    pub(super) structure: Structure,
 }
 
 /// A family whose keys do nothing but set gains, masses and dampings, and its motions.
 pub(super) struct Followed<'a> {
     family: &'a Family,
-    motions: Vec<Motion>,
+    pub(super) motions: Vec<Motion>,
 }
 
 impl<'a> Followed<'a> {
@@ -60,15 +62,10 @@ impl<'a> Followed<'a> {
     pub(super) fn certify(&self, ranges: &[[f64; 2]]) -> Result<Option<BoxCertificate>, ProofError> {
         let mut parts = Vec::new();
         let Some(proven) = self.decide_with(ranges, Some(&mut parts))? else { return Ok(None) };
-        if proven == Proven::Unstable {
-            // One part that grows is enough.
-            parts.retain(|(of, _)| *of == proven);
-            parts.truncate(1);
-        }
-        Ok(Some(BoxCertificate { ranges: ranges.to_vec(), guarantee: proven.into(), parts: parts.into_iter().map(|(_, part)| part).collect() }))
+        Ok(Some(BoxCertificate { ranges: ranges.to_vec(), guarantee: proven.into(), parts: needed(Some(proven), parts) }))
     }
 
-    fn decide_with(&self, ranges: &[[f64; 2]], mut certified: Option<&mut Vec<(Proven, PartCertificate)>>) -> Result<Option<Proven>, ProofError> {
+    fn decide_with(&self, ranges: &[[f64; 2]], mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let corner = |place: usize| ranges.iter().enumerate().map(|(key, range)| range[place >> key & 1]).collect::<Vec<f64>>();
         let scenes = (0..1 << ranges.len()).map(|place| self.family.written(&corner(place))).collect::<Result<Vec<Scene>, FamilyError>>()?;
         let all = scenes.iter().map(|scene| pieces(scene, "a proof")).collect::<Result<Vec<_>, _>>()?;
@@ -86,9 +83,23 @@ impl<'a> Followed<'a> {
     }
 }
 
+/// Boxes of a family with all by which their verdicts can be checked. A box is an operation of the watch, which may end it.
+pub(super) fn certify(family: &Family, boxes: Vec<Vec<[f64; 2]>>, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
+    let followed = Followed::new(family)?;
+    watch.expects(real(boxes.len()));
+    let certificates = boxes.into_par_iter().map(|ranges| {
+        if watch.stops() {
+            return Err(ProofError::Analysis(AnalysisError::Stopped));
+        }
+        watch.done(1.0);
+        Ok(followed.certify(&ranges)?.unwrap_or(BoxCertificate { ranges, guarantee: Guarantee::Undecided, parts: Vec::new() }))
+    });
+    certificates.collect()
+}
+
 impl Motion {
     /// The verdict on the motion between scenes, the corners of a box, and the certificates of its parts where they are asked for.
-    fn decide(&self, scenes: &[&Scene], mut certified: Option<&mut Vec<(Proven, PartCertificate)>>) -> Result<Option<Proven>, ProofError> {
+    fn decide(&self, scenes: &[&Scene], mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let structure = &self.structure;
         let nodes: Vec<_> = scenes.iter().map(|scene| structure.nodes(scene)).collect();
         let time = structure.time(scenes[0], &nodes[0]);

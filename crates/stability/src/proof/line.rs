@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::followed::Followed;
-use super::{Guarantee, ProofError};
+use super::followed::{Followed, certify};
+use super::{BoxCertificate, Guarantee, ProofError};
 use crate::worst_case::rounding::real;
 use crate::{Family, Watch};
 
@@ -25,6 +25,8 @@ pub struct ProvenLine {
     pub stretches: Vec<ProvenStretch>,
     /// How many stretches were looked at.
     pub attempts: usize,
+    /// The stretches as they were decided, of which neighbours may agree.
+    pieces: Vec<ProvenStretch>,
     /// Whether nobody ended the proof; if somebody did, stretches that were not looked at are undecided too.
     pub is_whole: bool,
 }
@@ -71,12 +73,21 @@ impl ProvenLine {
         }
         found.sort_by(|one, other| one.low.total_cmp(&other.low));
         let mut stretches: Vec<ProvenStretch> = Vec::new();
-        for one in found {
+        for one in &found {
             match stretches.last_mut() {
                 Some(last) if last.guarantee == one.guarantee => last.high = one.high,
-                _ => stretches.push(one),
+                _ => stretches.push(*one),
             }
         }
-        Ok(Self { stretches, attempts, is_whole })
+        Ok(Self { stretches, attempts, is_whole, pieces: found })
+    }
+
+    /// The pieces of the line with all by which they can be checked. Each is decided once more.
+    ///
+    /// # Errors
+    ///
+    /// As [`ProvenLine::prove`], of the family that was proven, and if the watch ends it.
+    pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
+        certify(family, self.pieces.iter().map(|ProvenStretch { low, high, .. }| vec![[*low, *high]]).collect(), watch)
     }
 }

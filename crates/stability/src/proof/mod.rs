@@ -10,15 +10,21 @@ mod certificate;
 mod corners;
 mod discs;
 mod followed;
+mod growing;
 mod line;
+mod mean_square;
+#[cfg(test)]
+mod mutation;
 mod number;
+#[cfg(test)]
+mod points;
 mod region;
 mod span;
 mod steps;
 #[cfg(test)]
 mod tests;
 
-pub use certificate::{BoxCertificate, PartCertificate};
+pub use certificate::{BoxCertificate, NumberCertificate, PartCertificate};
 pub use discs::FreeCircle;
 pub use line::{ProvenLine, ProvenStretch};
 pub use number::{EveryNumber, MOST_FOLLOWED, NumberSpan, prove_every_number};
@@ -114,6 +120,14 @@ pub enum ProofError {
         "links leave something to chance, and a guarantee is about one sequence of events: expected links without jitter and loss; `stability point --losses-in-a-row` bounds all losses"
     )]
     Chance,
+    /// Something is left to chance among peers that differ, or otherwise than independently.
+    #[error(
+        "links leave something to chance: expected equal peers over equal links that lose independently and on which nothing overtakes, for every number of them in the mean square"
+    )]
+    UnequalChance,
+    /// Certificates are not written for second moments.
+    #[error("a proof in the mean square has no certificate: expected links that leave nothing to chance")]
+    NoCertificate,
     /// A law uses the ages of samples.
     #[error("the coordination uses the ages of samples, which are no gains: ask `stability point` for single scenes")]
     Ages,

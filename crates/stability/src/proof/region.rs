@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::followed::Followed;
+use super::followed::{Followed, certify};
 use super::{BoxCertificate, Guarantee, ProofError};
 use crate::worst_case::rounding::real;
-use crate::{AnalysisError, Family, Watch};
+use crate::{Family, Watch};
 
 /// A box of two keys, and the verdict on all scenes in it.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -81,17 +81,7 @@ impl ProvenRegion {
     ///
     /// As [`ProvenRegion::prove`], of the family that was proven, and if the watch ends it.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
-        let followed = Followed::new(family)?;
-        watch.expects(real(self.boxes.len()));
-        let certificates = self.boxes.par_iter().map(|ProvenBox { x, y, .. }| {
-            if watch.stops() {
-                return Err(ProofError::Analysis(AnalysisError::Stopped));
-            }
-            watch.done(1.0);
-            let ranges = vec![*x, *y];
-            Ok(followed.certify(&ranges)?.unwrap_or(BoxCertificate { ranges, guarantee: Guarantee::Undecided, parts: Vec::new() }))
-        });
-        certificates.collect()
+        certify(family, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
     }
 
     /// The share of the area of the ranges with that verdict.

@@ -5,7 +5,7 @@
 
 use super::steps::StepMatrix;
 use crate::Matrix;
-use crate::worst_case::rounding::{UNDERFLOW, gamma, outward, real};
+use crate::worst_case::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
 
 /// A matrix over a box.
 #[derive(Clone, Debug)]
@@ -51,6 +51,42 @@ impl StepSpan {
             }
         }
         span
+    }
+
+    /// The same matrix all over a box of that many numbers.
+    pub(super) fn constant(mean: Matrix, numbers: usize) -> Self {
+        let none = Matrix::zeros(mean.rows(), mean.columns());
+        Self { slopes: vec![none.clone(); numbers], radius: none, mean }
+    }
+
+    /// Over a box with one more number, which changes nothing.
+    pub(super) fn with_another_number(mut self) -> Self {
+        self.slopes.push(Matrix::zeros(self.mean.rows(), self.mean.columns()));
+        self
+    }
+
+    pub(super) fn transposed(&self) -> Self {
+        Self { mean: self.mean.transposed(), slopes: self.slopes.iter().map(Matrix::transposed).collect(), radius: self.radius.transposed() }
+    }
+
+    /// The sum of two matrices over the same box.
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        let sum = |one: &Matrix, other: &Matrix| plus(one, other);
+        let slopes: Vec<Matrix> = self.slopes.iter().zip(&other.slopes).map(|(one, other)| sum(one, other)).collect();
+        let (mean, radius) = (sum(&self.mean, &other.mean), sum(&self.radius, &other.radius));
+        // Each sum rounds once.
+        let rounded = |i: usize, j: usize| UNIT * (mean[(i, j)].abs() + slopes.iter().map(|slope| slope[(i, j)].abs()).sum::<f64>());
+        let radius = Matrix::from_fn(mean.rows(), mean.columns(), |i, j| outward(radius[(i, j)] + rounded(i, j)));
+        Self { mean, slopes, radius }
+    }
+
+    pub(super) fn negated(&self) -> Self {
+        Self { mean: self.mean.scaled(-1.0), slopes: self.slopes.iter().map(|slope| slope.scaled(-1.0)).collect(), radius: self.radius.clone() }
+    }
+
+    /// T·M·Tᵀ.
+    pub(super) fn through(&self, by: &Self) -> Self {
+        by.times(self).times(&by.transposed())
     }
 
     /// The largest size that each entry can have.

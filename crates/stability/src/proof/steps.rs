@@ -229,9 +229,13 @@ impl Plan {
                 next += 1;
             }
         }
-        let largest = nodes.iter().map(|node| node.step_norm(scale)).fold(1.0, f64::max);
-        StepMatrix { matrix, error: ROUNDING * largest }
+        StepMatrix { matrix, error: error(nodes, scale) }
     }
+}
+
+/// How far each entry of a step of nodes may be from the exact one.
+pub(super) fn error(nodes: &[Node], scale: Scale) -> f64 {
+    ROUNDING * nodes.iter().map(|node| node.step_norm(scale)).fold(1.0, f64::max)
 }
 
 /// Which samples are states before each step, and after the last: those sent before that are used from there on, in this frame or in a later one.

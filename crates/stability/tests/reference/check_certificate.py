@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Checks a certificate of `cohaptic stability map --prove --certificate` with no part of the program that wrote it.
+"""Checks a certificate of `cohaptic stability` with no part of the program that wrote it: of `map --prove`, `boundary --prove` or `point --every-number`.
 
     python3 check_certificate.py certificate.json
 
-A certificate has a scene, boxes of two of its gains, and for each box a verdict with the numbers by which it can be checked. This program
-writes down the frame of the scene over each box from the equations of docs/model.md, with a bound of every rounding error, and checks that
+A certificate has a scene, boxes of one or two of its keys or spans of numbers of peers, and for each a verdict with the numbers by which it can be checked. This
+program writes down the frame of the scene over each from the equations of docs/model.md, with a bound of every rounding error, and checks that
 
-1. the boxes cover the whole range, once;
+1. the boxes cover the whole range, once, or spans leave no number out;
 2. on a circle all matrices A(z) = W·(z·1 − M)·V of the box are strictly diagonally dominant with the weights of the certificate, where W is the
    inverse of its coordinates V, nearly. Then no M of the box has an eigenvalue on the circle (Gershgorin 1931), and as many inside as A has
    diagonal entries that vanish there;
@@ -21,17 +21,21 @@ import struct
 import sys
 import tomllib
 from fractions import Fraction
+from itertools import product as tuples
 from operator import mul
 
 import scene as scenes
-from frame_over_box import Box, Part, classes_of
+from frame_over_box import KeyBox, NumberBox, Part, classes_of
 from scene import Scene
 
 # The relative error of one operation, and of some in a row.
 EPS = 2.0**-52
 UP = 1 + 2.0**-40
 
-GAINS = {"coordination.stiffness", "coordination.damping", "peer.coupling.stiffness", "peer.coupling.damping"}
+KEYS = {
+    *("coordination.stiffness", "coordination.damping", "peer.coupling.stiffness", "peer.coupling.damping"),
+    *("object.mass", "object.damping", "peer.device.mass", "peer.device.damping"),
+}
 
 
 class Refused(Exception):
@@ -153,37 +157,48 @@ def check_part(frame, certificate) -> tuple:
 
 
 def check_box(document, box) -> str:
-    verdict = box["verdict"]
+    """The verdict of a box of keys."""
+    corners = []
+    for place in range(2 ** len(document["keys"])):
+        values = [(key, box["ranges"][number][place >> number & 1]) for number, key in enumerate(document["keys"])]
+        corners.append(scene_of(document, values))
+    return check_verdict(lambda: KeyBox(corners, classes_of(corners)), box, corners)
+
+
+def check_span(document, span) -> str:
+    """The verdict of a span of numbers of peers."""
+    scene = scene_of(document)
+    return check_verdict(lambda: NumberBox(scene, classes_of([scene]), document["growing"], span["from"], span["to"]), span, [scene])
+
+
+def scene_of(document, values=()) -> Scene:
+    return scene_with(document["scene"], [*map(override, document["overrides"]), *values])
+
+
+def check_verdict(make, certified, scenes) -> str:
+    verdict = certified["verdict"]
     if verdict == "undecided":
         return verdict
-    corners = []
-    for place in range(4):
-        values = [(key, box["ranges"][number][place >> number & 1]) for number, key in enumerate(document["keys"])]
-        corners.append(scene_with(document["scene"], [override(text) for text in document["overrides"]] + values))
-    over = Box(corners)
-    first = corners[0]
-    classes = classes_of(corners)
-    certified = {}
-    for part in box["parts"]:
+    over = make()
+    found = set()
+    for part in certified["parts"]:
         name = (part["difference"], tuple(map(tuple, part["members"])))
-        frame = Part(over, classes, *name, part["states"], part["heard"], part["time"]).frame()
+        frame = Part(over, *name, part["states"], part["heard"], part["time"]).frame()
         within, size, kind, least = check_part(frame, part)
         if verdict == "unstable" and (least < 1 or kind == "around-zero" and within == size):
             raise Refused("no eigenvalue is shown to be outside of the unit circle")
         if verdict == "stable" and (kind != "around-zero" or part["circle"][1] > 1 or within < size):
             raise Refused("not all eigenvalues are shown to be within the unit circle")
-        certified[name] = True
-    whole = tuple(classes)
-    differences = {(True, (members,)) for members in classes if len(members) > 1}
-    known = differences | {(False, whole)}
-    if not certified.keys() <= known:
+        found.add(name)
+    known = {(True, (members,)) for members in over.classes if over.has_differences(members)} | {(False, tuple(over.classes))}
+    if not found <= known:
         raise Refused("a part of the certificate is none of the scene")
-    if verdict == "unstable" and not certified:
+    if verdict == "unstable" and not found:
         raise Refused("there is no part that grows")
     if verdict == "stable":
-        if certified.keys() != known:
+        if found != known:
             raise Refused("a part of the scene is missing")
-        for peer in first.peers:
+        for peer in (peer for scene in scenes for peer in scene.peers):
             damping = peer.device_damping + (peer.arm[1] if peer.arm else 0.0)
             if not peer.touches and not damping > 0:
                 raise Refused(f"the device of {peer.name} touches nothing and has no damping")
@@ -193,43 +208,67 @@ def check_box(document, box) -> str:
 
 
 def check_cover(document):
-    """Refuses boxes that do not cover the range once: each is the range, or a quarter of a box that is no box."""
-    ranges = document["ranges"]
+    """Refuses boxes that do not cover the range once: each is the range, or a part of a box that is no box, with all sides halved."""
     left = {tuple(map(tuple, box["ranges"])) for box in document["boxes"]}
     if len(left) != len(document["boxes"]):
         raise Refused("a box stands there twice")
-    waiting = [tuple(map(tuple, ranges))]
+    waiting = [tuple(map(tuple, document["ranges"]))]
     while waiting:
         box = waiting.pop()
         if box in left:
             left.remove(box)
             continue
-        (x, y) = box
-        halves = lambda low, high: ((low, (low + high) / 2), ((low + high) / 2, high))
-        if not left or not (x[0] < halves(*x)[0][1] < x[1] and y[0] < halves(*y)[0][1] < y[1]):
+        halves = [((low, (low + high) / 2), ((low + high) / 2, high)) for low, high in box]
+        if not left or not all(low < middle < high for (low, middle), (_, high) in halves):
             raise Refused(f"nothing covers {box}")
-        waiting += [(of_x, of_y) for of_x in halves(*x) for of_y in halves(*y)]
+        waiting += tuples(*halves)
     if left:
         raise Refused(f"beyond the range, or twice: {left.pop()}")
 
 
-def check(document) -> dict:
-    """The shares of the area that are stable, unstable and undecided; refuses what does not hold."""
-    if document["schema"].split("/")[:2] != ["cohaptic", "stability-certificate"]:
-        raise Refused("not a certificate of a region")
+def check(document) -> str:
+    """What a certificate shows, in words; refuses what does not hold."""
+    kind = document["schema"].split("/")
+    if kind == ["cohaptic", "stability-certificate"]:
+        return check_boxes(document)
+    if kind == ["cohaptic", "stability-number-certificate"]:
+        return check_spans(document)
+    raise Refused("not a certificate of a region or of numbers of peers")
+
+
+def checked(one, all_of, place, words) -> str:
+    """The verdict on a piece, or a refusal that says which."""
+    try:
+        return one(all_of, place)
+    except (Refused, ValueError, KeyError) as refused:
+        raise Refused(f"{words}, {place['verdict']}: {refused}") from None
+
+
+def check_boxes(document) -> str:
     for key in document["keys"]:
-        if key not in GAINS:
-            raise Refused(f"a key that is not covered: {key}; expected gains")
+        if key not in KEYS:
+            raise Refused(f"a key that is not covered: {key}; expected gains, masses and dampings")
     check_cover(document)
     area = lambda box: math.prod(Fraction(high) - Fraction(low) for low, high in box["ranges"])
     shares = {"stable": Fraction(0), "unstable": Fraction(0), "undecided": Fraction(0)}
     for number, box in enumerate(document["boxes"], start=1):
-        try:
-            shares[check_box(document, box)] += area(box)
-        except (Refused, ValueError, KeyError) as refused:
-            raise Refused(f"box {number} of {len(document['boxes'])}, {box['ranges']}, {box['verdict']}: {refused}") from None
+        shares[checked(check_box, document, box, f"box {number} of {len(document['boxes'])}, {box['ranges']}")] += area(box)
     whole = sum(shares.values())
-    return {name: float(share / whole) for name, share in shares.items()}
+    return f"{len(document['boxes'])} boxes hold: " + ", ".join(f"{name} {float(100 * share / whole):.3f} %" for name, share in shares.items())
+
+
+def check_spans(document) -> str:
+    found = []
+    for span in document["spans"]:
+        low, high = span["from"], span["to"]
+        if found and found[-1][1] != low - 1 or high is not None and high < low:
+            raise Refused(f"numbers of peers are left out before {low}, or stand there twice")
+        verdict = checked(check_span, document, span, f"from {low} to {high} peers")
+        if found and found[-1][2] == verdict:
+            low = found.pop()[0]
+        found.append((low, high, verdict))
+    words = [f"{verdict} from {low} on" if high is None else f"{verdict} from {low} to {high}" for low, high, verdict in found]
+    return f"{len(document['spans'])} spans of numbers hold: " + ", ".join(words)
 
 
 def main():
@@ -238,10 +277,9 @@ def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         document = json.load(file)
     try:
-        shares = check(document)
+        print(check(document))
     except Refused as refused:
         sys.exit(f"refused: {refused}")
-    print(f"{len(document['boxes'])} boxes hold: " + ", ".join(f"{name} {100 * share:.3f} %" for name, share in shares.items()))
 
 
 if __name__ == "__main__":

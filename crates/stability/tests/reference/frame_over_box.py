@@ -1,6 +1,6 @@
-"""A frame of a scene over a box of gains: every entry as a mean, a slope along each gain, and a radius for all else, rounding included.
+"""A frame of a scene over a box of numbers: every entry as a mean, a slope along each number, and a radius for all else, rounding included.
 
-With sᵢ ∈ [−1, 1] where in the box a gain is, an entry is mean + Σ sᵢ·slopeᵢ + e with |e| ≤ radius. Rows of such entries, coefficients of the state at the
+The numbers are gains, coefficients of step maps, or what they are multiplied by for a number of peers. With sᵢ ∈ [−1, 1] where in the box one is, an entry is mean + Σ sᵢ·slopeᵢ + e with |e| ≤ radius. Rows of such entries, coefficients of the state at the
 beginning of a frame, go through what happens in the frame: sample, deliver, forces, move.
 
 The averages of the classes of equal peers are one part of the motion; how the members of a class differ is another, one peer that hears its own samples
@@ -10,14 +10,12 @@ times −1/(N−1). Only average-position and proportional-derivative coordinati
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import product as tuples
 
 from timing import Timing
 
 EPS = 2.0**-52
 # Radii are sums of products; a few roundings of each are far below this.
 UP = 1 + 2.0**-40
-NUMBERS = 2
 
 
 class NotCovered(ValueError):
@@ -33,9 +31,26 @@ class Scalar:
     radius: float
 
 
-def scalar(mean, slopes=(Fraction(0),) * NUMBERS) -> Scalar:
-    """The nearest doubles of an exact affine number, and how far they are from it."""
-    exact = [Fraction(mean), *map(Fraction, slopes)]
+@dataclass
+class Affine:
+    """A number over a box, exact."""
+
+    mean: Fraction
+    slopes: tuple
+
+    def scaled(self, by):
+        return Affine(self.mean * by, tuple(slope * by for slope in self.slopes))
+
+
+def between(low, high, place, count) -> Affine:
+    """From one number to another, along that number of a box."""
+    slope = (high - low) / 2
+    return Affine(low + slope, tuple(slope if number == place else Fraction(0) for number in range(count)))
+
+
+def scalar(affine: Affine) -> Scalar:
+    """The nearest doubles of an exact number, and how far they are from it."""
+    exact = [affine.mean, *affine.slopes]
     near = [float(number) for number in exact]
     off = sum(abs(number - Fraction(double)) for number, double in zip(exact, near))
     return Scalar(near[0], near[1:], float(off) * UP + 5e-324 if off else 0.0)
@@ -50,12 +65,12 @@ class Row:
         self.mean, self.slopes, self.radius = mean, slopes, radius
 
     @classmethod
-    def zeros(cls, size):
-        return cls([0.0] * size, [[0.0] * size for _ in range(NUMBERS)], [0.0] * size)
+    def zeros(cls, size, numbers):
+        return cls([0.0] * size, [[0.0] * size for _ in range(numbers)], [0.0] * size)
 
     @classmethod
-    def unit(cls, size, place):
-        row = cls.zeros(size)
+    def unit(cls, size, place, numbers):
+        row = cls.zeros(size, numbers)
         row.mean[place] = 1.0
         return row
 
@@ -104,9 +119,9 @@ class Frame:
 def step(mass, damping, stiffness, span):
     """Increments of one step of m·a = f − b·v − k·x with f held: e00, e01, e10, e11, g0, g1, exact but for 10⁻⁴⁰ of what they are at most."""
     h = Fraction(span, 10**9)
-    x = [[Fraction(0), h, Fraction(0)], [-stiffness / mass * h, -damping / mass * h, h / mass], [Fraction(0)] * 3]
+    x = [[Fraction(0), h, Fraction(0)], [-stiffness / mass * h, -damping / mass * h, h], [Fraction(0)] * 3]
     norm = max(sum(map(abs, row)) for row in x)
-    if norm > 20:
+    if norm > 60:
         raise NotCovered("a body that moves by far within a tick")
     grid = 2**400
     short = lambda number: Fraction(round(number * grid), grid)
@@ -117,12 +132,23 @@ def step(mass, damping, stiffness, span):
         term = [[short(sum(term[i][k] * x[k][j] for k in range(3)) / number) for j in range(3)] for i in range(3)]
         total = [[a + b for a, b in zip(*rows)] for rows in zip(total, term)]
         bound = bound * norm / number
-    return total[0][0], total[0][1], total[1][0], total[1][1], total[0][2], total[1][2]
+    # The last column is for a force of the mass times 1 m/s².
+    return total[0][0], total[0][1], total[1][0], total[1][1], total[0][2] / mass, total[1][2] / mass
+
+
+def refuse(scene):
+    """Refuses what is not covered."""
+    if scene.lag is not None or scene.horizon is not None or scene.own_age is not None:
+        raise NotCovered("a law other than average-position and proportional-derivative")
+    if len({(p.tick, p.offset, p.phase, p.compute_delay) for p in scene.peers}) > 1 or scene.peers[0].compute_delay:
+        raise NotCovered("clocks that differ, or a compute delay")
+    if any(link != scene.links[0, 1] or link.loss or link.uniform_sd for link in scene.links.values()):
+        raise NotCovered("links that differ, or chance")
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """The numbers of a peer at a corner of the box, exact."""
+    """The numbers of a peer, exact: its bodies as mass, damping and stiffness, and its gains."""
 
     device: tuple
     copy: tuple
@@ -132,79 +158,230 @@ class Numbers:
     bt: Fraction
 
 
-def numbers_of(scene, peer) -> Numbers:
-    n = len(scene.peers)
+def numbers_of(scene, peer, copy_mass, of_law, of_coupling) -> Numbers:
+    """Of a peer of a scene with copies of that mass and gains times those factors."""
     arm = peer.arm or (0.0, 0.0, 0.0)
     device = tuple(Fraction(own) + Fraction(of_arm) for own, of_arm in zip((peer.device_mass, peer.device_damping, 0.0), arm))
-    mass = Fraction(scene.mass) / (n if scene.split else 1)
-    scale = Fraction(2, n) if peer.coupling_scaling else Fraction(1)
-    kc, bc = (Fraction(gain) * scale for gain in peer.coupling)
-    # PD is AP with N − 1 times both gains.
-    scale = Fraction(n - 1) if scene.proportional_derivative else Fraction(1)
+    kc, bc = (Fraction(gain) * of_coupling for gain in peer.coupling)
+    return Numbers(device, (copy_mass, Fraction(scene.damping), Fraction(0)), kc, bc, Fraction(scene.stiffness) * of_law, Fraction(scene.rate) * of_law)
+
+
+def law_factor(scene, nu, mu):
+    """By what the gains of the law are multiplied, for ν = 1/(N − 1) and µ = 1/N. PD is AP with N − 1 times both gains."""
     if scene.inverse_n:
-        scale *= Fraction(4 * (n - 1), n * n)
-    return Numbers(device, (mass, Fraction(scene.damping), Fraction(0)), kc, bc, Fraction(scene.stiffness) * scale, Fraction(scene.rate) * scale)
+        return 4 * (1 - mu) ** 2 if scene.proportional_derivative else 4 * mu * (1 - mu)
+    if scene.proportional_derivative and nu == 0:
+        raise NotCovered("gains without a limit")
+    return 1 / nu if scene.proportional_derivative else Fraction(1)
 
 
-class Box:
-    """The scenes at the corners of a box: number b is at its upper end where bit b of the corner's place is set."""
+class KeyBox:
+    """The scenes at the corners of a box of keys: key b is at its upper end where bit b of the corner's place is set."""
 
-    def __init__(self, corners):
-        self.corners = corners
+    def __init__(self, corners, classes):
+        self.classes, self.scene = classes, corners[0]
         for scene in corners:
-            if scene.lag is not None or scene.horizon is not None or scene.own_age is not None:
-                raise NotCovered("a law other than average-position and proportional-derivative")
-            if len({(p.tick, p.offset, p.phase, p.compute_delay) for p in scene.peers}) > 1 or scene.peers[0].compute_delay:
-                raise NotCovered("clocks that differ, or a compute delay")
-            if any(link != scene.links[0, 1] or link.loss or link.uniform_sd for link in scene.links.values()):
-                raise NotCovered("links that differ, or chance")
-        self.numbers = [[numbers_of(scene, peer) for peer in scene.peers] for scene in corners]
-        if len({tuple((n.device, n.copy) for n in corner) for corner in self.numbers}) > 1:
-            raise NotCovered("masses or dampings that vary")
+            refuse(scene)
+        n = Fraction(len(self.scene.peers))
+        nu, mu = 1 / (n - 1), 1 / n
+        of = lambda scene, peer: numbers_of(
+            scene, peer, Fraction(scene.mass) * (mu if scene.split else 1), law_factor(scene, nu, mu), 2 * mu if peer.coupling_scaling else 1
+        )
+        self.numbers = [[of(scene, peer) for peer in scene.peers] for scene in corners]
+        self.keys = len(corners).bit_length() - 1
+        # Coefficients of step maps that vary are numbers of their own.
+        self.steps, self.count = {}, self.keys
+        for peer in range(len(self.scene.peers)):
+            for body in ("device", "copy"):
+                plants = self.plants(peer, body)
+                if plants not in self.steps:
+                    self.steps[plants] = self.coefficients(plants, self.scene.peers[peer].tick)
+        self.steps = {plants: [between(low, high, place, self.count) for low, high, place in of_plant] for plants, of_plant in self.steps.items()}
 
-    def gain(self, peer, name) -> Scalar:
-        low, first, second, both = (getattr(corner[peer], name) for corner in self.numbers)
-        if both - first - second + low != 0:
-            raise NotCovered("a gain that is no sum of what each key gives")
-        slopes = ((first - low) / 2, (second - low) / 2)
-        return scalar(low + sum(slopes), slopes)
+    def plants(self, peer, body):
+        return tuple(getattr(corner[peer], body) for corner in self.numbers)
+
+    def coefficients(self, plants, tick):
+        """Of the step map of a body, from where to where each goes, and along which number. Of a body that nothing ties to ground each of them is monotone in its mass and in its damping."""
+        if len(set(plants)) == 1:
+            return [(number, number, 0) for number in step(*plants[0], tick)]
+        if any(stiffness for _, _, stiffness in plants):
+            raise NotCovered("a body that is tied to ground and varies")
+        ranges = [(min(values), max(values)) for values in zip(*(step(*plant, tick) for plant in plants))]
+        # Without a change of its damping over its mass, a force has effects that are multiples of one number.
+        place = self.count
+        if len({damping / mass for mass, damping, _ in plants}) == 1:
+            self.count += 1
+            return [(low, high, place) for low, high in ranges]
+        self.count += 6
+        return [(low, high, place + number) for number, (low, high) in enumerate(ranges)]
+
+    def step(self, peer, body):
+        return self.steps[self.plants(peer, body)]
+
+    def gain(self, peer, name) -> Affine:
+        low, *others = (getattr(corner[peer], name) for corner in self.numbers)
+        slopes = [(others[2**key - 1] - low) / 2 for key in range(self.keys)]
+        for place, value in enumerate(others, start=1):
+            if value - low != sum(2 * slope for key, slope in enumerate(slopes) if place >> key & 1):
+                raise NotCovered("a gain that is no sum of what each key gives")
+        return Affine(low + sum(slopes), (*slopes, *[Fraction(0)] * (self.count - self.keys)))
+
+    def laws(self):
+        """KT and BT of all peers at all corners, those of the first first."""
+        return [(numbers.kt, numbers.bt) for corner in self.numbers for numbers in corner]
+
+    def weight(self, row, column, difference):
+        """Of the average of a class in what another hears."""
+        others = len(self.scene.peers) - 1
+        return Fraction(-1, others) if difference else Fraction(len(self.classes[column]) - (row == column), others)
+
+    def weighed(self, by: Affine, weight) -> Affine:
+        return by.scaled(weight)
+
+    def has_differences(self, members):
+        return len(members) > 1
+
+
+class NumberBox:
+    """A scene with from `low` to `high` peers (None: without end), of which more and more are equal to the peer at the place `growing`.
+
+    Numbers: the factor s of the law's gains, s·ν, the factor of coupling gains, and coefficients of step maps. Each is monotone in N. Without damping of the object
+    a copy of the mass m/N moves by N times a force; where that has a limit for all gains, forces are counted in newtons over N: copies have the mass m, gains
+    are N times as large, and a device moves by 1/N of a force.
+    """
+
+    def __init__(self, scene, classes, growing, low, high):
+        refuse(scene)
+        self.scene, self.classes = scene, classes
+        self.growing = [growing in members for members in classes].index(True)
+        self.others = Fraction(len(scene.peers) - len(classes[self.growing]))
+        if len(classes[self.growing]) < 2 or low <= self.others or low < 2:
+            raise NotCovered("no equal peers of which there are more and more")
+        self.low = low
+        ends = [(Fraction(1, n - 1), Fraction(1, n)) if n else (Fraction(0), Fraction(0)) for n in (low, high)]
+        touching = [peer for peer in scene.peers if peer.touches]
+        shrinks = scene.inverse_n and not scene.proportional_derivative and all(peer.coupling_scaling for peer in touching)
+        self.divides = scene.split and scene.damping == 0 and shrinks
+        law = [4 * (1 - mu) if self.divides else law_factor(scene, nu, mu) for nu, mu in ends]
+        # s·ν where s itself has no limit is N − 1 times ν.
+        heard = [s * nu for s, (nu, _) in zip(law, ends)]
+        coupling = [Fraction(2) if self.divides else 2 * mu for _, mu in ends]
+        self.count = 3
+        self.factors = [(law, 0), (heard, 1), (coupling, 2)]
+        self.steps = {}
+        for peer in scene.peers:
+            for plants, by in self.bodies(peer, ends).values():
+                if (plants, by) not in self.steps:
+                    self.steps[plants, by] = self.coefficients(plants, by, peer.tick)
+        self.ends = ends
+        self.factors = [between(*ends, place, self.count) for ends, place in self.factors]
+        self.steps = {body: [between(low, high, place, self.count) for low, high, place in of_body] for body, of_body in self.steps.items()}
+        self.base = [numbers_of(scene, peer, Fraction(1), Fraction(1), Fraction(1)) for peer in scene.peers]
+
+    def bodies(self, peer, ends):
+        """The bodies of a peer at both ends, and by what their effects of a force are multiplied."""
+        mass = Fraction(self.scene.mass)
+        plants = numbers_of(self.scene, peer, mass, Fraction(1), Fraction(1))
+        masses = [mass * mu if self.scene.split and not self.divides else mass for _, mu in ends]
+        if 0 in masses:
+            raise NotCovered("a mass without a limit")
+        return {
+            "device": ((plants.device,) * 2, tuple(mu if self.divides else Fraction(1) for _, mu in ends)),
+            "copy": (tuple((of_end, *plants.copy[1:]) for of_end in masses), (Fraction(1),) * 2),
+        }
+
+    def coefficients(self, plants, by, tick):
+        ends = []
+        for plant, factor in zip(plants, by):
+            *free, g0, g1 = step(*plant, tick)
+            ends.append([*free, g0 * factor, g1 * factor])
+        ranges = [(min(values), max(values)) for values in zip(*ends)]
+        place = self.count
+        if all(low == high for low, high in ranges[:4]):
+            self.count += any(low < high for low, high in ranges)
+            return [(low, high, place) for low, high in ranges]
+        self.count += 6
+        return [(low, high, place + number) for number, (low, high) in enumerate(ranges)]
+
+    def step(self, peer, body):
+        return self.steps[self.bodies(self.scene.peers[peer], self.ends)[body]]
+
+    def gain(self, peer, name) -> Affine:
+        base = getattr(self.base[peer], name)
+        law, _, coupling = self.factors
+        if name in ("kt", "bt"):
+            return law.scaled(base)
+        if self.divides or self.scene.peers[peer].coupling_scaling:
+            return coupling.scaled(base)
+        return Affine(base, (Fraction(0),) * self.count)
+
+    def laws(self):
+        law = self.factors[0]
+        at_low = law.mean - sum(law.slopes)
+        return [(self.base[0].kt * at_low, self.base[0].bt * at_low)]
+
+    def weight(self, row, column, difference):
+        """A constant, and a multiple of ν."""
+        own = int(row == column)
+        if difference:
+            return Fraction(0), Fraction(-1)
+        if column == self.growing:
+            return Fraction(1), 1 - self.others - own
+        return Fraction(0), Fraction(len(self.classes[column]) - own)
+
+    def weighed(self, by: Affine, weight) -> Affine:
+        law, heard, _ = self.factors
+        constant, of_nu = weight
+        share = by.mean / law.mean if law.mean else Fraction(0)
+        parts = (law.scaled(share * constant), heard.scaled(share * of_nu))
+        return Affine(sum(part.mean for part in parts), tuple(map(sum, zip(*(part.slopes for part in parts)))))
+
+    def has_differences(self, members):
+        grows = members == self.classes[self.growing]
+        return self.low - self.others > 1 if grows else len(members) > 1
 
 
 def classes_of(corners) -> list:
     """The places of equal peers, in the order of the first of each."""
     classes = {}
     for place in range(len(corners[0].peers)):
-        alike = tuple(replace(scene.peers[place], name="", device_mass=0.0) for scene in corners)
-        own = corners[0].peers[place]
+        alike = tuple(replace(scene.peers[place], name="") for scene in corners)
         # Of a device that touches nothing the coupling does not count.
-        contact = alike if own.touches else tuple(replace(peer, coupling=(0.0, 0.0), coupling_scaling=False) for peer in alike)
-        classes.setdefault(repr((contact, own.device_mass)), []).append(place)
+        if not alike[0].touches:
+            alike = tuple(replace(peer, coupling=(0.0, 0.0), coupling_scaling=False) for peer in alike)
+        classes.setdefault(repr(alike), []).append(place)
     return [tuple(members) for members in classes.values()]
 
 
 class Part:
     """A part of the motion, in the states that a certificate names."""
 
-    def __init__(self, box, classes, difference, members, states, heard, time):
-        self.box, self.time, self.difference = box, time, difference
+    def __init__(self, box, difference, members, states, heard, time):
+        self.box, self.time, self.difference = box, Fraction(time), difference
         self.states = [tuple(state) for state in states]
         self.members = [tuple(of_class) for of_class in members]
-        if (len(self.members) != 1 if difference else self.members != classes):
+        if (len(self.members) != 1 if difference else self.members != box.classes):
             raise NotCovered("classes of peers that are not those of the scene")
-        scene = box.corners[0]
-        others = len(scene.peers) - 1
-        if difference:
-            self.weights = [[Fraction(-1, others)]]
-        else:
-            count = [len(of_class) for of_class in self.members]
-            self.weights = [[Fraction(n - (i == j), others) for j, n in enumerate(count)] for i in range(len(count))]
+        scene = box.scene
         self.first = [of_class[0] for of_class in self.members]
-        tied = any(scene.peers[peer].touches and scene.peers[peer].arm is not None and scene.peers[peer].arm[2] > 0 for peer in range(len(scene.peers)))
+        classes = range(len(self.members))
+        self.weights = [[box.weight(i, j, difference) for j in classes] for i in classes]
+        tied = any(peer.touches and peer.arm is not None and peer.arm[2] > 0 for peer in scene.peers)
         self.reference = None if difference or tied else ("copy", 0)
         self.combined = heard is not None
 
+    def zeros(self, size):
+        return Row.zeros(size, self.box.count)
+
+    def unit(self, size, place):
+        return Row.unit(size, place, self.box.count)
+
+    def constant(self, number):
+        return scalar(Affine(Fraction(number), (Fraction(0),) * self.box.count))
+
     def touches(self, c):
-        return self.box.corners[0].peers[self.first[c]].touches
+        return self.box.scene.peers[self.first[c]].touches
 
     def link(self, sender, receiver):
         """Two peers between which samples of a class go to another, or to itself."""
@@ -212,21 +389,25 @@ class Part:
             return self.first[sender], self.first[receiver]
         return self.members[sender][1], self.members[sender][0]
 
+    def hears(self, i, j):
+        """Whether samples of a class go to another, or to itself."""
+        return i != j or len(self.members[i]) > 1
+
     def heard(self):
         """Of each number of a sample, what it is of position and velocity; and of each class, by what each number is multiplied in what its law hears."""
         kt, bt = ([self.box.gain(peer, name) for peer in self.first] for name in ("kt", "bt"))
-        by_time = scalar(1 / Fraction(self.time))
+        constant = self.constant
         if not self.combined:
-            return [row_of(scalar(1), scalar(0)), row_of(scalar(0), scalar(1))], [(k, times(b, by_time)) for k, b in zip(kt, bt)]
-        stiffness, damping = ((getattr(self.box.numbers[0][self.first[0]], name)) for name in ("kt", "bt"))
-        unit = stiffness + damping / Fraction(self.time)
+            return [row_of(constant(1), constant(0)), row_of(constant(0), constant(1))], [(k, b.scaled(1 / self.time)) for k, b in zip(kt, bt)]
+        laws = self.box.laws()
+        stiffness, damping = laws[0]
+        unit = stiffness + damping / self.time
         if unit == 0:
             raise NotCovered("a law that hears nothing")
-        for corner, peer in tuples(self.box.numbers, self.first):
-            if corner[peer].kt * damping != corner[peer].bt * stiffness:
-                raise NotCovered("one number of a sample where two are heard")
-        shares = row_of(scalar(stiffness / unit), scalar(damping / Fraction(self.time) / unit))
-        by = [times(k, scalar(unit / stiffness)) if stiffness else times(b, scalar(unit / damping)) for k, b in zip(kt, bt)]
+        if any(k * damping != b * stiffness for k, b in laws):
+            raise NotCovered("one number of a sample where two are heard")
+        shares = row_of(constant(stiffness / unit), constant(damping / self.time / unit))
+        by = [k.scaled(unit / stiffness) if stiffness else b.scaled(unit / damping) for k, b in zip(kt, bt)]
         return [shares], [(scale,) for scale in by]
 
     def frame(self) -> Frame:
@@ -240,11 +421,11 @@ class Part:
             taken.add(name)
             if name not in place_of:
                 raise NotCovered(f"a state that is missing: {name}")
-            return Row.unit(size, place_of[name])
+            return self.unit(size, place_of[name])
 
-        scene, timing = self.box.corners[0], Timing(self.box.corners[0])
+        scene, timing = self.box.scene, Timing(self.box.scene)
         classes = range(len(self.members))
-        zero = Row.zeros(size)
+        zero = self.zeros(size)
         body = lambda kind, c: [zero if (kind, c) == self.reference else state(kind, c, "position"), state(kind, c, "velocity")]
         bodies = [[*body("copy", c), *(body("device", c) if self.touches(c) else [])] for c in classes]
         shares, heard_by = self.heard()
@@ -260,17 +441,20 @@ class Part:
                 raise NotCovered(f"a sample that is missing: {number} of class {c}")
             return samples[c, number]
 
-        links = {(i, j): self.link(i, j) for i in classes for j in classes if self.weights[j][i] != 0}
+        links = {(i, j): self.link(i, j) for i in classes for j in classes if self.hears(i, j)}
         held = {pair: number_of(pair[0], timing.held(*link)) for pair, link in links.items()}
         due = {pair: timing.in_force(*link) for pair, link in links.items()}
         senders = [[i for i in classes if (i, c) in links] for c in classes]
         ticks = [self.tick(c, senders[c], heard_by[c]) for c in classes]
         peer = self.first[0]
         for instant in range(timing.first_tick(peer, timing.t0), timing.t1, scene.peers[peer].tick):
+            # Samples of this instant, of where everything is.
+            fresh = {}
             for c in classes:
                 if instant in timing.sends(self.first[c], timing.t0, timing.t1):
                     x, v, *_ = bodies[c]
                     samples[c, number_of(c, instant)] = [x.times(share.entry(0)) + v.times(share.entry(1)) for share in shares]
+                    fresh[c, number_of(c, instant)] = [{(c, 0): share.entry(0), (c, 1): share.entry(1)} for share in shares]
             for pair, arrivals in due.items():
                 for tick, sent in arrivals:
                     if tick == instant:
@@ -286,8 +470,7 @@ class Part:
             shift = moved[0][0] if self.reference else {}
             bodies = [[combination(difference(row, {} if place % 2 else shift), seen) for place, row in enumerate(moved[c])] for c in classes]
             if shift:
-                by = combination(shift, seen)
-                samples = {name: [row - by.times(share.entry(0)) for row, share in zip(rows, shares)] for name, rows in samples.items()}
+                samples = {name: self.shifted(name, rows, fresh.get(name), shift, seen, shares) for name, rows in samples.items()}
         final = []
         for kind, c, *which in self.states:
             if kind == "sample":
@@ -296,37 +479,47 @@ class Part:
                 final.append(bodies[c][2 * (kind == "device") + (which == ["velocity"])])
         if taken != set(place_of):
             raise NotCovered(f"states that nothing begins with: {sorted(map(str, set(place_of) - taken))}")
-        return Frame([row.mean for row in final], [[row.slopes[k] for row in final] for k in range(NUMBERS)], [row.radius for row in final])
+        return Frame([row.mean for row in final], [[row.slopes[k] for row in final] for k in range(self.box.count)], [row.radius for row in final])
+
+    def shifted(self, name, rows, fresh, shift, seen, shares):
+        """The numbers of a sample, from where the first copy is after the move."""
+        shifted = []
+        for channel, (row, share) in enumerate(zip(rows, shares)):
+            own = ("sample", *name, channel)
+            of_shift = {of: times(by, share.entry(0)) for of, by in shift.items()}
+            shifted.append(combination(difference(fresh[channel] if fresh else {own: self.constant(1)}, of_shift), {**seen, own: row}))
+        return shifted
 
     def tick(self, c, senders, heard_by):
         """Where a class moves in a tick, copy and device: what each is of where they are and of the samples held, for velocities multiplied by the time of the part."""
         peer = self.first[c]
-        by_time = scalar(1 / Fraction(self.time))
         kc, bc, kt, bt = (self.box.gain(peer, name) for name in ("kc", "bc", "kt", "bt"))
+        of_velocity = lambda gain: scalar(gain.scaled(1 / self.time))
         bodies = 4 if self.touches(c) else 2
         size = bodies + len(senders) * len(heard_by)
-        x, v, *device = (Row.unit(size, place) for place in range(bodies))
-        zero = Row.zeros(size)
-        force = zero - (x.times(kt) + v.times(times(bt, by_time)))
+        x, v, *device = (self.unit(size, place) for place in range(bodies))
+        zero = self.zeros(size)
+        force = zero - (x.times(scalar(kt)) + v.times(of_velocity(bt)))
         for place, sender in enumerate(senders):
             for channel, by in enumerate(heard_by):
-                held = Row.unit(size, bodies + place * len(heard_by) + channel)
-                force = force + held.times(times(by, scalar(self.weights[c][sender])))
+                held = self.unit(size, bodies + place * len(heard_by) + channel)
+                force = force + held.times(scalar(self.box.weighed(by, self.weights[c][sender])))
         if not device:
             return self.move("copy", peer, (x, v), force)
-        grasp = (device[0] - x).times(kc) + (device[1] - v).times(times(bc, by_time))
+        grasp = (device[0] - x).times(scalar(kc)) + (device[1] - v).times(of_velocity(bc))
         return self.move("copy", peer, (x, v), force + grasp) + self.move("device", peer, device, zero - grasp)
 
-    def move(self, name, peer, state, force):
-        e00, e01, e10, e11, g0, g1 = step(*getattr(self.box.numbers[0][peer], name), self.box.corners[0].peers[peer].tick)
-        t, (x, v) = Fraction(self.time), state
-        by = lambda *coefficients: sum((row.times(scalar(number)) for number, row in zip(coefficients, (x, v, force))), start=Row.zeros(len(x.mean)))
-        return [x + by(e00, e01 / t, g0), v + by(e10 * t, e11, g1 * t)]
+    def move(self, body, peer, state, force):
+        e00, e01, e10, e11, g0, g1 = self.box.step(peer, body)
+        t, (x, v) = self.time, state
+        by = lambda *coefficients: sum((row.times(scalar(number)) for number, row in zip(coefficients, (x, v, force))), start=self.zeros(len(x.mean)))
+        return [x + by(e00, e01.scaled(1 / t), g0), v + by(e10.scaled(t), e11, g1.scaled(t))]
 
 
 def combination(coefficients, rows):
     """Σ coefficient·row over the names of the coefficients."""
-    total = Row.zeros(len(next(iter(rows.values())).mean))
+    one = next(iter(rows.values()))
+    total = Row.zeros(len(one.mean), len(one.slopes))
     for name, by in coefficients.items():
         if by.mean or any(by.slopes) or by.radius:
             total = total + rows[name].times(by)
@@ -335,9 +528,9 @@ def combination(coefficients, rows):
 
 def difference(one, other):
     """Coefficients less others, by name."""
-    zero = scalar(0)
     less = lambda a, b: (row_of(a) - row_of(b)).entry(0)
-    return {name: less(one.get(name, zero), other[name]) if name in other else one[name] for name in {**one, **other}}
+    zero = lambda b: Scalar(0.0, [0.0] * len(b.slopes), 0.0)
+    return {name: less(one.get(name, zero(other[name])), other[name]) if name in other else one[name] for name in {**one, **other}}
 
 
 def row_of(*scalars) -> Row:

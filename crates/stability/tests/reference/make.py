@@ -1,4 +1,4 @@
-"""Makes radii.json, mean_square.json, admittance.json, random.json and laws.json, or those named on the command line. See README.md."""
+"""Makes radii.json, mean_square.json, admittance.json, random.json, laws.json and verdicts.json, or those named on the command line. See README.md."""
 
 import json
 import sys
@@ -11,6 +11,7 @@ import cases
 import laws
 import mean_square
 import random_scenes
+import verdicts
 from mpmath import mpf
 from modes import One
 from radius import digits
@@ -53,7 +54,7 @@ def write(name, entries):
 
 
 def main():
-    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance", "random", "laws"]
+    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance", "random", "laws", "verdicts"]
     with Pool() as pool:
         if "radii" in wanted:
             write("radii.json", radii(pool))
@@ -65,6 +66,8 @@ def main():
             write("random.json", random_scenes.entries(pool))
         if "laws" in wanted:
             write("laws.json", laws.entries(pool))
+        if "verdicts" in wanted:
+            (HERE / "verdicts.json").write_text(json.dumps(verdicts.entries(pool)) + "\n")
 
 
 if __name__ == "__main__":

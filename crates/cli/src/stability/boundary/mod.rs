@@ -26,6 +26,7 @@ const ROWS: &str = "boundary.rows";
 
 /// Everything that is asked for, checked: nothing is written before there is one.
 struct Order {
+    text: String,
     title: String,
     range: KeyRange,
     options: BoundaryOptions,
@@ -111,7 +112,7 @@ impl Order {
             format!("along {:?} of the scene {:016x}", arguments.along, source::fingerprint_of(&family).map_err(refused)?),
             "each row: its number, the value, the radius, its error, and 1 if it is nominal".to_owned(),
         ];
-        Ok(Self { title, range, options, family, header })
+        Ok(Self { text, title, range, options, family, header })
     }
 }
 

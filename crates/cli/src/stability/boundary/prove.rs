@@ -13,6 +13,7 @@ use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_into;
 use crate::output;
+use crate::stability::certificate::{self, Given};
 use crate::stability::guarantee::{self, PieceWatch};
 
 /// Proves the line and shows or writes it.
@@ -22,6 +23,11 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments) -> Result<Exit
     if let Some(folder) = &arguments.out {
         std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
         files.push(write_into(folder, "proof.csv", table(order, &line))?);
+        if arguments.certificate && line.is_whole {
+            let pieces = line.certify(&order.family, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
+            let given = Given { title: &order.title, text: &order.text, overrides: &arguments.scene.overrides.set };
+            files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], &pieces)?)?);
+        }
     }
     output::answer(arguments.scene.json, DocumentSchema::STABILITY_LINE, &answer(order, &line, &files), || describe(order, &line), &files)?;
     if line.is_whole { Ok(ExitCode::SUCCESS) } else { Err(guarantee::ended()) }

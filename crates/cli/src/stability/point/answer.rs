@@ -2,9 +2,7 @@
 
 use cohaptic_answers::notes;
 use cohaptic_scene::Scene;
-use cohaptic_stability::{
-    Analysis, ContactMode, EveryNumber, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Switching, Verdict, WorstVerdict,
-};
+use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Switching, Verdict, WorstVerdict};
 use cohaptic_units::print::Span;
 use serde::Serialize;
 
@@ -18,7 +16,7 @@ pub(super) fn of(
     scene: &Scene,
     judgement: &Judgement,
     worst: Option<&SceneWorstCase>,
-    every: Option<&EveryNumber>,
+    every: Option<&every_number::Proof>,
     contacts: Option<&Switching>,
 ) -> impl Serialize {
     let Judgement { verdict, analysis, mean_square } = judgement;

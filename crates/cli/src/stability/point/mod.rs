@@ -56,7 +56,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         DocumentSchema::STABILITY_POINT,
         &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref(), switching.as_ref()),
         || answer::describe(&scene, &judgement, worst.as_ref()) + &more(),
-        output::NO_FILES,
+        every.iter().filter_map(|every| every.file.as_ref()),
     )?;
     Ok(ExitCode::SUCCESS)
 }

@@ -16,10 +16,9 @@ use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_into;
 use crate::output::{self, figure};
+use crate::stability::certificate::{self, Given};
 use crate::stability::guarantee::{self, PieceWatch};
 use crate::stability::source::axis_of;
-
-mod certificate;
 
 /// A variant, and its proof.
 struct Proof {
@@ -60,7 +59,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
         }
         files.extend(pictures(order, &proofs, folder, arguments)?);
         if arguments.certificate && proofs.iter().all(|proof| proof.region.is_whole) {
-            files.extend(certificate::write(order, arguments, &proofs, folder)?);
+            files.extend(certificates(order, arguments, &proofs, folder)?);
         }
     }
     let wall_s = start.elapsed().as_secs_f64();
@@ -72,6 +71,20 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
         &files,
     )?;
     if proofs.iter().all(|proof| proof.region.is_whole) { Ok(ExitCode::SUCCESS) } else { Err(guarantee::ended()) }
+}
+
+/// Writes a certificate for each variant, and gives the names of the files.
+fn certificates(order: &Order, arguments: &MapArguments, proofs: &[Proof], folder: &Path) -> Result<Vec<String>, Failure> {
+    let mut files = Vec::new();
+    let watch = PieceWatch::new();
+    for (number, (proof, family)) in proofs.iter().zip(&order.families).enumerate() {
+        let boxes = proof.region.certify(family, &watch).map_err(|error| failure(order, arguments, number, error))?;
+        let overrides = order.variants[number].on_top_of(&arguments.scene.overrides.set);
+        let given = Given { title: &order.title, text: &order.text, overrides: &overrides };
+        let name = if number == 0 { "certificate.json".to_owned() } else { format!("certificate-{}.json", number + 1) };
+        files.push(write_into(folder, &name, certificate::of_boxes(&given, &[order.x(), order.y()], &boxes)?)?);
+    }
+    Ok(files)
 }
 
 fn failure(order: &Order, arguments: &MapArguments, variant: usize, error: ProofError) -> Failure {

@@ -1,0 +1,96 @@
+//! Files of certificates: all by which verdicts on sets of scenes can be checked without this program.
+
+use cohaptic_stability::{BoxCertificate, FrameState, FreeCircle, KeyRange, NumberCertificate, PartCertificate};
+use serde::Serialize;
+
+use crate::document_schema::{DocumentSchema, document};
+use crate::failure::Failure;
+
+/// A scene as it was given: its title, its text, and what was put into it.
+pub(super) struct Given<'a> {
+    pub(super) title: &'a str,
+    pub(super) text: &'a str,
+    pub(super) overrides: &'a [String],
+}
+
+/// The text of a certificate of boxes that cover the ranges of keys.
+pub(super) fn of_boxes(given: &Given<'_>, keys: &[&KeyRange], boxes: &[BoxCertificate]) -> Result<String, Failure> {
+    written(
+        DocumentSchema::STABILITY_CERTIFICATE,
+        &document! {
+            title: given.title,
+            scene: given.text,
+            overrides: given.overrides,
+            keys: keys.iter().map(|range| range.key.as_str()).collect::<Vec<_>>(),
+            ranges: keys.iter().map(|range| [range.low, range.high]).collect::<Vec<_>>(),
+            boxes: boxes.iter().map(of_box).collect::<Vec<_>>(),
+        },
+    )
+}
+
+/// The text of a certificate of numbers of peers, of which more and more are equal to one.
+pub(super) fn of_numbers(given: &Given<'_>, growing: usize, spans: &[NumberCertificate]) -> Result<String, Failure> {
+    let spans = spans.iter().map(|span| {
+        document! {
+            from: span.from,
+            // `null`: without end.
+            to: span.to,
+            verdict: span.guarantee.word(),
+            parts: span.parts.iter().map(of_part).collect::<Vec<_>>(),
+        }
+    });
+    written(
+        DocumentSchema::STABILITY_NUMBER_CERTIFICATE,
+        &document! {
+            title: given.title,
+            scene: given.text,
+            overrides: given.overrides,
+            // The place of the first of the equal peers, counted from 0.
+            growing: growing,
+            spans: spans.collect::<Vec<_>>(),
+        },
+    )
+}
+
+fn written(schema: DocumentSchema, document: &impl Serialize) -> Result<String, Failure> {
+    let text = serde_json::to_string(&schema.of(document)).map_err(|error| Failure::Input(format!("--certificate: {error}")))?;
+    Ok(text + "\n")
+}
+
+fn of_box(one: &BoxCertificate) -> impl Serialize {
+    document! {
+        ranges: one.ranges.as_slice(),
+        verdict: one.guarantee.word(),
+        parts: one.parts.iter().map(of_part).collect::<Vec<_>>(),
+    }
+}
+
+fn of_part(part: &PartCertificate) -> impl Serialize {
+    let circle = match part.circle {
+        FreeCircle::AroundZero(radius) => serde_json::json!(["around-zero", radius]),
+        FreeCircle::AroundEntry(place, radius) => serde_json::json!(["around-entry", place, radius]),
+    };
+    document! {
+        // The members of its classes of equal peers, counted from 0, and whether it is how the members of one differ.
+        members: part.members.as_slice(),
+        difference: part.is_difference,
+        states: part.states.iter().map(of_state).collect::<Vec<_>>(),
+        // The gains K and B by which a sample is the number (K·x + B·v)/(K + B/time); null: its position and its velocity.
+        heard: part.heard.map(|gains| [gains.stiffness, gains.damping]),
+        // What velocities are multiplied by, in seconds.
+        time: part.time,
+        coordinates: part.coordinates.as_str(),
+        weights: part.weights.as_str(),
+        circle: circle,
+    }
+}
+
+fn of_state(state: &FrameState) -> serde_json::Value {
+    let which = |velocity: bool| if velocity { "velocity" } else { "position" };
+    match *state {
+        FrameState::Device { class, velocity } => serde_json::json!(["device", class, which(velocity)]),
+        FrameState::Copy { class, velocity } => serde_json::json!(["copy", class, which(velocity)]),
+        FrameState::Sample { class, number, channel } => serde_json::json!(["sample", class, number, channel]),
+        FrameState::Other { class, row } => serde_json::json!(["other", class, row]),
+    }
+}

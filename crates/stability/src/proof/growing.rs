@@ -1,0 +1,324 @@
+//! A scene with more and more equal peers, and the verdict on all numbers of them from one to another.
+//!
+//! Averages of classes and differences within one do not mix (`structure`), and only numbers in them depend on N: the mass of a copy, m or
+//! m/N; gains, multiplied by 1, 2/N, N − 1, 4(N − 1)/N² or 4(N − 1)²/N²; and the weights. Of F peers in the other classes, with ν = 1/(N − 1), a class of n is heard with weight nν, itself with (n − 1)ν, and
+//! the growing one with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So what a gain hears is that gain times a constant, and that gain times ν times another. Each of these
+//! factors is monotone in N from 2 on, so that those of the ends of a span of numbers enclose them.
+//!
+//! Without damping of the object a copy of the mass m/N moves by N times a force, and nothing else of it depends on N. Its forces may be counted in newtons over N: gains are N times as large, copies have the mass m and
+//! devices N times theirs, and the motion is the same. Where gains shrink with N these numbers have limits, and the others have not.
+
+use cohaptic_peer::{Gains, StepMap};
+use cohaptic_scene::Scene;
+
+use super::certificate::{Certified, PartCertificate};
+use super::corners::{Common, Point, doubled, states, steps, steps_beyond};
+use super::discs::decide;
+use super::span::StepSpan;
+use super::{ProofError, Proven};
+use crate::analysis::pairs;
+use crate::lifted::Node;
+use crate::lifted::node::Body;
+use crate::network::NominalNetwork;
+use crate::parts::alone;
+use crate::pieces::pieces;
+use crate::structure::{Structure, count};
+use crate::{Matrix, Verdict};
+
+/// As good as without end: a weight of 1/(N − 1) is below a rounding.
+pub(super) const ENDLESS: u64 = 1 << 53;
+
+/// A motion of the scene, in one combination of contacts: its classes, of which one grows.
+pub(super) struct Motion {
+    pub(super) scene: Scene,
+    pub(super) structure: Structure,
+    /// The class that grows.
+    growing: usize,
+    /// Whether forces are counted in newtons over N.
+    divides_forces: bool,
+}
+
+/// A scene of which the largest class of equal peers grows.
+pub(super) struct Growing {
+    pub(super) motions: Vec<Motion>,
+    /// The first peer of the class that grows.
+    pub(super) first: usize,
+    /// The least number of peers of which one is of the class that grows.
+    pub(super) least: u64,
+}
+
+impl Growing {
+    pub(super) fn new(scene: &Scene, network: &NominalNetwork) -> Result<Self, ProofError> {
+        let all = pieces(scene, "every number of peers")?;
+        let (mut motions, mut least, mut first) = (Vec::new(), 2, 0);
+        for (piece, combination) in pairs(&all, &mut false)? {
+            let structure = Structure::of(&[&*piece.scene], network, &combination.contacts)?;
+            let Some(growing) =
+                (0..structure.classes.len()).filter(|class| structure.apart[*class].is_some()).max_by_key(|class| structure.classes[*class].len())
+            else {
+                return Err(ProofError::Unequal);
+            };
+            for class in 0..structure.classes.len() {
+                // It does not depend on N.
+                if alone(&structure, &piece.scene, class, 1).is_some_and(|(part, _)| part.radius.verdict() != Verdict::Stable) {
+                    return Err(ProofError::Loose { peer: scene.peers[structure.classes[class][0]].name.clone() });
+                }
+            }
+            least = least.max(structure.peers - structure.classes[growing].len() + 1);
+            first = structure.classes[growing][0];
+            let mut motion = Motion { scene: piece.scene.clone().into_owned(), structure, growing, divides_forces: false };
+            motion.divides_forces = motion.has_limits_of_divided_forces();
+            motions.push(motion);
+        }
+        Ok(Self { motions, first, least: least as u64 })
+    }
+
+    /// What every number of peers from `low` to `high` has in common, if that is proven, and the certificates of its parts where they are asked for.
+    pub(super) fn decide(&self, low: u64, high: u64, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
+        let mut all = Some(Proven::Stable);
+        for motion in &self.motions {
+            let has_differences = |class: &usize| motion.structure.apart[*class].is_some() && (*class != motion.growing || motion.size(low) > 1);
+            let parts = std::iter::once(None).chain((0..motion.structure.classes.len()).filter(has_differences).map(Some));
+            for part in parts {
+                match motion.decide(low, high, part, certified.as_deref_mut())? {
+                    // One part that grows is enough.
+                    Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
+                    Some(Proven::Stable) => {}
+                    None => all = None,
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    /// Whether all numbers of peers from one on are proven unstable, where something grows without a limit.
+    pub(super) fn is_unstable_beyond(&self, from: u64) -> Result<bool, ProofError> {
+        for motion in &self.motions {
+            let parts =
+                std::iter::once(None).chain((0..motion.structure.classes.len()).filter(|class| motion.structure.apart[*class].is_some()).map(Some));
+            for part in parts {
+                if motion.is_unstable_beyond(from, part)? {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
+    /// The number of a node that has no limit as N grows, in words.
+    pub(super) fn without_limit(&self) -> Result<Option<String>, ProofError> {
+        for motion in &self.motions {
+            let [far, near] = [ENDLESS, ENDLESS / 2].map(|number| motion.scaled(number).swap_remove(motion.growing));
+            let force = |node: &Node| force(node).ok_or(ProofError::Drift);
+            if differs(force(&far)?, force(&near)?) && !motion.divides_forces {
+                return Ok(Some("the mass of a copy, m/N, vanishes".to_owned()));
+            }
+            if !motion.divides_forces && differs(held(&far), held(&near)) {
+                let grows = held(&far) > held(&near);
+                return Ok(Some(if grows { "the gains of the coordination grow with N" } else { "the gains of the coordination vanish" }.to_owned()));
+            }
+            let touches = motion.structure.touching.contains(&true);
+            if touches && differs(coupled(&far), coupled(&near)) {
+                return Ok(Some("the coupling of devices and copies vanishes".to_owned()));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// A body that moves by that many times less of a force.
+fn heavier(body: &Body, by: f64) -> Body {
+    let of = |map: StepMap| {
+        let (e, g) = map.coefficients();
+        StepMap::new(e, g.map(|g| g / by))
+    };
+    body.only_map().map_or(*body, |map| body.with_map(of(map)))
+}
+
+/// By what a force changes the velocity of a copy in a tick; `None` where its ticks differ.
+fn force(node: &Node) -> Option<f64> {
+    node.object.only_map().map(|map| map.coefficients().1[1])
+}
+
+fn sum(gains: Gains) -> f64 {
+    gains.stiffness + gains.damping
+}
+
+fn held(node: &Node) -> f64 {
+    sum(node.law.held_by())
+}
+
+fn coupled(node: &Node) -> f64 {
+    sum(node.coupling)
+}
+
+fn differs(far: f64, near: f64) -> bool {
+    (far - near).abs() > 1e-9 * far.abs().max(near.abs())
+}
+
+impl Motion {
+    /// The nodes of all classes, with forces in newtons.
+    fn scaled(&self, number: u64) -> Vec<Node> {
+        self.structure.nodes(&self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX)))
+    }
+
+    /// The nodes of all classes.
+    fn nodes(&self, number: u64) -> Vec<Node> {
+        let nodes = self.scaled(number);
+        if !self.divides_forces {
+            return nodes;
+        }
+        let halves = self.scaled(2);
+        let divided = |(node, half): (Node, Node)| {
+            let by = count_of(number);
+            Node {
+                object: heavier(&half.object, 2.0),
+                device: node.device.as_ref().map(|device| heavier(device, by)),
+                law: node.law.scaled(by),
+                coupling: node.coupling.scaled(by),
+                wall: node.wall.map(|wall| wall.scaled(by)),
+                ..node
+            }
+        };
+        nodes.into_iter().zip(halves).map(divided).collect()
+    }
+
+    /// What velocities are multiplied by \[s\].
+    pub(super) fn time(&self, number: u64) -> f64 {
+        self.structure.time(&self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX)), &self.scaled(number))
+    }
+
+    /// Whether a copy moves by N times a force, and N times all gains have limits.
+    fn has_limits_of_divided_forces(&self) -> bool {
+        let [two, near, far] = [2, ENDLESS / 2, ENDLESS].map(|number| self.scaled(number));
+        let free = |node: &Node| node.object.only_map().map(|map| map.coefficients().0);
+        two.iter().zip(near.iter().zip(&far)).all(|(two, (near, far))| {
+            let is_light = free(two).is_some() && free(two) == free(far) && force(near).zip(force(far)).is_some_and(|(near, far)| far > 1.5 * near);
+            let of_device = two.device.is_none_or(|device| device.only_map().is_some()) && two.wall.is_none();
+            let shrinks = |of: &dyn Fn(&Node) -> f64| !differs(2.0 * of(far), of(near));
+            is_light && of_device && shrinks(&held) && (two.device.is_none() || shrinks(&coupled))
+        })
+    }
+
+    /// How many members the class that grows has among that number of peers.
+    fn size(&self, number: u64) -> u64 {
+        number.saturating_sub((self.structure.peers - self.structure.classes[self.growing].len()) as u64)
+    }
+
+    /// The weight of the average of a class (column) in the target of a class (row): a constant, and a multiple of ν.
+    fn weight(&self, row: usize, column: usize) -> (f64, f64) {
+        let classes = &self.structure.classes;
+        let (own, others) = (f64::from(u8::from(row == column)), count(self.structure.peers - classes[self.growing].len()));
+        if column == self.growing { (1.0, 1.0 - others - own) } else { (0.0, count(classes[column].len()) - own) }
+    }
+
+    /// The nodes of all classes, or that of one.
+    pub(super) fn part(&self, number: u64, apart: Option<usize>) -> Vec<Node> {
+        let nodes = self.nodes(number);
+        apart.map_or_else(|| nodes.clone(), |class| vec![nodes[class].clone()])
+    }
+
+    fn weights(&self, nu: f64, apart: Option<usize>) -> Matrix {
+        let classes = if apart.is_some() { 1 } else { self.structure.classes.len() };
+        Matrix::from_fn(classes, classes, |row, column| {
+            let (constant, slope) = if apart.is_some() { (0.0, -1.0) } else { self.weight(row, column) };
+            constant + slope * nu
+        })
+    }
+
+    fn common(&self, apart: Option<usize>, time: f64) -> Common<'_> {
+        let timetable = apart.and_then(|class| self.structure.apart[class].as_ref()).unwrap_or(&self.structure.timetable);
+        Common { timetable, tied: apart.is_some() || self.structure.tied, time }
+    }
+
+    /// The corners of a box: from nodes on, with ν times the gains at each end, and laws and couplings that go from those of `near` to those of `end`. A law that is none of the box's numbers stays as it is.
+    pub(super) fn corners(&self, nodes: Vec<Node>, [near, end]: [&[Node]; 2], heard: [f64; 2], varies: bool, apart: Option<usize>) -> Vec<Point> {
+        let differ = |of: &dyn Fn(&Node, &Node) -> bool| near.iter().zip(end).any(|(near, end)| of(near, end));
+        let with = |point: &Point, change: &dyn Fn(&Node, &mut Node)| {
+            let mut point = point.clone();
+            point.nodes.iter_mut().zip(end).for_each(|(node, end)| change(end, node));
+            point
+        };
+        let mut points = vec![Point { weights: self.weights(heard[0] / gain(&nodes[0]), apart), nodes }];
+        if varies && differ(&|near, end| near.law != end.law) {
+            points = doubled(&points, |point, upper| if upper { with(point, &|end, node| node.law = end.law.clone()) } else { point.clone() });
+        }
+        // ν times the gains is a number of its own beside the gains.
+        if self.weights(0.0, apart) != self.weights(1.0, apart) {
+            let hears = |point: &Point, heard: f64| Point { weights: self.weights(heard / gain(&point.nodes[0]), apart), ..point.clone() };
+            points = if heard[0].to_bits() == heard[1].to_bits() {
+                points.iter().map(|point| hears(point, heard[0])).collect()
+            } else {
+                doubled(&points, |point, upper| hears(point, heard[usize::from(upper)]))
+            };
+        }
+        if differ(&|near, end| near.coupling != end.coupling) {
+            points = doubled(&points, |point, upper| if upper { with(point, &|end, node| node.coupling = end.coupling) } else { point.clone() });
+        }
+        points
+    }
+
+    /// Whether all numbers of peers from one on are proven unstable in a part of which either the gains of the law or the effects of a force on the copies grow with N, and nothing else changes but
+    /// towards a limit. A frame divided by N/N₀ a step is one of a box then, and an unstable one is so without the division.
+    fn is_unstable_beyond(&self, from: u64, apart: Option<usize>) -> Result<bool, ProofError> {
+        let [near, far, end] = [from, 2 * from, ENDLESS].map(|number| self.part(number, apart));
+        let grows = |of: &dyn Fn(&Node) -> f64| of(&end[0]) > 2.0 * of(&far[0]);
+        let force = |node: &Node| force(node).unwrap_or(0.0);
+        let (law_grows, mass_vanishes) = (grows(&gain), grows(&force));
+        let free = |nodes: &[Node]| nodes.iter().map(|node| node.object.only_map().map(|map| map.coefficients().0)).collect::<Vec<_>>();
+        let has_limits = free(&near) == free(&far)
+            && free(&far) == free(&end)
+            && (mass_vanishes || near.iter().zip(&end).all(|(near, end)| near.object == end.object))
+            && near.iter().zip(&end).all(|(near, end)| near.device == end.device);
+        let third = self.part(3 * from, apart);
+        let is_affine = |of: &dyn Fn(&Node) -> f64| (of(&third[0]) - 2.0 * of(&far[0]) + of(&near[0])).abs() <= 1e-12 * of(&third[0]).abs();
+        if law_grows == mass_vanishes || !has_limits || !is_affine(&gain) && law_grows || !is_affine(&force) && mass_vanishes {
+            return Ok(false);
+        }
+        let heard = [gain(&near[0]) * nu(from), gain(&end[0]) * nu(ENDLESS)];
+        let points = |at: &[Node]| {
+            let mixed = at.iter().zip(&near).map(|(at, near)| Node {
+                object: if mass_vanishes { at.object } else { near.object },
+                law: if law_grows { at.law.clone() } else { near.law.clone() },
+                ..near.clone()
+            });
+            self.corners(mixed.collect(), [&near, &end], heard, !law_grows, apart)
+        };
+        let time = self.structure.time(&self.scene, &self.nodes(from));
+        let span = StepSpan::product(&steps_beyond(&points(&near), &points(&far), self.common(apart, time))?);
+        Ok(decide(&span).is_some_and(|decision| decision.proven == Proven::Unstable))
+    }
+
+    /// The verdict on the averages of all classes, or on how the members of one differ.
+    fn decide(&self, low: u64, high: u64, apart: Option<usize>, certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
+        let ends = [low, high].map(|number| self.part(number, apart));
+        let [first, last] = ends.each_ref().map(Vec::as_slice);
+        let time = self.time(low);
+        let heard = [gain(&first[0]) * nu(low), gain(&last[0]) * nu(high)];
+        let points = self.corners(first.to_vec(), [first, last], heard, true, apart);
+        let common = self.common(apart, time);
+        let Some(decision) = decide(&StepSpan::product(&steps(&points, &ends, common)?)) else { return Ok(None) };
+        if let Some(certified) = certified {
+            let classes = apart.map_or(0..self.structure.classes.len(), |class| class..class + 1);
+            let members = classes.map(|class| self.structure.classes[class].clone()).collect();
+            let part = PartCertificate::new(members, apart.is_some(), states(&points, common)?, time, &decision.witness);
+            certified.push((decision.proven, part));
+        }
+        Ok(Some(decision.proven))
+    }
+}
+
+/// A gain of the law that is not zero, if there is one: all of them are multiples of the same function of N.
+fn gain(node: &Node) -> f64 {
+    let gains = node.law.rows().flat_map(|row| [row.own.stiffness, row.own.damping, row.past.stiffness, row.past.damping]);
+    gains.into_iter().find(|gain| *gain != 0.0).unwrap_or(1.0)
+}
+
+/// ν.
+pub(super) fn nu(number: u64) -> f64 {
+    1.0 / (count_of(number) - 1.0)
+}
+
+fn count_of(number: u64) -> f64 {
+    usize::try_from(number).map_or(f64::INFINITY, count)
+}
