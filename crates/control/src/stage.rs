@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-/// The person who asks: whoever started the run, or somebody to whom a link was handed out.
+/// The person who asks: the one who started the run, or somebody to whom a link was handed out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Role {
     /// May change links, begin the run anew and compare.

@@ -118,7 +118,7 @@ struct PointerDevice {
 
 impl LiveDevice for PointerDevice {
     fn read(&mut self, now: Instant) -> Option<State<3>> {
-        // Whoever tells holds the lock for nanoseconds; if it is held just now, the next tick is soon enough.
+        // The other side holds the lock for nanoseconds; if it is held just now, the next tick is soon enough.
         let told = match self.pointer.0.try_lock() {
             Ok(shared) => shared.told,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner().told,
@@ -181,7 +181,8 @@ mod tests {
         pointer.tell(Some([0.05, 0.0, 0.0])).unwrap();
         near(x(&mut *device, 80), [0.03, 0.5]);
         pointer.tell(Some([0.0, 0.0, 0.0])).unwrap();
-        near(x(&mut *device, 100), [0.04, -1.0]);
+        // 40 mm back in 20 ms.
+        near(x(&mut *device, 100), [0.04, -2.0]);
     }
 
     #[test]

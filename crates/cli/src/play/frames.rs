@@ -1,7 +1,7 @@
 //! The picture of everything that moves, from the thread that has to be on time to the pages.
 
 use std::fmt::Write as _;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use cohaptic_harness::live::Presence;
 use cohaptic_live::session::{EndedPacket, Motion, PeerStatus};
@@ -15,7 +15,7 @@ struct Newest {
     number: u64,
     part: usize,
     axes: usize,
-    motion: Option<Motion>,
+    motion: Option<Arc<Motion>>,
     /// The text of that number.
     text: Option<(u64, Arc<str>)>,
 }
@@ -23,32 +23,42 @@ struct Newest {
 impl Frames {
     /// Another part begins, of a scene with that number of axes.
     pub(super) fn begin(&self, part: usize, axes: usize) {
-        let mut newest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        (newest.part, newest.axes) = (part, axes);
+        let mut newest = self.newest();
+        (newest.part, newest.axes, newest.motion) = (part, axes, None);
     }
 
-    /// Takes a motion unless somebody is reading at this very moment; the next one comes soon.
+    /// Takes a motion. A reader holds the lock for as long as it takes to count a reference, so that nobody waits.
     pub(super) fn publish(&self, motion: Motion) {
-        let Ok(mut newest) = self.0.try_lock() else { return };
+        let mut newest = self.newest();
         newest.number += 1;
-        newest.motion = Some(motion);
+        newest.motion = Some(Arc::new(motion));
     }
 
-    /// The last motion of the part that has ended.
-    pub(super) fn last(&self) -> Option<Motion> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).motion.clone()
+    /// The last motion of the part; `None` before the first.
+    pub(super) fn last(&self) -> Option<Arc<Motion>> {
+        self.newest().motion.clone()
     }
 
     pub(super) fn text(&self) -> (u64, Arc<str>) {
-        let mut newest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((number, text)) = &newest.text
-            && *number == newest.number
-        {
-            return (*number, Arc::clone(text));
+        let (number, part, axes, motion) = {
+            let newest = self.newest();
+            if let Some((number, text)) = &newest.text
+                && *number == newest.number
+            {
+                return (*number, Arc::clone(text));
+            }
+            (newest.number, newest.part, newest.axes, newest.motion.clone())
+        };
+        let text: Arc<str> = motion.map_or_else(|| "{}".to_owned(), |motion| written(part, axes, &motion)).into();
+        let mut newest = self.newest();
+        if newest.number == number {
+            newest.text = Some((number, Arc::clone(&text)));
         }
-        let text: Arc<str> = newest.motion.as_ref().map_or_else(|| "{}".to_owned(), |motion| written(newest.part, newest.axes, motion)).into();
-        newest.text = Some((newest.number, Arc::clone(&text)));
-        (newest.number, text)
+        (number, text)
+    }
+
+    fn newest(&self) -> MutexGuard<'_, Newest> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -91,7 +101,7 @@ fn write_peer(text: &mut String, axes: usize, peer: &PeerStatus) {
     text.push('}');
 }
 
-/// What is no number is `null`: a scene may diverge.
+/// Numbers that are not finite are `null`: a scene may diverge.
 fn write_numbers(text: &mut String, numbers: &[f64], digits: usize) {
     for (place, number) in numbers.iter().enumerate() {
         text.push(if place == 0 { '[' } else { ',' });

@@ -27,7 +27,7 @@ use crate::live::onlookers;
 use crate::realtime::{Edit, KeyedLinks, Look, refused_server, say, token_of};
 use crate::{input, interrupt};
 
-/// What is played without a scene: three users, average-position, 24 ms.
+/// The scene if none is given: three users, average-position, 24 ms.
 const USUAL: &str = include_str!("../../scenarios/live/play.toml");
 const USUAL_NAME: &str = "play.toml";
 

@@ -23,7 +23,7 @@ use crate::realtime::KeyedLinks;
 /// How long a part may take to end and be written before it is compared.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// What is to be different in the next part.
+/// The differences of the next part.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wish {
     strategy: Option<String>,
@@ -133,7 +133,7 @@ impl PlayStage {
     }
 
     fn next(&self, part: &Part, wish: &Wish) -> PlayedScene {
-        let peers: Vec<PeerStatus> = self.frames.last().map(|motion| motion.peers).unwrap_or_default();
+        let peers: Vec<PeerStatus> = self.frames.last().map(|motion| motion.peers.clone()).unwrap_or_default();
         let number = wish.peers.unwrap_or(part.scene.peers.len());
         let stood = if wish.reset { self.beginning.clone() } else { part.played.clone().standing(&peers, &part.scene) };
         let strategy = wish.strategy.as_deref().unwrap_or_else(|| part.scene.coordination.strategy.name());
@@ -188,7 +188,7 @@ impl Stage for PlayStage {
         let free = part.scene.peers.iter().enumerate().find(|(place, peer)| wanted.is_none_or(|wanted| wanted == *place) && is_free(*place, peer));
         let (place, _) = free.ok_or_else(|| match wanted {
             Some(_) => "somebody has that hand, or nobody can: choose another one".to_owned(),
-            None => "every hand is taken: whoever started the session can add a peer".to_owned(),
+            None => "every hand is taken: the person who started the session can add a peer".to_owned(),
         })?;
         taken[place] = true;
         Ok(place)

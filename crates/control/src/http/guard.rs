@@ -52,7 +52,7 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
 /// A guest changes nothing but a hand.
 fn may(role: Role, method: &Method) -> Result<Role, Refusal> {
     if role == Role::Guest && method != Method::GET {
-        return Err(Refusal::new(StatusCode::FORBIDDEN, "only whoever started the run may change it: this token is that of a guest"));
+        return Err(Refusal::new(StatusCode::FORBIDDEN, "only the person who started the run may change it: this token is that of a guest"));
     }
     Ok(role)
 }

@@ -55,7 +55,7 @@ pub(crate) struct HandDevice<const A: usize> {
     /// What was felt when it came back, and how far it has come from there.
     before: State<A>,
     share: f64,
-    /// What is pulled, if what is read is a pointer.
+    /// The device that a pointer pulls, if a pointer is read.
     pulled: Option<PulledDevice<A>>,
 }
 

@@ -119,7 +119,7 @@ impl Seat {
         &mut self.fades[self.followed.clone()]
     }
 
-    /// Whether its copy is of interest: one of a device that is simulated here is, whoever holds that.
+    /// Whether its copy is of interest: one with a device that is simulated here is, held or not.
     pub(crate) fn is_there(&self) -> bool {
         !self.is_silent || self.followed.len() < self.fades.len()
     }

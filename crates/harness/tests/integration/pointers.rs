@@ -144,7 +144,7 @@ fn a_scene_begun_anew_in_the_middle_goes_on_without_a_jump() {
 #[test]
 fn a_recorded_pointer_moves_everything_again_to_the_byte() {
     let written = duo("");
-    let shows: fn(u64) -> Option<f64> = |t| (!(900..1300).contains(&t)).then(|| 0.03 * (t as f64 / 200.0).sin());
+    let shows: fn(u64) -> Option<f64> = |t| (!(900..1300).contains(&t)).then(|| 0.03 * (millis(t).as_secs_f64() * 5.0).sin());
     let recorded = session(&written.scene, |_| Some(Box::new(Shown(shows))), |_, _, _| {});
     let text = String::from_utf8(recorded.files["inputs.csv"].clone()).unwrap();
     assert!(text.contains("\n5000000,device,hand,,") && text.contains("\n1000000000,device,hand,,none\n"));

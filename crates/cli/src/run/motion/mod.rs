@@ -22,7 +22,7 @@ const STEP_S: f64 = 0.05;
 /// Where the copies are at each frame.
 pub(super) struct Places {
     peers: usize,
-    /// By frame, then peer; what is not known yet is where the peer was in the frame before.
+    /// By frame, then peer; a place that is not known yet is that of the frame before.
     frames: Vec<Vec<[f64; 2]>>,
     /// The next frame of each peer.
     next: Vec<usize>,

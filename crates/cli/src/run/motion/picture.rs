@@ -42,13 +42,13 @@ const EDGE: f64 = 46.0;
 const GONE: f64 = 2.0 * WIDTH;
 
 impl Motion {
-    /// An animation with that many seconds between two frames.
+    /// An animation with `step` seconds between two frames.
     #[must_use]
     pub(super) fn new(title: impl Into<String>, step: f64, runs: Vec<MotionRun>) -> Self {
         Self { title: title.into(), step, runs }
     }
 
-    /// The document, a file of its own. Who wants no motion sees the last frame.
+    /// The document, a file of its own. With reduced motion it shows the last frame.
     #[must_use]
     pub(super) fn svg(&self) -> String {
         let columns = u32::try_from(self.runs.len().max(1)).map_or(1.0, f64::from);

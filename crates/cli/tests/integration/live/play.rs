@@ -131,14 +131,22 @@ fn a_hand_moves_the_cube_and_parts_follow_one_another() {
 
 /// A part, run again from its record, ends where the scene of the next one begins.
 fn continues(desk: &Desk, part: usize) {
-    let document = desk.json(&format!("run played/part-{part}/scene.toml --inputs played/part-{part}/inputs.csv --json"));
+    let document = desk.text(&format!("run played/part-{part}/scene.toml --inputs played/part-{part}/inputs.csv --json"));
+    // A reader of JSON may round: the digits are read here, to the bit.
+    let ended = document.split("\"position_m\"").skip(1).map(|rest| {
+        let list = rest.split(['[', ']']).nth(1).unwrap();
+        list.split(',').map(|number| number.trim().parse::<f64>().unwrap()).collect::<Vec<_>>()
+    });
     let next: toml::Table = toml::from_str(&desk.read(&format!("played/part-{}/scene.toml", part + 1))).unwrap();
-    for (peer, begins) in document["peers"].as_array().unwrap().iter().zip(next["peers"].as_array().unwrap()) {
+    let mut compared = 0;
+    for (ended, begins) in ended.zip(next["peers"].as_array().unwrap()) {
         for axis in [0, 1] {
-            let (ended, begins) = (peer["position_m"][axis].as_f64().unwrap(), begins["position"][axis].as_float().unwrap());
-            assert_eq!(ended.to_bits(), begins.to_bits(), "part {part}: {peer} and {begins}");
+            let begins = begins["position"][axis].as_float().unwrap();
+            assert_eq!(ended[axis].to_bits(), begins.to_bits(), "part {part}: {ended:?} and {begins}");
+            compared += 1;
         }
     }
+    assert_eq!(compared, 6, "three peers on two axes");
 }
 
 #[test]

@@ -21,6 +21,8 @@ fn open(browser: &mut Browser, session: &mut Session) -> Control {
     browser.open(&url);
     browser.wait("document.getElementById('server').textContent === 'connected'");
     browser.wait("document.getElementById('law-now').textContent === 'AP, 3 peers'");
+    // The numbers as text come four times a second.
+    browser.wait("document.querySelectorAll('#peers tr').length === 3");
     Control::at(&url)
 }
 
