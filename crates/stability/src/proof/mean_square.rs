@@ -20,7 +20,7 @@ use super::growing::{ENDLESS, Growing, Motion, nu};
 use super::span::StepSpan;
 use super::steps::{StepMatrix, error};
 use super::{ProofError, Proven};
-use crate::lifted::node::{Scale, Scratch};
+use crate::lifted::node::{External, Scale, Scratch};
 use crate::lifted::{Lifted, Node, Sampling};
 use crate::mean_square::Independent;
 use crate::mean_square::positive::{Positive, radius_watched, solution};
@@ -339,7 +339,7 @@ fn moved(
         }
         let mut scratch = Scratch::default();
         scratch.resize(size);
-        node.tick(&mut z, own, |row| heard.row(row), None, span, scale, &mut scratch);
+        node.tick(&mut z, own, |row| heard.row(row), External::default(), span, scale, &mut scratch);
     }
     StepMatrix { matrix: z, error: error(std::slice::from_ref(node), scale) }
 }

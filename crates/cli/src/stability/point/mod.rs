@@ -9,6 +9,7 @@ mod worst;
 use std::path::Path;
 use std::process::ExitCode;
 
+use cohaptic_answers::notes;
 use cohaptic_scene::{Scene, read_weights};
 use cohaptic_stability::{
     Analysis, AnalysisError, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, analyse_spinning, has_chance,
@@ -48,7 +49,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let switching = switching::of(&scene, arguments, path)?;
     let more = || {
         let every = every.as_ref().map(|every| every_number::words(&scene, every));
-        let switching = switching.as_ref().map(|switching| switching::words(switching, &answer::notes(&judgement)));
+        let switching = switching.as_ref().map(|switching| switching::words(switching, &notes(&judgement)));
         every.unwrap_or_default() + &switching.unwrap_or_default()
     };
     output::answer(
