@@ -27,7 +27,7 @@ const NOT_YET: &str = "Not measured yet:";
 const OTHERS: &str = "## Written by other commands";
 
 /// Pages that need a quiet machine and privileges: what they say, and what writes them.
-const ALONE: [(&str, &str, &str); 4] = [
+const ALONE: [(&str, &str, &str); 5] = [
     (
         "measured-relay.md",
         "how late the relay and how fast",
