@@ -14,9 +14,10 @@ fn root() -> PathBuf {
 }
 
 /// The pages whose every command is looked at.
-const PAGES: [&str; 11] = [
+const PAGES: [&str; 12] = [
     "measured.md",
     "measured-speed.md",
+    "measured-cluster.md",
     "measured-link.md",
     "measured-samplers.md",
     "measured-stability.md",

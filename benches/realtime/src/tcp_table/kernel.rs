@@ -104,7 +104,7 @@ links = {{ x = {{ netem = \"{words}\" }} }}"
     );
     let file = RouterFile::parse(&text, Path::new("router.toml"), &[])?;
     let mut router = Router::open(&file, Pacing::Sleep)?;
-    // Without the right to a priority the thread stays as it is; the page says how late it was.
+    // Without the right to a priority the thread stays as it is.
     let _ = prepare_thread(&Wishes { lock_memory: false, ..Wishes::default() });
     for run in runs {
         run.send(())?;

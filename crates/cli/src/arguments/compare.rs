@@ -14,7 +14,7 @@ use super::{SceneArguments, ShardArguments, TableFormat};
 pub(crate) struct CompareArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// The strategies, with commas between them; the others are compared with the first. Parameters of a strategy stand behind its name, and any other key of the scene by its
+    /// The strategies, with commas between them; the others are compared with the first. Parameters stand behind the name, and other keys by their
     /// dotted path: --strategies 'average-position,local-damping{damping=58},extrapolated{horizon=50ms,coordination.damping=0}'
     #[arg(long, value_name = "A,B{KEY=VALUE},...", required_unless_present = "preset", conflicts_with = "preset")]
     pub(crate) strategies: Option<String>,

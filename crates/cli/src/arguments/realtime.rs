@@ -90,8 +90,8 @@ pub(crate) struct PlayArguments {
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::RELAY), override_usage = USAGE)]
 pub(crate) struct RelayArguments {
-    /// A relay file: the programs, and the links between them; - reads it from standard input. With --listen in its place the impairments of the link, as for cohaptic link: words of tc-netem
-    /// (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
+    /// A relay file: the programs, and the links between them; - reads it from standard input. With --listen the link, as for cohaptic link: words of
+    /// tc-netem (delay 20ms 5ms 25% loss 1%), or keys (delay=24ms loss=1%)
     #[arg(required_unless_present = "listen", value_name = "FILE | SPEC", allow_negative_numbers = true)]
     pub(crate) words: Vec<OsString>,
     /// Override a key of the relay file by its dotted path, again and again: --set relay.forget-after=10s --set link.delay=8ms

@@ -8,13 +8,13 @@ use cohaptic_campaign::{Shard, ShardError};
 
 #[derive(Debug, Args)]
 pub(crate) struct ShardArguments {
-    /// Do the I-th of N shares of the work, in a folder that processes on any machines share; auto or auto/N: as a scheduler says. docs/cluster.md
+    /// Do the I-th of N shares of the work, in a folder that processes share; auto or auto/N: as a scheduler says (docs/cluster.md)
     #[arg(long, value_name = "I/N", requires = "out")]
     pub(crate) shard: Option<ShardName>,
     /// In place of --out: put the shards in this folder together; refused while anything is missing
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "shard", "status"])]
     pub(crate) merge: Option<PathBuf>,
-    /// In place of --out: say what is done in this folder, by which processes, and when the rest will be
+    /// In place of --out: say what each process did in this folder, and when the rest will be done
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "shard"])]
     pub(crate) status: Option<PathBuf>,
 }

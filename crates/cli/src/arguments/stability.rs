@@ -33,22 +33,21 @@ pub(crate) enum StabilityCommand {
 pub(crate) struct PointArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// How the verdict is reached: peers that are equal taken together; the same with long delays as roots of a determinant (chosen anyway where it
-    /// pays); or the whole state pushed through the code that simulates
+    /// How the verdict is reached: equal peers together; long delays as roots of a determinant too (chosen anyway where it pays); or the whole state
+    /// pushed through the code that simulates
     #[arg(long, value_enum, default_value_t = MethodName::Reduced)]
     pub(crate) method: MethodName,
-    /// What small motions are about: all copies together at rest and nobody pushing; for an object that turns, the rest under constant forces of the hands, or the steady spin
-    /// under their constant torques about one axis
+    /// What small motions are about: rest without forces; for an object that turns, rest under constant forces of the hands, or the steady spin under
+    /// their constant torques about one axis
     #[arg(long, value_enum, value_name = "REST", default_value_t = RestName::Unloaded, conflicts_with_all = ["graph", "losses_in_a_row", "delay_within"])]
     pub(crate) about: RestName,
-    /// Let each peer hear only its neighbours: complete (as the scene is), ring, star, or a CSV file of mutual weights, one row a peer. The peers must
-    /// be equal
+    /// Let each of equal peers hear only its neighbours: complete (as the scene is), ring, star, or a CSV file of mutual weights, one row a peer
     #[arg(long, value_name = "GRAPH", conflicts_with_all = ["method", "losses_in_a_row", "delay_within"])]
     pub(crate) graph: Option<String>,
     /// The verdict for every number of equal peers too, proven: of those from 2 on, or FROM.., or FROM..TO
     #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, conflicts_with_all = ["graph", "method", "about"])]
     pub(crate) every_number: Option<(u64, Option<u64>)>,
-    /// With --every-number, write into this file all by which the verdicts can be checked without this program
+    /// With --every-number, write a file by which others can check the verdicts
     #[arg(long, value_name = "FILE", requires = "every_number")]
     pub(crate) certificate: Option<PathBuf>,
     /// Whether the scene is stable however its one-sided contacts and walls open and close, proven; or else a motion that grows
@@ -162,11 +161,11 @@ pub(crate) struct MapArguments {
     /// How many values of each, the ends among them
     #[arg(long, value_name = "WxH", value_parser = GridSize::parse, required_unless_present = "prove")]
     pub(crate) grid: Option<GridSize>,
-    /// In place of a grid, prove the whole region: boxes that are stable or unstable throughout, and a rest that is not decided, with sides of at least the ranges halved this number of times. Keys that do
-    /// nothing but set gains, masses and dampings
+    /// In place of a grid, prove the whole region of gains, masses or dampings: boxes that are stable or unstable throughout, and undecided ones with
+    /// sides of the ranges halved this number of times
     #[arg(long, value_name = "HALVINGS", num_args = 0..=1, default_missing_value = "8", conflicts_with = "grid", value_parser = integer::<u32>(0, cohaptic_stability::MOST_HALVINGS.into()))]
     pub(crate) prove: Option<u32>,
-    /// With --prove, write certificate.json into the folder of --out too, and such a file for each further map: all by which the verdicts can be checked without this program. Some 15 kB a box
+    /// With --prove, write certificate.json for each map into the folder of --out too, by which others can check the verdicts. Some 15 kB a box
     #[arg(long, requires = "prove", requires = "out")]
     pub(crate) certificate: bool,
     /// Another map in the same picture, with these keys overridden too, again and again:
@@ -199,10 +198,10 @@ pub(crate) struct BoundaryArguments {
     /// How exactly a crossing is found, in the unit of the key [default: a billionth of the range; in the mean square a ten-millionth]
     #[arg(long, value_name = "T", value_parser = real, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
-    /// Prove which stretches are stable and which unstable, and enclose every crossing between them. A key that does nothing but set gains, masses and dampings
+    /// Prove which stretches of a gain, mass or damping are stable and which unstable, and enclose every crossing between them
     #[arg(long, conflicts_with = "samples")]
     pub(crate) prove: bool,
-    /// With --prove, write certificate.json into the folder of --out too: all by which the verdicts can be checked without this program
+    /// With --prove, write certificate.json into the folder of --out too, by which others can check the verdicts
     #[arg(long, requires = "prove", requires = "out")]
     pub(crate) certificate: bool,
     /// How many values are looked at first, the ends among them [default: 400]

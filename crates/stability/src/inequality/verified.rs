@@ -34,7 +34,7 @@ pub(crate) fn holds(inequality: &Inequality, solution: &Solution) -> bool {
     signs && solution.shapes.iter().all(is_shape) && shrinks(inequality, solution, 1.0)
 }
 
-/// Whether every part is shown to hold with what is measured before a step multiplied by `square`.
+/// Whether every part is shown to hold with the forms before a step multiplied by `square`.
 fn shrinks(inequality: &Inequality, solution: &Solution, square: f64) -> bool {
     inequality.parts.iter().all(|part| {
         let (difference, error) = difference(part, solution, square);

@@ -362,7 +362,7 @@ impl FrameMap {
         self.displacements[row]
     }
 
-    /// Where the unknowns of the frame, and of the inputs so many, stand among the columns of [`FrameMap::driven`]; and where the samples of each node do.
+    /// Where the unknowns of the frame, and of this number of inputs, stand among the columns of [`FrameMap::driven`]; and where the samples of each node do.
     pub(crate) fn places(&self, inputs: usize) -> (Vec<usize>, Vec<usize>) {
         let states = self.state_unknowns();
         let mut first = Vec::with_capacity(self.depth.len());

@@ -126,7 +126,7 @@ impl Growing {
     }
 }
 
-/// A body that moves by that many times less of a force.
+/// A body that a force moves less by this factor.
 fn heavier(body: &Body, by: f64) -> Body {
     let of = |map: StepMap| {
         let (e, g) = map.coefficients();

@@ -10,7 +10,7 @@
 //! σ² = µ·C[u − h] + (1 − µ)·A[u − out] + (1 − µ)/(1 − ν²)·A[in + ν·out] + ((1 − 2ν)/2 + (1 − ν)/(2 + 2ν))·x
 //! ```
 //!
-//! with a the states of a peer and its samples on the way, in the mean of what it holds, out the mean of what is held of it, ν = 1/(N − 1), µ = 1/N, and X\[v\] = vᵀXv. All of it is analytic in ν, down to 0, and a tick is multi-affine in gains
+//! with a the states of a peer and its samples on the way, in the mean of the samples that it holds, out the mean of its samples that others hold, ν = 1/(N − 1), µ = 1/N, and X\[v\] = vᵀXv. All of it is analytic in ν, down to 0, and a tick is multi-affine in gains
 //! and coefficients of step maps. So the image L(Y) of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius ([`StepSpan`]), and
 //! Y − L(Y) is positive definite on all of the span if it is at all ends of the slopes, radius included. Y is looked for at a number in the middle, and need not be exact. If it is positive definite too, every number is *stable*; if an
 //! entry of its diagonal is below zero, every one is *unstable* ([`positive`](crate::mean_square::positive)).
@@ -110,7 +110,7 @@ enum Action {
     },
 }
 
-/// Where the rows of a peer are: its states, samples of earlier frames and of this one, and what is held: h, or in and out.
+/// Where the rows of a peer are: its states, samples of earlier frames and of this one, and held samples: h, or in and out.
 struct Rows {
     states: usize,
     depth: usize,
@@ -272,7 +272,7 @@ impl Frame<'_> {
         translation: Option<&[f64]>,
     ) -> Moment {
         let skipped = translation.map(|_| rows.position);
-        // What is there between frames, of what is there within one: at its beginning, and from its end.
+        // Rows that are kept between frames, among the rows within one: at its beginning, and from its end.
         let begins = |held: usize, skipped: Option<usize>| {
             let places: Vec<usize> = (0..rows.kept()).chain((0..held).map(|held| rows.held() + held)).filter(|row| Some(*row) != skipped).collect();
             numbers.constant(Matrix::from_fn(rows.held() + held, places.len(), |row, column| f64::from(u8::from(places[column] == row))))

@@ -154,20 +154,22 @@ fn structures(followed: &mut Followed<'_>, change: impl Fn(&mut crate::structure
     followed.motions.iter_mut().for_each(|motion| change(&mut motion.structure));
 }
 
-/// Each fault makes a box that holds a point of the other kind, or decides nothing any more.
+/// Each fault makes a box that holds a point of the other kind, or leaves more than half of the points undecided, which the test without faults refuses too.
 #[test]
 fn faults_of_the_prover_are_seen() {
     let cases = cases();
     for (what, mutation, change) in FAULTS {
         let mut found = Found::default();
-        let mut looked_at = 0;
+        let (mut looked_at, mut points) = (0, 0);
         for case in &cases {
             with(mutation, || found.of(case, &change));
             looked_at += 1;
+            points += case.spread.len() + case.near.len();
             if !found.contradictions.is_empty() {
                 break;
             }
         }
-        assert!(!found.contradictions.is_empty(), "{what}: {} points of {looked_at} scenes, and no box shows it", found.judged);
+        let is_seen = !found.contradictions.is_empty() || found.judged <= points / 2;
+        assert!(is_seen, "{what}: {} points of {looked_at} scenes, and no box shows it", found.judged);
     }
 }

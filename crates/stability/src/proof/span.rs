@@ -53,7 +53,7 @@ impl StepSpan {
         span
     }
 
-    /// The same matrix all over a box of that many numbers.
+    /// The same matrix all over a box of this number of numbers.
     pub(super) fn constant(mean: Matrix, numbers: usize) -> Self {
         let none = Matrix::zeros(mean.rows(), mean.columns());
         Self { slopes: vec![none.clone(); numbers], radius: none, mean }

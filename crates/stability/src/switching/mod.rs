@@ -18,9 +18,9 @@
 //! ```
 //!
 //! Of b only differences occur, in which a position that all have, or that of a device that lies somewhere, cancels: it does not matter where things rest. With
-//! the forces as inputs a frame is linear. If for some V > 0 and multipliers (those of (a) of any sign, others not negative) the quadratic form
-//! V(after) − V(before) + Σ multiplier·product is below zero for all values of states y, forces and depths, then V(y, p₀), which is what motion and springs
-//! have, shrinks in every frame by a factor below 1, whatever opens and closes: the products are not below zero, so V(after) < V(before). Motion and
+//! the forces as inputs a frame is linear. Take V > 0 and multipliers, those of (a) of any sign, others not negative. Let the quadratic form
+//! V(after) − V(before) + Σ multiplier·product be below zero for all values of states y, forces and depths. The products are not below zero, so
+//! V(after) < V(before): V(y, p₀), a norm of motion and springs, shrinks in every frame by a factor below 1, whatever opens and closes. Motion and
 //! forces then die out, and devices come to lie somewhere. Forces of hands that stay bounded move a scene by a bounded amount: with an input
 //! more the form is below −ε·(all squares) + C·(input)².
 //!
@@ -33,7 +33,7 @@
 //! inequality splits as a frame does ([`structure`](crate::structure)), into one for the averages and one for differences, with common multipliers; its size
 //! does not depend on N. Nothing is lost: an inequality with equal peers that has a solution has the average of all its permutations as one.
 //!
-//! What is found is checked with bounds of all rounding errors. Where nothing is found a motion that grows is looked for.
+//! V and the multipliers are checked with bounds of all rounding errors. Where there are none a motion that grows is looked for.
 
 mod contact_frame;
 mod growing;
@@ -68,7 +68,7 @@ pub struct Switching {
     pub notes: Vec<String>,
 }
 
-/// What is known of the contacts along one axis.
+/// The answer about the contacts along one axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SwitchingMotion {
     /// Which motion, in words; empty if there is but one.
@@ -266,7 +266,7 @@ fn walled(along: &Along<'_>, nodes: Vec<Node>) -> Vec<Node> {
     nodes.into_iter().map(|node| Node { wall, ..node }).collect()
 }
 
-/// What is asked of a scene along an axis.
+/// The part of a scene along an axis that is looked at.
 struct Asked {
     groups: Vec<Group>,
     /// The frames of the parts that have contacts, the groups of these, and whether it is about differences.

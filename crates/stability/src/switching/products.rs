@@ -1,4 +1,4 @@
-//! The inequality of contacts: what is measured are states and depths, and the products are those of [`super`], with multipliers that equal contacts share.
+//! The inequality of contacts: its norm is one of states and depths, and the products are those of [`super`], with multipliers that equal contacts share.
 
 use super::contact_frame::ContactFrame;
 use crate::inequality::{Inequality, Measured, Part, Product, Row};

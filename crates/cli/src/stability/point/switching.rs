@@ -16,7 +16,7 @@ use crate::failure::{Failure, not_analysed};
 use crate::input;
 use crate::output::{self, figure};
 
-/// What is known of contacts that open and close, if it is asked for.
+/// The answer about contacts that open and close, if it is asked for.
 pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Switching>, Failure> {
     if !arguments.switching {
         return Ok(None);

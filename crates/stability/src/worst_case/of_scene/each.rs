@@ -218,7 +218,7 @@ impl Link {
         let unknowns = inputs + if apart { 2 * stretches } else { stretches };
         let unit = |place: usize, by: f64| -> Vec<f64> { (0..unknowns).map(|other| if other == place { by } else { 0.0 }).collect() };
         let mut heard: Vec<Vec<f64>> = Vec::new();
-        // A row of the frame, whose samples are what is heard in stretches.
+        // A row of the frame, whose samples are those heard in stretches.
         let composed = |row: &[f64], heard: &[Vec<f64>]| {
             let mut entries = row[..states].to_vec();
             entries.resize(unknowns, 0.0);
@@ -232,7 +232,7 @@ impl Link {
         let sent = frame.sent_by(0).start;
         let own = if apart { -1.0 / others } else { 1.0 };
         for (stretch, age) in self.nominal.iter().enumerate() {
-            // A sample that is sent in this frame does not depend on what is heard after it.
+            // A sample that is sent in this frame does not depend on samples heard after it.
             let sample = if *age == 0 { composed(frame.sent.row(sent), &heard) } else { unit(states + age - 1, 1.0) };
             let mut row: Vec<f64> = sample.iter().map(|entry| own * entry).collect();
             row[inputs + stretch] += 1.0;

@@ -239,7 +239,7 @@ pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, w
     }
     if is_open.into_inner() {
         said.push(
-            "each link on its own: the lower bound is that of all links together, the upper one that of a norm for equal peers; what is between them stays open"
+            "each link on its own: the lower bound is that of all links together, the upper one that of a norm for equal peers; radii between them stay open"
                 .to_owned(),
         );
     }
