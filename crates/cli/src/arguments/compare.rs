@@ -27,7 +27,7 @@ pub(crate) struct CompareArguments {
     /// How many runs there are of each combination, with the same seeds for all strategies [default: 10]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 10, hide_default_value = true)]
     pub(crate) runs: u64,
-    /// The folder of the comparison: the table of runs as campaign writes it, verdicts, compare.csv and compare.html. The same command goes on from there
+    /// The folder of the comparison: the table of runs, verdicts, compare.csv and compare.html. The same command goes on from there
     #[arg(long, value_name = "DIR", required_unless_present_any = ["merge", "status"])]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
@@ -38,7 +38,7 @@ pub(crate) struct CompareArguments {
     /// How many runs are made at the same time [default: one a core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
-    /// How many runs are kept together, the most that a kill can cost on each thread [default: some seconds' worth]
+    /// How many runs are kept together, the most that a kill costs each thread [default: some seconds' worth]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
     pub(crate) part: Option<NonZeroU64>,
 }

@@ -85,7 +85,7 @@ pub(crate) struct WatchArguments {
     #[arg(help = "What the spring damps [N·s/m], up to 20")]
     #[arg(long, value_name = "DAMPING", value_parser = damping, requires = "spring", default_value_t = 0.0)]
     pub(crate) damping: f64,
-    #[arg(help = "No greater force [N], above 0 and up to 4. A device may push several times as hard as it is asked to (docs/falcon.md)")]
+    #[arg(help = "No greater force [N], above 0 and up to 4. A device may push several times as hard (docs/falcon.md)")]
     #[arg(long, value_name = "NEWTONS", value_parser = gentle, default_value_t = 0.5)]
     pub(crate) limit: f64,
     /// Write every exchange into this file

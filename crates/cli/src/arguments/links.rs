@@ -55,14 +55,14 @@ pub(crate) enum Profile {
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::FIT))]
 pub(crate) struct FitArguments {
-    /// A CSV of one-way measurements (t,delay or sent,arrived), a file of fates, or the capture of the sender (which takes that of the receiver too)
+    /// A CSV of one-way measurements (t,delay or sent,arrived), a file of fates, or the capture of the sender (with that of the receiver)
     pub(crate) file: PathBuf,
     /// The capture of the receiver
     pub(crate) receiver: Option<PathBuf>,
     /// Only datagrams to this UDP port, of captures
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u16>(0, 65_535), requires = "receiver")]
     pub(crate) port: Option<u16>,
-    /// Estimate the linear drift of one clock against the other, and remove it first where it is significant at 1 %
+    /// Remove the linear drift of one clock against the other first, where it is significant at 1 %
     #[arg(long)]
     pub(crate) skew: bool,
     /// Print one JSON document and nothing else

@@ -22,7 +22,7 @@ pub(crate) struct RealTimeArguments {
     /// Do not ask the system for SCHED_FIFO and locked memory
     #[arg(long)]
     pub(crate) no_priority: bool,
-    /// The run says that it was not valid if more than one in a thousand ticks or packets was later than this [default: that of the file, or 1ms]
+    /// A run is not valid if more than one in a thousand ticks or packets was later [default: that of the file, or 1ms]
     #[arg(long, value_name = "TIME", value_parser = parse::duration)]
     pub(crate) tolerance: Option<Duration>,
     /// Serve live control and /metrics over HTTP at this address [without one: a free port of 127.0.0.1]. The URL with its token is printed

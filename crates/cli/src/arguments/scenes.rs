@@ -23,10 +23,10 @@ pub(crate) struct RunArguments {
     pub(crate) against: Vec<String>,
     #[command(flatten)]
     pub(crate) measure: MeasureArguments,
-    /// Write trajectory.csv, packets.csv, links.csv, plots (SVG) and run.html, a page of it all, into this folder; the second run goes into its folder against
+    /// Write trajectory.csv, packets.csv, links.csv, plots (SVG) and run.html, a page of all, into this folder; the second run into its folder against
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Write one row a link, as in links.csv of --out, into this file or pipe; the only way to see each link where there are more than 1,000
+    /// Write one row a link, as in links.csv of --out, into this file or pipe: each link where there are more than 1,000
     #[arg(long, value_name = "FILE", conflicts_with = "against")]
     pub(crate) links: Option<PathBuf>,
     #[command(flatten)]
@@ -34,7 +34,7 @@ pub(crate) struct RunArguments {
     /// Draw the copies in motion into this file, an SVG that moves; with --against those of both runs
     #[arg(long, value_name = "FILE")]
     pub(crate) motion: Option<PathBuf>,
-    /// Replay a live session: its inputs.csv, with the scene and the --set of that session. Fates and motion are the same to the last bit
+    /// Replay a live session: its inputs.csv, with its scene and its --set. Fates and motion are the same to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = ["against", "general"])]
     pub(crate) inputs: Option<PathBuf>,
     /// Replay even if the scene or its --set are not those of the session, and say what differs
@@ -43,7 +43,7 @@ pub(crate) struct RunArguments {
     /// Do not draw positions in the terminal, and do not write run.html. Without --out nothing is looked at then but counters, which is fastest
     #[arg(long)]
     pub(crate) no_plot: bool,
-    /// How many threads share a run that nothing looks at, where that pays, as explain says [default: one a core]. Results do not depend on it
+    /// How many threads share an unobserved run where that pays, as explain says [default: one a core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
     /// Simulate everything the program has, needed or not: slower, and the same answer to the last bit
@@ -108,7 +108,7 @@ pub(crate) struct CampaignArguments {
     /// How many runs are made at the same time [default: one a core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
-    /// How many runs are kept together, the most that a kill can cost on each thread [default: some seconds' worth]
+    /// How many runs are kept together, the most that a kill costs each thread [default: some seconds' worth]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
     pub(crate) part: Option<NonZeroU64>,
     /// Do not draw pictures

@@ -47,7 +47,7 @@ pub(crate) struct PointArguments {
     /// The verdict for every number of equal peers too, proven: of those from 2 on, or FROM.., or FROM..TO
     #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, conflicts_with_all = ["graph", "method", "about"])]
     pub(crate) every_number: Option<(u64, Option<u64>)>,
-    /// With --every-number, write a file by which others can check the verdicts
+    /// With --every-number, write a file to check the verdicts by
     #[arg(long, value_name = "FILE", requires = "every_number")]
     pub(crate) certificate: Option<PathBuf>,
     /// Whether the scene is stable however its one-sided contacts and walls open and close, proven; or else a motion that grows
@@ -165,7 +165,7 @@ pub(crate) struct MapArguments {
     /// sides of the ranges halved this number of times
     #[arg(long, value_name = "HALVINGS", num_args = 0..=1, default_missing_value = "8", conflicts_with = "grid", value_parser = integer::<u32>(0, cohaptic_stability::MOST_HALVINGS.into()))]
     pub(crate) prove: Option<u32>,
-    /// With --prove, write certificate.json for each map into the folder of --out too, by which others can check the verdicts. Some 15 kB a box
+    /// With --prove, write certificate.json for each map into the folder of --out too, to check the verdicts by. Some 15 kB a box
     #[arg(long, requires = "prove", requires = "out")]
     pub(crate) certificate: bool,
     /// Another map in the same picture, with these keys overridden too, again and again:
@@ -201,7 +201,7 @@ pub(crate) struct BoundaryArguments {
     /// Prove which stretches of a gain, mass or damping are stable and which unstable, and enclose every crossing between them
     #[arg(long, conflicts_with = "samples")]
     pub(crate) prove: bool,
-    /// With --prove, write certificate.json into the folder of --out too, by which others can check the verdicts
+    /// With --prove, write certificate.json into the folder of --out too, to check the verdicts by
     #[arg(long, requires = "prove", requires = "out")]
     pub(crate) certificate: bool,
     /// How many values are looked at first, the ends among them [default: 400]
@@ -256,7 +256,7 @@ pub(crate) struct AdmittanceArguments {
     /// The peer whose device is pushed
     #[arg(long, value_name = "NAME")]
     pub(crate) peer: String,
-    /// Along which axis it is pushed, or of a device that turns about which axis it is twisted [default: that of its own one-sided contact, or x]
+    /// The axis of the push, or of the twist of a device that turns [default: that of its own one-sided contact, or x]
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) axis: Option<AxisName>,
     /// Along or about which axis its motion is looked at, where the object turns [default: that of the push]
@@ -265,7 +265,7 @@ pub(crate) struct AdmittanceArguments {
     /// The lowest frequency [default: 0.01]
     #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) from: Option<f64>,
-    /// The highest frequency, at most half the rate of the peer's ticks [default: 100, or less if that is too high]
+    /// The highest frequency, at most half the rate of the peer's ticks [default: 100, or that]
     #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) to: Option<f64>,
     /// How many frequencies from the lowest to the highest, each the same factor above the one before [default: 60]
