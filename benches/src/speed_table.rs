@@ -115,7 +115,7 @@ fn queues(work: Work) {
         "The mesh above with jitter and loss, and over links that have a line of 10 Mbit/s with a queue of 100 packets besides, dropped from its tail (*rate and queue*) or by"
     );
     println!(
-        "CoDel, or gamma jitter with a correlation of 0.5 and Gilbert-Elliott loss (*chains*): processor time a packet offered, and as a multiple of jitter and loss. The"
+        "CoDel, or gamma jitter with a correlation of 0.5 and Gilbert-Elliott loss (*chains*). Figures are processor time a packet offered, and its multiple of jitter and loss. The"
     );
     println!(
         "bare loop of the first two is the one above, with Lindley's recursion over departures for the queue. The median of {} rounds in which all alternate.\n",
@@ -137,7 +137,7 @@ fn queues(work: Work) {
         }
         let nanos: Vec<f64> = medians_in_turn(&works, work.rounds).iter().map(|time| 1e9 * time.as_secs_f64() / packets).collect();
         for (place, (name, asked)) in rows.enumerate() {
-            let bare = nanos[scenes.len()..].get(place).map_or("|".to_owned(), |bare| format!("{bare:.0} | {:.2}", nanos[place] / bare));
+            let bare = nanos[scenes.len()..].get(place).map_or_else(|| "|".to_owned(), |bare| format!("{bare:.0} | {:.2}", nanos[place] / bare));
             println!("| {peers} | {name} | {:.0} | {:.2} | {asked} | {bare} |", nanos[place], nanos[place] / nanos[0]);
         }
     }

@@ -81,7 +81,7 @@ fn settings(law: Coordination, micros: u64) -> LawSettings {
         let value = match parameter.form {
             LawForm::Duration | LawForm::AutomaticDuration => LawValue::Duration(Duration::from_micros(micros)),
             LawForm::AutomaticDamping | LawForm::Damping => LawValue::Number(1e-3 * f64::from(u32::try_from(micros).unwrap())),
-            form => panic!("no law has a parameter like {form:?}"),
+            form @ (LawForm::Impedance | LawForm::Energy | LawForm::Words(_) | LawForm::Peer) => panic!("no law has a parameter like {form:?}"),
         };
         settings.of_mut(law).set(place, value);
     }
@@ -146,8 +146,8 @@ fn turning(law: Coordination, kind: u8, number: u64) -> ChangeKind {
             peer,
             contact: [Contact::None, Contact::Grasp, Contact::Push(Direction { axis: 1, positive: true })][(number / 2 % 3) as usize],
         },
-        3 => ChangeKind::HandTorque { peer, torque: (number % 3 > 0).then_some(Signal::Constant(triple)) },
-        4 => ChangeKind::Hand { peer, hand: (number % 3 > 0).then_some(Hand::Force(Signal::Constant(triple))) },
+        3 => ChangeKind::HandTorque { peer, torque: (!number.is_multiple_of(3)).then_some(Signal::Constant(triple)) },
+        4 => ChangeKind::Hand { peer, hand: (!number.is_multiple_of(3)).then_some(Hand::Force(Signal::Constant(triple))) },
         _ => ChangeKind::Parameters(Box::new(settings(law, number))),
     }
 }

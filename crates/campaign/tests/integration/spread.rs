@@ -49,9 +49,10 @@ fn the_rows_are_those_of_one_process_whoever_has_which() {
     for (row, expected) in rows.iter().zip(&expected) {
         for ((value, expected), name) in row.iter().zip(expected).zip(&names) {
             // Numbers are written with the fewest digits that read back the same.
-            match value {
-                Value::Number(number) => assert_eq!(expected.parse::<f64>().unwrap().to_bits(), number.to_bits(), "{name}"),
-                other => assert_eq!(&cell(other), expected, "{name}"),
+            if let Value::Number(number) = value {
+                assert_eq!(expected.parse::<f64>().unwrap().to_bits(), number.to_bits(), "{name}");
+            } else {
+                assert_eq!(&cell(value), expected, "{name}");
             }
         }
     }

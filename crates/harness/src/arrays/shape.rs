@@ -165,12 +165,15 @@ mod tests {
 
     /// Why two peers with these keys besides cannot be run in arrays.
     fn refusal(keys: &str) -> Option<&'static str> {
-        let text = format!(
-            "scene = {{ duration = \"1s\", count = 2 }}\nobject.mass = 1\npeer = {{ contact = \"none\", device.mass = 1 }}\nlink.delay = \"9ms\"\n\
-             coordination = {{ strategy = \"average-position\", stiffness = 1, update = \"8ms\" }}\n"
-        );
+        let text = r#"
+scene = { duration = "1s", count = 2 }
+object.mass = 1
+peer = { contact = "none", device.mass = 1 }
+link.delay = "9ms"
+coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
+"#;
         let settings: Vec<String> = keys.lines().map(str::to_owned).collect();
-        let scene = Scene::parse(&text, Path::new("x.toml"), &settings).unwrap_or_else(|error| panic!("{keys}: {error}"));
+        let scene = Scene::parse(text, Path::new("x.toml"), &settings).unwrap_or_else(|error| panic!("{keys}: {error}"));
         Shape::of(&scene, &Plan::new(&scene, Model::Least, false), &FromScene).err()
     }
 

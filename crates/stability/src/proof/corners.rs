@@ -131,9 +131,12 @@ pub(super) fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofErr
     Ok(())
 }
 
+/// A body at each end, and the nodes that have it.
+type EqualBodies = (Vec<Body>, Vec<(usize, BodyOf)>);
+
 /// The points with one more number for each coefficient of a step map that varies between the ends. Bodies that are equal at all ends vary together: their coefficients are the same functions of what varies.
 fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, ProofError> {
-    let mut groups: Vec<(Vec<Body>, Vec<(usize, BodyOf)>)> = Vec::new();
+    let mut groups: Vec<EqualBodies> = Vec::new();
     for node in 0..points[0].nodes.len() {
         for body in [BodyOf::Copy, BodyOf::Device] {
             let found: Vec<Body> = ends.iter().filter_map(|nodes| body.of(&mut nodes[node].clone()).copied()).collect();

@@ -159,10 +159,7 @@ impl World {
     fn is_legitimate(&self, side: usize, error: Error) -> bool {
         let silence = self.closed_at[side].map(|at| at.saturating_duration_since(self.heard_at[side]));
         let is_peer_over = self.closed_at[1 - side].is_some_and(|over| self.closed_at[side].is_some_and(|at| over <= at));
-        match error {
-            Error::TimedOut => silence.is_some_and(|silence| silence >= Duration::from_secs(63)),
-            _ => is_peer_over,
-        }
+        if error == Error::TimedOut { silence.is_some_and(|silence| silence >= Duration::from_secs(63)) } else { is_peer_over }
     }
 }
 
