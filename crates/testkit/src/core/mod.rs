@@ -178,12 +178,16 @@ impl Shared {
         self.try_core().map(|core| core.wire.recorded())
     }
 
+    /// Not held for long: a loop of tokio takes the state again and again, each time for a moment.
     fn try_core(&self) -> Option<MutexGuard<'_, Core>> {
-        match self.core.try_lock() {
+        (0..10_000).find_map(|_| match self.core.try_lock() {
             Ok(core) => Some(core),
             Err(TryLockError::Poisoned(held)) => Some(held.into_inner()),
-            Err(TryLockError::WouldBlock) => None,
-        }
+            Err(TryLockError::WouldBlock) => {
+                std::thread::yield_now();
+                None
+            }
+        })
     }
 
     /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.

@@ -243,7 +243,7 @@ fn each_link_on_its_own_is_bounded_at_any_number_of_equal_peers() {
         let found = worst_case(&scene, &patterns, &Effort::default()).unwrap();
         let together = worst_case(&scene, &Patterns { links: Links::Together, ..patterns }, &Effort::default()).unwrap();
         assert_eq!((found.verdict(), found.lower.to_bits()), (WorstVerdict::Stable, together.lower.to_bits()), "{overrides:?}: {found:?}");
-        assert!(found.lower < found.upper && found.notes.last().is_some_and(|note| note.ends_with("stays open")), "{found:?}");
+        assert!(found.lower < found.upper && found.notes.last().is_some_and(|note| note.ends_with("stay open")), "{found:?}");
     }
 }
 
