@@ -52,7 +52,9 @@ import cohaptic, sys
 LONG = {LONG!r}
 class Spring:
     def __init__(self, peer): self.peer = peer
-    def command(self, own, held, t): return self.peer.stiffness * (own.position - held.mean.position)
+    def command(self, own, held, t):
+        # Damped, so that nothing overflows, which would end the run.
+        return self.peer.stiffness * (own.position - held.mean.position) + self.peer.damping * (own.velocity - held.mean.velocity)
 scene = cohaptic.Scene(LONG)
 print("ready", flush=True)
 try:
