@@ -324,7 +324,7 @@ impl Campaign {
         written.map_err(|error| unwritten(&path, error))
     }
 
-    /// [`Campaign::keep`] by one of several workers, who leaves alone a part that another one has put away: it is the same.
+    /// [`Campaign::keep`] by one of several workers, which leaves a part alone that another worker has put away: both parts are equal.
     pub(crate) fn keep_by(&self, worker: &str, part: u64, rows: &[Row]) -> Result<(), CampaignError> {
         let path = self.folder.part(part, self.plan.format());
         if path.exists() {

@@ -45,7 +45,7 @@ pub struct PartState {
 }
 
 impl SharedCampaign {
-    /// Begins a campaign in a folder, or goes on with the one there if it is the same. `worker` is a name that no other worker has; it becomes part of names of
+    /// Begins a campaign in a folder, or goes on with the one there if that has an equal plan. `worker` is a name that no other worker has; it becomes part of names of
     /// files.
     ///
     /// # Errors

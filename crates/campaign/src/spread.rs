@@ -46,7 +46,7 @@ impl SpreadCampaign {
         Ok(Self { plan, roster, columns })
     }
 
-    /// Everybody who takes part in any run, as a text for [`SpreadCampaign::with_roster`].
+    /// The peers of all runs, as a text for [`SpreadCampaign::with_roster`].
     #[must_use]
     pub fn roster(&self) -> String {
         serde_json::to_string(&self.roster).unwrap_or_default()

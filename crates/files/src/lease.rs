@@ -391,7 +391,7 @@ mod tests {
                 let threads: Vec<_> = (0..4).map(|number| take(100 * (round + 1) + number)).collect();
                 threads.into_iter().filter_map(|thread| thread.join().unwrap()).collect()
             });
-            // A slow one may have taken away the lease of a fast one, who then sees it: one owner is left.
+            // A slow process may have taken away the lease of a fast one, which then sees it: one owner is left.
             let mine = leases.iter_mut().filter_map(|lease| lease.renew().unwrap().then_some(())).count();
             assert_eq!(mine, 1, "round {round}");
         }

@@ -63,7 +63,7 @@ fn compare(scenes: &[Scene]) {
     }
 }
 
-/// Ends a run at the last of so many instants at which it is asked. A run that looked ahead and diverged is run once more, and asks again: the answers are the same.
+/// Ends a run at the last of a number of instants at which it is asked. A run that looked ahead and diverged is run once more, and asks again: the answers are the same.
 struct Impatient {
     breaths: usize,
     asked: Vec<Instant>,

@@ -16,7 +16,7 @@ use proptest::sample::select;
 use super::arrays::{difference, mesh, run, run_interrupted};
 use super::{turning_arrays, watched};
 
-/// The scene with its changes so much later [ns], but none after its end.
+/// The scene with its changes later by a span [ns], but none after its end.
 fn later(mut scene: Scene, nanos: u64) -> Scene {
     let end = Instant::ZERO.saturating_add(scene.duration);
     for change in &mut scene.timeline {

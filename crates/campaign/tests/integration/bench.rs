@@ -90,7 +90,7 @@ impl Bench {
         pool.install(|| Campaign::open(self.plan()?, &self.path(folder), watch)?.run(watch))
     }
 
-    /// Does a shard of it with so many threads, as a worker of that name.
+    /// Does a shard of it with this number of threads, as a worker of that name.
     pub(crate) fn shard(&self, folder: &str, shard: Shard, worker: &str, threads: usize, watch: &dyn Watch) -> Result<ShardReport, CampaignError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| SharedCampaign::open(self.plan()?, &self.path(folder), worker, watch)?.run(shard, watch))

@@ -51,7 +51,7 @@ function drawCurves() {
   drawCurve('force-plot', 'force_n', 1, 'N');
 }
 
-/** Three curves over time. What is far above the rest is cut: a run that falls apart would hide the others. */
+/** Three curves over time. A curve far above the others is cut: a run that falls apart would hide them. */
 function drawCurve(id, key, factor, unit) {
   const { context, width, height } = sized($(id));
   const peaks = compared.runs.map((run) => Math.max(...run[key])).sort((one, other) => one - other);

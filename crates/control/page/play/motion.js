@@ -2,7 +2,7 @@
 
 /** How fast the picture follows [ms]: 50 pictures a second look like 60. */
 const FOLLOWS = 18;
-/** Who wants less motion sees what was measured, without a way in between and without flying dots. */
+/** With reduced motion measured places are drawn, without a way in between and without flying dots. */
 const still = matchMedia('(prefers-reduced-motion: reduce)');
 
 let facts = { part: 0, peers: [], axes: 1, edges: null, host: false };
@@ -21,7 +21,7 @@ function takeFrame(next) {
   return another;
 }
 
-/** Moves what is shown towards what was measured. */
+/** Moves the drawn places towards the measured ones. */
 function follow(passed) {
   if (frame === null) return;
   const share = still.matches ? 1 : 1 - Math.exp(-passed / FOLLOWS);

@@ -169,7 +169,7 @@ fn motions_keep_to_the_products_and_to_the_rate() {
     }
 }
 
-/// The check refuses what is changed.
+/// The check refuses changed solutions.
 #[test]
 fn shapes_and_multipliers_that_are_changed_are_refused() {
     let (_, inequality) = asked(&scene(&[]));

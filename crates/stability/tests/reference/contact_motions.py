@@ -123,7 +123,7 @@ class Scene:
                 xh[i], vh[i] = (math.fsum((row[0] * xh[i], row[1] * vh[i], -row[2] * f)) for row in device)
             if tick % self.update == self.update - 1:
                 sizes.append(size)
-            # Positions of 0.01 m are rounded to 1e-18 m, which counts as 1e-16: what is smaller than some powers of ten more does not shrink.
+            # Positions of 0.01 m are rounded to 1e-18 m, which counts as 1e-16: a size below some powers of ten more does not shrink.
             if not 1e-11 < size < 1e280:
                 break
         first, last = len(sizes) // 3, len(sizes) - 1

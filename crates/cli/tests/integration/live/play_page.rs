@@ -152,7 +152,7 @@ fn the_keyboard_alone_and_a_finger_on_a_phone_will_do() {
     assert_eq!(browser.value("document.getElementById('grasp').textContent"), json!("Let go"));
     browser.press("Escape", 27);
     browser.wait("document.querySelector('#peers tr').cells[1].textContent === 'let go'");
-    // Who wants less motion has no flying dots, and drags all the same.
+    // With reduced motion there are no flying dots, and dragging works.
     browser.call("Emulation.setEmulatedMedia", json!({ "features": [{ "name": "prefers-reduced-motion", "value": "reduce" }] }));
     let phone = json!({ "width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": true });
     browser.call("Emulation.setDeviceMetricsOverride", phone);

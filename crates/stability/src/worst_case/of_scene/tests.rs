@@ -230,7 +230,7 @@ fn each_link_on_its_own_is_bounded_as_by_all_kinds_of_frame() {
     }
 }
 
-/// What was refused for more than three peers costs the same for any number of them.
+/// The bound for more than three peers costs as much for any number of them.
 #[test]
 fn each_link_on_its_own_is_bounded_at_any_number_of_equal_peers() {
     for (overrides, patterns) in [
