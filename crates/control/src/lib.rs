@@ -44,6 +44,7 @@ mod metrics;
 mod server;
 mod snapshot;
 mod stage;
+mod ticket;
 mod token;
 mod typed;
 mod views;

@@ -10,6 +10,7 @@ use tokio::runtime::Builder;
 use tokio::sync::{Semaphore, oneshot};
 
 use crate::http::{self, App};
+use crate::ticket::Ticket;
 use crate::{Board, LinkEditor, Stage, Token, TokenError};
 
 /// Where to listen, and which requests to let in.
@@ -68,6 +69,7 @@ pub struct Server {
     address: SocketAddr,
     token: Token,
     guests: Option<Token>,
+    ticket: Arc<Ticket>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -104,8 +106,10 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
     listener.set_nonblocking(true).map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
     let guests = if stage.is_some() { Some(Token::random()?) } else { None };
+    let ticket = Arc::new(Ticket::default());
     let app = App {
         board,
+        ticket: Arc::clone(&ticket),
         editor: Mutex::new(editor),
         token: token.clone(),
         guests: guests.clone(),
@@ -130,7 +134,7 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
         runtime.shutdown_background();
     };
     let thread = std::thread::Builder::new().name("live-control".to_owned()).spawn(run).map_err(ServeError::Thread)?;
-    Ok(Server { address, token, guests, stop: Some(stop), thread: Some(thread) })
+    Ok(Server { address, token, guests, ticket, stop: Some(stop), thread: Some(thread) })
 }
 
 impl Server {
@@ -144,6 +148,13 @@ impl Server {
     #[must_use]
     pub fn url(&self) -> String {
         format!("http://{}/?token={}", self.reachable(), self.token.secret())
+    }
+
+    /// An address that leads to the page once, for a program that opens browsers: other users of the machine see the arguments of its programs, and the
+    /// token is not among them. The last address given is the one that leads there. If the system has no random numbers, it is [`Server::url`].
+    #[must_use]
+    pub fn open_url(&self) -> String {
+        self.ticket.issue().map_or_else(|_| self.url(), |ticket| format!("http://{}/open?ticket={}", self.reachable(), ticket.secret()))
     }
 
     /// The link to hand out to those who are to take part, with a token of their own; `None` if nobody takes part from a page.

@@ -18,6 +18,10 @@ const OLD: Duration = Duration::from_millis(100);
 /// Between two places the way takes as long as passed between their coming, within these limits: a screen shows 60 a second, or 144.
 const QUICKEST: Duration = Duration::from_millis(2);
 const SLOWEST: Duration = Duration::from_millis(50);
+/// Of the first place that a session reads nobody knows how long ago the one before it came. The way there is slow, so that the arm does not jerk.
+const FIRST: Duration = Duration::from_millis(80);
+/// A way is no quicker than this share of the one before it: what was missed while nobody read is caught up little by little.
+const CATCHES_UP: f64 = 0.85;
 
 /// Why a place is no place of a pointer.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
@@ -34,8 +38,8 @@ pub struct Pointer(Arc<Mutex<Shared>>);
 #[derive(Clone, Copy, Debug, Default)]
 struct Shared {
     told: Told,
-    /// Where the session last took it to be; what it begins with if it begins anew.
-    shown: Option<State<3>>,
+    /// The rest of its way when a session last read it: the next session goes on from there.
+    rest: Option<Way>,
     /// FC \[N\].
     force: [f64; 3],
 }
@@ -76,7 +80,7 @@ impl Pointer {
     #[must_use]
     pub fn device(&self) -> Box<dyn LiveDevice> {
         let shared = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        Box::new(PointerDevice { pointer: self.clone(), told: shared.told, newest: Instant::ZERO, way: shared.shown.map(Way::resting) })
+        Box::new(PointerDevice { pointer: self.clone(), told: shared.told, newest: None, way: shared.rest })
     }
 }
 
@@ -90,8 +94,12 @@ struct Way {
 }
 
 impl Way {
-    const fn resting(state: State<3>) -> Self {
-        Self { from: state.position, to: state.position, begin: Instant::ZERO, span: QUICKEST }
+    /// What is left of it at `now`, for a clock that begins then.
+    fn rest(&self, now: Instant) -> Self {
+        let left = self.begin.saturating_add(self.span).saturating_duration_since(now);
+        let State { position: from, .. } = self.at(now);
+        // Where nothing is left both ends are the same place.
+        Self { from, to: self.to, begin: Instant::ZERO, span: if left.is_zero() { QUICKEST } else { left } }
     }
 
     fn at(&self, now: Instant) -> State<3> {
@@ -110,8 +118,8 @@ impl Way {
 struct PointerDevice {
     pointer: Pointer,
     told: Told,
-    /// When it was told that.
-    newest: Instant,
+    /// When it was told that; `None` if that was before this session.
+    newest: Option<Instant>,
     /// `None` before it was told anything, and when it has let go.
     way: Option<Way>,
 }
@@ -125,14 +133,15 @@ impl LiveDevice for PointerDevice {
             Err(TryLockError::WouldBlock) => self.told,
         };
         if told.number != self.told.number {
-            let since = now.saturating_duration_since(self.newest);
+            let since = self.newest.map_or(FIRST, |newest| now.saturating_duration_since(newest).clamp(QUICKEST, SLOWEST));
+            let span = self.way.as_ref().map_or(since, |way| since.max(way.span.mul_f64(CATCHES_UP)));
             self.way = told.position.map(|to| match &self.way {
-                Some(way) => Way { from: way.at(now).position, to, begin: now, span: since.clamp(QUICKEST, SLOWEST) },
+                Some(way) => Way { from: way.at(now).position, to, begin: now, span },
                 None => Way { from: to, to, begin: now, span: QUICKEST },
             });
-            (self.told, self.newest) = (told, now);
+            (self.told, self.newest) = (told, Some(now));
         }
-        let is_fresh = now.saturating_duration_since(self.newest) < OLD;
+        let is_fresh = now.saturating_duration_since(self.newest.unwrap_or(Instant::ZERO)) < OLD;
         self.told.position.filter(|_| is_fresh)?;
         self.way.as_ref().map(|way| way.at(now))
     }
@@ -140,7 +149,7 @@ impl LiveDevice for PointerDevice {
     fn hold(&mut self, now: Instant, _span: Duration, coupling_force: [f64; 3]) {
         if let Ok(mut shared) = self.pointer.0.try_lock() {
             shared.force = coupling_force;
-            shared.shown = self.way.as_ref().map(|way| way.at(now));
+            shared.rest = self.way.as_ref().map(|way| way.rest(now));
         }
     }
 }
@@ -181,8 +190,8 @@ mod tests {
         pointer.tell(Some([0.05, 0.0, 0.0])).unwrap();
         near(x(&mut *device, 80), [0.03, 0.5]);
         pointer.tell(Some([0.0, 0.0, 0.0])).unwrap();
-        // 40 mm back in 20 ms.
-        near(x(&mut *device, 100), [0.04, -2.0]);
+        // 40 mm back, 20 ms later: in 85 % of the 40 ms before, not at once.
+        near(x(&mut *device, 100), [0.04, -0.04 / 0.034]);
     }
 
     #[test]
@@ -202,18 +211,29 @@ mod tests {
         near(x(&mut *device, 104), [0.07, 0.0]);
     }
 
+    /// The device of the next session goes on along the way of the last one, as fast; the first place that is new is reached in 80 ms, because nobody knows
+    /// how long the session was away.
     #[test]
-    fn the_next_session_begins_where_the_pointer_is() {
+    fn the_next_session_goes_on_along_the_way() {
         let pointer = Pointer::default();
         let mut device = pointer.device();
         pointer.tell(Some([0.01, 0.0, 0.0])).unwrap();
         near(x(&mut *device, 10), [0.01, 0.0]);
-        device.hold(at(10), Duration::from_millis(1), [0.25, 0.0, 0.0]);
+        pointer.tell(Some([0.03, 0.0, 0.0])).unwrap();
+        // 20 mm in 20 ms, of which 15 ms are gone when the session ends.
+        near(x(&mut *device, 30), [0.01, 1.0]);
+        near(x(&mut *device, 45), [0.025, 1.0]);
+        device.hold(at(45), Duration::from_millis(1), [0.25, 0.0, 0.0]);
         assert_eq!(pointer.force().map(f64::to_bits), [0.25_f64.to_bits(), 0, 0]);
         let mut next = pointer.device();
-        near(x(&mut *next, 0), [0.01, 0.0]);
-        pointer.tell(Some([0.02, 0.0, 0.0])).unwrap();
-        near(x(&mut *next, 10), [0.01, 1.0]);
+        near(x(&mut *next, 0), [0.025, 1.0]);
+        pointer.tell(Some([0.108, 0.0, 0.0])).unwrap();
+        // 80 mm in 80 ms, though it was told after 3 ms of this session; then 60 mm in 85 % of that.
+        near(x(&mut *next, 3), [0.028, 1.0]);
+        pointer.tell(Some([0.096, 0.0, 0.0])).unwrap();
+        near(x(&mut *next, 11), [0.036, 0.06 / 0.068]);
+        device.hold(at(99), Duration::from_millis(1), [0.0; 3]);
+        near(x(&mut *pointer.device(), 0), [0.03, 0.0]);
     }
 
     proptest! {

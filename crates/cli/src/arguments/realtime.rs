@@ -79,6 +79,9 @@ pub(crate) struct PlayArguments {
     pub(crate) overrides: Overrides,
     #[command(flatten)]
     pub(crate) real_time: RealTimeArguments,
+    /// Do not open the page in a browser
+    #[arg(long)]
+    pub(crate) no_open: bool,
     /// End by itself after this time [default: on Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,

@@ -1,6 +1,9 @@
 //! `cohaptic play`: a session in which people take part from a page.
 
 mod compare;
+#[cfg(test)]
+mod continuity;
+mod desktop;
 mod frames;
 mod scene;
 mod stage;
@@ -39,8 +42,9 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
         None => PlayedScene::read(USUAL, Path::new(USUAL_NAME), overrides)?,
     };
     check(&beginning)?;
+    let (beginning, lent) = lend_hand(beginning)?;
     let records = Records::create(arguments.out.as_deref())?;
-    let stage = Arc::new(PlayStage::new(beginning.clone()));
+    let stage = Arc::new(PlayStage::new(beginning.clone(), arguments.scene.is_none()));
     let scene = beginning.scene()?;
     let board = Arc::new(Board::new(onlookers::description(&scene, &onlookers::pairs(&scene))));
     let address = arguments.real_time.control.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], 0)));
@@ -53,6 +57,12 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     let announce = || {
         say(&format!("open {}", server.url()));
         say(&format!("for others: {join}"));
+        if let Some(name) = &lent {
+            say(&format!("the pointer of the page has the hand of {name}, which the scene simulates"));
+        }
+        if !arguments.no_open && desktop::is_there() {
+            desktop::open(&server.open_url());
+        }
     };
     let begun = Clock::now();
     let mut next = beginning;
@@ -88,9 +98,20 @@ fn check(played: &PlayedScene) -> Result<(), Failure> {
     }
     if let Some(peer) = scene.peers.iter().find(|peer| matches!(peer.kind, PeerKind::Udp(_) | PeerKind::Falcon(..))) {
         let kind = peer.kind.name();
-        return refuse(format!("peers.{}.kind: {kind}: expected simulated or pointer; `cohaptic live` takes the others", peer.name));
+        let name = &peer.name;
+        return refuse(format!(
+            "peers.{name}.kind: {kind}: expected simulated or pointer, as after --set peers.{name}.kind=pointer; `cohaptic live` takes the others"
+        ));
     }
     Ok(())
+}
+
+/// Gives the visitor a hand, and says whose it was if the scene simulates it.
+fn lend_hand(played: PlayedScene) -> Result<(PlayedScene, Option<String>), Failure> {
+    let file = played.file().display().to_string();
+    played.with_hand()?.ok_or_else(|| {
+        Failure::Input(format!("{file}: peers: every device turns, and a pointer turns nothing: expected a peer whose device has no inertia"))
+    })
 }
 
 /// Makes a part ready, and shows it to the pages.
@@ -229,7 +250,61 @@ fn reached_from_elsewhere(listening: SocketAddr, url: String) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
+    use cohaptic_peer::Contact;
+
     use super::*;
+
+    /// The scenes of the program, by the end of their path, with what keeps them from being played.
+    fn shipped() -> BTreeMap<String, Result<PlayedScene, String>> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+        let folders = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir());
+        let files = folders.flat_map(|folder| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()));
+        let scenes = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+        scenes
+            .map(|path| {
+                let text = std::fs::read_to_string(&path).unwrap();
+                let played = PlayedScene::read(&text, &path, &[]).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+                let lent = check(&played).and_then(|()| lend_hand(played)).map(|(played, _)| played);
+                let name = path.strip_prefix(&folder).unwrap().display().to_string();
+                (name, lent.map_err(|failure| format!("{failure:?}")))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_shipped_scene_has_a_hand_for_the_visitor_or_says_why_not() {
+        let refused = [
+            ("coordination/n50.toml", "50 of them"),
+            ("coordination/topology-graph.toml", "topology"),
+            ("coordination/topology-ring.toml", "topology"),
+            ("coordination/topology-star.toml", "topology"),
+            ("counterexamples/wave-held.toml", "timeline"),
+            ("live/three-falcons.toml", "kind=pointer"),
+            ("live/two-and-a-program.toml", "kind=pointer"),
+            ("network/push-contact.toml", "timeline"),
+            ("network/timeline.toml", "timeline"),
+        ];
+        let refused = BTreeMap::from(refused);
+        let scenes = shipped();
+        assert!(scenes.len() > 80, "{}", scenes.len());
+        for (name, played) in &scenes {
+            match (played, refused.get(name.as_str())) {
+                (Ok(played), None) => {
+                    let scene = played.scene().unwrap();
+                    let held = scene.peers.iter().filter(|peer| matches!(peer.kind, PeerKind::Pointer(..)) && peer.contact != Contact::None);
+                    assert!(held.count() >= 1, "{name}");
+                    // Where it stands, the next part begins: with every peer in the text.
+                    assert_eq!(played.clone().with_peers(scene.peers.len()).scene().unwrap(), scene, "{name}");
+                }
+                (Err(message), Some(word)) => assert!(message.contains(word), "{name}: {message}"),
+                (Ok(_), Some(word)) => panic!("{name} is played: {word}"),
+                (Err(message), None) => panic!("{name}: {message}"),
+            }
+        }
+        assert!(refused.keys().all(|name| scenes.contains_key(*name)), "{refused:?}");
+    }
 
     #[test]
     fn a_link_for_others_has_an_address_that_they_can_ask_for() {

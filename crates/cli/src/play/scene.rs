@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use cohaptic_live::session::PeerStatus;
+use cohaptic_peer::{Contact, Gains};
 use cohaptic_scene::{LinkKeys, PeerKind, Scene, SceneError, scene_text};
 use toml::{Table, Value};
 
@@ -12,6 +13,9 @@ pub(super) const PEERS: std::ops::RangeInclusive<usize> = 2..=10;
 
 /// A part lasts no longer than this; recordings of longer ones would not be compared in a moment.
 const DURATION: &str = "1h";
+
+/// How a visitor holds an object that nobody touches in its scene: as in the scene that is usual here.
+const GRASP: Gains = Gains { stiffness: 1000.0, damping: 5.0 };
 
 /// A scene as a document that can be changed.
 #[derive(Clone, Debug)]
@@ -33,9 +37,17 @@ impl PlayedScene {
         let text = scene_text(text, file, overrides)?;
         let mut table: Table = toml::from_str(&text).expect("what was read as TOML is TOML");
         table.remove("expect");
-        section(&mut table, "scene").insert("duration".to_owned(), DURATION.into());
-        section(&mut table, "scene").insert("title".to_owned(), scene.title.into());
-        let peers = table.remove("peers").and_then(|peers| peers.try_into().ok()).unwrap_or_default();
+        let about = section(&mut table, "scene");
+        about.insert("duration".to_owned(), DURATION.into());
+        about.insert("title".to_owned(), scene.title.clone().into());
+        // Peers that a number makes are written out: each stands somewhere else when the next part begins.
+        about.remove("count");
+        let written: Vec<Table> = table.remove("peers").and_then(|peers| peers.try_into().ok()).unwrap_or_default();
+        let peer = |name: &str| {
+            let known = written.iter().find(|peer| peer.get("name").and_then(Value::as_str) == Some(name));
+            known.cloned().unwrap_or_else(|| Table::from_iter([("name".to_owned(), Value::from(name))]))
+        };
+        let peers = scene.peers.iter().map(|spec| peer(&spec.name)).collect();
         Ok(Self { table, peers, file: file.to_path_buf() })
     }
 
@@ -53,6 +65,29 @@ impl PlayedScene {
     /// The scene itself.
     pub(super) fn scene(&self) -> Result<Scene, SceneError> {
         Scene::parse_live(&self.text(), &self.file, &[])
+    }
+
+    /// With a hand for the visitor, and the name of its peer if the scene has no pointer of its own: the first simulated peer that touches the object, or else
+    /// the first one, then with a grasp. A pointer turns nothing, so a device that turns is passed over. `None` if no peer is left.
+    pub(super) fn with_hand(mut self) -> Result<Option<(Self, Option<String>)>, SceneError> {
+        let scene = self.scene()?;
+        if scene.peers.iter().any(|peer| matches!(peer.kind, PeerKind::Pointer(..))) {
+            return Ok(Some((self, None)));
+        }
+        let turns = |place: usize| scene.rotation.as_ref().is_some_and(|rotation| rotation.peers[place].device.is_some());
+        let is_free = |place: &usize| matches!(scene.peers[*place].kind, PeerKind::Simulated) && !turns(*place);
+        let touches = |place: &usize| scene.peers[*place].contact != Contact::None;
+        let free = || (0..scene.peers.len()).filter(is_free);
+        let Some(place) = free().find(touches).or_else(|| free().next()) else { return Ok(None) };
+        let peer = &mut self.peers[place];
+        peer.insert("kind".to_owned(), "pointer".into());
+        if !touches(&place) {
+            let gains = [("stiffness", GRASP.stiffness), ("damping", GRASP.damping)];
+            peer.insert("contact".to_owned(), "grasp".into());
+            peer.insert("coupling".to_owned(), Value::Table(gains.into_iter().map(|(key, gain)| (key.to_owned(), gain.into())).collect()));
+        }
+        let name = scene.peers[place].name.clone();
+        Ok(Some((self, Some(name))))
     }
 
     pub(super) fn has_timeline(&self) -> bool {

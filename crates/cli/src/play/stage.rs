@@ -70,6 +70,8 @@ pub(super) struct PlayStage {
     pub(super) frames: Frames,
     /// Where it begins, and where it is put back to.
     beginning: PlayedScene,
+    /// Whether the three steps of the page say what happens in this scene.
+    is_guided: bool,
     pointers: Vec<Pointer>,
     taken: Mutex<Vec<bool>>,
     part: Mutex<Option<Arc<Part>>>,
@@ -89,10 +91,11 @@ fn said(error: &SceneError) -> String {
 }
 
 impl PlayStage {
-    pub(super) fn new(beginning: PlayedScene) -> Self {
+    pub(super) fn new(beginning: PlayedScene, is_guided: bool) -> Self {
         Self {
             frames: Frames::default(),
             beginning,
+            is_guided,
             pointers: (0..*PEERS.end()).map(|_| Pointer::default()).collect(),
             taken: Mutex::new(vec![false; *PEERS.end()]),
             part: Mutex::new(None),
@@ -158,7 +161,8 @@ impl Stage for PlayStage {
         let Part { number, scene, .. } = &*part;
         let peer = |(place, peer): (usize, &cohaptic_scene::PeerSpec)| {
             let is_pointer = matches!(peer.kind, PeerKind::Pointer(..));
-            json!({ "name": peer.name, "kind": peer.kind.name(), "hand": is_pointer, "taken": lock(&self.taken)[place] })
+            let grasp = scene.rotation.as_ref().map(|rotation| rotation.peers[place].grasp);
+            json!({ "name": peer.name, "kind": peer.kind.name(), "hand": is_pointer, "taken": lock(&self.taken)[place], "grasp": grasp })
         };
         let is_host = role == Role::Host;
         json!({
@@ -171,6 +175,8 @@ impl Stage for PlayStage {
             "fewest_peers": PEERS.start(),
             "most_peers": PEERS.end(),
             "edges": scene.rotation.as_ref().and_then(|_| scene.even_box()),
+            "walls": scene.object.enclosure.map(|walls| [walls.min, walls.max]),
+            "guided": self.is_guided,
             "host": is_host,
             "join": self.join.get().filter(|_| is_host),
             "recorded": self.last_finished().map(|finished| finished.number),

@@ -15,7 +15,8 @@ async function compareNow() {
   try {
     compared = await ask('/api/compare', { method: 'POST' });
     const { lasted_s, took_s, hand: name } = compared;
-    tellCompared('The last ' + span(lasted_s, 2) + ' of the hand of ' + name + ', three times, in ' + span(took_s, 2) + '.', false);
+    const whose = facts.peers[ownHand]?.name === name ? 'your hand' : 'the hand of ' + name;
+    tellCompared('The last ' + span(lasted_s, 2) + ' of ' + whose + ', run three times in ' + span(took_s, 2) + '.', false);
     showRuns();
   } catch (error) {
     tellCompared(error.message, true);

@@ -109,8 +109,9 @@ function showFacts() {
   put($('number'), String(peers.length));
   $('fewer').disabled = !host || peers.length <= facts.fewest_peers;
   $('more').disabled = !host || peers.length >= facts.most_peers;
-  for (const node of document.querySelectorAll('#laws input, #laws select, #sliders input, #reset, #compare, #record')) node.disabled = !host;
+  for (const node of document.querySelectorAll('#laws input, #laws select, #sliders input, #reset, #compare, #record, #guide button')) node.disabled = !host;
   if (!host) put($('answer'), 'Only whoever started the session can change it.');
+  $('guide').hidden = !facts.guided;
   $('invite').hidden = !join;
   if (join) $('join').value = join;
   $('grasp').disabled = $('sway').disabled = ownHand === null;

@@ -38,10 +38,11 @@ function drawRoom(context, room, i) {
   context.save();
   context.beginPath();
   context.roundRect(room.left + 0.5, room.top + 0.5, room.width - 1, room.height - 1, 8);
-  context.strokeStyle = own ? ink.accent : ink.line;
+  context.strokeStyle = own ? ink.accent : ink.faint;
   context.lineWidth = own ? 2 : 1;
   context.stroke();
   context.clip();
+  if (facts.walls) drawWalls(context, room);
   shown.forEach((other, k) => { if (k !== i) drawGhost(context, room, other, k); });
   const body = shown[i];
   drawCube(context, room, body, i);
@@ -60,7 +61,6 @@ function drawRoom(context, room, i) {
 
 /** Where another peer has the cube: an outline. */
 function drawGhost(context, room, body, k) {
-  context.globalAlpha = 0.45;
   context.strokeStyle = colour(k);
   context.lineWidth = 1;
   context.setLineDash([3, 3]);
@@ -68,7 +68,18 @@ function drawGhost(context, room, body, k) {
   else squareAt(context, onCanvas(room, body.at), (EDGE * scaleOf(room)) / 2);
   context.stroke();
   context.setLineDash([]);
-  context.globalAlpha = 1;
+}
+
+/** The walls between which the copies are, where there are any along x and y. */
+function drawWalls(context, room) {
+  const far = (value, other) => (Number.isFinite(value) ? value : other);
+  const [min, max] = [facts.walls[0].map((value) => far(value, -LARGEST_REACH)), facts.walls[1].map((value) => far(value, LARGEST_REACH))];
+  const [from, to] = [onCanvas(room, [min[0], max[1], 0]), onCanvas(room, [max[0], min[1], 0])];
+  context.strokeStyle = ink.faint;
+  context.lineWidth = 1;
+  context.setLineDash([1, 5]);
+  context.strokeRect(from.x, from.y, to.x - from.x, to.y - from.y);
+  context.setLineDash([]);
 }
 
 function squareAt(context, { x, y }, half) {
@@ -94,7 +105,8 @@ function drawCube(context, room, body, i) {
 function facesSeen(room, body) {
   const matrix = matrixOf(body.turned);
   const half = facts.edges.map((edge) => Math.max(edge, 0.03 * Math.max(...facts.edges)) / 2);
-  const view = [-0.35, -0.25, 1];
+  // All that lies along it is at one point of the canvas: see onCanvas.
+  const view = [...SLANT, 1];
   return FACES.flatMap(({ axis, side, corners }) => {
     const normal = matrix.map((row) => side * row[axis]);
     if (dot3(normal, view) <= 0) return [];
@@ -119,20 +131,30 @@ function drawBox(context, room, body, i) {
 
 function outlineBox(context, room, body) {
   context.beginPath();
-  for (const { points } of facesSeen(room, body)) points.forEach(({ x, y }, k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  for (const { points } of facesSeen(room, body)) {
+    points.forEach(({ x, y }, k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+    context.closePath();
+  }
+}
+
+/** Where a peer holds the object: of one that turns a point of its own. */
+function graspOf(body, i) {
+  const grasp = facts.peers[i] && facts.peers[i].grasp;
+  return grasp ? add3(body.at, turned(matrixOf(body.turned), grasp), 1) : body.at;
 }
 
 /** The device, and the spring from it to the copy: it stretches as the two come apart, and reddens with the force. */
 function drawPull(context, room, body, i) {
-  const [from, to] = [onCanvas(room, body.at), onCanvas(room, body.device)];
-  // 5 N stretch a stiff spring by millimetres: the way is drawn longer than it is.
-  const stretch = 6;
+  const [from, to] = [onCanvas(room, graspOf(body, i)), onCanvas(room, body.device)];
+  // 5 N stretch a stiff spring by millimetres: the way is drawn longer than it is, but not out of the room.
+  const stretch = Math.min(6, (0.45 * Math.min(room.width, room.height)) / (Math.hypot(to.x - from.x, to.y - from.y) || 1));
   const end = { x: from.x + (to.x - from.x) * stretch, y: from.y + (to.y - from.y) * stretch };
   const [dx, dy] = [end.x - from.x, end.y - from.y];
   const length = Math.hypot(dx, dy);
   const share = Math.min(1, lengthOf(body.force) / STRONG);
   if (length > 3) {
-    const side = { x: (-dy / length) * 6, y: (dx / length) * 6 };
+    const wide = Math.min(6, length / 8);
+    const side = { x: (-dy / length) * wide, y: (dx / length) * wide };
     context.beginPath();
     context.moveTo(from.x, from.y);
     for (let k = 1; k < 14; k += 1) {

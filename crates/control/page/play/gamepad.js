@@ -30,6 +30,6 @@ function pulse(pads, strength) {
       vibrationActuator.playEffect('dual-rumble', { duration: 2 * PULSE, strongMagnitude: strength, weakMagnitude: strength / 2 }).catch(() => {});
     }
   }
-  // Browsers allow it to a page that was touched.
-  if (hand.touched && navigator.vibrate) navigator.vibrate(Math.round(PULSE * strength));
+  // Browsers allow it to a page that was tapped or clicked; the first touch counts at its end.
+  if (hand.touched && navigator.vibrate && navigator.userActivation?.hasBeenActive !== false) navigator.vibrate(Math.round(PULSE * strength));
 }

@@ -2,7 +2,7 @@
 
 /** No hand goes farther [m]. */
 const FARTHEST = 0.5;
-const hand = { holding: false, at: [0, 0, 0], swaying: null, touched: false };
+const hand = { holding: false, at: [0, 0, 0], swaying: null, pressed: false, touched: false };
 
 /** Takes hold of the device where it is, so that nothing jerks. */
 function takeHold() {
@@ -14,8 +14,9 @@ function takeHold() {
 
 function letGo() {
   if (!hand.holding) return;
-  hand.holding = false;
+  hand.holding = hand.pressed = false;
   hand.swaying = null;
+  hand.released = performance.now();
   tellHand(null);
   showHolding();
 }
@@ -28,7 +29,8 @@ function showHolding() {
   const button = $('grasp');
   button.setAttribute('aria-pressed', String(hand.holding));
   put(button, hand.holding ? 'Let go' : 'Take hold');
-  put($('holding'), ownHand === null ? 'you look on' : hand.holding ? 'you hold the device; it stays where your hand is' : 'nobody holds your device');
+  const holds = hand.pressed ? 'you hold it until you release' : 'you hold it: Escape lets go';
+  put($('holding'), ownHand === null ? 'you look on' : hand.holding ? holds : 'nobody holds your device');
   $('sway').setAttribute('aria-pressed', String(hand.swaying !== null));
   $('rooms').classList.toggle('held', hand.holding);
 }
@@ -38,6 +40,8 @@ function makeHand() {
   let last = null;
   canvas.addEventListener('pointerdown', (event) => {
     if (event.button !== 0) return;
+    // A press that takes hold lets go at its end. A hand that held before goes on holding, so that the mouse is free for the controls.
+    hand.pressed = !hand.holding || hand.pressed || hand.swaying !== null;
     hand.swaying = null;
     hand.touched = event.pointerType === 'touch';
     takeHold();
@@ -52,7 +56,11 @@ function makeHand() {
     moveHand(inWorld(rooms[ownPlace()], event.clientX - last.x, event.clientY - last.y));
     last = { ...last, x: event.clientX, y: event.clientY };
   });
-  for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => { last = null; });
+  for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, (event) => {
+    if (!last || event.pointerId !== last.id) return;
+    last = null;
+    if (hand.pressed) letGo();
+  });
   canvas.addEventListener('wheel', (event) => {
     if (facts.axes < 3 || !hand.holding) return;
     moveHand([0, 0, -event.deltaY / 10000]);

@@ -22,7 +22,8 @@ function onTrouble(text, looksOn) {
 async function showValid() {
   if (lost || document.hidden) return;
   const state = await ask('/api/state');
-  put($('valid'), state.valid ? 'valid' : 'not valid: ' + state.invalid);
+  put($('valid'), state.valid ? 'valid' : 'not valid');
+  put($('late'), state.valid ? 'The session is on time.' : 'The machine is busy; not valid as a measurement: ' + state.invalid + '.');
   $('valid').className = 'pill ' + (state.valid ? 'good' : 'bad');
 }
 
@@ -47,7 +48,7 @@ requestAnimationFrame(function next(now) {
   stepKeyboard(passed);
   stepGamepad(passed, now);
   stepHand(now);
-  watchSteps();
+  watchSteps(now);
   drawAll(passed, now);
   requestAnimationFrame(next);
 });

@@ -29,7 +29,7 @@ function drawPackets(context, rooms, now) {
     const fallen = dot.lost && gone > 0.5 ? ((now - dot.begin - dot.over / 2) / FALL) : 0;
     const x = a.x + (b.x - a.x) * share + side.x;
     const y = a.y + (b.y - a.y) * share + side.y + 60 * fallen * fallen;
-    context.globalAlpha = Math.max(0, 0.85 - 0.6 * fallen);
+    context.globalAlpha = Math.max(0, 1 - 0.6 * fallen);
     context.fillStyle = dot.lost && fallen > 0 ? ink.bad : colour(dot.from);
     if (dot.lost && fallen > 0) {
       context.fillRect(x - 4, y - 1, 8, 2);

@@ -31,10 +31,13 @@ function layRooms(width, height, number, own) {
 const scaleOf = (room) => Math.min(room.width, room.height) / 2 / reach;
 const middleOf = (room) => ({ x: room.left + room.width / 2, y: room.top + room.height / 2 });
 
-/** Where a place of the world is on the canvas: x to the right, y up, z a little towards the right and down. */
+/** How far one goes to the left and down on the canvas along z: one looks from the right and from above. */
+const SLANT = [0.35, 0.25];
+
+/** Where a place of the world is on the canvas: x to the right, y up, z towards the viewer, aslant to the left and down. */
 function onCanvas(room, place) {
   const [{ x, y }, scale] = [middleOf(room), scaleOf(room)];
-  return { x: x + (place[0] - 0.35 * place[2]) * scale, y: y - (place[1] - 0.25 * place[2]) * scale };
+  return { x: x + (place[0] - SLANT[0] * place[2]) * scale, y: y - (place[1] - SLANT[1] * place[2]) * scale };
 }
 
 /** A way on the canvas as a way in the world; scenes have one axis or more. */
@@ -45,9 +48,10 @@ function inWorld(room, dx, dy) {
 
 /** Wide enough for all that is shown, and steady. */
 function lookAround(passed) {
+  const size = facts.edges ? lengthOf(facts.edges) / 2 : 0;
   let most = 0.12;
-  for (const { at, device } of shown) for (const place of [at, device]) most = Math.max(most, 1.15 * Math.max(...place.map(Math.abs)));
-  most = Math.min(most, LARGEST_REACH);
+  for (const { at, device } of shown) for (const place of [at, device]) most = Math.max(most, 1.15 * (Math.max(...place.map(Math.abs)) + size));
+  most = Math.min(most, LARGEST_REACH + size);
   const share = still.matches ? 1 : 1 - Math.exp(-passed / (most > reach ? 60 : 1500));
   reach += (most - reach) * share;
 }

@@ -5,25 +5,37 @@ const delayNow = () => measured(network.delay ?? '0ms', SPANS) ?? 0;
 let moved = 0;
 let lastPlace = null;
 
+/** How long a hand has let go [ms], so that one has seen what follows. */
+const idle = (now) => (hand.holding ? 0 : now - (hand.released ?? now));
+
+const isUnder = (strategy) => facts.strategy === strategy && delayNow() >= 100;
+const under = (strategy) => { if (facts.strategy !== strategy) beginAnew({ strategy }); };
+
 const STEPS = [
   {
-    text: 'Every peer has a copy of the cube of its own. Drag yours to and fro: the others follow late, because the network takes a while.',
+    text: 'Every peer has a copy of the cube of its own. Drag yours, the large one, to and fro: the others follow late, because the network takes a while.',
     done: () => moved > 0.15,
   },
   {
-    text: 'Raise the delay to 100 ms, drag, and let go (Escape): under AP the cube is heavier in the hand, and comes to rest.',
+    text: 'Raise the delay to 100 ms, drag, and let go: under AP the cube is heavier in the hand, and comes to rest.',
     button: 'Delay 100 ms',
-    act: () => slide('delay', '100ms'),
-    done: () => delayNow() >= 100 && facts.strategy === 'average-position' && moved > 0.15 && !hand.holding,
+    act: () => {
+      slide('delay', '100ms');
+      under('average-position');
+    },
+    done: (now) => isUnder('average-position') && moved > 0.15 && idle(now) > 2500,
   },
   {
     text: 'Now PD, with the same springs and the same network: drag, and let go. The copies swing up by themselves.',
     button: 'Now PD',
-    act: () => beginAnew({ strategy: 'proportional-derivative' }),
-    done: () => facts.strategy === 'proportional-derivative' && delayNow() >= 100 && moved > 0.1 && !hand.holding && farthestOut() > 0.05,
+    act: () => {
+      if (delayNow() < 100) slide('delay', '100ms');
+      under('proportional-derivative');
+    },
+    done: (now) => isUnder('proportional-derivative') && moved > 0.1 && idle(now) > 1500 && farthestOut() > 0.05,
   },
 ];
-const WHY = 'Why: under PD each of the other copies pulls at yours with a whole spring; under AP they share one. A spring that pulls to where a copy was 100 ms ago pushes a swing on, the more the stiffer it is. So PD swings up, and AP only brakes. Compare below runs your own motion under both.';
+const WHY = 'Why: each copy is pulled to where the others were 100 ms ago. A pull that comes so late does not brake a swing but pushes it on, the more the stiffer it is. Under PD each of the other copies pulls with a whole spring; under AP they share one, and the damping wins. Compare, below, runs your own motion under both.';
 let step = 0;
 
 function makeSteps() {
@@ -38,7 +50,7 @@ function makeSteps() {
     }
     $('steps').append(item);
   }
-  put($('why'), WHY);
+  $('back').addEventListener('click', () => under('average-position'));
   showSteps();
 }
 
@@ -48,17 +60,19 @@ function showSteps() {
     if (i === step) item.setAttribute('aria-current', 'step');
     else item.removeAttribute('aria-current');
   });
-  $('why').hidden = step < STEPS.length;
+  const all = step === STEPS.length;
+  $('answered').hidden = !all;
+  put($('why'), all ? WHY : '');
 }
 
 /** Once a picture: how far the hand has moved, and whether that was the step. */
-function watchSteps() {
-  if (step >= STEPS.length) return;
+function watchSteps(now) {
+  if (step >= STEPS.length || !facts.guided) return;
   if (hand.holding) {
     if (lastPlace) moved += lengthOf(add3(hand.at, lastPlace, -1));
     lastPlace = [...hand.at];
   } else lastPlace = null;
-  if (STEPS[step].done()) {
+  if (STEPS[step].done(now)) {
     step += 1;
     moved = 0;
     showSteps();

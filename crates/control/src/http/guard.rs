@@ -6,7 +6,7 @@ use std::sync::Arc;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
-use axum::response::{IntoResponse as _, Response};
+use axum::response::{IntoResponse as _, Redirect, Response};
 
 use super::{App, Refusal, page};
 use crate::Role;
@@ -25,7 +25,11 @@ const HEADERS: [(HeaderName, &str); 7] = [
 /// Lets a request through to its route, or refuses it.
 pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let mut request = request;
-    let mut answer = match check(&app, request.uri(), request.headers()).and_then(|role| may(role, request.method())) {
+    let known = check_host(&app, request.uri(), request.headers());
+    let mut answer = match known.and_then(|()| check_token(&app, request.uri(), request.headers())).and_then(|role| may(role, request.method())) {
+        Err(refusal) if refusal.status == StatusCode::UNAUTHORIZED && has_ticket(&app, request.uri(), request.method()) => {
+            Redirect::to(&format!("/?token={}", app.token.secret())).into_response()
+        }
         Ok(role) => {
             request.extensions_mut().insert(role);
             next.run(request).await
@@ -33,7 +37,7 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
         // A person with a browser gets a place to enter the token.
         Err(refusal)
             if refusal.status == StatusCode::UNAUTHORIZED
-                && ["/", "/join", "/details"].contains(&request.uri().path())
+                && ["/", "/join", "/details", "/open"].contains(&request.uri().path())
                 && accepts_html(request.headers()) =>
         {
             page::door()
@@ -57,7 +61,7 @@ fn may(role: Role, method: &Method) -> Result<Role, Refusal> {
     Ok(role)
 }
 
-fn check(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Role, Refusal> {
+fn check_host(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
     let mut hosts = headers.get_all(header::HOST).iter();
     let (Some(host), None) = (hosts.next(), hosts.next()) else {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "expected exactly one Host header"));
@@ -69,6 +73,16 @@ fn check(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Role, Refusal> {
             format!("the host {:?} is not known here: ask for localhost, for an address, or for a name that the server was started with", host),
         ));
     }
+    Ok(())
+}
+
+/// Whether a browser comes with the ticket, which is used up then.
+fn has_ticket(app: &App, uri: &Uri, method: &Method) -> bool {
+    let offered = || uri.query().unwrap_or_default().split('&').find_map(|part| part.strip_prefix("ticket="));
+    uri.path() == "/open" && method == Method::GET && offered().is_some_and(|offered| app.ticket.redeem(offered.as_bytes()))
+}
+
+fn check_token(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Role, Refusal> {
     let in_header = headers.get_all(header::AUTHORIZATION).iter().filter_map(|value| bearer(value.as_bytes()));
     let in_query = uri.query().unwrap_or_default().split('&').filter_map(|part| part.strip_prefix("token=")).map(str::as_bytes);
     let role_of = |offered: &[u8]| match &app.guests {

@@ -25,6 +25,7 @@ use serde_json::{Value, json};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
+use crate::ticket::Ticket;
 use crate::{Board, LinkEditor, Stage, Token};
 
 /// What all answers are made from.
@@ -32,6 +33,7 @@ pub(crate) struct App {
     pub(crate) board: Arc<Board>,
     pub(crate) editor: Mutex<Box<dyn LinkEditor>>,
     pub(crate) token: Token,
+    pub(crate) ticket: Arc<Ticket>,
     /// That of those to whom a link was handed out.
     pub(crate) guests: Option<Token>,
     pub(crate) hosts: Vec<String>,

@@ -12,6 +12,7 @@ use tokio::sync::Semaphore;
 use tower::ServiceExt as _;
 
 use super::{App, router};
+use crate::ticket::Ticket;
 use crate::{Board, Body as ObjectBody, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Snapshot, TurnView};
 
 const TOKEN: &str = "a-token-of-more-than-22-characters";
@@ -35,6 +36,7 @@ impl LinkEditor for Recorder {
 }
 
 struct Site {
+    ticket: Arc<Ticket>,
     router: Router,
     calls: Calls,
     runtime: Runtime,
@@ -65,8 +67,10 @@ impl Site {
         let counters = LinkCounters { offered: 7, dropped: vec![("loss", 2)], ..LinkCounters::default() };
         board.publish(Arc::new(Snapshot { links: vec![counters], measures: vec![Some(0.25)], ..Snapshot::default() })).unwrap();
         let calls = Calls::default();
+        let ticket = Arc::new(Ticket::default());
         let app = App {
             board,
+            ticket: Arc::clone(&ticket),
             editor: Mutex::new(Box::new(Recorder(Arc::clone(&calls)))),
             token: TOKEN.parse().unwrap(),
             guests: None,
@@ -75,7 +79,7 @@ impl Site {
             hands: Arc::new(Semaphore::new(1)),
             comparing: Semaphore::new(1),
         };
-        Self { router: router(app), calls, runtime: Builder::new_current_thread().enable_time().build().unwrap() }
+        Self { ticket, router: router(app), calls, runtime: Builder::new_current_thread().enable_time().build().unwrap() }
     }
 
     fn send(&self, request: Request<Body>) -> Answer {
@@ -174,6 +178,23 @@ fn the_token_is_taken_from_a_header_or_from_the_address() {
     assert_eq!(in_query.status, StatusCode::OK);
     let lower = site.send(request("GET", "/api/state").header("authorization", format!("bearer {TOKEN}")).body(Body::empty()).unwrap());
     assert_eq!(lower.status, StatusCode::OK);
+}
+
+/// The address for a program that opens browsers leads to the page once; then, and by another host, it leads nowhere.
+#[test]
+fn a_ticket_leads_to_the_page_once() {
+    let site = Site::new(1);
+    let get = |path: &str| site.send(request("GET", path).body(Body::empty()).unwrap());
+    assert_eq!(get("/open?ticket=").status, StatusCode::UNAUTHORIZED);
+    let path = format!("/open?ticket={}", site.ticket.issue().unwrap().secret());
+    let foreign = Request::builder().uri(&path).header("host", "evil.example").body(Body::empty()).unwrap();
+    assert_eq!(site.send(foreign).status, StatusCode::FORBIDDEN);
+    assert_eq!(site.send(request("POST", &path).body(Body::empty()).unwrap()).status, StatusCode::UNAUTHORIZED);
+    assert_eq!(get(&path.replace("/open", "/api/state")).status, StatusCode::UNAUTHORIZED);
+    let answer = get(&path);
+    assert_eq!((answer.status, answer.headers["location"].to_str().unwrap()), (StatusCode::SEE_OTHER, format!("/?token={TOKEN}").as_str()));
+    assert_eq!(answer.headers["cache-control"], "no-store");
+    assert_eq!(get(&path).status, StatusCode::UNAUTHORIZED);
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod jump;
 mod peer;
 mod peer_elsewhere;
 mod play;
+mod play_access;
 mod play_page;
 mod records;
 mod session;

@@ -1,5 +1,6 @@
 //! `cohaptic play` without a browser: hands over WebSockets, parts that follow one another, records, and those who may not.
 
+use std::io::Write as _;
 use std::net::TcpStream;
 use std::time::Instant;
 
@@ -17,12 +18,12 @@ pub(super) struct Page(WebSocket<TcpStream>);
 
 impl Page {
     /// Connects, with what follows in the query; the error is the status with which that was refused.
-    fn try_open(control: &Control, query: &str, origin: Option<&str>) -> Result<Self, u16> {
+    fn try_open(control: &Control, query: &str, header: Option<(&'static str, &str)>) -> Result<Self, u16> {
         let stream = TcpStream::connect(&control.host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let mut request = format!("ws://{}/api/hand?token={}{query}", control.host, control.token).into_client_request().unwrap();
-        if let Some(origin) = origin {
-            request.headers_mut().insert("Origin", origin.parse().unwrap());
+        if let Some((name, value)) = header {
+            request.headers_mut().insert(name, value.parse().unwrap());
         }
         match tungstenite::client(request, stream) {
             Ok((socket, _)) => Ok(Self(socket)),
@@ -123,6 +124,7 @@ fn a_hand_moves_the_cube_and_parts_follow_one_another() {
         let (status, answer) = control.ask("POST", "/api/play", wish);
         assert!(status == 422 && answer.contains(word), "{wish}: {status} {answer}");
     }
+    assert_eq!(control.ask("POST", "/api/play", &format!("{{{}}}", " ".repeat(5000))).0, 413);
     end(session);
     for part in [1, 2] {
         continues(&desk, part);
@@ -183,8 +185,10 @@ fn who_has_no_token_or_comes_from_another_site_moves_nothing() {
     assert_eq!(Page::try_open(&stranger, "", None).err(), Some(401));
     let own = format!("http://{}", control.host);
     for (origin, status) in [("http://evil.example", Some(403)), ("null", Some(403)), ("https://127.0.0.1", Some(403)), (own.as_str(), None)] {
-        assert_eq!(Page::try_open(&control, "&hand=none", Some(origin)).err(), status, "{origin}");
+        assert_eq!(Page::try_open(&control, "&hand=none", Some(("Origin", origin))).err(), status, "{origin}");
     }
+    // A name that somebody points at this machine is no name of it.
+    assert_eq!(Page::try_open(&control, "&hand=none", Some(("Host", "evil.example"))).err(), Some(403));
     // A guest may look on and take a hand that nobody has, and change nothing.
     for (method, path, body) in [("PATCH", "/api/links", r#"{"delay": "1ms"}"#), ("POST", "/api/play", "{}"), ("POST", "/api/compare", "")] {
         assert_eq!(guest.ask(method, path, body).0, 403, "{method} {path}");
@@ -224,13 +228,52 @@ fn what_is_no_place_ends_the_connection_and_moves_nothing() {
     end(session);
 }
 
+/// Bytes of a generator (Lehmer's, with the multiplier of Park & Miller 1988) in place of frames, after a handshake that was in order.
+#[test]
+fn bytes_that_are_no_frames_end_the_connection_and_nothing_else() {
+    let desk = Desk::new();
+    let (session, control, _) = begin(&desk, "");
+    let mut state = 1_u64;
+    let mut next = || {
+        state = state * 48_271 % 2_147_483_647;
+        state
+    };
+    for round in 0..60 {
+        let mut page = Page::open(&control, "&hand=0");
+        let length = 1 + next() % 300;
+        let mut bytes: Vec<u8> = (0..length).map(|_| u8::try_from(next() % 256).unwrap()).collect();
+        if round % 2 == 0 {
+            // The beginning of a text that is masked, as those of browsers are, and of any length.
+            bytes.splice(0..0, [0x81, 0x80 | u8::try_from(next() % 128).unwrap()]);
+        }
+        // The server may be gone before all of it is said.
+        let _said = page.0.get_mut().write_all(&bytes);
+        drop(page);
+        wait_for("the hand is free again", || (control.get("/api/play")["peers"][0]["taken"] == json!(false)).then_some(()));
+    }
+    let mut page = Page::open(&control, "&hand=0");
+    let frame = page.hold_until([0.03, 0.0, 0.0], "the second copy comes", |frame| x(frame, 1) > 0.005);
+    assert_eq!(frame["part"], 1, "{frame}");
+    end(session);
+}
+
 #[test]
 fn scenes_that_cannot_be_played_are_refused() {
     let desk = Desk::with("udp.toml", super::peer_elsewhere::SCENE);
     desk.cohaptic("play udp.toml").assert_refused(2, &["kind", "pointer"]);
     desk.cohaptic("play --set topology={kind='ring'}").assert_refused(2, &["topology"]);
     desk.cohaptic("play --control 0.0.0.0:0").assert_refused(2, &["--allow-remote"]);
-    desk.cohaptic("play --set peers.you.kind=falcon").assert_refused(2, &["falcon"]);
+    desk.cohaptic("play --set peers.you.kind=falcon").assert_refused(2, &["falcon", "--set peers.you.kind=pointer"]);
+    let turns = [
+        "peers.you.hand.follows.position=[0.03,0,0]",
+        "object.inertia=0.01",
+        "scene.axes=3",
+        "peer.device.inertia=1e-4",
+        "peer.coupling.rotational-stiffness=1",
+        "peer.kind=simulated",
+    ];
+    let set: String = turns.iter().map(|key| format!(" --set {key}")).collect();
+    desk.cohaptic(&format!("play{set}")).assert_refused(2, &["turns nothing"]);
     let outcome = desk.cohaptic("play --for 300ms --no-priority");
     assert!(outcome.status == Some(0) && outcome.stderr.contains("part 1: average-position"), "{outcome:?}");
 }
