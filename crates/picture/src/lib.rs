@@ -1,11 +1,11 @@
-//! Pictures of curves, regions and maps as SVG documents that are fit to print, and pages of HTML that show them.
+//! Pictures of curves, regions and maps as SVG documents that are fit to print, pages of HTML that show them, and pictures that move.
 //!
 //! You need it if your program draws curves, maps or bars for print and for pages.
 //!
 //! A [`Picture`] has a title, notes and [`Panel`]s in a grid; a panel has two [`Axis`] and contents: [`Line`], [`Band`], [`Region`], [`HeatMap`], [`Rug`].
 //! Texts wrap and never leave the picture or lie on each other, by widths that no common font exceeds; the legend is outside of the plots; lines differ by
 //! colour and by dashes. A picture is light or dark as its reader prefers, in a file, in an `<img>` and within a page. Text stays text. The [`Size`] is one or
-//! two columns of a paper, a page on a screen, or given.
+//! two columns of a paper, a page on a screen, or given. A [`Motion`] shows copies that move.
 //!
 //! This crate reads no file and no clock, and prints nothing: equal pictures are equal bytes. The choice of content is the callers'.
 //!
@@ -37,6 +37,7 @@ mod gauge;
 mod layout;
 mod legend;
 mod look;
+mod motion;
 pub mod page;
 mod panel;
 mod path;
@@ -53,6 +54,7 @@ pub use content::{Band, Content, HeatMap, Line, Region, Rug, cell_edges};
 pub use gauge::Gauge;
 pub use legend::LegendPlace;
 pub use look::{Fill, Look, Marker};
+pub use motion::{Motion, MotionRun};
 pub use panel::Panel;
 pub use picture::Picture;
 pub use size::{Size, SizeError};

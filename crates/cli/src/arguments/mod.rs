@@ -61,7 +61,7 @@ pub(crate) enum Command {
     Admittance(AdmittanceArguments),
     /// Runs a scene by the wall clock, with other programs and Falcons attached, all through the emulated links
     Live(LiveArguments),
-    /// Opens a page on which people pull the object with a mouse, a finger or a stick, and feel by eye what the network does
+    /// Opens a page on which people pull the object by mouse, finger or stick, and feel by eye what the network does
     Play(PlayArguments),
     /// Puts the emulator between programs that speak UDP to each other
     Relay(RelayArguments),

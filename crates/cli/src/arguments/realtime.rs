@@ -85,7 +85,7 @@ pub(crate) struct PlayArguments {
     /// End by itself after this time [default: on Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
-    /// Keep the scene and the inputs of each part in this folder: run --inputs replays them
+    /// Keep scene and inputs of each part in this folder: run --inputs replays them
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

@@ -52,7 +52,7 @@ fn run(played: &PlayedScene, pointer: &Pointer, begin: u64, ticks: u64) -> (Felt
     let mut live = LiveScene::new(&scene, |peer| (peer == 0).then(|| pointer.device()));
     let mut felt = Felt::default();
     for tick in 0..ticks {
-        if (begin + tick) % PICTURE == 0 {
+        if (begin + tick).is_multiple_of(PICTURE) {
             pointer.tell(Some(place(begin + tick))).unwrap();
         }
         let Ok(()) = live.handle_timeout(Instant::from_nanos(tick * TICK), &mut felt);
@@ -80,7 +80,7 @@ fn nobody_is_jerked_when_a_part_begins() {
         for (strategy, peers) in [("average-position", 3), ("average-position", 4), ("proportional-derivative", 3), ("proportional-derivative", 5)] {
             let pointer = Pointer::default();
             let (before, stands) = run(&played, &pointer, 0, ends);
-            for tick in (ends..ends + PAUSE).filter(|tick| tick % PICTURE == 0) {
+            for tick in (ends..ends + PAUSE).filter(|tick| tick.is_multiple_of(PICTURE)) {
                 pointer.tell(Some(place(tick))).unwrap();
             }
             let next = played.clone().standing(&stands, &scene).with_strategy(strategy).with_peers(peers);

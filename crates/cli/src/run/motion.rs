@@ -1,15 +1,13 @@
 //! The copies in motion, as a picture that moves.
 
-mod picture;
-
 use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_harness::TickRow;
+use cohaptic_picture::{Motion, MotionRun};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use self::picture::{Motion, MotionRun};
 use super::Run;
 use crate::arguments::RunArguments;
 use crate::failure::Failure;

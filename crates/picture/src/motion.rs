@@ -2,11 +2,20 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_picture::escape;
+use crate::xml::{coordinate, escape};
 
-/// An animation. All runs have the scale of the first, so that one that comes apart leaves its frame.
+/// An animation of some runs beside each other. All have the scale of the first, so that one that comes apart leaves its frame.
+///
+/// ```
+/// use cohaptic_picture::{Motion, MotionRun};
+///
+/// let frames = (0..20).map(f64::from).map(|t| vec![[0.002 * t, 0.0], [0.001 * t, 0.0]]).collect();
+/// let names = vec!["left".to_owned(), "right".to_owned()];
+/// let svg = Motion::new("Two copies", 0.05, vec![MotionRun { title: "AP".to_owned(), names, frames }]).svg();
+/// assert!(svg.starts_with("<svg ") && svg.contains("@keyframes"));
+/// ```
 #[derive(Clone, Debug)]
-pub(super) struct Motion {
+pub struct Motion {
     title: String,
     /// Between two frames \[s\].
     step: f64,
@@ -15,13 +24,14 @@ pub(super) struct Motion {
 
 /// One run: where each copy is in each frame.
 #[derive(Clone, Debug)]
-pub(super) struct MotionRun {
+pub struct MotionRun {
     /// What stands above it.
-    pub(super) title: String,
+    pub title: String,
     /// The names of the copies.
-    pub(super) names: Vec<String>,
-    /// By frame, then copy: where it is along the first two axes \[m\].
-    pub(super) frames: Vec<Vec<[f64; 2]>>,
+    pub names: Vec<String>,
+    /// By frame, then copy: where it is along the first two axes \[m\], y upwards. A place that is not finite is out of the frame, one that is missing is in the
+    /// middle.
+    pub frames: Vec<Vec<[f64; 2]>>,
 }
 
 /// Colours that are told apart with any kind of colour vision (Okabe & Ito 2008), on light and on dark ground.
@@ -42,15 +52,15 @@ const EDGE: f64 = 46.0;
 const GONE: f64 = 2.0 * WIDTH;
 
 impl Motion {
-    /// An animation with `step` seconds between two frames.
+    /// An animation with `step` seconds between two frames, above zero. It lasts as long as the run with the most frames, and one step at least.
     #[must_use]
-    pub(super) fn new(title: impl Into<String>, step: f64, runs: Vec<MotionRun>) -> Self {
+    pub fn new(title: impl Into<String>, step: f64, runs: Vec<MotionRun>) -> Self {
         Self { title: title.into(), step, runs }
     }
 
     /// The document, a file of its own. With reduced motion it shows the last frame.
     #[must_use]
-    pub(super) fn svg(&self) -> String {
+    pub fn svg(&self) -> String {
         let columns = u32::try_from(self.runs.len().max(1)).map_or(1.0, f64::from);
         let frame_width = (WIDTH - MARGIN * (columns + 1.0)) / columns;
         let (top, lasts) = (MARGIN + 2.0 * TITLE, self.seconds());
@@ -159,13 +169,6 @@ fn write_text(xml: &mut String, text: &str, [x, y]: [f64; 2], size: f64) {
     let _ = writeln!(xml, "<text class=\"ink\" x=\"{x}\" y=\"{y}\" font-size=\"{size}\">{}</text>", escape(text));
 }
 
-/// A number with at most two decimals.
-fn coordinate(value: f64) -> String {
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
-}
-
 struct View {
     middle: [f64; 2],
     /// \[px/m\]
@@ -201,7 +204,7 @@ mod tests {
         );
         let svg = motion.svg();
         assert_eq!(svg, motion.svg());
-        assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
+        assert_eq!(crate::testing::faults(&svg), [""; 0]);
         assert!(svg.contains(">a &lt;b&gt;<") && svg.matches("@keyframes").count() == 4, "{svg}");
         assert!(svg.contains("prefers-reduced-motion") && svg.contains("animation:k1-1 1s linear infinite"));
         let way = |name: &str| svg.lines().find(|line| line.starts_with(&format!("@keyframes {name}{{"))).unwrap().to_owned();
