@@ -94,7 +94,7 @@ struct Way {
 }
 
 impl Way {
-    /// What is left of it at `now`, for a clock that begins then.
+    /// The remaining way at `now`, for a clock that begins then.
     fn rest(&self, now: Instant) -> Self {
         let left = self.begin.saturating_add(self.span).saturating_duration_since(now);
         let State { position: from, .. } = self.at(now);

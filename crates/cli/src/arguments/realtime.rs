@@ -79,7 +79,7 @@ pub(crate) struct PlayArguments {
     pub(crate) overrides: Overrides,
     #[command(flatten)]
     pub(crate) real_time: RealTimeArguments,
-    /// Do not open the page in a browser
+    /// Open no browser
     #[arg(long)]
     pub(crate) no_open: bool,
     /// End by itself after this time [default: on Ctrl-C]

@@ -46,7 +46,7 @@ fn place(tick: u64) -> [f64; 3] {
     [0.04 * angle.sin(), 0.04 * (1.0 - angle.cos()), 0.0]
 }
 
-/// Runs a part for so many ticks with the hand that began before it. Gives what was felt and how it stands.
+/// Runs a part over a number of ticks, with the hand that began before it. Gives the forces and places, and how it stands at the end.
 fn run(played: &PlayedScene, pointer: &Pointer, begin: u64, ticks: u64) -> (Felt, Vec<PeerStatus>) {
     let scene = played.scene().unwrap();
     let mut live = LiveScene::new(&scene, |peer| (peer == 0).then(|| pointer.device()));
@@ -68,8 +68,8 @@ fn largest(felt: &[[f64; 6]]) -> [f64; 2] {
 }
 
 /// At the border itself force and places change no more than from tick to tick before. Then the hand catches up with what it moved while no part ran, and the
-/// copies hear nothing for 100 ms and then another strategy: no force changes by more than 0.3 N in a millisecond, where a pointer that was at once at
-/// its new place would pull at 20 N·s/m and beyond 0.2 m/s by 4 N and more, and nothing moves at more than 0.3 m/s.
+/// copies hear nothing for 100 ms and then another strategy. No force changes by more than 0.3 N in a millisecond, and nothing moves at more than 0.3 m/s. A
+/// pointer that was at once at its new place would pull with 20 N·s/m at more than 0.2 m/s: by 4 N and more.
 #[test]
 fn nobody_is_jerked_when_a_part_begins() {
     let delay = ["link.delay=100ms".to_owned()];
