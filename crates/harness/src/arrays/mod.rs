@@ -314,7 +314,8 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         if let Samples::PerPacket(samples) = &mut self.samples {
             others.exchange(&self.senders, &mut self.sent);
             let change = self.changes.next_at();
-            samples.send((tick, now), &self.senders, &self.sent, |sender| until(&self.shape, tick, self.next_send[sender]).min(change));
+            let next = |sender: usize| until(&self.shape, tick, self.next_send[sender]).min(change);
+            samples.send(self.processor, (tick, now), &self.senders, &self.sent, next);
         }
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
     }

@@ -154,14 +154,43 @@ impl DirectLinks {
     #[inline(never)]
     fn offer_one_by_one(&mut self, now: Instant, first: usize, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         for place in (0..count).filter(|place| excluded >> place & 1 == 0) {
-            let words = self.links[first + place].words(&self.kinds);
-            arrivals.sequences[place] = self.links[first + place].offered;
-            if let Some((at, overtakes)) = self.offer_one(now, first + place, words) {
+            let link = LinkId::new(first + place);
+            arrivals.sequences[place] = self.offered(link);
+            if let Some((at, overtakes)) = self.offer_one(now, link) {
                 arrivals.at[place] = at;
                 arrivals.arrive |= 1 << place;
                 arrivals.overtake |= u8::from(overtakes) << place;
             }
         }
+    }
+
+    /// How many packets were offered to a link.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    #[must_use]
+    #[inline]
+    pub fn offered(&self, link: LinkId) -> u64 {
+        self.links[link.index()].offered
+    }
+
+    /// Offers a packet to one link, and gives when it arrives, if it does, and whether before one that was sent earlier. Instants must not go back.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    #[inline]
+    pub fn offer_one(&mut self, now: Instant, link: LinkId) -> Option<(Instant, bool)> {
+        let place = link.index();
+        let link = &mut self.links[place];
+        let (words, draws) = (link.words(&self.kinds), link.draws.packet(link.offered));
+        let verdict = match link.memory {
+            Memory::Plain(kind) => self.kinds[usize::from(kind)].1.fate(now, words, draws),
+            Memory::Remembering(kind) => self.kinds[usize::from(kind)].1.verdict(now, &mut self.remembered[place], words, draws),
+            Memory::Other(other) => self.others[other as usize].verdict(now, link.offered, words),
+        };
+        link.count(now, self.until, verdict)
     }
 
     /// Takes back that a packet is delivered: nobody will look when it arrives.
@@ -208,18 +237,6 @@ impl DirectLinks {
         };
         Some((u16::try_from(place).ok()?, &self.kinds[place].1))
     }
-
-    /// When the next packet of a link arrives, and whether it overtakes.
-    fn offer_one(&mut self, now: Instant, place: usize, words: Words) -> Option<(Instant, bool)> {
-        let link = &mut self.links[place];
-        let draws = link.draws.packet(link.offered);
-        let verdict = match link.memory {
-            Memory::Plain(kind) => self.kinds[usize::from(kind)].1.fate(now, words, draws),
-            Memory::Remembering(kind) => self.kinds[usize::from(kind)].1.verdict(now, &mut self.remembered[place], words, draws),
-            Memory::Other(other) => self.others[other as usize].verdict(now, link.offered, words),
-        };
-        link.count(now, self.until, verdict)
-    }
 }
 
 impl Other {
@@ -244,6 +261,19 @@ impl Other {
     }
 }
 
+/// The first random words of the next packet of neighbouring links of one kind, and the number of each.
+#[inline(always)]
+fn draw(kind: &Kind, links: &[LinkState], sequences: &mut [u64; DirectLinks::AT_ONCE]) -> [Words; DirectLinks::AT_ONCE] {
+    let mut words = [[0; 2]; DirectLinks::AT_ONCE];
+    for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(sequences)) {
+        *sequence = link.offered;
+        if kind.is_random {
+            *words = link.draws.packet(link.offered).loss_and_jitter();
+        }
+    }
+    words
+}
+
 /// Offers a packet to neighbouring links of one kind, which remember something or nothing: each step for all of them before the next.
 ///
 /// A closure for the verdict would be called for each packet: a seventh of the time of ten peers.
@@ -255,23 +285,21 @@ fn alike<const REMEMBER: bool>(
     excluded: u8,
     arrivals: &mut Arrivals,
 ) {
-    let mut words = [[0; 2]; DirectLinks::AT_ONCE];
-    let Arrivals { sequences, at, .. } = arrivals;
-    for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(sequences)) {
-        *sequence = link.offered;
-        if kind.is_random {
-            *words = link.draws.packet(link.offered).loss_and_jitter();
-        }
-    }
+    let words = draw(kind, links, &mut arrivals.sequences);
     let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
-    for (place, (link, (words, at))) in links.iter_mut().zip(words.into_iter().zip(at)).enumerate() {
+    for (place, (link, (words, at))) in links.iter_mut().zip(words.into_iter().zip(&mut arrivals.at)).enumerate() {
         if excluded & bit == 0 {
             let draws = link.draws.packet(link.offered);
             let verdict = if REMEMBER { kind.verdict(now, &mut remembered[place], words, draws) } else { kind.fate(now, words, draws) };
-            if let Some((arrival, overtakes)) = link.count(now, until, verdict) {
-                *at = arrival;
-                arrive |= bit;
-                overtake |= if overtakes { bit } else { 0 };
+            link.offered += 1;
+            match verdict {
+                Verdict::Arrives(arrival) => {
+                    *at = arrival;
+                    arrive |= bit;
+                    overtake |= if link.count_arrival(now, until, arrival) { bit } else { 0 };
+                }
+                Verdict::Lost => link.lost += 1,
+                Verdict::Dropped => {}
             }
         }
         bit = bit.wrapping_shl(1);
@@ -307,21 +335,26 @@ impl LinkState {
     #[inline(always)]
     fn count(&mut self, now: Instant, until: Instant, verdict: Verdict) -> Option<(Instant, bool)> {
         self.offered += 1;
-        let at = match verdict {
-            Verdict::Arrives(at) => at,
+        match verdict {
+            Verdict::Arrives(at) => Some((at, self.count_arrival(now, until, at))),
             Verdict::Lost => {
                 self.lost += 1;
-                return None;
+                None
             }
-            Verdict::Dropped => return None,
-        };
+            Verdict::Dropped => None,
+        }
+    }
+
+    /// Counts the arrival of a packet, and says whether it overtakes.
+    #[inline(always)]
+    fn count_arrival(&mut self, now: Instant, until: Instant, at: Instant) -> bool {
         if at <= until {
             self.delivered += 1;
             self.delay_nanos += u128::from(at.as_nanos() - now.as_nanos());
         }
         let overtakes = at < self.latest;
-        self.latest = self.latest.max(at);
-        Some((at, overtakes))
+        self.latest = if overtakes { self.latest } else { at };
+        overtakes
     }
 
     /// The first random words of the next packet; zeros if it needs none.

@@ -10,7 +10,7 @@ use super::{Links, PerPacket};
 
 impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// [`PerPacket::send`] where each receiver has senders of its own.
-    #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, and there are eight runs")]
+    #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
     pub(super) fn send_to_neighbours(
         &mut self,
         (tick, now): (u64, Instant),
@@ -28,9 +28,8 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             Packet {
                 arrival,
                 sequence,
-                place: rows.place(receiver, column) as u32,
+                place: (rows.place(receiver, column) * L + run) as u32,
                 receiver: receiver as u16,
-                run: run as u16,
                 position: sample.position.map(|runs| weighed(runs[run])),
                 velocity: sample.velocity.map(|runs| weighed(runs[run])),
             }
