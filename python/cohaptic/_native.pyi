@@ -5,7 +5,7 @@ from _typeshed import SupportsGetItem
 from os import PathLike
 from typing import Any, SupportsFloat, SupportsIndex, final
 
-__all__ = ["Campaign", "Held", "Link", "Run", "Scene", "State", "Table", "admittance", "boundary", "causes", "eigenvalues", "map", "monodromy", "stability"]
+__all__ = ["Campaign", "Drawing", "Held", "Link", "Run", "Scene", "State", "Table", "admittance", "boundary", "causes", "eigenvalues", "map", "monodromy", "stability"]
 
 @final
 class Campaign:
@@ -37,6 +37,24 @@ class Campaign:
     def table(self, /, rows: "list[list[int | float | str | None]]") -> "Table":
         """
         The rows of all runs as one table.
+        """
+
+@final
+class Drawing:
+    """
+    A picture as SVG.
+    """
+    def __new__(cls, /, svg: str) -> Drawing:
+        """
+        One that is drawn already.
+        """
+    def __reduce__(self, /) -> tuple[type, tuple[str]]:
+        """
+        For other processes it is drawn.
+        """
+    def svg(self, /) -> str:
+        """
+        All of it.
         """
 
 @final

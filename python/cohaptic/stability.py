@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cohaptic import _native
+from cohaptic.run import Picture
 
 
 class Radius(NamedTuple):
@@ -175,18 +176,26 @@ class Map:
     """``spectral-radius`` or ``mean-square``."""
     contours: list[np.ndarray]
     """Where the radius is 1: lines with a row (x, y) for each point."""
+    _drawing: _native.Drawing = field(repr=False)
 
     @classmethod
     def _of(cls, said: dict[str, Any]) -> Map:
         verdict = np.array(said["verdicts"]).reshape(said["radius"].shape)
         keys, units = tuple(said["keys"]), tuple(said["units"])
         same = {key: said[key] for key in ("x", "y", "radius", "nominal", "criterion", "contours")}
-        return cls(keys=keys, units=units, verdict=verdict, **same)
+        return cls(keys=keys, units=units, verdict=verdict, _drawing=said["drawing"], **same)
 
     @property
     def stable(self) -> np.ndarray:
         """Which cells are stable."""
         return np.asarray(self.verdict == "stable")
+
+    def plot(self) -> Picture:
+        """The program's own picture: the outline of the stable region, shaded."""
+        return Picture(self._drawing.svg())
+
+    def _repr_svg_(self) -> str:
+        return self._drawing.svg()
 
     def to_xarray(self) -> Any:
         """The map as an ``xarray.Dataset``, which must be installed."""
@@ -239,10 +248,19 @@ class Boundary:
     """Its radius, by the criterion."""
     error: np.ndarray
     """How far that may be off."""
+    _drawing: _native.Drawing = field(repr=False)
 
     @classmethod
     def _of(cls, said: dict[str, Any]) -> Boundary:
-        return cls(**{**said, "crossings": [Crossing(*crossing) for crossing in said["crossings"]]})
+        drawing = said.pop("drawing")
+        return cls(_drawing=drawing, **{**said, "crossings": [Crossing(*crossing) for crossing in said["crossings"]]})
+
+    def plot(self) -> Picture:
+        """The program's own picture: the radius along the key, with the crossings."""
+        return Picture(self._drawing.svg())
+
+    def _repr_svg_(self) -> str:
+        return self._drawing.svg()
 
 
 @dataclass(frozen=True)
@@ -271,11 +289,20 @@ class Admittance:
     """What the whole object alone would be felt as."""
     notes: list[str]
     """What the numbers leave out."""
+    _drawing: _native.Drawing = field(repr=False)
 
     @classmethod
     def _of(cls, said: dict[str, Any]) -> Admittance:
+        drawing = said.pop("drawing")
         felt = {name: Radius(*said[name]) for name in ("stiffness", "viscosity", "inertia")}
-        return cls(**{**said, **felt})
+        return cls(_drawing=drawing, **{**said, **felt})
+
+    def plot(self) -> Picture:
+        """The program's own picture: a Bode plot."""
+        return Picture(self._drawing.svg())
+
+    def _repr_svg_(self) -> str:
+        return self._drawing.svg()
 
     @property
     def magnitude_db(self) -> np.ndarray:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 class Table:
     """Columns by their names, as read-only NumPy arrays that are not copied.
 
-    It has the Arrow PyCapsule protocol: ``pyarrow.table(t)``, ``polars.DataFrame(t)`` and DuckDB take it as it is, over the same memory. A column
+    It has the Arrow PyCapsule protocol: ``pyarrow.table(t)`` and ``polars.DataFrame(t)`` take it as it is, over the same memory, and
+    ``pandas.DataFrame.from_arrow(t)`` and queries of DuckDB by its name. A column
     of names is kept as codes; Arrow gets a dictionary column.
 
     >>> from cohaptic import Scene

@@ -1,11 +1,14 @@
 //! Admittances.
 
+use cohaptic_answers::{AdmittanceCurve, admittance_picture};
+use cohaptic_picture::Picture;
 use cohaptic_stability::{Admittance, AdmittanceError, Estimate, PushedAxis};
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::drawing::Drawing;
 use crate::errors::of_analysis;
 use crate::interrupt::interruptible;
 use crate::scene::Scene;
@@ -35,7 +38,8 @@ pub(crate) fn admittance_of<'py>(
     let frequencies = if frequencies.is_callable() { frequencies.call1((admittance.highest_frequency(),))? } else { frequencies };
     let frequencies: Vec<f64> = frequencies.extract()?;
     let (response, fit) = interruptible(py, |stop| (admittance.response_watched(&frequencies, stop), admittance.fit_low_frequency()))?;
-    let points = response.map_err(refused)?.points;
+    let response = response.map_err(refused)?;
+    let points = &response.points;
     let said = PyDict::new(py);
     said.set_item("frequencies", frequencies.into_pyarray(py))?;
     said.set_item("values", points.iter().map(|point| point.value).collect::<Vec<_>>().into_pyarray(py))?;
@@ -49,5 +53,12 @@ pub(crate) fn admittance_of<'py>(
     said.set_item("inertia", pair(fit.inertia))?;
     said.set_item("object_mass", admittance.object_mass())?;
     said.set_item("notes", admittance.notes().to_vec())?;
+    let (title, peer) = (scene.scene.title.clone(), peer.to_owned());
+    let drawing = Drawing::of(move || {
+        let curve = AdmittanceCurve { name: "as it stands", admittance: &admittance, response: &response };
+        // The same frequencies had a response before.
+        admittance_picture(&title, &peer, &[curve]).unwrap_or_else(|_| Picture::new(title.as_str()))
+    });
+    said.set_item("drawing", drawing)?;
     Ok(said)
 }

@@ -1,11 +1,14 @@
 //! Maps and boundaries: scenes with keys left open.
 
+use cohaptic_answers::{NamedMap, boundary_picture, map_picture};
+use cohaptic_picture::Picture;
 use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Criterion, Family, FamilyError, Grid, KeyRange, Map, MapError, MapRow};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::matrix;
+use crate::drawing::Drawing;
 use crate::errors::{of_analysis, of_scene, of_value};
 use crate::interrupt::on_threads;
 use crate::scene::Scene;
@@ -28,6 +31,12 @@ impl Scene {
         let (text, file, overrides) = self.source();
         py.detach(|| Family::new(text, file, overrides, keys)).map_err(|error| refused(py, &error))
     }
+}
+
+/// What a picture of a family is called: its scene with every open key at the lower end.
+fn title(py: Python<'_>, family: &Family) -> PyResult<String> {
+    let low: Vec<f64> = family.keys().iter().map(|key| key.low).collect();
+    family.scene(&low).map(|scene| scene.title).map_err(|error| refused(py, &error))
 }
 
 fn criterion(family: &Family) -> &'static str {
@@ -60,6 +69,14 @@ pub(crate) fn map_of<'py>(
         error => of_value(&error),
     })?;
     let said = PyDict::new(py);
+    let drawing = {
+        let (map, keys, title, criterion) = (map.clone(), keys.clone(), title(py, &family)?, family.criterion());
+        Drawing::of(move || {
+            let drawn = map_picture(&title, [&keys[0], &keys[1]], &[NamedMap { name: "as it stands", map: &map, criterion }]);
+            drawn.unwrap_or_else(|| Picture::new(title.as_str()))
+        })
+    };
+    said.set_item("drawing", drawing)?;
     said.set_item("keys", keys.iter().map(|key| key.key.clone()).collect::<Vec<_>>())?;
     said.set_item("units", keys.iter().map(|key| key.unit.clone()).collect::<Vec<_>>())?;
     said.set_item("criterion", criterion(&family))?;
@@ -98,6 +115,11 @@ pub(crate) fn boundary_of<'py>(
         error => of_value(&error),
     })?;
     let said = PyDict::new(py);
+    let drawing = {
+        let (found, key, title, criterion) = (found.clone(), key.clone(), title(py, &family)?, family.criterion());
+        Drawing::of(move || boundary_picture(&title, &key, criterion, &found))
+    };
+    said.set_item("drawing", drawing)?;
     said.set_item("key", &key.key)?;
     said.set_item("unit", &key.unit)?;
     said.set_item("criterion", criterion(&family))?;

@@ -5,6 +5,7 @@
 mod admittance;
 mod arrays;
 mod campaign;
+mod drawing;
 mod errors;
 mod family;
 mod interrupt;
@@ -22,6 +23,8 @@ mod _native {
     use crate::admittance::admittance_of;
     #[pymodule_export]
     use crate::campaign::Campaign;
+    #[pymodule_export]
+    use crate::drawing::Drawing;
     #[pymodule_export]
     use crate::family::{boundary_of, map_of};
     #[pymodule_export]

@@ -1,5 +1,7 @@
 """Matrices, maps, boundaries and admittances against the program and against NumPy."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -88,6 +90,30 @@ def test_an_admittance_is_that_of_the_program(path: str, answer) -> None:
     usual = answer("admittance", path, "--peer", "peer1")
     spread = Scene(path).admittance()
     assert np.allclose(spread.frequencies, [point["hz"] for point in usual["points"]], rtol=1e-14)
+
+
+@pytest.mark.parametrize("more", [[], ["link.loss=10%"]])
+def test_pictures_are_those_of_the_program(path: str, cohaptic_program, tmp_path, more: list[str]) -> None:
+    scene = Scene(path, more)
+    along = "link.delay=0ms..60ms"
+    for found, words in {
+        scene.map(x=X, y=Y, grid=(9, 5)).plot: ["stability", "map", path, "--x", X, "--y", Y, "--grid", "9x5"],
+        scene.boundary(along, samples=20).plot: ["stability", "boundary", path, "--along", along, "--samples", "20"],
+        scene.admittance(peer="peer2").plot: ["admittance", path, "--peer", "peer2"],
+    }.items():
+        out = tmp_path / "-".join(words[:2])
+        done = cohaptic_program(*words, *(f"--set={text}" for text in more), "--out", str(out))
+        assert done.returncode == 0, done.stderr
+        (drawn,) = out.glob("*.svg")
+        assert found().svg == drawn.read_text(encoding="utf-8"), drawn.name
+
+
+def test_what_is_drawn_travels_to_other_processes(path: str) -> None:
+    found = Scene(path).map(x=X, y=Y, grid=(3, 3))
+    copy = pickle.loads(pickle.dumps(found))
+    assert copy.plot().svg == copy._repr_svg_() == found._repr_svg_()
+    assert copy.radius.tobytes() == found.radius.tobytes()
+    assert "drawing" not in repr(found)
 
 
 def test_what_makes_no_sense_is_refused(path: str) -> None:

@@ -2,6 +2,7 @@
 
 import gc
 
+import duckdb
 import numpy as np
 import pandas
 import polars
@@ -61,6 +62,17 @@ def test_frames_of_others_have_the_same_numbers(trajectory: Table) -> None:
     assert frame.to_dict(as_series=False) == columns
     frame = pandas.DataFrame(dict(trajectory))
     assert frame["xo"].tolist() == columns["xo"]
+    frame = pandas.DataFrame.from_arrow(trajectory)
+    assert {name: frame[name].tolist() for name in frame} == columns
+
+
+def test_duckdb_queries_a_table_by_its_name(trajectory: Table) -> None:
+    found = duckdb.sql("select * from trajectory")
+    assert found.columns == list(trajectory)
+    assert found.fetchall() == list(zip(*(trajectory.decode(name).tolist() for name in trajectory), strict=True))
+    largest = duckdb.sql("select peer, max(xo) from trajectory group by peer order by peer").fetchall()
+    place, peers = trajectory["xo"], trajectory.decode("peer")
+    assert largest == [(name, place[peers == name].max()) for name in ("left", "right")]
 
 
 def test_a_schema_names_types(trajectory: Table) -> None:

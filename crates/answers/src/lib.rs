@@ -1,9 +1,9 @@
-//! What runs, checks, explanations and verdicts of scenes answer, as values and as JSON documents.
+//! What runs, checks, explanations and verdicts of scenes answer, as values, as JSON documents and as pictures.
 //!
 //! You need it if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
 //!
 //! [`run()`] is a run, [`explanation()`] the model of a scene, [`check()`] a scene and its expectations, where [`quick_verdict()`] tells first whether the
-//! scene is stable. [`document!`] makes a document.
+//! scene is stable. [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
 //! Nothing here reads a clock or prints.
 //!
@@ -31,6 +31,7 @@ mod document;
 mod explanation;
 mod notes;
 mod parts;
+mod pictures;
 mod quick_verdict;
 mod run;
 
@@ -38,5 +39,9 @@ pub use check::{Answered, OutcomeDocument, check};
 pub use explanation::explanation;
 pub use notes::notes;
 pub use parts::{MOST_LINKS, access_line, ending_name, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
+pub use pictures::{
+    AdmittanceCurve, AdmittanceWords, NamedMap, admittance_picture, admittance_words, axis_of, axis_of_key, boundary_picture, crossing_in_words,
+    label, map_picture, radius_name,
+};
 pub use quick_verdict::{OPERATIONS_A_SECOND, Quick, quick_verdict};
 pub use run::run;

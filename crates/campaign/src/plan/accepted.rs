@@ -21,6 +21,11 @@ impl Accepted {
         Self { of_each, count: combinations - refused.len() as u64, refused }
     }
 
+    /// How many runs a combination has.
+    pub(crate) const fn of_each(&self) -> u64 {
+        self.of_each
+    }
+
     /// How many runs there are.
     pub(crate) const fn runs(&self) -> u64 {
         self.count * self.of_each

@@ -12,9 +12,10 @@ use parquet::column::reader::ColumnReader;
 use parquet::column::writer::{ColumnCloseResult, ColumnWriter};
 use parquet::data_type::ByteArray;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, RowGroupMetaData};
+use parquet::file::metadata::{ColumnChunkMetaData, KeyValue, RowGroupMetaData};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::file::statistics::Statistics;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
@@ -131,6 +132,18 @@ fn append(to: &mut SerializedRowGroupWriter<'_, &mut WholeFile>, part: &File, gr
     Ok(())
 }
 
+/// What the column `ending` says of a run that diverged.
+const DIVERGED: &[u8] = b"diverged";
+
+/// The text of every row of a column in a row group, if its statistics say that there is one only: most runs are complete, and a text takes longer to read than all
+/// numbers that are summed up.
+fn only_text(column: &ColumnChunkMetaData) -> Option<&[u8]> {
+    let Some(Statistics::ByteArray(statistics)) = column.statistics() else { return None };
+    let is_exact = statistics.min_is_exact() && statistics.max_is_exact();
+    let (least, greatest) = (statistics.min_opt()?.data(), statistics.max_opt()?.data());
+    (is_exact && least == greatest).then_some(least)
+}
+
 pub(super) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> {
     let reader = SerializedFileReader::new(file)?;
     let described = reader.metadata().file_metadata().schema_descr_ptr();
@@ -142,16 +155,19 @@ pub(super) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> 
     for number in 0..reader.num_row_groups() {
         let group = reader.get_row_group(number)?;
         let rows = usize::try_from(group.metadata().num_rows()).unwrap_or_default();
-        let (mut endings, mut discrepancies) = (Vec::new(), Vec::new());
-        match (group.get_column_reader(ending)?, group.get_column_reader(discrepancy)?) {
-            (ColumnReader::ByteArrayColumnReader(mut ending), ColumnReader::DoubleColumnReader(mut discrepancy)) => {
-                ending.read_records(rows, None, None, &mut endings)?;
-                discrepancy.read_records(rows, None, None, &mut discrepancies)?;
-            }
-            _ => return Err(of_another_kind()),
+        let ColumnReader::DoubleColumnReader(mut discrepancy) = group.get_column_reader(discrepancy)? else { return Err(of_another_kind()) };
+        let mut discrepancies = Vec::new();
+        discrepancy.read_records(rows, None, None, &mut discrepancies)?;
+        if let Some(text) = only_text(group.metadata().column(ending)) {
+            let diverged = text == DIVERGED;
+            discrepancies.into_iter().for_each(|max_discrepancy| each(Gist { diverged, max_discrepancy }));
+            continue;
         }
-        for (ending, max_discrepancy) in endings.iter().zip(&discrepancies) {
-            each(Gist { diverged: ending.data() == b"diverged", max_discrepancy: *max_discrepancy });
+        let ColumnReader::ByteArrayColumnReader(mut ending) = group.get_column_reader(ending)? else { return Err(of_another_kind()) };
+        let mut endings = Vec::new();
+        ending.read_records(rows, None, None, &mut endings)?;
+        for (ending, max_discrepancy) in endings.iter().zip(discrepancies) {
+            each(Gist { diverged: ending.data() == DIVERGED, max_discrepancy });
         }
     }
     Ok(())

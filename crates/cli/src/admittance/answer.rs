@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_answers::AdmittanceWords;
 use cohaptic_stability::{Estimate, Verdict};
 use serde::Serialize;
 
-use super::curve::{Curve, Words};
+use super::curve::Curve;
 use crate::document_schema::document;
 use crate::output::figure;
 
@@ -67,7 +68,7 @@ pub(super) fn describe(peer: &str, curves: &[Curve]) -> String {
         if let Some(warning) = curve.warning() {
             let _ = writeln!(text, "  WARNING: {warning}");
         }
-        let Words { what, free, inertia, .. } = curve.words();
+        let AdmittanceWords { what, free, inertia, .. } = curve.words();
         let mass = cohaptic_units::print::Number(curve.mass);
         let _ = writeln!(text, "\n  {what} at the device of {peer}, compared with that of a {free} of {mass} {inertia}");
         table(&mut text, curve);

@@ -1,9 +1,10 @@
 //! One curve: the scene as it stands, or with what `--curve` changes.
 
+use cohaptic_answers::{AdmittanceWords, admittance_words};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Admittance, AdmittanceError, AnalysisError, FrequencyResponse, Limits, LowFrequencyFit, MeanSquare, PushedAxis, QUICK_UNKNOWNS, Verdict, Watch,
-    has_chance, ideal, mean_square_watched,
+    Admittance, AdmittanceError, AnalysisError, FrequencyResponse, Limits, LowFrequencyFit, MeanSquare, QUICK_UNKNOWNS, Verdict, Watch, has_chance,
+    ideal, mean_square_watched,
 };
 
 use crate::arguments::AdmittanceArguments;
@@ -33,14 +34,6 @@ pub(super) struct Curve {
     pub(super) chance: Option<Result<MeanSquare, AnalysisError>>,
     /// What the whole object alone would be felt as: see [`Admittance::object_mass`].
     pub(super) mass: f64,
-}
-
-/// The words of a curve.
-pub(super) struct Words {
-    pub(super) what: String,
-    pub(super) over: &'static str,
-    pub(super) free: &'static str,
-    pub(super) inertia: &'static str,
 }
 
 /// The scene as it stands, then that of every `--curve`.
@@ -97,19 +90,8 @@ impl Curve {
     }
 
     /// In words: the motion over the push, what the whole object alone is, and the units of both.
-    pub(super) fn words(&self) -> Words {
-        let [push, seen] = self.admittance.axes();
-        let along = |axis: PushedAxis| format!(" {} {}", if axis.is_turn() { "about" } else { "along" }, axis.word().trim_start_matches('r'));
-        let [force, velocity] = if push == seen { [push, seen].map(|_| String::new()) } else { [push, seen].map(along) };
-        let name = |axis: PushedAxis, turned: &'static str, moved: &'static str| if axis.is_turn() { turned } else { moved };
-        let (push_name, seen_name) = (name(push, "torque", "force"), name(seen, "angular velocity", "velocity"));
-        let (over, free, inertia) = match (push.is_turn(), seen.is_turn()) {
-            (false, false) => ("m/(N·s)", "free mass", "kg"),
-            (true, true) => ("rad/(N·m·s)", "free turn", "kg·m²"),
-            (false, true) => ("rad/(N·s)", "free object", "kg·m"),
-            (true, false) => ("m/(N·m·s)", "free object", "kg·m"),
-        };
-        Words { what: format!("{seen_name}{velocity} over {push_name}{force}"), over, free, inertia }
+    pub(super) fn words(&self) -> AdmittanceWords {
+        admittance_words(&self.admittance)
     }
 
     /// What the whole object alone would be at each frequency \[dB\].

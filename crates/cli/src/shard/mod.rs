@@ -50,16 +50,6 @@ impl<'a> Sharing<'a> {
         Ok(Self::Shard(shard, folder))
     }
 
-    /// That the work is not shared, as it cannot be with an option.
-    pub(crate) fn is_whole(self, option: &str) -> Result<(), Failure> {
-        match self {
-            Self::Whole(_) => Ok(()),
-            Self::Shard(..) | Self::Merge(_) | Self::Status(_) => {
-                Err(Failure::Input(format!("{option}: a proof has no shards; expected --out alone")))
-            }
-        }
-    }
-
     /// The folder that files are written into, if there is one.
     pub(crate) const fn folder(self) -> Option<&'a Path> {
         match self {

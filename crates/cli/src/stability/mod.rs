@@ -5,6 +5,7 @@ mod certificate;
 mod guarantee;
 mod map;
 mod point;
+mod proof_blocks;
 mod rows_file;
 pub(crate) mod source;
 

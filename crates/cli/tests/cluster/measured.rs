@@ -1,5 +1,4 @@
-//! Writes `docs/measured-cluster.md`, if it is asked to: `cargo test --release -p cohaptic-cli --test cluster -- --ignored`. Minutes, on a machine that does nothing
-//! else.
+//! Writes `docs/measured-cluster.md`, if it is asked to, with a program that is built for release: see its head. Minutes, on a machine that does nothing else.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -17,7 +16,8 @@ const HEAD: &str = "# Shards: how fast
 
 What do shards cost, and how fast are they merged? How they are done: [cluster.md](cluster.md). This page is written by
 
-    cargo test --release -p cohaptic-cli --test cluster -- --ignored
+    cargo build --release
+    COHAPTIC_PROGRAM=target/release/cohaptic cargo test --workspace --test cluster -- --ignored
 
 ";
 
@@ -190,7 +190,8 @@ fn where_and_when() -> String {
     let processor = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let processor = processor.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or_default();
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let build = if cfg!(debug_assertions) { ", a debug build" } else { "" };
+    let is_debug = cfg!(debug_assertions) && std::env::var_os("COHAPTIC_PROGRAM").is_none();
+    let build = if is_debug { ", a debug build" } else { "" };
     let note = std::env::var("COHAPTIC_BUILD").map(|note| format!(", {note}")).unwrap_or_default();
     format!("and measured on {}, {}, {cores} cores{build}{note}.\n\n", said("date", &["-u", "+%F"]), processor.trim_start_matches([' ', '\t', ':']))
 }

@@ -72,7 +72,8 @@ impl Work {
     /// A program in this folder, which finds `cohaptic` and is not taken for a task of a scheduler that runs the tests.
     pub(crate) fn command(&self, program: impl AsRef<std::ffi::OsStr>) -> Command {
         let mut command = Command::new(program);
-        let folder = Path::new(program_path()).parent().unwrap();
+        let program = program_path();
+        let folder = program.parent().unwrap();
         let path = std::env::var("PATH").unwrap_or_default();
         command.current_dir(self.0.path()).env("PATH", format!("{}:{path}", folder.display())).stdin(Stdio::null());
         for (name, _) in std::env::vars() {
@@ -136,8 +137,13 @@ impl Work {
     }
 }
 
-fn program_path() -> &'static str {
-    env!("CARGO_BIN_EXE_cohaptic")
+/// That of `COHAPTIC_PROGRAM`, such as one of a release build, or the one built with these tests.
+fn program_path() -> PathBuf {
+    let named = std::env::var_os("COHAPTIC_PROGRAM").map(|named| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(named);
+        path.canonicalize().unwrap()
+    });
+    named.unwrap_or_else(|| PathBuf::from(env!("CARGO_BIN_EXE_cohaptic")))
 }
 
 /// The words of the work.

@@ -12,6 +12,8 @@ use crate::scenes::{RANDOM, TWO};
 
 /// 24 runs in eight parts of three.
 const CAMPAIGN: &str = "campaign random.toml --vary coordination.stiffness=500..1500/2 --runs 12 --part 3 --format csv";
+const PROVEN_MAP: &str = "stability map two.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..50 --prove 4";
+const PROVEN_LINE: &str = "stability boundary two.toml --along coordination.stiffness=100..6000 --prove --tolerance 0.01";
 /// Long enough to be killed on its way: some seconds in 40 parts.
 const LONG: &str = "campaign two.toml --vary link.delay=8ms..24ms/4 --runs 5000 --part 500 --threads 1 --set link.jitter=1ms --no-plot";
 
@@ -40,8 +42,9 @@ fn assert_shards_are_one(desk: &Desk, line: &str, order: &[u64]) {
     }
     let whole = desk.text(&format!("{line} --out whole"));
     let merged = desk.text(&format!("{line} --merge shards"));
-    // The second command on a finished campaign computes nothing either. A map says how fast it was.
-    let timeless = |text: &str| text.lines().filter(|line| !line.contains(" computed in ")).map(str::to_owned).collect::<Vec<_>>();
+    // The second command on a finished campaign computes nothing either. A map says how fast it was, a proof how long it took.
+    let is_time = |line: &str| line.contains(" computed in ") || line.trim().strip_suffix(" s").is_some_and(|span| span.parse::<f64>().is_ok());
+    let timeless = |text: &str| text.lines().filter(|line| !is_time(line)).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(timeless(&merged), timeless(&whole.replace("whole", "shards")));
     assert_same(desk, "shards", "whole");
 }
@@ -55,6 +58,8 @@ fn shards_of_everything_that_is_shared_give_the_files_of_one_process() {
         "compare random.toml --strategies average-position,wave --vary link.delay=8ms,24ms --runs 4 --part 2".to_owned(),
         "stability map two.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..50 --grid 5x7 --curve scene.axes=1".to_owned(),
         "stability boundary two.toml --along coordination.stiffness=100..6000 --samples 30".to_owned(),
+        format!("{PROVEN_MAP} --curve scene.axes=1"),
+        PROVEN_LINE.to_owned(),
     ] {
         assert_shards_are_one(&desk, &line, &[3, 1, 2]);
         for folder in ["shards", "whole"] {
@@ -69,7 +74,7 @@ fn while_anything_is_missing_a_merge_says_what_and_by_which_shard_it_is_done() {
     for (line, piece) in [
         (CAMPAIGN, "part"),
         ("stability map two.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..50 --grid 2x8", "row"),
-        ("stability boundary two.toml --along coordination.stiffness=100..6000 --samples 8", "sample"),
+        ("stability boundary two.toml --along coordination.stiffness=100..6000 --samples 65", "block"),
     ] {
         let out = piece;
         desk.text(&format!("{line} --out {out} --shard 2/4"));
@@ -90,6 +95,29 @@ fn while_anything_is_missing_a_merge_says_what_and_by_which_shard_it_is_done() {
         desk.text(&format!("{line} --out {out}"));
         assert!(desk.files(out).iter().all(|name| !name.contains("worker") && !name.contains("partial")), "{:?}", desk.files(out));
     }
+}
+
+/// The pieces of a proof that a worker found before it was killed are not looked at again, and the command without shards does the others.
+#[test]
+fn a_proof_that_lacks_blocks_is_refused_and_goes_on_with_what_there_is() {
+    let desk = desk();
+    desk.text(&format!("{PROVEN_MAP} --out out --shard 2/3"));
+    let refused = desk.cohaptic(&format!("{PROVEN_MAP} --merge out"));
+    refused.assert_refused(3, &["out is not whole: ", " of 64 blocks are missing", "Do them with --shard"]);
+    let document = parse(&desk.text(&format!("{PROVEN_MAP} --status out --json")));
+    let worker = &document["workers"][0];
+    assert_eq!((&document["pieces"], &worker["state"], &worker["pieces"]), (&64.into(), &"done".into(), &21.into()));
+    // Of larger pieces that are decided all blocks are done.
+    assert!((21..64).contains(&document["pieces_done"].as_u64().unwrap()), "{document}");
+    // The machine lost its power in the middle of a line.
+    let rows = desk.files("out").into_iter().find(|name| name.starts_with("proof.rows.")).unwrap();
+    let text = desk.read(&format!("out/{rows}"));
+    desk.write(&format!("out/{rows}"), &text[..text.len() - 40]);
+    let again = desk.text(&format!("{PROVEN_MAP} --out out --shard 2/3"));
+    assert!(again.contains("21 blocks of 21 ranges") && again.contains("there already"), "{again}");
+    desk.text(&format!("{PROVEN_MAP} --out out"));
+    desk.text(&format!("{PROVEN_MAP} --out whole"));
+    assert_same(&desk, "out", "whole");
 }
 
 /// Begins a shard, and waits until it has kept something.
@@ -226,7 +254,8 @@ fn what_makes_no_sense_together_is_refused() {
     campaign("--merge out --shard 1/2").assert_refused(2, &["cannot be used with"]);
     campaign("--merge out").assert_refused(2, &["out holds no campaign: expected the folder in which shards of it were done"]);
     campaign("--status out").assert_refused(2, &["out holds no campaign"]);
-    let map = "stability map two.toml --x object.mass=0.1..2 --y object.damping=0..10 --prove 1";
-    desk.cohaptic(&format!("{map} --out out --shard 1/2")).assert_refused(2, &["--prove: a proof has no shards"]);
+    // A merge takes what its shards are of, and no other proof.
+    desk.text(&format!("{PROVEN_MAP} --out proof --shard 1/1"));
+    desk.cohaptic(&format!("{PROVEN_MAP} --merge proof").replace("--prove 4", "--prove 5")).assert_refused(2, &["halved 4 times", "halved 5 times"]);
     assert!(!desk.path("out").exists());
 }

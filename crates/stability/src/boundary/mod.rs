@@ -6,6 +6,7 @@
 //! by the second differences around it, so an island that is smooth on the scale of the samples, or a tangency, is found however narrow it is; one that
 //! shows nothing of itself at the samples around it is not, and the result says how fine it looked.
 
+mod blocks;
 mod intervals;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 use crate::map::{Scratches, nodes};
 use crate::watch::Asks;
 use crate::{AnalysisError, Cell, Family, FamilyError, KeyRange, Verdict, Watch};
+pub use blocks::BoundaryBlock;
 use intervals::{Samples, wanted};
 
 /// How closely a boundary is looked for.
@@ -86,6 +88,46 @@ pub struct Boundary {
     settled: bool,
 }
 
+/// How a search ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum End {
+    /// Every interval was looked at as closely as it needs.
+    Settled,
+    /// It had looked at as many values as it may.
+    Most,
+    /// It was stopped.
+    Stopped,
+}
+
+/// Looks at values, and then at those between them that they call for, pass after pass.
+fn go_on<E: Send>(
+    first: Vec<f64>,
+    range: &KeyRange,
+    options: BoundaryOptions,
+    look: impl Fn(f64) -> Result<Option<(f64, Cell)>, E> + Sync,
+) -> Result<(Samples, End), E> {
+    let spacing = (range.high - range.low) / crate::structure::count(options.samples - 1);
+    let (mut seen, mut next) = (Samples::default(), first);
+    while !next.is_empty() {
+        if seen.len() + next.len() > options.most {
+            return Ok((seen, End::Most));
+        }
+        let found: Vec<Option<(f64, Cell)>> = next.par_iter().map(|value| look(*value)).collect::<Result<_, E>>()?;
+        let is_whole = found.iter().all(Option::is_some);
+        seen.extend(found.into_iter().flatten());
+        if !is_whole {
+            return Ok((seen, End::Stopped));
+        }
+        next = wanted(&seen, options.tolerance, spacing);
+    }
+    Ok((seen, End::Settled))
+}
+
+/// What is known, by the bits of the value.
+fn by_value(known: &[(f64, Cell)]) -> BTreeMap<u64, Cell> {
+    known.iter().map(|(value, cell)| (value.to_bits(), *cell)).collect()
+}
+
 /// Why there is no boundary.
 #[derive(Debug, thiserror::Error)]
 pub enum BoundaryError<E> {
@@ -149,36 +191,6 @@ impl Boundary {
         Self::searched(range, options, known, radius, progress, || watch.stops())
     }
 
-    /// The values that a search looks at first, ascending: those that it looks at then follow from what it finds there.
-    #[must_use]
-    pub fn first_values(range: &KeyRange, options: BoundaryOptions) -> Vec<f64> {
-        nodes(range, options.samples)
-    }
-
-    /// The radius at each of these values of the open key of a family, as a search computes it, on all threads of the pool that it is called in. `done` gets the place
-    /// of each value and its radius, in no particular order. Gives how many are done: fewer than there are if the watch ended it.
-    ///
-    /// # Errors
-    ///
-    /// [`FamilyError`] of a radius that cannot be computed.
-    pub fn look_at(family: &Family, values: &[f64], done: impl Fn(usize, Cell) + Sync, watch: &dyn Watch) -> Result<usize, FamilyError> {
-        let pool = Scratches::default();
-        let look = |(place, value): (usize, &f64)| {
-            if watch.stops() {
-                return Ok(0);
-            }
-            match pool.with(|scratch| family.bounded_radius_watched(&[*value], scratch, watch)) {
-                Ok(cell) => {
-                    done(place, cell);
-                    Ok(1)
-                }
-                Err(FamilyError::Analysis(AnalysisError::Stopped)) => Ok(0),
-                Err(error) => Err(error),
-            }
-        };
-        values.par_iter().enumerate().map(look).try_reduce(|| 0, |one, other| Ok(one + other))
-    }
-
     /// Finds every crossing of a radius over a range, which may be that of anything. Values are looked at on all threads of the pool it is called in;
     /// what comes out does not depend on how many there are.
     ///
@@ -212,7 +224,7 @@ impl Boundary {
         if samples < 2 || samples > most || !(tolerance > 0.0 && tolerance.is_finite()) {
             return Err(BoundaryError::Options { samples, tolerance, most });
         }
-        let known: BTreeMap<u64, Cell> = known.iter().map(|(value, cell)| (value.to_bits(), *cell)).collect();
+        let known = by_value(known);
         let looked_at = AtomicUsize::new(0);
         let look = |value: f64| -> Result<Option<(f64, Cell)>, E> {
             if stop() {
@@ -226,25 +238,8 @@ impl Boundary {
             progress(looked_at.fetch_add(1, Ordering::Relaxed) + 1);
             Ok(Some((value, found)))
         };
-        let spacing = (range.high - range.low) / crate::structure::count(samples - 1);
-        let mut seen = Samples::default();
-        let mut next = nodes(range, samples);
-        let mut settled = true;
-        while !next.is_empty() {
-            if seen.len() + next.len() > most {
-                settled = false;
-                break;
-            }
-            let found: Vec<Option<(f64, Cell)>> =
-                next.par_iter().map(|value| look(*value)).collect::<Result<_, E>>().map_err(BoundaryError::Radius)?;
-            settled = found.iter().all(Option::is_some);
-            seen.extend(found.into_iter().flatten());
-            if !settled {
-                break;
-            }
-            next = wanted(&seen, tolerance, spacing);
-        }
-        Ok(Self::of(&seen, tolerance, settled))
+        let (seen, end) = go_on(nodes(range, samples), range, options, look).map_err(BoundaryError::Radius)?;
+        Ok(Self::of(&seen, tolerance, end == End::Settled))
     }
 
     /// How many of the values are nominal: see [`Cell::is_nominal`].

@@ -150,3 +150,33 @@ fn a_search_that_may_not_look_any_further_says_so() {
     assert!(refused(BoundaryOptions { samples: 1, ..options }).contains("expected at least 2 samples"));
     assert!(refused(BoundaryOptions { tolerance: 0.0, ..options }).contains("tolerance above zero"));
 }
+
+/// Blocks look at almost all that a search looks at, and the search finds the same with and without them.
+#[test]
+fn blocks_leave_a_search_little_to_do() {
+    let text = r#"
+        scene = { duration = "1s", count = 2 }
+        object = { mass = 0.45 }
+        coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+        peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    "#;
+    let range = KeyRange::parse("link.delay=0ms..100ms").unwrap();
+    let family = Family::new(text, "two.toml".as_ref(), &[], vec![range.clone()]).unwrap();
+    let options = BoundaryOptions { samples: 100, ..BoundaryOptions::of(&range) };
+    let whole = Boundary::find(&family, options, &[], |_| (), || false).unwrap();
+    assert!(!whole.crossings.is_empty());
+    let blocks = Boundary::blocks(&range, options);
+    assert_eq!((blocks.len(), blocks[0].first_values().len(), blocks[12].first_values().len()), (13, 9, 4));
+    let known = std::sync::Mutex::new(Vec::new());
+    for (place, block) in blocks.iter().enumerate() {
+        let before = known.lock().unwrap().clone();
+        assert!(!block.is_known(&range, options, &before), "{place}");
+        let keep = |value, cell| known.lock().unwrap().push((value, cell));
+        Boundary::search_blocks(&family, options, std::slice::from_ref(block), &before, keep, |_| (), &crate::Unwatched).unwrap();
+        assert!(block.is_known(&range, options, &known.lock().unwrap()), "{place}");
+    }
+    let known = known.into_inner().unwrap();
+    let rest = whole.known.iter().filter(|(value, _)| known.iter().all(|(known, _)| known.to_bits() != value.to_bits())).count();
+    assert!(10 * rest < whole.samples, "{rest} of {} values are left", whole.samples);
+    assert_eq!(Boundary::find(&family, options, &known, |_| (), || false).unwrap(), whole);
+}

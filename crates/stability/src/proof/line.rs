@@ -1,10 +1,9 @@
 //! A line along one key: stretches of which each is proven stable or proven unstable, and between them stretches that hold every crossing.
 
-use rayon::prelude::*;
-
 use super::followed::{Followed, certify};
+use super::halving::{Halved, Halving};
+use super::shared::{KnownPieces, NothingKnown};
 use super::{BoxCertificate, Guarantee, ProofError};
-use crate::worst_case::rounding::real;
 use crate::{Family, Watch};
 
 /// Values of a key from one to another, and the verdict on all scenes with them.
@@ -34,6 +33,11 @@ pub struct ProvenLine {
 /// More stretches than this are not kept waiting: where an eigenvalue stays at the unit circle, none is ever decided.
 const MOST_WAITING: usize = 1 << 16;
 
+/// How a line is halved.
+pub(super) const fn halving(tolerance: f64) -> Halving {
+    Halving { times: u32::MAX, tolerance: Some(tolerance), most: MOST_WAITING - 1 }
+}
+
 impl ProvenLine {
     /// Decides a family with one key over its range: stretches that are not decided are halved until they are no longer than `tolerance`, or have no number within. What comes out does not
     /// depend on the number of threads. A stretch is an operation of the watch, which may end the proof.
@@ -42,35 +46,21 @@ impl ProvenLine {
     ///
     /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings, and for scenes of which nothing can be proven.
     pub fn prove(family: &Family, tolerance: f64, watch: &dyn Watch) -> Result<Self, ProofError> {
+        Self::prove_with(family, tolerance, &NothingKnown, watch)
+    }
+
+    /// [`ProvenLine::prove`], where stretches that are known are not decided again: what comes out is the same.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`ProvenLine::prove`].
+    pub fn prove_with(family: &Family, tolerance: f64, pieces: &dyn KnownPieces, watch: &dyn Watch) -> Result<Self, ProofError> {
         let [key] = family.keys() else { return Err(ProofError::OneKey) };
         let followed = Followed::new(family)?;
-        let mut waiting = vec![[key.low, key.high]];
-        let (mut found, mut attempts, mut is_whole) = (Vec::new(), 0, true);
-        while !waiting.is_empty() {
-            watch.expects(real(waiting.len()));
-            let proven = waiting.par_iter().map(|range| {
-                if watch.stops() {
-                    return Ok(None);
-                }
-                let proven = followed.decide(&[*range])?;
-                watch.done(1.0);
-                Ok::<_, ProofError>(proven)
-            });
-            let proven = proven.collect::<Result<Vec<_>, _>>()?;
-            attempts += proven.len();
-            is_whole = is_whole && !watch.stops();
-            let last = !is_whole || waiting.len() >= MOST_WAITING;
-            let mut next = Vec::new();
-            for ([low, high], proven) in waiting.into_iter().zip(proven) {
-                let middle = low.midpoint(high);
-                if proven.is_none() && !last && high - low > tolerance && low < middle && middle < high {
-                    next.extend([[low, middle], [middle, high]]);
-                } else {
-                    found.push(ProvenStretch { low, high, guarantee: proven.map_or(Guarantee::Undecided, Guarantee::from) });
-                }
-            }
-            waiting = next;
-        }
+        let Halved { pieces, attempts, is_whole } =
+            halving(tolerance).of(vec![[key.low, key.high]], 0, &|ranges| followed.look(ranges, pieces, watch).map(Some), watch)?;
+        let stretch = |(ranges, guarantee): (Vec<[f64; 2]>, Guarantee)| ProvenStretch { low: ranges[0][0], high: ranges[0][1], guarantee };
+        let mut found: Vec<ProvenStretch> = pieces.into_iter().map(stretch).collect();
         found.sort_by(|one, other| one.low.total_cmp(&other.low));
         let mut stretches: Vec<ProvenStretch> = Vec::new();
         for one in &found {

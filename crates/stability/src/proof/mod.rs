@@ -11,6 +11,7 @@ mod corners;
 mod discs;
 mod followed;
 mod growing;
+mod halving;
 mod line;
 mod mean_square;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod number;
 #[cfg(test)]
 mod points;
 mod region;
+mod shared;
 mod span;
 mod steps;
 #[cfg(test)]
@@ -29,6 +31,7 @@ pub use discs::FreeCircle;
 pub use line::{ProvenLine, ProvenStretch};
 pub use number::{EveryNumber, MOST_FOLLOWED, NumberSpan, prove_every_number};
 pub use region::{MOST_HALVINGS, ProvenBox, ProvenRegion};
+pub use shared::{KnownPieces, SharedProof};
 pub use steps::FrameState;
 
 use cohaptic_scene::Scene;

@@ -1,10 +1,9 @@
 //! A whole region of two keys: boxes of which each is proven stable or proven unstable, and a rest that is not decided.
 
-use rayon::prelude::*;
-
 use super::followed::{Followed, certify};
+use super::halving::{Halved, Halving};
+use super::shared::{KnownPieces, NothingKnown};
 use super::{BoxCertificate, Guarantee, ProofError};
-use crate::worst_case::rounding::real;
 use crate::{Family, Watch};
 
 /// A box of two keys, and the verdict on all scenes in it.
@@ -34,6 +33,11 @@ pub const MOST_HALVINGS: u32 = 16;
 /// More boxes than this are not kept waiting, and stay undecided: where an eigenvalue stays at the unit circle, none is ever decided.
 const MOST_WAITING: usize = 1 << 21;
 
+/// How a region is halved.
+pub(super) fn halving(halvings: u32) -> Halving {
+    Halving { times: halvings.min(MOST_HALVINGS), tolerance: None, most: MOST_WAITING / 4 }
+}
+
 impl ProvenRegion {
     /// Decides a family with two keys over their ranges: boxes that are not decided are divided into four, up to `halvings` times. What comes out does not depend on the number of threads.
     /// A box is an operation of the watch, which may end the proof.
@@ -42,36 +46,21 @@ impl ProvenRegion {
     ///
     /// [`ProofError`] if there are not two keys that each do nothing but set gains, masses and dampings, and for scenes of which nothing can be proven.
     pub fn prove(family: &Family, halvings: u32, watch: &dyn Watch) -> Result<Self, ProofError> {
+        Self::prove_with(family, halvings, &NothingKnown, watch)
+    }
+
+    /// [`ProvenRegion::prove`], where boxes that are known are not decided again: what comes out is the same.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`ProvenRegion::prove`].
+    pub fn prove_with(family: &Family, halvings: u32, pieces: &dyn KnownPieces, watch: &dyn Watch) -> Result<Self, ProofError> {
         let [x, y] = family.keys() else { return Err(ProofError::Keys) };
         let followed = Followed::new(family)?;
-        let mut waiting = vec![([x.low, x.high], [y.low, y.high])];
-        let (mut boxes, mut attempts, mut is_whole) = (Vec::new(), 0, true);
-        for halved in 0..=halvings.min(MOST_HALVINGS) {
-            watch.expects(real(waiting.len()));
-            let found = waiting.par_iter().map(|(x, y)| {
-                if watch.stops() {
-                    return Ok(None);
-                }
-                let proven = followed.decide(&[*x, *y])?;
-                watch.done(1.0);
-                Ok::<_, ProofError>(proven)
-            });
-            let found = found.collect::<Result<Vec<_>, _>>()?;
-            attempts += found.len();
-            is_whole = is_whole && !watch.stops();
-            let is_last = !is_whole || halved >= halvings.min(MOST_HALVINGS) || 4 * found.len() > MOST_WAITING;
-            let mut next = Vec::new();
-            for ((x, y), proven) in waiting.into_iter().zip(found) {
-                match proven {
-                    None if !is_last => {
-                        let halves = |[low, high]: [f64; 2]| [[low, low.midpoint(high)], [low.midpoint(high), high]];
-                        next.extend(halves(y).into_iter().flat_map(|y| halves(x).map(|x| (x, y))));
-                    }
-                    proven => boxes.push(ProvenBox { x, y, guarantee: proven.map_or(Guarantee::Undecided, Guarantee::from) }),
-                }
-            }
-            waiting = next;
-        }
+        let whole = vec![[x.low, x.high], [y.low, y.high]];
+        let Halved { pieces, attempts, is_whole } =
+            halving(halvings).of(whole, 0, &|ranges| followed.look(ranges, pieces, watch).map(Some), watch)?;
+        let boxes = pieces.into_iter().map(|(ranges, guarantee)| ProvenBox { x: ranges[0], y: ranges[1], guarantee }).collect();
         Ok(Self { boxes, attempts, is_whole })
     }
 

@@ -375,3 +375,57 @@ proptest! {
         }
     }
 }
+
+/// Pieces that were looked at, and how many of them were not known.
+#[derive(Default)]
+struct Kept(std::sync::Mutex<(std::collections::BTreeMap<Vec<u64>, Guarantee>, usize)>);
+
+fn bits(ranges: &[[f64; 2]]) -> Vec<u64> {
+    ranges.iter().flatten().map(|value| value.to_bits()).collect()
+}
+
+impl KnownPieces for Kept {
+    fn known(&self, ranges: &[[f64; 2]]) -> Option<Guarantee> {
+        self.0.lock().unwrap().0.get(&bits(ranges)).copied()
+    }
+
+    fn found(&self, ranges: &[[f64; 2]], guarantee: Guarantee) {
+        let mut kept = self.0.lock().unwrap();
+        kept.0.insert(bits(ranges), guarantee);
+        kept.1 += 1;
+    }
+}
+
+/// In whatever order, and by however many processes: a proof of which all blocks are known is that of one process, and looks at nothing.
+#[test]
+fn blocks_make_the_proof_of_one_process() {
+    let line = Family::new(SCENE, "two.toml".as_ref(), &[], vec![KeyRange::parse("object.mass=0.05..1").unwrap()]).unwrap();
+    let region = family(&["scene.count=3"], GAINS[0], GAINS[1]);
+    for halvings in [0, 1, 5] {
+        let shared = SharedProof::of_region(&region, halvings);
+        assert_eq!(shared.blocks(), [1, 4, 64][[0, 1, 5].iter().position(|of| *of == halvings).unwrap()]);
+        let (kept, done) = (Kept::default(), std::sync::Mutex::new(Vec::new()));
+        let blocks: Vec<u64> = (0..shared.blocks()).rev().collect();
+        for block in &blocks {
+            shared.look_at(&region, &[*block], &kept, |block| done.lock().unwrap().push(block), &Unwatched).unwrap();
+            assert!(shared.is_known(*block, &kept));
+        }
+        assert_eq!(*done.lock().unwrap(), blocks);
+        let looked_at = kept.0.lock().unwrap().1;
+        let whole = ProvenRegion::prove(&region, halvings, &Unwatched).unwrap();
+        assert_eq!(ProvenRegion::prove_with(&region, halvings, &kept, &Unwatched).unwrap(), whole);
+        // Neither the blocks nor the whole look at a piece twice, and the blocks look at no other pieces.
+        assert_eq!((kept.0.lock().unwrap().1, looked_at), (looked_at, whole.attempts));
+    }
+    let shared = SharedProof::of_line(&line, 1e-6);
+    let kept = Kept::default();
+    let half: Vec<u64> = (0..64).filter(|block| block % 2 == 0).collect();
+    shared.look_at(&line, &half, &kept, |_| (), &Unwatched).unwrap();
+    let known = (0..64).filter(|block| shared.is_known(*block, &kept)).count();
+    assert!((32..64).contains(&known), "{known}");
+    // What is missing is looked at.
+    assert_eq!(ProvenLine::prove_with(&line, 1e-6, &kept, &Unwatched).unwrap(), ProvenLine::prove(&line, 1e-6, &Unwatched).unwrap());
+    // Somebody who ends it is heard.
+    let ended = crate::watch::Asks(|| true);
+    shared.look_at(&line, &[0], &Kept::default(), |block| panic!("{block} is not whole"), &ended).unwrap();
+}

@@ -1,9 +1,8 @@
 //! Which key lies along which axis, and which has a panel for each of its values.
 
+use cohaptic_answers::axis_of_key;
 use cohaptic_campaign::{CampaignPlan, Variation};
 use cohaptic_picture::{Axis, cell_edges};
-
-use crate::stability::source::axis_of_key;
 
 /// The most panels beside each other.
 const MOST_PANELS: usize = 12;

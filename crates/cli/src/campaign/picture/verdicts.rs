@@ -1,5 +1,6 @@
 //! The verdicts of a campaign: the radius over one key, regions over two.
 
+use cohaptic_answers::radius_name;
 use cohaptic_campaign::Judgement;
 use cohaptic_picture::{Axis, Fill, Line, Look, Marker, Panel, Picture};
 use cohaptic_stability::{Criterion, Verdict};
@@ -8,7 +9,6 @@ use super::Sheet;
 use super::arranged::{Along, Keys};
 use super::panels::{marked, with_cells};
 use crate::campaign::judge::{is_nominal, is_spectral};
-use crate::stability::source;
 
 /// A radius above this is cut off: how far beyond 1 it is says nothing about where it crosses.
 const HIGHEST: f64 = 2.0;
@@ -86,7 +86,7 @@ impl Radii {
         let points = self.points(sheet, along, facet);
         let radius = Line::new(points.iter().map(|(x, radius, _)| (*x, *radius)), Look::of(0));
         let panel =
-            Panel::new(along.axis(), self.axis()).with(Line::level(1.0).named("1")).with(marked(radius, along).named(source::name(self.criterion)));
+            Panel::new(along.axis(), self.axis()).with(Line::level(1.0).named("1")).with(marked(radius, along).named(radius_name(self.criterion)));
         with_nominal(panel, points.iter().filter(|point| point.2).map(|(x, radius, _)| (*x, *radius)).collect())
     }
 
@@ -95,7 +95,7 @@ impl Radii {
         let points = self.points(sheet, along, facet);
         let of = |nominal: bool| points.iter().filter(move |point| point.2 == nominal).map(|(y, radius, _)| (*radius, *y)).collect::<Vec<_>>();
         let panel = Panel::new(self.axis(), along.axis()).with(Line::upright(1.0).named("1"));
-        with_nominal(panel.with(Line::new(of(false), Look::of(0)).marks_only(Marker::Disc).named(source::name(self.criterion))), of(true))
+        with_nominal(panel.with(Line::new(of(false), Look::of(0)).marks_only(Marker::Disc).named(radius_name(self.criterion))), of(true))
     }
 }
 

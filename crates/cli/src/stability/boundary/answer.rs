@@ -1,6 +1,7 @@
 //! A boundary as a JSON document and in words.
 
-use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange};
+use cohaptic_answers::crossing_in_words;
+use cohaptic_stability::{Boundary, Criterion};
 use cohaptic_units::print::Counted;
 use serde::Serialize;
 
@@ -66,8 +67,4 @@ pub(super) fn describe(order: &Order, found: &Boundary) -> String {
     }
     super::notes(found).iter().for_each(|note| line(format!("note: {note}")));
     text
-}
-
-pub(super) fn crossing_in_words(range: &KeyRange, crossing: &Crossing) -> String {
-    format!("{} from {} (before: {})", crossing.to.word(), range.text(crossing.value), crossing.from.word())
 }

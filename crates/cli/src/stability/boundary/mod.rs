@@ -38,12 +38,9 @@ struct Order {
 /// Finds every crossing along a key.
 pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
-    if arguments.prove {
-        sharing.is_whole("--prove")?;
-    }
     let order = Order::new(arguments)?;
     if arguments.prove {
-        return prove::prove(&order, arguments);
+        return prove::prove(&order, arguments, sharing);
     }
     let kept = sharing.folder().map(|folder| Kept { folder, name: ROWS, header: &order.header });
     match (sharing, kept) {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use cohaptic_stability::{BoundaryError, Guarantee, ProofError, ProvenLine, ProvenStretch};
+use cohaptic_stability::{BoundaryError, Guarantee, ProofError, ProvenLine, ProvenStretch, SharedProof};
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 
@@ -13,20 +13,45 @@ use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_into;
 use crate::output;
+use crate::shard::{self, Sharing};
 use crate::stability::certificate::{self, Given};
 use crate::stability::guarantee::{self, PieceWatch};
+use crate::stability::proof_blocks::{self, Pieces, Proofs};
+use crate::stability::rows_file::Kept;
 
-/// Proves the line and shows or writes it.
-pub(super) fn prove(order: &Order, arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
-    let line = ProvenLine::prove(&order.family, order.options.tolerance, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
+/// What files are called in which pieces are kept that shards have looked at.
+const ROWS: &str = "proof.rows";
+
+/// Proves the line and shows or writes it, or does a shard of that.
+pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Sharing<'_>) -> Result<ExitCode, Failure> {
+    let (families, tolerance) = (std::slice::from_ref(&order.family), order.options.tolerance);
+    let shared = SharedProof::of_line(&order.family, tolerance);
+    let mut header = order.header.clone();
+    header[0] = format!("cohaptic {} stability boundary --prove: pieces looked at; the same command goes on from here", env!("CARGO_PKG_VERSION"));
+    header.pop();
+    header.extend([format!("to {tolerance:?}"), proof_blocks::ROW.to_owned()]);
+    let proofs = sharing.folder().map(|folder| Proofs { families, shared: &shared, kept: Kept { folder, name: ROWS, header: &header }, threads: 0 });
+    match (sharing, proofs) {
+        (Sharing::Shard(shard, _), Some(proofs)) => {
+            return shard::answer(arguments.scene.json, &proofs.shard(shard, |_, error| failure(order, arguments, error))?);
+        }
+        (Sharing::Status(folder), Some(proofs)) => return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &proofs.pieces()?),
+        (Sharing::Merge(_) | Sharing::Whole(_), _) | (_, None) => {}
+    }
+    let rows = proofs.map_or(Ok(Vec::new()), |proofs| proofs.rows(sharing))?;
+    let known = Pieces::of(0, &rows, None);
+    let line = ProvenLine::prove_with(&order.family, tolerance, &known, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
     let mut files = Vec::new();
-    if let Some(folder) = &arguments.out {
-        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
+    if let Some(folder) = sharing.folder() {
+        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
         files.push(write_into(folder, "proof.csv", table(order, &line))?);
         if arguments.certificate && line.is_whole {
             let pieces = line.certify(&order.family, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
             let given = Given { title: &order.title, text: &order.text, overrides: &arguments.scene.overrides.set };
             files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], &pieces)?)?);
+        }
+        if line.is_whole {
+            proof_blocks::remove(folder, ROWS)?;
         }
     }
     output::answer(arguments.scene.json, DocumentSchema::STABILITY_LINE, &answer(order, &line, &files), || describe(order, &line), &files)?;

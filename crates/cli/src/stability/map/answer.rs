@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_answers::{label, radius_name};
 use cohaptic_stability::{Criterion, Verdict};
 use cohaptic_units::print::Counted;
 use serde::Serialize;
@@ -10,7 +11,6 @@ use super::{Order, Speed, VariantMap, glance};
 use crate::document_schema::document;
 use crate::output::{are, figure};
 use crate::stability::source;
-use crate::stability::source::label;
 
 /// The answer of `cohaptic stability map --json`.
 pub(super) fn of(order: &Order, maps: &[VariantMap], speed: Speed, files: &[String]) -> impl Serialize {
@@ -108,6 +108,6 @@ fn least(order: &Order, VariantMap { map, criterion, .. }: &VariantMap) -> Strin
     let cells = map.y.iter().zip(&map.radius).flat_map(|(y, row)| map.x.iter().zip(row).map(move |(x, radius)| (*radius, *x, *y)));
     let least = cells.filter(|(radius, ..)| radius.is_finite()).min_by(|one, other| one.0.total_cmp(&other.0));
     least.map_or_else(String::new, |(radius, x, y)| {
-        format!("; the least {} is {}, at {} and {}", source::name(*criterion), figure(radius, 6), order.x().text(x), order.y().text(y))
+        format!("; the least {} is {}, at {} and {}", radius_name(*criterion), figure(radius, 6), order.x().text(x), order.y().text(y))
     })
 }

@@ -15,12 +15,17 @@ use crate::arguments::MapArguments;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::shard::{Done, Names, Piece, Sharing, Worker, all_done, nobody_works_in, owner, show};
+use crate::stability::proof_blocks::on_threads;
 use crate::stability::rows_file::{Kept, Row, RowsFile, fingerprint};
 use crate::stability::source::fingerprint_of;
 use crate::{interrupt, output};
 
 /// What files are called in which finished rows are kept.
 const ROWS: &str = "map.rows";
+
+/// What the header of its file says of rows.
+const WHAT: [&str; 3] =
+    ["stability map: rows that are finished", "", "each row: its number, the radius of each cell, and for each cell 1 if it is nominal"];
 
 const NAMES: Names = Names { piece: "row", unit: "cell" };
 
@@ -36,7 +41,7 @@ pub(super) struct Filled {
 
 /// Fills every map, or puts together the rows of shards.
 pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>) -> Result<Filled, Failure> {
-    let header = header(order, arguments)?;
+    let header = header(order, arguments, WHAT)?;
     let (file, known) = match sharing.folder() {
         None => (None, Vec::new()),
         Some(folder) => {
@@ -51,7 +56,7 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>
     let begun_before = !known.is_empty();
     let keeper = Keeper { file: Mutex::new((file, None)), broken: AtomicBool::new(false), worker: None };
     let work = || in_turn(order, sorted(known, order), &keeper);
-    let filled = on_threads(arguments, work);
+    let filled = on_threads(threads(arguments), work);
     let (rows, broken) = keeper.file.into_inner().unwrap_or_else(PoisonError::into_inner);
     if let Some(failure) = broken {
         return Err(failure);
@@ -68,18 +73,14 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>
     }
 }
 
-fn on_threads<T: Send>(arguments: &MapArguments, work: impl FnOnce() -> T + Send) -> T {
-    let threads = usize::from(arguments.threads.unwrap_or(0));
-    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(work),
-        // Without threads of its own it uses those that there are.
-        Err(_) => work(),
-    }
+/// On how many threads, 0 for one a core.
+fn threads(arguments: &MapArguments) -> usize {
+    usize::from(arguments.threads.unwrap_or(0))
 }
 
 /// Fills the rows of a shard.
 pub(super) fn shard<'a>(order: &Order, arguments: &MapArguments, shard: Shard, folder: &'a Path) -> Result<Done<'a>, Failure> {
-    let header = header(order, arguments)?;
+    let header = header(order, arguments, WHAT)?;
     let kept = Kept { folder, name: ROWS, header: &header };
     // Rows of other work are refused before anything is written.
     kept.read()?;
@@ -109,7 +110,7 @@ fn rows_of_shard(order: &Order, arguments: &MapArguments, shard: Shard, kept: Ke
         }
     }
     let keeper = Keeper { file: Mutex::new((Some(file), None)), broken: AtomicBool::new(false), worker: Some(worker) };
-    let filled = on_threads(arguments, || in_turn(order, known, &keeper));
+    let filled = on_threads(threads(arguments), || in_turn(order, known, &keeper));
     if let Some(failure) = keeper.file.into_inner().unwrap_or_else(PoisonError::into_inner).1 {
         return Err(failure);
     }
@@ -135,7 +136,7 @@ fn are_all_there(order: &Order, kept: Kept<'_>) -> Result<(), Failure> {
 
 /// Says which rows are done.
 pub(super) fn status(order: &Order, arguments: &MapArguments, folder: &Path) -> Result<ExitCode, Failure> {
-    let header = header(order, arguments)?;
+    let header = header(order, arguments, WHAT)?;
     let kept = Kept { folder, name: ROWS, header: &header };
     show(arguments.scene.json, folder, NAMES, &pieces(order, kept)?)
 }
@@ -212,21 +213,21 @@ fn sorted(known: Vec<Row>, order: &Order) -> Vec<Vec<MapRow>> {
 }
 
 /// What the rows belong to. Numbers of another version of the program may differ in their last digits, and are not mixed.
-fn header(order: &Order, arguments: &MapArguments) -> Result<Vec<String>, Failure> {
+pub(super) fn header(order: &Order, arguments: &MapArguments, [command, size, rows]: [&str; 3]) -> Result<Vec<String>, Failure> {
     let mut lines = vec![
-        format!("cohaptic {} stability map: rows that are finished; the same command goes on from here", env!("CARGO_PKG_VERSION")),
+        format!("cohaptic {} {command}; the same command goes on from here", env!("CARGO_PKG_VERSION")),
         format!("scene text {:016x}", fingerprint(&order.text)),
         format!("set {:?}", arguments.scene.overrides.set),
         format!("x {:?}", arguments.x),
         format!("y {:?}", arguments.y),
-        format!("grid {}x{}", order.grid.columns(), order.grid.rows()),
+        if size.is_empty() { format!("grid {}x{}", order.grid.columns(), order.grid.rows()) } else { size.to_owned() },
         format!("maps {}", order.variants.len()),
     ];
     for (number, (variant, family)) in order.variants.iter().zip(&order.families).enumerate() {
         let scene = fingerprint_of(family).map_err(|error| order.failure(number, arguments, error.into()))?;
         lines.push(format!("map {} {:?} of the scene {scene:016x}", number + 1, variant.overrides));
     }
-    lines.push("each row: its number, the radius of each cell, and for each cell 1 if it is nominal".to_owned());
+    lines.push(rows.to_owned());
     Ok(lines)
 }
 

@@ -60,12 +60,9 @@ impl Speed {
 /// Fills the maps and shows or writes them.
 pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
-    if arguments.prove.is_some() {
-        sharing.is_whole("--prove")?;
-    }
     let order = Order::new(arguments)?;
     if let Some(halvings) = arguments.prove {
-        return prove::prove(&order, arguments, halvings);
+        return prove::prove(&order, arguments, halvings, sharing);
     }
     match sharing {
         Sharing::Whole(_) | Sharing::Merge(_) => {}

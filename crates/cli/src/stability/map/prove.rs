@@ -5,20 +5,23 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
+use cohaptic_answers::axis_of;
 use cohaptic_picture::{Fill, Panel, Picture, Region};
-use cohaptic_stability::{Guarantee, ProofError, ProvenBox, ProvenRegion};
+use cohaptic_stability::{Guarantee, ProofError, ProvenBox, ProvenRegion, SharedProof};
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 
-use super::Order;
+use super::{Order, filling};
 use crate::arguments::MapArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_into;
 use crate::output::{self, figure};
+use crate::shard::{self, Sharing};
 use crate::stability::certificate::{self, Given};
 use crate::stability::guarantee::{self, PieceWatch};
-use crate::stability::source::axis_of;
+use crate::stability::proof_blocks::{self, Pieces, Proofs, on_threads};
+use crate::stability::rows_file::Kept;
 
 /// A variant, and its proof.
 struct Proof {
@@ -31,17 +34,34 @@ struct Proof {
 /// The shares that an answer has, in this order.
 const GUARANTEES: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided];
 
-/// Proves the region of each variant and shows or writes it.
-pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> Result<ExitCode, Failure> {
+/// What files are called in which pieces are kept that shards have looked at.
+const ROWS: &str = "proof.rows";
+
+/// Proves the region of each variant and shows or writes it, or does a shard of that.
+pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, sharing: Sharing<'_>) -> Result<ExitCode, Failure> {
     let start = Clock::now();
+    let shared = SharedProof::of_region(&order.families[0], halvings);
     let threads = usize::from(arguments.threads.unwrap_or(0));
+    let size = format!("halved {halvings} times");
+    let header = filling::header(order, arguments, ["stability map --prove: pieces looked at", &size, proof_blocks::ROW])?;
+    let proofs = sharing.folder().map(|folder| Proofs {
+        families: &order.families,
+        shared: &shared,
+        kept: Kept { folder, name: ROWS, header: &header },
+        threads,
+    });
+    match (sharing, proofs) {
+        (Sharing::Shard(shard, _), Some(proofs)) => {
+            let done = proofs.shard(shard, |variant, error| failure(order, arguments, variant, error))?;
+            return shard::answer(arguments.scene.json, &done);
+        }
+        (Sharing::Status(folder), Some(proofs)) => return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &proofs.pieces()?),
+        (Sharing::Merge(_) | Sharing::Whole(_), _) | (_, None) => {}
+    }
+    let rows = proofs.map_or(Ok(Vec::new()), |proofs| proofs.rows(sharing))?;
     let watch = PieceWatch::new();
-    let all = || order.families.iter().map(|family| ProvenRegion::prove(family, halvings, &watch)).collect::<Vec<_>>();
-    let regions = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(all),
-        // Without threads of its own it uses those that there are.
-        Err(_) => all(),
-    };
+    let prove = |(number, family)| ProvenRegion::prove_with(family, halvings, &Pieces::of(number, &rows, None), &watch);
+    let regions = on_threads(threads, || order.families.iter().enumerate().map(prove).collect::<Vec<_>>());
     drop(watch);
     let mut proofs = Vec::new();
     for (variant, region) in order.variants.iter().zip(regions) {
@@ -49,8 +69,8 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
         proofs.push(Proof { name: variant.name.clone(), overrides: variant.overrides.clone(), region, file: None });
     }
     let mut files = Vec::new();
-    if let Some(folder) = &arguments.out {
-        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
+    if let Some(folder) = sharing.folder() {
+        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
         for (number, proof) in proofs.iter_mut().enumerate() {
             let name = if number == 0 { "proof.csv".to_owned() } else { format!("proof-{}.csv", number + 1) };
             let path = write_into(folder, &name, table(order, &proof.region))?;
@@ -60,6 +80,9 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
         files.extend(pictures(order, &proofs, folder, arguments)?);
         if arguments.certificate && proofs.iter().all(|proof| proof.region.is_whole) {
             files.extend(certificates(order, arguments, &proofs, folder)?);
+        }
+        if proofs.iter().all(|proof| proof.region.is_whole) {
+            proof_blocks::remove(folder, ROWS)?;
         }
     }
     let wall_s = start.elapsed().as_secs_f64();

@@ -118,7 +118,7 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         lines: &["cohaptic campaign scenarios/network/loss-independent.toml --runs 2 --out shards --shard 1/1 --json"],
         rows: &[
             ("shard, out", "as `I/N`; the folder"),
-            ("piece, unit", "`part` of `run`, `row` of `cell`, `sample` of `value`"),
+            ("piece, unit", "`part` of `run`, `row` of `cell`, `block` of `sample` or `range`"),
             ("pieces, units, units_computed", "of the shard; computed this time"),
             ("wall_s", "of this time"),
         ],

@@ -1,0 +1,83 @@
+//! Blocks of a search that several processes share. A block has some of the first samples, and is searched as if there were no others; what they say of each other
+//! across its ends is left to the search of the whole, which finds almost all that it looks at known.
+
+use rayon::prelude::*;
+
+use super::{Boundary, BoundaryOptions, End, by_value, go_on};
+use crate::map::{Scratches, nodes};
+use crate::{AnalysisError, Cell, Family, FamilyError, KeyRange, Watch};
+
+/// So many intervals between first samples are a block.
+const INTERVALS: usize = 8;
+
+/// A part of the range of a search.
+#[derive(Clone, PartialEq, Debug)]
+pub struct BoundaryBlock(Vec<f64>);
+
+impl BoundaryBlock {
+    /// The values that are looked at first, ascending, both ends of the block among them.
+    #[must_use]
+    pub fn first_values(&self) -> &[f64] {
+        &self.0
+    }
+
+    /// Whether its search finds all that it looks at known.
+    #[must_use]
+    pub fn is_known(&self, range: &KeyRange, options: BoundaryOptions, known: &[(f64, Cell)]) -> bool {
+        let known = by_value(known);
+        let look = |value: f64| Ok::<_, std::convert::Infallible>(known.get(&value.to_bits()).map(|cell| (value, *cell)));
+        let Ok((_, end)) = go_on(self.0.clone(), range, options, look);
+        end != End::Stopped
+    }
+}
+
+impl Boundary {
+    /// The range of a search in blocks, which meet at their ends.
+    #[must_use]
+    pub fn blocks(range: &KeyRange, options: BoundaryOptions) -> Vec<BoundaryBlock> {
+        let values = nodes(range, options.samples);
+        let block = |place: usize| BoundaryBlock(values[place..values.len().min(place + INTERVALS + 1)].to_vec());
+        (0..values.len().saturating_sub(1)).step_by(INTERVALS).map(block).collect()
+    }
+
+    /// Searches some blocks, on all threads of the pool that it is called in. `found` gets each value that was not known and its radius, and `done` the place of
+    /// each block that is whole; the others were ended by the watch.
+    ///
+    /// # Errors
+    ///
+    /// [`FamilyError`] of a radius that cannot be computed, and if the family has not one open key.
+    pub fn search_blocks(
+        family: &Family,
+        options: BoundaryOptions,
+        blocks: &[BoundaryBlock],
+        known: &[(f64, Cell)],
+        found: impl Fn(f64, Cell) + Sync,
+        done: impl Fn(usize) + Sync,
+        watch: &dyn Watch,
+    ) -> Result<(), FamilyError> {
+        let [range] = family.keys() else { return Err(FamilyError::Values { given: 1, keys: family.keys().len() }) };
+        let (known, pool) = (by_value(known), Scratches::default());
+        let look = |value: f64| {
+            if watch.stops() {
+                return Ok(None);
+            }
+            if let Some(cell) = known.get(&value.to_bits()) {
+                return Ok(Some((value, *cell)));
+            }
+            match pool.with(|scratch| family.bounded_radius_watched(&[value], scratch, watch)) {
+                Ok(cell) => {
+                    found(value, cell);
+                    Ok(Some((value, cell)))
+                }
+                Err(FamilyError::Analysis(AnalysisError::Stopped)) => Ok(None),
+                Err(error) => Err(error),
+            }
+        };
+        blocks.par_iter().enumerate().try_for_each(|(place, block)| {
+            if go_on(block.0.clone(), range, options, look)?.1 != End::Stopped {
+                done(place);
+            }
+            Ok(())
+        })
+    }
+}

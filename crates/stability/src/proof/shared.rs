@@ -1,0 +1,130 @@
+//! Proofs that several processes share: the ranges are cut into blocks, and each block is looked at by itself.
+
+use rayon::prelude::*;
+
+use super::followed::Followed;
+use super::halving::{Halving, Look, Ranges, halves};
+use super::{Guarantee, ProofError, line, region};
+use crate::{Family, Unwatched, Watch};
+
+/// The pieces of a proof that were looked at, in this process or in others.
+pub trait KnownPieces: Sync {
+    /// The verdict on the scenes between these values of each key; `None` if it is not known.
+    fn known(&self, ranges: &[[f64; 2]]) -> Option<Guarantee>;
+
+    /// This verdict was found.
+    fn found(&self, ranges: &[[f64; 2]], guarantee: Guarantee);
+}
+
+/// Nothing is known before, and nothing kept.
+pub(super) struct NothingKnown;
+
+impl KnownPieces for NothingKnown {
+    fn known(&self, _ranges: &[[f64; 2]]) -> Option<Guarantee> {
+        None
+    }
+
+    fn found(&self, _ranges: &[[f64; 2]], _guarantee: Guarantee) {}
+}
+
+impl Followed<'_> {
+    /// The verdict on ranges: the known one, or it is found.
+    pub(super) fn look(&self, ranges: &[[f64; 2]], pieces: &dyn KnownPieces, watch: &dyn Watch) -> Result<Guarantee, ProofError> {
+        let guarantee = match pieces.known(ranges) {
+            Some(known) => known,
+            None => {
+                let found = self.decide(ranges)?.map_or(Guarantee::Undecided, Guarantee::from);
+                pieces.found(ranges, found);
+                found
+            }
+        };
+        watch.done(1.0);
+        Ok(guarantee)
+    }
+}
+
+/// A proof over the ranges of the open keys of a family, in blocks.
+#[derive(Clone, Debug)]
+pub struct SharedProof {
+    whole: Ranges,
+    halving: Halving,
+    /// How often the ranges are halved for a block.
+    depth: u32,
+}
+
+/// Into how many blocks a proof is cut: two to the power of this.
+const BLOCKS: u32 = 6;
+
+impl SharedProof {
+    /// That of [`ProvenRegion::prove`](super::ProvenRegion::prove).
+    #[must_use]
+    pub fn of_region(family: &Family, halvings: u32) -> Self {
+        Self::new(family, region::halving(halvings))
+    }
+
+    /// That of [`ProvenLine::prove`](super::ProvenLine::prove).
+    #[must_use]
+    pub fn of_line(family: &Family, tolerance: f64) -> Self {
+        Self::new(family, line::halving(tolerance))
+    }
+
+    fn new(family: &Family, halving: Halving) -> Self {
+        let whole: Ranges = family.keys().iter().map(|key| [key.low, key.high]).collect();
+        let keys = u32::try_from(whole.len()).unwrap_or(1).max(1);
+        Self { whole, halving, depth: (BLOCKS / keys).min(halving.times) }
+    }
+
+    /// How many blocks there are: 64, or fewer of ranges that are halved less often.
+    #[must_use]
+    pub fn blocks(&self) -> u64 {
+        1 << (u64::from(self.depth) * self.whole.len() as u64)
+    }
+
+    /// Looks at every piece of some blocks that is not known, and at those that they are parts of, on all threads of the pool that it is called in. `done` gets each
+    /// block that is whole.
+    ///
+    /// # Errors
+    ///
+    /// Those of the proof.
+    pub fn look_at(
+        &self,
+        family: &Family,
+        blocks: &[u64],
+        pieces: &dyn KnownPieces,
+        done: impl Fn(u64) + Sync,
+        watch: &dyn Watch,
+    ) -> Result<(), ProofError> {
+        let followed = Followed::new(family)?;
+        blocks.par_iter().try_for_each(|block| {
+            if self.walk(*block, &|ranges| followed.look(ranges, pieces, watch).map(Some), watch)? {
+                done(*block);
+            }
+            Ok(())
+        })
+    }
+
+    /// Whether every piece of a block is known.
+    #[must_use]
+    pub fn is_known(&self, block: u64, pieces: &dyn KnownPieces) -> bool {
+        self.walk(block, &|ranges| Ok(pieces.known(ranges)), &Unwatched).unwrap_or(false)
+    }
+
+    fn walk(&self, block: u64, look: Look<'_>, watch: &dyn Watch) -> Result<bool, ProofError> {
+        let keys = self.whole.len() as u64;
+        let mut ranges = self.whole.clone();
+        for halved in 0..self.depth {
+            if watch.stops() {
+                return Ok(false);
+            }
+            match look(&ranges)? {
+                None => return Ok(false),
+                Some(Guarantee::Stable | Guarantee::Unstable) => return Ok(true),
+                Some(Guarantee::Undecided) if !self.halving.may_halve(&ranges) => return Ok(true),
+                Some(Guarantee::Undecided) => {}
+            }
+            let place = block >> (keys * u64::from(self.depth - 1 - halved)) & ((1 << keys) - 1);
+            ranges = halves(&ranges).swap_remove(usize::try_from(place).unwrap_or_default());
+        }
+        Ok(self.halving.of(ranges, self.depth, look, watch)?.is_whole)
+    }
+}
