@@ -35,16 +35,18 @@ pub struct ProvenLine {
 const MOST_WAITING: usize = 1 << 16;
 
 impl ProvenLine {
-    /// Decides a family with one key over its range: stretches that are not decided are halved until they are no longer than `tolerance`, or have no number within. What comes out does not
+    /// Decides a family with one key over its range: stretches that are not decided are halved until they are no longer than `tolerance`, or have no number within; a delay of links is divided where a sample comes into force at another tick, and nowhere else. What comes out does not
     /// depend on the number of threads. A stretch is an operation of the watch, which may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings, and for scenes of which nothing can be proven.
+    /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings or a delay, and for scenes of which nothing can be proven.
     pub fn prove(family: &Family, tolerance: f64, watch: &dyn Watch) -> Result<Self, ProofError> {
-        let [key] = family.keys() else { return Err(ProofError::OneKey) };
-        let followed = Followed::new(family)?;
-        let mut waiting = vec![[key.low, key.high]];
+        if family.keys().len() != 1 {
+            return Err(ProofError::OneKey);
+        }
+        let followed = Followed::new(family, None)?;
+        let mut waiting: Vec<[f64; 2]> = followed.beginnings().concat();
         let (mut found, mut attempts, mut is_whole) = (Vec::new(), 0, true);
         while !waiting.is_empty() {
             watch.expects(real(waiting.len()));
@@ -63,7 +65,7 @@ impl ProvenLine {
             let mut next = Vec::new();
             for ([low, high], proven) in waiting.into_iter().zip(proven) {
                 let middle = low.midpoint(high);
-                if proven.is_none() && !last && high - low > tolerance && low < middle && middle < high {
+                if proven.is_none() && !last && followed.is_divided(0) && high - low > tolerance && low < middle && middle < high {
                     next.extend([[low, middle], [middle, high]]);
                 } else {
                     found.push(ProvenStretch { low, high, guarantee: proven.map_or(Guarantee::Undecided, Guarantee::from) });
@@ -88,6 +90,6 @@ impl ProvenLine {
     ///
     /// As [`ProvenLine::prove`], of the family that was proven, and if the watch ends it.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
-        certify(family, self.pieces.iter().map(|ProvenStretch { low, high, .. }| vec![[*low, *high]]).collect(), watch)
+        certify(family, None, self.pieces.iter().map(|ProvenStretch { low, high, .. }| vec![[*low, *high]]).collect(), watch)
     }
 }

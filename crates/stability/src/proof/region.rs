@@ -27,6 +27,8 @@ pub struct ProvenRegion {
     pub attempts: usize,
     /// Whether nobody ended the proof; if somebody did, boxes that were not looked at are undecided too.
     pub is_whole: bool,
+    /// For which numbers of peers its verdicts hold.
+    every: Option<(u64, Option<u64>)>,
 }
 
 /// How finely a region is divided at most: each range into two to the power of this.
@@ -35,16 +37,19 @@ pub const MOST_HALVINGS: u32 = 16;
 const MOST_WAITING: usize = 1 << 21;
 
 impl ProvenRegion {
-    /// Decides a family with two keys over their ranges: boxes that are not decided are divided into four, up to `halvings` times. What comes out does not depend on the number of threads.
+    /// Decides a family with two keys over their ranges: boxes that are not decided are divided into four, up to `halvings` times. A key that is a delay of links is divided where a sample comes into force at another tick, and nowhere else.
+    /// With `every` a verdict holds for every number of peers from the first to the second, or without end, of the largest class of equal ones. What comes out does not depend on the number of threads.
     /// A box is an operation of the watch, which may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if there are not two keys that each do nothing but set gains, masses and dampings, and for scenes of which nothing can be proven.
-    pub fn prove(family: &Family, halvings: u32, watch: &dyn Watch) -> Result<Self, ProofError> {
-        let [x, y] = family.keys() else { return Err(ProofError::Keys) };
-        let followed = Followed::new(family)?;
-        let mut waiting = vec![([x.low, x.high], [y.low, y.high])];
+    /// [`ProofError`] if there are not two keys that each do nothing but set gains, masses and dampings, or delays for one of them, and for scenes of which nothing can be proven.
+    pub fn prove(family: &Family, halvings: u32, every: Option<(u64, Option<u64>)>, watch: &dyn Watch) -> Result<Self, ProofError> {
+        if family.keys().len() != 2 {
+            return Err(ProofError::Keys);
+        }
+        let followed = Followed::new(family, every)?;
+        let mut waiting: Vec<([f64; 2], [f64; 2])> = followed.beginnings().into_iter().map(|ranges| (ranges[0], ranges[1])).collect();
         let (mut boxes, mut attempts, mut is_whole) = (Vec::new(), 0, true);
         for halved in 0..=halvings.min(MOST_HALVINGS) {
             watch.expects(real(waiting.len()));
@@ -64,15 +69,17 @@ impl ProvenRegion {
             for ((x, y), proven) in waiting.into_iter().zip(found) {
                 match proven {
                     None if !is_last => {
-                        let halves = |[low, high]: [f64; 2]| [[low, low.midpoint(high)], [low.midpoint(high), high]];
-                        next.extend(halves(y).into_iter().flat_map(|y| halves(x).map(|x| (x, y))));
+                        let halves = |key: usize, [low, high]: [f64; 2]| {
+                            if followed.is_divided(key) { vec![[low, low.midpoint(high)], [low.midpoint(high), high]] } else { vec![[low, high]] }
+                        };
+                        next.extend(halves(1, y).into_iter().flat_map(|y| halves(0, x).into_iter().map(move |x| (x, y))));
                     }
                     proven => boxes.push(ProvenBox { x, y, guarantee: proven.map_or(Guarantee::Undecided, Guarantee::from) }),
                 }
             }
             waiting = next;
         }
-        Ok(Self { boxes, attempts, is_whole })
+        Ok(Self { boxes, attempts, is_whole, every })
     }
 
     /// The boxes with all by which they can be checked. Each is decided once more.
@@ -81,10 +88,10 @@ impl ProvenRegion {
     ///
     /// As [`ProvenRegion::prove`], of the family that was proven, and if the watch ends it.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
-        certify(family, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
+        certify(family, self.every, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
     }
 
-    /// The share of the area of the ranges with that verdict.
+    /// The share of the area of the ranges with that verdict. A single delay, such as none at all, has no area.
     #[must_use]
     pub fn share(&self, guarantee: Guarantee) -> f64 {
         let area = |boxes: &mut dyn Iterator<Item = &ProvenBox>| boxes.map(|one| (one.x[1] - one.x[0]) * (one.y[1] - one.y[0])).sum::<f64>();

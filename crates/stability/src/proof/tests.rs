@@ -195,7 +195,7 @@ fn no_box_holds_a_point_that_contradicts_it() {
         (&["scene.count=3", "peers=[{ name = \"peer2\", device = { mass = 0.2 } }, { name = \"peer3\", contact = \"none\" }]"], GAINS),
     ] {
         let family = family(set, x, y);
-        let region = ProvenRegion::prove(&family, 5, &Unwatched).unwrap();
+        let region = ProvenRegion::prove(&family, 5, None, &Unwatched).unwrap();
         let mut scratch = crate::FamilyScratch::default();
         let mut decided = 0;
         for (number, one) in region.boxes.iter().enumerate().filter(|(_, one)| one.guarantee != Guarantee::Undecided) {
@@ -252,7 +252,7 @@ fn a_line_encloses_every_crossing() {
 #[test]
 fn finer_boxes_decide_more() {
     let family = family(&["scene.count=3"], GAINS[0], GAINS[1]);
-    let regions = [3, 5, 7].map(|halvings| ProvenRegion::prove(&family, halvings, &Unwatched).unwrap());
+    let regions = [3, 5, 7].map(|halvings| ProvenRegion::prove(&family, halvings, None, &Unwatched).unwrap());
     let open = regions.each_ref().map(|region| region.share(Guarantee::Undecided));
     assert!(open[0] > 2.0 * open[1] && open[1] > 2.0 * open[2], "{open:?}");
     for pair in regions.windows(2) {
@@ -263,7 +263,7 @@ fn finer_boxes_decide_more() {
 
 #[test]
 fn keys_that_do_more_than_to_set_numbers_are_refused() {
-    let refused = |set: &[&str], x: &str, y: &str| ProvenRegion::prove(&family(set, x, y), 3, &Unwatched).unwrap_err().to_string();
+    let refused = |set: &[&str], x: &str, y: &str| ProvenRegion::prove(&family(set, x, y), 3, None, &Unwatched).unwrap_err().to_string();
     assert!(refused(&[], "link.delay=0ms..40ms", GAINS[1]).starts_with("link.delay does more than"));
     assert!(refused(&["link.loss=5%"], GAINS[0], GAINS[1]).contains("leave something to chance"));
 }

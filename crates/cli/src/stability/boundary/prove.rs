@@ -26,7 +26,7 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments) -> Result<Exit
         if arguments.certificate && line.is_whole {
             let pieces = line.certify(&order.family, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
             let given = Given { title: &order.title, text: &order.text, overrides: &arguments.scene.overrides.set };
-            files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], &pieces)?)?);
+            files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], None, &pieces)?)?);
         }
     }
     output::answer(arguments.scene.json, DocumentSchema::STABILITY_LINE, &answer(order, &line, &files), || describe(order, &line), &files)?;

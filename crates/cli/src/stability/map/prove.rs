@@ -36,7 +36,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
     let start = Clock::now();
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let watch = PieceWatch::new();
-    let all = || order.families.iter().map(|family| ProvenRegion::prove(family, halvings, &watch)).collect::<Vec<_>>();
+    let all = || order.families.iter().map(|family| ProvenRegion::prove(family, halvings, arguments.every_number, &watch)).collect::<Vec<_>>();
     let regions = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(all),
         // Without threads of its own it uses those that there are.
@@ -66,8 +66,8 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32) -> R
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_REGION,
-        &answer(order, &proofs, halvings, wall_s, &files),
-        || describe(order, &proofs, wall_s),
+        &answer(order, arguments, &proofs, wall_s, &files),
+        || describe(order, arguments, &proofs, wall_s),
         &files,
     )?;
     if proofs.iter().all(|proof| proof.region.is_whole) { Ok(ExitCode::SUCCESS) } else { Err(guarantee::ended()) }
@@ -82,7 +82,7 @@ fn certificates(order: &Order, arguments: &MapArguments, proofs: &[Proof], folde
         let overrides = order.variants[number].on_top_of(&arguments.scene.overrides.set);
         let given = Given { title: &order.title, text: &order.text, overrides: &overrides };
         let name = if number == 0 { "certificate.json".to_owned() } else { format!("certificate-{}.json", number + 1) };
-        files.push(write_into(folder, &name, certificate::of_boxes(&given, &[order.x(), order.y()], &boxes)?)?);
+        files.push(write_into(folder, &name, certificate::of_boxes(&given, &[order.x(), order.y()], arguments.every_number, &boxes)?)?);
     }
     Ok(files)
 }
@@ -92,7 +92,7 @@ fn failure(order: &Order, arguments: &MapArguments, variant: usize, error: Proof
 }
 
 /// The answer of `cohaptic stability map --prove --json`.
-fn answer(order: &Order, proofs: &[Proof], halvings: u32, wall_s: f64, files: &[String]) -> impl Serialize {
+fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64, files: &[String]) -> impl Serialize {
     let (x, y) = (order.x(), order.y());
     let regions = proofs.iter().map(|proof| {
         let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| proof.region.share(guarantee));
@@ -123,16 +123,24 @@ fn answer(order: &Order, proofs: &[Proof], halvings: u32, wall_s: f64, files: &[
         y_unit: y.unit.as_str(),
         y_range: [y.low, y.high],
         // How often each range was halved at most.
-        halvings: halvings,
+        halvings: arguments.prove,
+        // For which numbers of equal peers verdicts hold, the end `null` if there is none; absent: for the number of the scene.
+        #[serde(flatten)]
+        every: arguments.every_number.map(|(from, to)| document! { every_number: document! { from: from, to: to } }),
         regions: regions.collect::<Vec<_>>(),
         wall_s: wall_s,
         files: files,
     }
 }
 
-fn describe(order: &Order, proofs: &[Proof], wall_s: f64) -> String {
+fn describe(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64) -> String {
     let percent = |share: f64| format!("{} %", figure(100.0 * share, 4));
     let mut text = format!("{}\n\n", order.title);
+    if let Some((from, to)) = arguments.every_number {
+        let end = to.map_or_else(String::new, |to| format!(" to {to}"));
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "  for every number of equal peers from {from}{}:", if to.is_none() { " on" } else { &end });
+    }
     for (number, proof) in proofs.iter().enumerate() {
         let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| percent(proof.region.share(guarantee)));
         let name = if proofs.len() > 1 { format!("{}: ", proof.name) } else { String::new() };
