@@ -153,7 +153,7 @@ fn figure(work: Work) {
 fn proven(work: Work) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
     let (wall, processor) = (Instant::now(), process_time());
-    let prove = |family: &Family| pool.install(|| ProvenRegion::prove(family, work.halvings, &Unwatched)).expect("a region");
+    let prove = |family: &Family| pool.install(|| ProvenRegion::prove(family, work.halvings, None, &Unwatched)).expect("a region");
     let regions: Vec<ProvenRegion> = figure_3(0).iter().map(prove).collect();
     let (wall, processor) = (wall.elapsed().as_secs_f64(), (process_time() - processor).as_secs_f64());
     let boxes: usize = regions.iter().map(|region| region.attempts).sum();

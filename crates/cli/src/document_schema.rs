@@ -26,6 +26,7 @@ impl DocumentSchema {
     pub(crate) const STABILITY_REGION: Self = Self { name: "cohaptic/stability-region", version: 1 };
     pub(crate) const STABILITY_CERTIFICATE: Self = Self { name: "cohaptic/stability-certificate", version: 1 };
     pub(crate) const STABILITY_NUMBER_CERTIFICATE: Self = Self { name: "cohaptic/stability-number-certificate", version: 1 };
+    pub(crate) const STABILITY_SWITCHING_CERTIFICATE: Self = Self { name: "cohaptic/stability-switching-certificate", version: 1 };
     pub(crate) const ADMITTANCE: Self = Self { name: "cohaptic/admittance", version: 1 };
     pub(crate) const LIVE: Self = Self { name: "cohaptic/live", version: 1 };
     pub(crate) const RELAY: Self = Self { name: "cohaptic/relay", version: 1 };

@@ -331,15 +331,16 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
     Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
 }
 
+/// What a verdict says of contacts that open and close, of which each combination is analysed as if it lasted.
+pub const CHANGES_LEFT_OUT: &str = "changing between them is not covered";
+
 /// What a verdict leaves out, in addition to the notes so far.
 pub(crate) fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
     let mut notes = said.to_vec();
     if combines {
-        notes.push(
-            "the scene is not linear: every combination of its contacts is analysed as if it lasted, and the verdict is that of the worst; changing \
-             between them is not covered"
-                .to_owned(),
-        );
+        notes.push(format!(
+            "the scene is not linear: every combination of its contacts is analysed as if it lasted, and the verdict is that of the worst; {CHANGES_LEFT_OUT}"
+        ));
     }
     if !scene.timeline.is_empty() {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());

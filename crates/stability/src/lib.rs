@@ -59,7 +59,9 @@ mod watch;
 mod worst_case;
 
 pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, PushedAxis, admittance, ideal};
-pub use analysis::{Analysis, ContactMode, Method, UNLOADED, analyse, analyse_loaded, analyse_spinning, analyse_watched, analyse_with};
+pub use analysis::{
+    Analysis, CHANGES_LEFT_OUT, ContactMode, Method, UNLOADED, analyse, analyse_loaded, analyse_spinning, analyse_watched, analyse_with,
+};
 pub use boundary::{Boundary, BoundaryBlock, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use cost::{FrameCost, eigenvalue_operations, full_operations};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
@@ -73,12 +75,12 @@ pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square,
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use proof::{
-    BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, KnownPieces, MOST_FOLLOWED, MOST_HALVINGS, NumberCertificate, NumberSpan,
-    PartCertificate, ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch, SharedProof, prove_every_number,
+    BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, KnownPieces, MOST_FOLLOWED, MOST_HALVINGS, MomentCertificate, NumberCertificate,
+    NumberSpan, PartCertificate, ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch, SharedProof, prove_every_number,
 };
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
-pub use switching::{GrowingMotion, Switching, SwitchingError, SwitchingMotion, prove_switching};
+pub use switching::{GrowingMotion, PushCertificate, Switching, SwitchingCertificate, SwitchingError, SwitchingMotion, prove_switching};
 pub use watch::{Limits, Unwatched, Watch};
 pub use worst_case::{
     Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Links, Pattern, PatternError, Patterns, SceneWorstCase,

@@ -159,6 +159,11 @@ impl Structure {
         }
     }
 
+    /// The largest class with more members than one, the last of those that are as large.
+    pub(crate) fn largest_equal(&self) -> Option<usize> {
+        (0..self.classes.len()).filter(|class| self.apart[*class].is_some()).max_by_key(|class| self.classes[*class].len())
+    }
+
     /// Whether the members of a class have devices that touch nothing.
     pub(crate) fn has_loose_devices(&self, class: usize) -> bool {
         !self.touching[class] && !self.absent[class]

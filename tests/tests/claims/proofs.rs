@@ -29,7 +29,7 @@ fn proven(text: &str) -> ProvenRegion {
     let range = |text: &str| KeyRange::parse(text).unwrap();
     let keys = ["coordination.stiffness=10..1000", "peer.coupling.stiffness=500..6000"].map(range);
     let family = Family::new(text, Path::new("figure.toml"), &[], keys.to_vec()).unwrap();
-    ProvenRegion::prove(&family, 10, &Unwatched).unwrap()
+    ProvenRegion::prove(&family, 10, None, &Unwatched).unwrap()
 }
 
 /// Proves the first region of `region-contains` for these numbers of peers, of peers that touch, and delays \[ms\].
@@ -63,6 +63,6 @@ fn beyond_the_region_boxes_are_unstable() {
     let text = figure(3, 3, true, 8);
     let keys = ["coordination.stiffness=10..4000", "peer.coupling.stiffness=500..6000"].map(|text| KeyRange::parse(text).unwrap());
     let family = Family::new(&text, Path::new("figure.toml"), &[], keys.to_vec()).unwrap();
-    let region = ProvenRegion::prove(&family, 6, &Unwatched).unwrap();
+    let region = ProvenRegion::prove(&family, 6, None, &Unwatched).unwrap();
     assert!(region.share(Guarantee::Stable) < 0.9 && region.share(Guarantee::Unstable) > 0.05, "{}", region.share(Guarantee::Stable));
 }

@@ -47,8 +47,8 @@ pub(crate) struct PointArguments {
     /// The verdict for every number of equal peers too, proven: of those from 2 on, or FROM.., or FROM..TO
     #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, conflicts_with_all = ["graph", "method", "about"])]
     pub(crate) every_number: Option<(u64, Option<u64>)>,
-    /// With --every-number, write a file to check the verdicts by
-    #[arg(long, value_name = "FILE", requires = "every_number")]
+    /// With --every-number or --switching, write a file to check the verdicts by
+    #[arg(long, value_name = "FILE")]
     pub(crate) certificate: Option<PathBuf>,
     /// Whether the scene is stable however its one-sided contacts and walls open and close, proven; or else a motion that grows
     #[arg(long, conflicts_with_all = ["graph", "method", "about"])]
@@ -161,11 +161,14 @@ pub(crate) struct MapArguments {
     /// How many values of each, the ends among them
     #[arg(long, value_name = "WxH", value_parser = GridSize::parse, required_unless_present = "prove")]
     pub(crate) grid: Option<GridSize>,
-    /// In place of a grid, prove the whole region of gains, masses or dampings: boxes that are stable or unstable throughout, and undecided ones with
-    /// sides of the ranges halved this number of times
+    /// In place of a grid, prove boxes of gains, masses, dampings or a delay stable or unstable throughout; sides are halved at most this number of
+    /// times
     #[arg(long, value_name = "HALVINGS", num_args = 0..=1, default_missing_value = "8", conflicts_with = "grid", value_parser = integer::<u32>(0, cohaptic_stability::MOST_HALVINGS.into()))]
     pub(crate) prove: Option<u32>,
-    /// With --prove, write certificate.json for each map into the folder of --out too, to check the verdicts by. Some 15 kB a box
+    /// With --prove, for every number of equal peers from 2 on, or FROM.., or FROM..TO
+    #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, requires = "prove")]
+    pub(crate) every_number: Option<(u64, Option<u64>)>,
+    /// With --prove, write certificate.json for each map into the folder of --out too: some 15 kB a box
     #[arg(long, requires = "prove", requires = "out")]
     pub(crate) certificate: bool,
     /// Another map in the same picture, with these keys overridden too, again and again:
@@ -198,10 +201,10 @@ pub(crate) struct BoundaryArguments {
     /// How exactly a crossing is found, in the unit of the key [default: a billionth of the range; in the mean square a ten-millionth]
     #[arg(long, value_name = "T", value_parser = real, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
-    /// Prove which stretches of a gain, mass or damping are stable and which unstable, and enclose every crossing between them
+    /// Prove which stretches of a gain, mass, damping or delay are stable or unstable, and enclose every crossing
     #[arg(long, conflicts_with = "samples")]
     pub(crate) prove: bool,
-    /// With --prove, write certificate.json into the folder of --out too, to check the verdicts by
+    /// With --prove, write certificate.json into the folder of --out too
     #[arg(long, requires = "prove", requires = "out")]
     pub(crate) certificate: bool,
     /// How many values are looked at first, the ends among them [default: 400]

@@ -1,6 +1,9 @@
 //! Files of certificates: all by which verdicts on sets of scenes can be checked without this program.
 
-use cohaptic_stability::{BoxCertificate, FrameState, FreeCircle, KeyRange, NumberCertificate, PartCertificate};
+use cohaptic_stability::{
+    BoxCertificate, FrameState, FreeCircle, Guarantee, KeyRange, MomentCertificate, NumberCertificate, PartCertificate, Switching,
+    SwitchingCertificate,
+};
 use serde::Serialize;
 
 use crate::document_schema::{DocumentSchema, document};
@@ -14,7 +17,12 @@ pub(super) struct Given<'a> {
 }
 
 /// The text of a certificate of boxes that cover the ranges of keys.
-pub(super) fn of_boxes(given: &Given<'_>, keys: &[&KeyRange], boxes: &[BoxCertificate]) -> Result<String, Failure> {
+pub(super) fn of_boxes(
+    given: &Given<'_>,
+    keys: &[&KeyRange],
+    every: Option<(u64, Option<u64>)>,
+    boxes: &[BoxCertificate],
+) -> Result<String, Failure> {
     written(
         DocumentSchema::STABILITY_CERTIFICATE,
         &document! {
@@ -23,6 +31,9 @@ pub(super) fn of_boxes(given: &Given<'_>, keys: &[&KeyRange], boxes: &[BoxCertif
             overrides: given.overrides,
             keys: keys.iter().map(|range| range.key.as_str()).collect::<Vec<_>>(),
             ranges: keys.iter().map(|range| [range.low, range.high]).collect::<Vec<_>>(),
+            units: keys.iter().map(|range| range.unit.as_str()).collect::<Vec<_>>(),
+            // For which numbers N of equal peers; a box then ends with the range of 1/(N - 1). `null`: for those of the scene.
+            every_number: every.map(|(from, to)| document! { from: from, to: to }),
             boxes: boxes.iter().map(of_box).collect::<Vec<_>>(),
         },
     )
@@ -37,6 +48,8 @@ pub(super) fn of_numbers(given: &Given<'_>, growing: usize, spans: &[NumberCerti
             to: span.to,
             verdict: span.guarantee.word(),
             parts: span.parts.iter().map(of_part).collect::<Vec<_>>(),
+            // In the mean square.
+            moments: span.moments.iter().map(of_moment).collect::<Vec<_>>(),
         }
     });
     written(
@@ -50,6 +63,50 @@ pub(super) fn of_numbers(given: &Given<'_>, growing: usize, spans: &[NumberCerti
             spans: spans.collect::<Vec<_>>(),
         },
     )
+}
+
+/// The text of a certificate of contacts that open and close.
+pub(super) fn of_switching(given: &Given<'_>, found: &Switching) -> Result<String, Failure> {
+    let motions = found.motions.iter().map(|motion| {
+        document! {
+            motion: motion.name.as_str(),
+            // Of a motion that is not proven stable nothing can be checked.
+            verdict: if motion.certificate.is_some() { motion.guarantee.word() } else { Guarantee::Undecided.word() },
+            #[serde(flatten)]
+            proof: motion.certificate.as_ref().map(of_contacts),
+        }
+    });
+    written(
+        DocumentSchema::STABILITY_SWITCHING_CERTIFICATE,
+        &document! {
+            title: given.title,
+            scene: given.text,
+            overrides: given.overrides,
+            motions: motions.collect::<Vec<_>>(),
+        },
+    )
+}
+
+fn of_contacts(of: &SwitchingCertificate) -> impl Serialize + use<'_> {
+    let parts = of.parts.iter().map(|part| {
+        document! {
+            members: part.members.as_slice(),
+            difference: part.is_difference,
+            states: part.states.iter().map(of_state).collect::<Vec<_>>(),
+            shape: part.shape.as_str(),
+        }
+    });
+    document! {
+        axis: of.axis,
+        // By which the form shrinks in a frame at least.
+        factor: of.factor,
+        time: of.time,
+        heard: of.heard.map(|gains| [gains.stiffness, gains.damping]),
+        parts: parts.collect::<Vec<_>>(),
+        // How the members of classes without contacts differ.
+        rest: of.rest.iter().map(of_part).collect::<Vec<_>>(),
+        multipliers: of.multipliers.as_str(),
+    }
 }
 
 fn written(schema: DocumentSchema, document: &impl Serialize) -> Result<String, Failure> {
@@ -82,6 +139,19 @@ fn of_part(part: &PartCertificate) -> impl Serialize {
         coordinates: part.coordinates.as_str(),
         weights: part.weights.as_str(),
         circle: circle,
+    }
+}
+
+fn of_moment(moment: &MomentCertificate) -> impl Serialize {
+    document! {
+        // The moment grows by less than this in a frame if it is stable, and by this at least if it is not.
+        factor: moment.factor,
+        time: moment.time,
+        heard: moment.heard.map(|gains| [gains.stiffness, gains.damping]),
+        // How many samples of frames before take part.
+        depth: moment.depth,
+        // Of the mean of all peers, of differences from it, and of what is left of samples held.
+        blocks: moment.blocks.as_slice(),
     }
 }
 

@@ -51,6 +51,7 @@ mod shards;
 mod stability_boundary;
 mod stability_certificates;
 mod stability_chance;
+mod stability_claims;
 mod stability_map;
 mod stability_point;
 mod stability_proofs;

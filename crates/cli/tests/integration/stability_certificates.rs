@@ -29,13 +29,13 @@ peers = [
 link = { delay = "13ms" }
 "#;
 
-fn check(desk: &Desk, file: &str) -> Output {
+pub(crate) fn check(desk: &Desk, file: &str) -> Output {
     let program = concat!(env!("CARGO_MANIFEST_DIR"), "/../stability/tests/reference/check_certificate.py");
     Command::new("python3").arg(program).arg(desk.path(file)).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap()
 }
 
 /// Whether there is a Python that can check; says so if there is none.
-fn can_check() -> bool {
+pub(crate) fn can_check() -> bool {
     let can = Command::new("python3").args(["-c", "import tomllib"]).output().is_ok_and(|output| output.status.success());
     if !can {
         eprintln!("skipped: no python3 of version 3.11 or later was found");
@@ -101,6 +101,9 @@ fn certificates_of_lines_and_numbers_hold_too() {
         ),
         (UNEQUAL, "--set object.split-mass=false", false),
         (UNEQUAL, "--set object.damping=0 --set peer.coupling.scaling=inverse-n", false),
+        // A divided mass with damping: its step maps have four coefficients that vary.
+        (EQUAL, "--set coordination.strategy=average-position", false),
+        (UNEQUAL, "--set object.damping=2", false),
     ] {
         let desk = Desk::with("scene.toml", scene);
         let document = desk.json(&format!("stability point scene.toml {options} --every-number --certificate numbers.json --json"));
@@ -115,6 +118,97 @@ fn certificates_of_lines_and_numbers_hold_too() {
         }
         let last = spans.last().unwrap();
         assert!(!without_end || text.contains(&format!("{} from {} on", last["verdict"].as_str().unwrap(), last["from"])), "{options}: {text}");
+    }
+}
+
+/// In the mean square the same checker follows second moments, and of contacts quadratic forms.
+#[test]
+fn certificates_of_moments_and_of_contacts_hold_too() {
+    if !can_check() {
+        return;
+    }
+    let desk = Desk::with("scene.toml", EQUAL);
+    for (options, words) in [
+        ("--set coordination.strategy=average-position --set object.split-mass=false --set link.loss=20%", "stable from 3 on"),
+        ("--set object.split-mass=false --set link.loss=10%", "unstable from"),
+    ] {
+        desk.text(&format!("stability point scene.toml {options} --every-number --certificate numbers.json"));
+        let output = check(&desk, "numbers.json");
+        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+        assert!(output.status.success() && text.contains(words), "{options}: {text}{refusal}");
+    }
+    let push = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/network/push-contact.toml");
+    desk.text(&format!("stability point {push} --switching --certificate contacts.json"));
+    let output = check(&desk, "contacts.json");
+    let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert!(output.status.success() && text.contains("contacts that open and close: stable"), "{text}{refusal}");
+}
+
+/// Moments and forms that show something else are refused.
+#[test]
+fn certificates_of_moments_and_of_contacts_that_say_more_than_they_show_are_refused() {
+    if !can_check() {
+        return;
+    }
+    let desk = Desk::with("scene.toml", EQUAL);
+    desk.text("stability point scene.toml --set coordination.strategy=average-position --set object.split-mass=false --set link.loss=20% --every-number 3..9 --certificate numbers.json");
+    let push = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/network/push-contact.toml");
+    desk.text(&format!("stability point {push} --switching --certificate contacts.json"));
+    let [numbers, contacts] = ["numbers.json", "contacts.json"].map(|file| serde_json::from_str::<Value>(&desk.read(file)).unwrap());
+    let scene = |whole: &Value, from: &str, to: &str| {
+        let text = whole["scene"].as_str().unwrap();
+        assert!(text.contains(from), "{from}");
+        Value::from(text.replace(from, to))
+    };
+    let half = |digits: &Value| Value::from(digits.as_str().unwrap()[..16].to_owned());
+    let changes = [
+        (&numbers, "/spans/0/verdict", "unstable".into(), "something else"),
+        (&numbers, "/spans/0/moments/0/factor", 1.5.into(), "something else"),
+        (&numbers, "/spans/0/moments/0/factor", 0.05.into(), "leaves more"),
+        (&numbers, "/spans/0/moments/0/blocks/0", half(&numbers["spans"][0]["moments"][0]["blocks"][0]), "expected a moment"),
+        (&numbers, "/scene", scene(&numbers, "stiffness = 1000.0", "stiffness = 60000.0"), "leaves more"),
+        (&contacts, "/motions/0/factor", 0.2.into(), "not shown to fall"),
+        (&contacts, "/motions/0/multipliers", half(&contacts["motions"][0]["multipliers"]), "another size"),
+        (&contacts, "/motions/0/rest", Value::Array(Vec::new()), "missing"),
+        (&contacts, "/motions/0/parts", Value::Array(Vec::new()), "missing"),
+        (&contacts, "/scene", scene(&contacts, "stiffness = 3500.0", "stiffness = 350000.0"), "not shown to fall|not dominant"),
+        (&contacts, "/scene", scene(&contacts, "mass = 0.1", "mass = 0.001"), "not shown to fall|not dominant"),
+    ];
+    for (whole, place, value, words) in changes {
+        let mut changed = whole.clone();
+        *changed.pointer_mut(place).unwrap() = value;
+        desk.write("changed.json", changed.to_string());
+        let output = check(&desk, "changed.json");
+        let refusal = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");
+    }
+}
+
+/// Delays and numbers of peers as sides of boxes.
+#[test]
+fn certificates_of_delays_and_of_every_number_hold_too() {
+    if !can_check() {
+        return;
+    }
+    let desk = Desk::with("scene.toml", EQUAL);
+    for (command, words) in [
+        ("map scene.toml --x link.delay=0ms..6ms --y coordination.stiffness=100..4000 --prove 4", "stable "),
+        ("boundary scene.toml --along link.delay=0ms..20ms --prove", "undecided 0.000 %"),
+        (
+            "map scene.toml --x coordination.stiffness=100..2000 --y coordination.damping=0..20 --prove 4 --every-number 3.. --set object.split-mass=false --set coordination.strategy=average-position",
+            "stable ",
+        ),
+    ] {
+        desk.text(&format!("stability {command} --certificate --out out"));
+        let output = check(&desk, "out/certificate.json");
+        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+        assert!(output.status.success() && text.contains(words), "{command}: {text}{refusal}");
+        let whole: Value = serde_json::from_str(&desk.read("out/certificate.json")).unwrap();
+        let mut fewer = whole.clone();
+        fewer["boxes"].as_array_mut().unwrap().remove(0);
+        desk.write("changed.json", fewer.to_string());
+        let refusal = String::from_utf8(check(&desk, "changed.json").stderr).unwrap();
+        assert!(["left out", "nothing covers"].iter().any(|words| refusal.contains(words)), "{command}: {refusal}");
     }
 }
 

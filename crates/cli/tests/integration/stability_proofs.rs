@@ -94,6 +94,41 @@ fn a_line_encloses_the_crossings_of_the_search() {
     assert!(text.contains("  crossing:  from coordination.stiffness=") && text.contains("nothing crosses anywhere else"), "{text}");
 }
 
+/// A delay is divided where a sample comes into force at another tick: single delays within say what its pieces say.
+#[test]
+fn delays_are_proven_tick_by_tick() {
+    let desk = Desk::with("equal.toml", EQUAL);
+    let set = "--set coordination.stiffness=2000";
+    let proven = desk.json(&format!("stability boundary equal.toml --along link.delay=0ms..30ms {set} --prove --json"));
+    let stretches = proven["stretches"].as_array().unwrap();
+    let ends = |stretch: &serde_json::Value| ["low", "high"].map(|end| stretch[end].as_f64().unwrap());
+    assert!(stretches.len() > 1 && stretches.iter().all(|stretch| stretch["verdict"] != "undecided"), "{proven:#}");
+    assert!(stretches.iter().all(|stretch| ends(stretch)[1].fract() == 0.0), "{proven:#}");
+    for stretch in stretches {
+        for value in ends(stretch) {
+            let single = desk.json(&format!("stability point equal.toml --json {set} --set link.delay={value:?}ms"));
+            assert_eq!(single["verdict"], stretch["verdict"], "{value} {stretch}");
+        }
+    }
+    let region = desk.json("stability map equal.toml --x link.delay=0ms..4ms --y coordination.stiffness=100..6000 --prove 4 --json --out out");
+    let stable = region["regions"][0]["stable"].as_f64().unwrap();
+    assert!(stable > 0.1 && stable < 1.0, "{region:#}");
+}
+
+/// A box for every number of peers is one for each of them.
+#[test]
+fn a_region_of_every_number_holds_each_number() {
+    let desk = Desk::with("equal.toml", EQUAL);
+    let average = "--set coordination.strategy=average-position --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --prove 5";
+    let share = |rest: &str| desk.json(&format!("stability map equal.toml {average} --json {rest}"))["regions"][0]["stable"].as_f64().unwrap();
+    let every = share("--every-number 3..");
+    assert!(every > 0.1, "{every}");
+    for count in [3, 4, 9, 50] {
+        let one = share(&format!("--set scene.count={count}"));
+        assert!(one >= every - 0.02, "{count}: {one} {every}");
+    }
+}
+
 #[test]
 fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
     let desk = Desk::with("equal.toml", EQUAL);
@@ -102,10 +137,14 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
         ("stability point equal.toml --every-number 9..8", "the smaller number comes first"),
         ("stability point equal.toml --every-number some", "expected FROM.. or FROM..TO"),
         ("stability point equal.toml --every-number --set link.loss=5% --set peers.peer1.contact=none", "leave something to chance"),
-        ("stability point equal.toml --every-number --set link.loss=5% --certificate numbers.json", "has no certificate"),
-        ("stability point equal.toml --certificate numbers.json", "--every-number"),
-        ("stability map equal.toml --x link.delay=0ms..9ms --y coordination.damping=0..9 --prove", "link.delay does more than to set"),
-        ("stability boundary equal.toml --along link.delay=0ms..9ms --prove", "link.delay does more than to set"),
+        ("stability point equal.toml --certificate numbers.json", "expected --every-number or --switching"),
+        (
+            "stability map equal.toml --x coordination.update=1ms..9ms --y coordination.damping=0..9 --prove",
+            "coordination.update does more than to set",
+        ),
+        ("stability boundary equal.toml --along coordination.update=1ms..9ms --prove", "coordination.update does more than to set"),
+        ("stability map equal.toml --x object.mass=1..2 --y coordination.damping=0..9 --prove --every-number", "depend on the number of peers"),
+        ("stability map equal.toml --x object.mass=1..2 --y coordination.damping=0..9 --grid 2x2 --every-number", "--prove"),
         ("stability map equal.toml --x link.loss=0%..9% --y coordination.damping=0..9 --prove", "link.loss does more than to set"),
         ("stability map equal.toml --x object.mass=1..2 --y coordination.damping=0..9", "--grid"),
         ("stability map equal.toml --x object.mass=1..2 --y coordination.damping=0..9 --prove --grid 2x2", "cannot be used with"),

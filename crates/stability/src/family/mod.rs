@@ -126,14 +126,15 @@ impl Family {
         Ok(Scene::parse(&self.text, &self.file, &overrides)?)
     }
 
-    /// The scene with those values of its keys, all of which are learned: of equal peers the first alone has them.
+    /// The scene with those values of its keys: of equal peers the first alone has those that are learned.
     pub(crate) fn written(&self, values: &[f64]) -> Result<Scene, FamilyError> {
         let prepared = self.prepared(values)?;
         if !prepared.is_varied() {
             return self.scene(values);
         }
         let mut scene = prepared.scene.clone();
-        prepared.write(values, &mut scene);
+        let learned: Vec<f64> = values.iter().zip(&self.learned).filter(|(_, learned)| **learned).map(|(value, _)| *value).collect();
+        prepared.write(&learned, &mut scene);
         Ok(scene)
     }
 

@@ -38,7 +38,7 @@ pub(crate) use self::equal::{Equal, EqualScratch};
 use self::law::{LinkLaw, is_random};
 use self::positive::{Positive, radius_watched};
 use self::symmetric::Symmetric;
-use crate::analysis::{Combination, UNLOADED, pairs};
+use crate::analysis::{CHANGES_LEFT_OUT, Combination, UNLOADED, pairs};
 use crate::cost::PASSES;
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
@@ -154,7 +154,7 @@ pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSqu
         });
     }
     if combines {
-        notes.push("every combination of contacts is analysed as if it lasted; changing between them is not covered".to_owned());
+        notes.push(format!("every combination of contacts is analysed as if it lasted; {CHANGES_LEFT_OUT}"));
     }
     if !scene.timeline.is_empty() {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());

@@ -11,16 +11,23 @@ use super::corners::States;
 use super::discs::{FreeCircle, Witness};
 use super::steps::FrameState;
 use super::{Guarantee, Proven};
+use crate::Matrix;
 
 /// A box of keys, and the numbers by which its verdict can be checked.
 #[derive(Clone, Debug)]
 pub struct BoxCertificate {
-    /// From which value of each key to which.
+    /// From which value of each key to which; and between which ends 1/(N − 1) is, where it holds for every number N of peers between them.
     pub ranges: Vec<[f64; 2]>,
     /// The verdict on each scene within.
     pub guarantee: Guarantee,
     /// Of a stable box all parts of the motion but devices that touch nothing; of an unstable one the part that grows; else none.
     pub parts: Vec<PartCertificate>,
+}
+
+impl BoxCertificate {
+    pub(super) fn new(ranges: Vec<[f64; 2]>, proven: Proven, parts: Vec<(Proven, PartCertificate)>) -> Self {
+        Self { ranges, guarantee: proven.into(), parts: needed(Some(proven), parts) }
+    }
 }
 
 /// Numbers of equal peers, and the numbers by which the verdict on them can be checked.
@@ -32,8 +39,25 @@ pub struct NumberCertificate {
     pub to: Option<u64>,
     /// The verdict on each.
     pub guarantee: Guarantee,
-    /// As those of [`BoxCertificate`].
+    /// As those of [`BoxCertificate`]; empty in the mean square.
     pub parts: Vec<PartCertificate>,
+    /// In the mean square, of a stable span one for each motion; of an unstable one that which grows; else none.
+    pub moments: Vec<MomentCertificate>,
+}
+
+/// A second moment Y of equal peers by which (γ·Y − L(Y)) can be checked to be positive definite for all numbers of a span.
+#[derive(Clone, Debug)]
+pub struct MomentCertificate {
+    /// γ.
+    pub factor: f64,
+    /// What velocities are multiplied by \[s\].
+    pub time: f64,
+    /// The gains K and B by which a sample is the one number (K·x + B·v)/(K + B/time).
+    pub heard: Option<Gains>,
+    /// How many samples of frames before take part.
+    pub depth: usize,
+    /// Y of the mean over the peers, of the differences from it, and of samples of which all sums are zero: row by row, in digits as those of [`PartCertificate`].
+    pub blocks: [String; 3],
 }
 
 /// Parts of a scene with their verdicts, where they are asked for.
@@ -48,8 +72,15 @@ pub(super) fn needed(verdict: Option<Proven>, mut parts: Vec<(Proven, PartCertif
     parts.into_iter().map(|(_, part)| part).collect()
 }
 
+impl MomentCertificate {
+    pub(super) fn new(factor: f64, time: f64, heard: Option<Gains>, depth: usize, blocks: [&Matrix; 3]) -> Self {
+        let rows = |block: &Matrix| digits((0..block.rows()).flat_map(|row| block.row(row).to_vec()));
+        Self { factor, time, heard, depth, blocks: blocks.map(rows) }
+    }
+}
+
 /// A part of the motion of a scene over a box: the averages of its classes of equal peers, or how the members of one of them differ.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct PartCertificate {
     /// The members of each class, by their places in the scene.
     pub members: Vec<Vec<usize>>,
@@ -79,7 +110,8 @@ impl PartCertificate {
     }
 }
 
-fn digits(numbers: impl Iterator<Item = f64>) -> String {
+/// Each number as sixteen hexadecimal digits of its IEEE 754 representation.
+pub(crate) fn digits(numbers: impl Iterator<Item = f64>) -> String {
     let mut text = String::new();
     for number in numbers {
         // Writing to a string does not fail.

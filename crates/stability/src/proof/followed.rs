@@ -1,11 +1,13 @@
-//! A family of scenes with open keys, and the verdict on all of them in a box of values.
+//! A family of scenes with open keys, and the verdict on all of them in a box of values; and for every number of equal peers too, where that is asked for.
 
 use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
-use super::certificate::{BoxCertificate, Certified, PartCertificate, needed};
-use super::corners::{Common, Point, states, steps};
+use super::certificate::{BoxCertificate, Certified, PartCertificate};
+use super::corners::{Common, Point, doubled, states, steps};
+use super::delays;
 use super::discs::decide;
+use super::growing::{ENDLESS, nu, weights_of_growing};
 use super::span::StepSpan;
 use super::{Guarantee, ProofError, Proven};
 use crate::analysis::pairs;
@@ -23,56 +25,149 @@ pub(super) struct Motion {
     /// Which of the pieces of a scene it is.
     piece: usize,
     pub(super) structure: Structure,
+    /// The class that grows, where a verdict is asked for every number of peers.
+    growing: Option<usize>,
 }
 
-/// A family whose keys do nothing but set gains, masses and dampings, and its motions.
-pub(super) struct Followed<'a> {
-    family: &'a Family,
+/// Values of a delay between which no frame differs, and its motions. Without a delay among the keys there is one stretch.
+pub(super) struct Stretch {
+    /// From which value of the delay to which.
+    range: Option<[f64; 2]>,
     pub(super) motions: Vec<Motion>,
 }
 
+/// A family whose keys do nothing but set gains, masses and dampings, but for one that may be a delay, and its motions.
+pub(super) struct Followed<'a> {
+    family: &'a Family,
+    /// The key that is a delay.
+    delay: Option<usize>,
+    pub(super) stretches: Vec<Stretch>,
+    /// Between which ends 1/(N − 1) is, where a verdict is asked for every number N of peers.
+    numbers: Option<[f64; 2]>,
+}
+
+/// Where one box of numbers of peers decides nothing, it is halved this number of times at most.
+const HALVINGS: u32 = 3;
+
 impl<'a> Followed<'a> {
-    pub(super) fn new(family: &'a Family) -> Result<Self, ProofError> {
+    /// `every`: from which number of equal peers on, and to which, a verdict shall hold; `None`: for the number that the scene has.
+    pub(super) fn new(family: &'a Family, every: Option<(u64, Option<u64>)>) -> Result<Self, ProofError> {
         let keys = family.keys();
-        if let Some(place) = family.learned().iter().position(|learned| !learned) {
-            return Err(ProofError::Key { key: keys[place].key.clone() });
+        let mut unlearned = (0..keys.len()).filter(|key| !family.learned()[*key]);
+        let delay = unlearned.next();
+        if let Some(other) = unlearned.next() {
+            return Err(ProofError::Key { key: keys[other].key.clone() });
         }
-        let at = |value: &dyn Fn(usize) -> f64| family.scene(&(0..keys.len()).map(value).collect::<Vec<f64>>());
-        // Values inside tell peers apart that are equal by chance at an end.
-        let scenes = [at(&|key| keys[key].odd(key))?, at(&|key| keys[key].low)?, at(&|key| keys[key].high)?];
-        scenes.iter().try_for_each(super::refuse)?;
-        let all = scenes.iter().map(|scene| pieces(scene, "a proof")).collect::<Result<Vec<_>, _>>()?;
-        let network = NominalNetwork::of(&scenes[0])?;
-        let mut motions = Vec::new();
-        for (piece, first) in all[0].iter().enumerate() {
-            let of_piece: Vec<&Scene> = all.iter().filter_map(|pieces| pieces.get(piece)).map(|piece| &*piece.scene).collect();
-            for (_, combination) in pairs(std::slice::from_ref(first), &mut false)? {
-                motions.push(Motion { piece, structure: Structure::of(&of_piece, &network, &combination.contacts)? });
+        let numbers = every.map(|(from, to)| [to.map_or(0.0, nu), nu(from)]);
+        let of = |delayed: Option<f64>| motions(family, delay.zip(delayed), every);
+        let Some(place) = delay else {
+            return Ok(Self { family, delay, stretches: vec![Stretch { range: None, motions: of(None)? }], numbers });
+        };
+        let lows: Vec<f64> = keys.iter().map(|key| key.low).collect();
+        let first = family.scene(&lows)?;
+        let frame = |value: f64| {
+            let mut values = lows.clone();
+            values[place] = value;
+            let scene = family.scene(&values)?;
+            if !delays::differ_in_delays_alone(&first, &scene) {
+                return Err(ProofError::Key { key: keys[place].key.clone() });
             }
-        }
-        Ok(Self { family, motions })
+            let motions = motions(family, Some((place, value)), every)?;
+            let all = pieces(&scene, "a proof")?;
+            let of = |motion: &Motion| {
+                let nodes = all.get(motion.piece).map(|piece| motion.structure.nodes(&piece.scene));
+                format!("{:?} {nodes:?}", motion.structure)
+            };
+            Ok(motions.iter().map(of).collect::<String>())
+        };
+        let found = delays::stretches(&keys[place], frame)?;
+        let stretch = |range: [f64; 2]| Ok::<_, ProofError>(Stretch { range: Some(range), motions: of(Some(range[0]))? });
+        Ok(Self { family, delay, stretches: found.into_iter().map(stretch).collect::<Result<_, _>>()?, numbers })
+    }
+
+    /// The boxes of values with which a proof begins: a key that is a delay is divided into stretches.
+    pub(super) fn beginnings(&self) -> Vec<Vec<[f64; 2]>> {
+        let whole: Vec<[f64; 2]> = self.family.keys().iter().map(|key| [key.low, key.high]).collect();
+        let of = |stretch: &Stretch| {
+            let mut ranges = whole.clone();
+            if let Some((place, range)) = self.delay.zip(stretch.range) {
+                ranges[place] = range;
+            }
+            ranges
+        };
+        self.stretches.iter().map(of).collect()
+    }
+
+    /// The key that is a delay, which is not divided further.
+    pub(super) fn delay(&self) -> Option<usize> {
+        self.delay
     }
 
     /// What all scenes of a box have in common, from one value to another of each key, if that is proven.
     pub(super) fn decide(&self, ranges: &[[f64; 2]]) -> Result<Option<Proven>, ProofError> {
-        self.decide_with(ranges, None)
+        match self.numbers {
+            None => self.decide_at(ranges, None, None),
+            Some(numbers) => self.decide_over(ranges, numbers, HALVINGS, None),
+        }
     }
 
-    /// The verdict on a box with all by which it can be checked; `None` if there is none.
-    pub(super) fn certify(&self, ranges: &[[f64; 2]]) -> Result<Option<BoxCertificate>, ProofError> {
+    /// The verdict on a box with all by which it can be checked, in one piece or one for each part of the numbers of peers; nothing if there is none.
+    pub(super) fn certify(&self, ranges: &[[f64; 2]]) -> Result<Vec<BoxCertificate>, ProofError> {
+        let mut found = Vec::new();
+        let Some(numbers) = self.numbers else {
+            let mut parts = Vec::new();
+            let proven = self.decide_at(ranges, None, Some(&mut parts))?;
+            found.extend(proven.map(|proven| BoxCertificate::new(ranges.to_vec(), proven, parts)));
+            return Ok(found);
+        };
+        if self.decide_over(ranges, numbers, HALVINGS, Some(&mut found))?.is_none() {
+            found.clear();
+        }
+        Ok(found)
+    }
+
+    /// A box with all numbers of peers for which none is decided.
+    fn open(&self, mut ranges: Vec<[f64; 2]>) -> BoxCertificate {
+        ranges.extend(self.numbers);
+        BoxCertificate { ranges, guarantee: Guarantee::Undecided, parts: Vec::new() }
+    }
+
+    /// The verdict that holds between two ends of 1/(N − 1).
+    fn decide_over(
+        &self,
+        ranges: &[[f64; 2]],
+        [low, high]: [f64; 2],
+        halvings: u32,
+        mut certified: Option<&mut Vec<BoxCertificate>>,
+    ) -> Result<Option<Proven>, ProofError> {
         let mut parts = Vec::new();
-        let Some(proven) = self.decide_with(ranges, Some(&mut parts))? else { return Ok(None) };
-        Ok(Some(BoxCertificate { ranges: ranges.to_vec(), guarantee: proven.into(), parts: needed(Some(proven), parts) }))
+        if let Some(proven) = self.decide_at(ranges, Some([low, high]), certified.is_some().then_some(&mut parts))? {
+            if let Some(certified) = certified {
+                certified.push(BoxCertificate::new(ranges.iter().copied().chain([[low, high]]).collect(), proven, parts));
+            }
+            return Ok(Some(proven));
+        }
+        let middle = low.midpoint(high);
+        if halvings == 0 || !(low < middle && middle < high) {
+            return Ok(None);
+        }
+        let Some(near) = self.decide_over(ranges, [low, middle], halvings - 1, certified.as_deref_mut())? else { return Ok(None) };
+        Ok(self.decide_over(ranges, [middle, high], halvings - 1, certified)?.filter(|far| *far == near))
     }
 
-    fn decide_with(&self, ranges: &[[f64; 2]], mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
-        let corner = |place: usize| ranges.iter().enumerate().map(|(key, range)| range[place >> key & 1]).collect::<Vec<f64>>();
-        let scenes = (0..1 << ranges.len()).map(|place| self.family.written(&corner(place))).collect::<Result<Vec<Scene>, FamilyError>>()?;
+    fn decide_at(&self, ranges: &[[f64; 2]], numbers: Option<[f64; 2]>, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
+        let stretch = self.delay.map_or(0, |key| self.stretches.iter().position(|one| one.range == Some(ranges[key])).unwrap_or(0));
+        let free: Vec<usize> = (0..ranges.len()).filter(|key| self.delay != Some(*key)).collect();
+        let corner = |place: usize| {
+            let upper = |key: usize| free.iter().position(|own| *own == key).is_some_and(|bit| place >> bit & 1 == 1);
+            ranges.iter().enumerate().map(|(key, range)| range[usize::from(upper(key))]).collect::<Vec<f64>>()
+        };
+        let scenes = (0..1 << free.len()).map(|place| self.family.written(&corner(place))).collect::<Result<Vec<Scene>, FamilyError>>()?;
         let all = scenes.iter().map(|scene| pieces(scene, "a proof")).collect::<Result<Vec<_>, _>>()?;
         let mut proven = Some(Proven::Stable);
-        for motion in &self.motions {
+        for motion in &self.stretches[stretch].motions {
             let scenes: Vec<&Scene> = all.iter().filter_map(|pieces| pieces.get(motion.piece)).map(|piece| &*piece.scene).collect();
-            match motion.decide(&scenes, certified.as_deref_mut())? {
+            match motion.decide(&scenes, numbers, certified.as_deref_mut())? {
                 // One motion that grows is enough.
                 Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
                 Some(Proven::Stable) => {}
@@ -83,30 +178,72 @@ impl<'a> Followed<'a> {
     }
 }
 
+/// The motions of a family for one value of its delay, if it has one.
+fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, Option<u64>)>) -> Result<Vec<Motion>, ProofError> {
+    let keys = family.keys();
+    let at = |value: &dyn Fn(usize) -> f64| {
+        let of = |key: usize| delayed.filter(|(place, _)| *place == key).map_or_else(|| value(key), |(_, delay)| delay);
+        family.scene(&(0..keys.len()).map(of).collect::<Vec<f64>>())
+    };
+    // Values inside tell peers apart that are equal by chance at an end.
+    let scenes = [at(&|key| keys[key].odd(key))?, at(&|key| keys[key].low)?, at(&|key| keys[key].high)?];
+    scenes.iter().try_for_each(super::refuse)?;
+    let all = scenes.iter().map(|scene| pieces(scene, "a proof")).collect::<Result<Vec<_>, _>>()?;
+    let network = NominalNetwork::of(&scenes[0])?;
+    let mut motions = Vec::new();
+    for (piece, first) in all[0].iter().enumerate() {
+        let of_piece: Vec<&Scene> = all.iter().filter_map(|pieces| pieces.get(piece)).map(|piece| &*piece.scene).collect();
+        for (_, combination) in pairs(std::slice::from_ref(first), &mut false)? {
+            let structure = Structure::of(&of_piece, &network, &combination.contacts)?;
+            let growing = every.map(|(from, _)| growing(&structure, &of_piece, from)).transpose()?;
+            motions.push(Motion { piece, structure, growing });
+        }
+    }
+    Ok(motions)
+}
+
+/// The class that grows, if nothing but the weights depends on how many peers there are.
+fn growing(structure: &Structure, scenes: &[&Scene], from: u64) -> Result<usize, ProofError> {
+    let growing = structure.largest_equal().ok_or(ProofError::Unequal)?;
+    let least = (structure.peers - structure.classes[growing].len() + 2) as u64;
+    if from < least {
+        return Err(ProofError::Fewer { least });
+    }
+    let of = |scene: &Scene, number: u64| structure.nodes(&scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX)));
+    let is_same = |scene: &&Scene| [from, 2 * from, ENDLESS].iter().all(|number| of(scene, *number) == structure.nodes(scene));
+    if scenes.iter().all(is_same) { Ok(growing) } else { Err(ProofError::Scaled) }
+}
+
 /// Boxes of a family with all by which their verdicts can be checked. A box is an operation of the watch, which may end it.
-pub(super) fn certify(family: &Family, boxes: Vec<Vec<[f64; 2]>>, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
-    let followed = Followed::new(family)?;
+pub(super) fn certify(
+    family: &Family,
+    every: Option<(u64, Option<u64>)>,
+    boxes: Vec<Vec<[f64; 2]>>,
+    watch: &dyn Watch,
+) -> Result<Vec<BoxCertificate>, ProofError> {
+    let followed = Followed::new(family, every)?;
     watch.expects(real(boxes.len()));
     let certificates = boxes.into_par_iter().map(|ranges| {
         if watch.stops() {
             return Err(ProofError::Analysis(AnalysisError::Stopped));
         }
         watch.done(1.0);
-        Ok(followed.certify(&ranges)?.unwrap_or(BoxCertificate { ranges, guarantee: Guarantee::Undecided, parts: Vec::new() }))
+        let found = followed.certify(&ranges)?;
+        Ok(if found.is_empty() { vec![followed.open(ranges)] } else { found })
     });
-    certificates.collect()
+    Ok(certificates.collect::<Result<Vec<_>, _>>()?.concat())
 }
 
 impl Motion {
-    /// The verdict on the motion between scenes, the corners of a box, and the certificates of its parts where they are asked for.
-    fn decide(&self, scenes: &[&Scene], mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
+    /// The verdict on the motion between scenes, the corners of a box, and the certificates of its parts where they are asked for. `numbers`: between which ends 1/(N − 1) is.
+    fn decide(&self, scenes: &[&Scene], numbers: Option<[f64; 2]>, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let structure = &self.structure;
         let nodes: Vec<_> = scenes.iter().map(|scene| structure.nodes(scene)).collect();
         let time = structure.time(scenes[0], &nodes[0]);
-        let mut of = |apart: Option<usize>, weights: &Matrix, timetable: &Timetable, tied: bool| {
+        let mut of = |apart: Option<usize>, timetable: &Timetable, tied: bool| {
             let classes = apart.map_or(0..structure.classes.len(), |class| class..class + 1);
             let ends: Vec<Vec<Node>> = nodes.iter().map(|nodes| nodes[classes.clone()].to_vec()).collect();
-            let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone() }).collect();
+            let points = self.points(&ends, numbers, apart);
             let common = Common { timetable, tied, time };
             let Some(decision) = decide(&StepSpan::product(&steps(&points, &ends, common)?)) else { return Ok(None) };
             if let Some(certified) = certified.as_deref_mut() {
@@ -126,8 +263,7 @@ impl Motion {
         };
         for class in 0..structure.classes.len() {
             if let Some(timetable) = &structure.apart[class] {
-                let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-                add(of(Some(class), &weight, timetable, true)?);
+                add(of(Some(class), timetable, true)?);
             }
             let radii: Vec<_> = scenes.iter().filter_map(|scene| alone(structure, scene, class, 1)).map(|(part, _)| part.radius).collect();
             if let Some(first) = radii.first() {
@@ -135,7 +271,22 @@ impl Motion {
                 add((is_one && first.verdict() == Verdict::Stable).then_some(Proven::Stable));
             }
         }
-        add(of(None, &structure.weights, &structure.timetable, structure.tied)?);
+        add(of(None, &structure.timetable, structure.tied)?);
         Ok(proven)
+    }
+
+    /// The corners of a box, for the averages of classes or for differences within one. Weights are affine in 1/(N − 1), which is one number more unless they stay.
+    fn points(&self, ends: &[Vec<Node>], numbers: Option<[f64; 2]>, apart: Option<usize>) -> Vec<Point> {
+        let structure = &self.structure;
+        let Some((growing, numbers)) = self.growing.zip(numbers) else {
+            let weights = apart.map_or_else(|| structure.weights.clone(), |_| Matrix::from_fn(1, 1, |_, _| structure.difference_weight()));
+            return ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone() }).collect();
+        };
+        let weights = numbers.map(|nu| weights_of_growing(structure, growing, nu, apart.is_some()));
+        let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights[0].clone() }).collect();
+        if weights[0] == weights[1] {
+            return points;
+        }
+        doubled(&points, |point, upper| Point { weights: weights[usize::from(upper)].clone(), ..point.clone() })
     }
 }

@@ -28,6 +28,9 @@ use crate::{Matrix, Verdict};
 /// As good as without end: a weight of 1/(N − 1) is below a rounding.
 pub(super) const ENDLESS: u64 = 1 << 53;
 
+/// Where a verdict is to be checked, what is enclosed is this number of times as wide: the checker encloses with wider intervals than the prover.
+const WIDER: f64 = 8.0;
+
 /// A motion of the scene, in one combination of contacts: its classes, of which one grows.
 pub(super) struct Motion {
     pub(super) scene: Scene,
@@ -53,11 +56,7 @@ impl Growing {
         let (mut motions, mut least, mut first) = (Vec::new(), 2, 0);
         for (piece, combination) in pairs(&all, &mut false)? {
             let structure = Structure::of(&[&*piece.scene], network, &combination.contacts)?;
-            let Some(growing) =
-                (0..structure.classes.len()).filter(|class| structure.apart[*class].is_some()).max_by_key(|class| structure.classes[*class].len())
-            else {
-                return Err(ProofError::Unequal);
-            };
+            let growing = structure.largest_equal().ok_or(ProofError::Unequal)?;
             for class in 0..structure.classes.len() {
                 // It does not depend on N.
                 if alone(&structure, &piece.scene, class, 1).is_some_and(|(part, _)| part.radius.verdict() != Verdict::Stable) {
@@ -205,13 +204,6 @@ impl Motion {
         number.saturating_sub((self.structure.peers - self.structure.classes[self.growing].len()) as u64)
     }
 
-    /// The weight of the average of a class (column) in the target of a class (row): a constant, and a multiple of ν.
-    fn weight(&self, row: usize, column: usize) -> (f64, f64) {
-        let classes = &self.structure.classes;
-        let (own, others) = (f64::from(u8::from(row == column)), count(self.structure.peers - classes[self.growing].len()));
-        if column == self.growing { (1.0, 1.0 - others - own) } else { (0.0, count(classes[column].len()) - own) }
-    }
-
     /// The nodes of all classes, or that of one.
     pub(super) fn part(&self, number: u64, apart: Option<usize>) -> Vec<Node> {
         let nodes = self.nodes(number);
@@ -219,11 +211,7 @@ impl Motion {
     }
 
     fn weights(&self, nu: f64, apart: Option<usize>) -> Matrix {
-        let classes = if apart.is_some() { 1 } else { self.structure.classes.len() };
-        Matrix::from_fn(classes, classes, |row, column| {
-            let (constant, slope) = if apart.is_some() { (0.0, -1.0) } else { self.weight(row, column) };
-            constant + slope * nu
-        })
+        weights_of_growing(&self.structure, self.growing, nu, apart.is_some())
     }
 
     fn common(&self, apart: Option<usize>, time: f64) -> Common<'_> {
@@ -297,7 +285,9 @@ impl Motion {
         let heard = [gain(&first[0]) * nu(low), gain(&last[0]) * nu(high)];
         let points = self.corners(first.to_vec(), [first, last], heard, true, apart);
         let common = self.common(apart, time);
-        let Some(decision) = decide(&StepSpan::product(&steps(&points, &ends, common)?)) else { return Ok(None) };
+        let span = StepSpan::product(&steps(&points, &ends, common)?);
+        let span = if certified.is_some() && low < high { span.widened(WIDER) } else { span };
+        let Some(decision) = decide(&span) else { return Ok(None) };
         if let Some(certified) = certified {
             let classes = apart.map_or(0..self.structure.classes.len(), |class| class..class + 1);
             let members = classes.map(|class| self.structure.classes[class].clone()).collect();
@@ -306,6 +296,22 @@ impl Motion {
         }
         Ok(Some(decision.proven))
     }
+}
+
+/// The weights of the averages of classes (columns) in the targets of classes (rows), of which one grows, or the weight of a difference in itself: constants, and multiples of ν.
+pub(super) fn weights_of_growing(structure: &Structure, growing: usize, nu: f64, is_difference: bool) -> Matrix {
+    let classes = &structure.classes;
+    let others = count(structure.peers - classes[growing].len());
+    let size = if is_difference { 1 } else { classes.len() };
+    Matrix::from_fn(size, size, |row, column| {
+        let own = f64::from(u8::from(row == column));
+        let (constant, slope) = match column {
+            _ if is_difference => (0.0, -1.0),
+            _ if column == growing => (1.0, 1.0 - others - own),
+            _ => (0.0, count(classes[column].len()) - own),
+        };
+        constant + slope * nu
+    })
 }
 
 /// A gain of the law that is not zero, if there is one: all of them are multiples of the same function of N.

@@ -18,6 +18,8 @@ pub(super) struct Halving {
     pub(super) tolerance: Option<f64>,
     /// More than these are not halved at once: where an eigenvalue stays at the unit circle, none is ever decided.
     pub(super) most: usize,
+    /// The key whose ranges are never halved.
+    pub(super) whole: Option<usize>,
 }
 
 /// The verdict on ranges; `None` if they were not looked at.
@@ -35,9 +37,13 @@ pub(super) struct Halved {
 }
 
 impl Halving {
+    /// The halving that leaves the ranges of a key whole.
+    pub(super) const fn but_for(self, whole: Option<usize>) -> Self {
+        Self { whole, ..self }
+    }
+
     /// Halves ranges that have been halved `halved` times before.
-    pub(super) fn of(self, whole: Ranges, halved: u32, look: Look<'_>, watch: &dyn Watch) -> Result<Halved, ProofError> {
-        let mut waiting = vec![whole];
+    pub(super) fn of(self, mut waiting: Vec<Ranges>, halved: u32, look: Look<'_>, watch: &dyn Watch) -> Result<Halved, ProofError> {
         let mut all = Halved { pieces: Vec::new(), attempts: 0, is_whole: true };
         for halved in halved.. {
             if waiting.is_empty() {
@@ -52,7 +58,7 @@ impl Halving {
             let mut next = Vec::new();
             for (ranges, found) in waiting.into_iter().zip(found) {
                 match found {
-                    Some(Guarantee::Undecided) if !is_last && self.may_halve(&ranges) => next.extend(halves(&ranges)),
+                    Some(Guarantee::Undecided) if !is_last && self.may_halve(&ranges) => next.extend(self.halves(&ranges)),
                     found => all.pieces.push((ranges, found.unwrap_or(Guarantee::Undecided))),
                 }
             }
@@ -67,16 +73,26 @@ impl Halving {
             let middle = low.midpoint(high);
             high - low > tolerance && low < middle && middle < high
         };
-        self.tolerance.is_none_or(|tolerance| ranges.iter().all(|range| is_long(*range, tolerance)))
+        let halved = self.halved_keys(ranges.len());
+        !halved.is_empty() && self.tolerance.is_none_or(|tolerance| halved.iter().all(|key| is_long(ranges[*key], tolerance)))
     }
-}
 
-/// The parts of ranges of which each is halved: those of the first key follow each other.
-pub(super) fn halves(ranges: &[[f64; 2]]) -> Vec<Ranges> {
-    let half = |range: [f64; 2], is_high: bool| {
-        let middle = range[0].midpoint(range[1]);
-        if is_high { [middle, range[1]] } else { [range[0], middle] }
-    };
-    let part = |place: usize| ranges.iter().enumerate().map(|(key, range)| half(*range, place >> key & 1 == 1)).collect();
-    (0..1 << ranges.len()).map(part).collect()
+    /// Which of that number of keys are halved.
+    pub(super) fn halved_keys(self, keys: usize) -> Vec<usize> {
+        (0..keys).filter(|key| self.whole != Some(*key)).collect()
+    }
+
+    /// The parts of ranges: those of the first key that is halved follow each other.
+    pub(super) fn halves(self, ranges: &[[f64; 2]]) -> Vec<Ranges> {
+        let halved = self.halved_keys(ranges.len());
+        let part = |place: usize| {
+            let mut part = ranges.to_vec();
+            for (bit, key) in halved.iter().enumerate() {
+                let middle = part[*key][0].midpoint(part[*key][1]);
+                part[*key][usize::from(place >> bit & 1 == 0)] = middle;
+            }
+            part
+        };
+        (0..1 << halved.len()).map(part).collect()
+    }
 }

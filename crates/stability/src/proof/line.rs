@@ -35,16 +35,16 @@ const MOST_WAITING: usize = 1 << 16;
 
 /// How a line is halved.
 pub(super) const fn halving(tolerance: f64) -> Halving {
-    Halving { times: u32::MAX, tolerance: Some(tolerance), most: MOST_WAITING - 1 }
+    Halving { times: u32::MAX, tolerance: Some(tolerance), most: MOST_WAITING - 1, whole: None }
 }
 
 impl ProvenLine {
-    /// Decides a family with one key over its range: stretches that are not decided are halved until they are no longer than `tolerance`, or have no number within. What comes out does not
+    /// Decides a family with one key over its range: stretches that are not decided are halved until they are no longer than `tolerance`, or have no number within; a delay of links is divided where a sample comes into force at another tick, and nowhere else. What comes out does not
     /// depend on the number of threads. A stretch is an operation of the watch, which may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings, and for scenes of which nothing can be proven.
+    /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings or a delay, and for scenes of which nothing can be proven.
     pub fn prove(family: &Family, tolerance: f64, watch: &dyn Watch) -> Result<Self, ProofError> {
         Self::prove_with(family, tolerance, &NothingKnown, watch)
     }
@@ -55,10 +55,13 @@ impl ProvenLine {
     ///
     /// Those of [`ProvenLine::prove`].
     pub fn prove_with(family: &Family, tolerance: f64, pieces: &dyn KnownPieces, watch: &dyn Watch) -> Result<Self, ProofError> {
-        let [key] = family.keys() else { return Err(ProofError::OneKey) };
-        let followed = Followed::new(family)?;
+        if family.keys().len() != 1 {
+            return Err(ProofError::OneKey);
+        }
+        let followed = Followed::new(family, None)?;
+        let halving = halving(tolerance).but_for(followed.delay());
         let Halved { pieces, attempts, is_whole } =
-            halving(tolerance).of(vec![[key.low, key.high]], 0, &|ranges| followed.look(ranges, pieces, watch).map(Some), watch)?;
+            halving.of(followed.beginnings(), 0, &|ranges| followed.look(ranges, pieces, watch).map(Some), watch)?;
         let stretch = |(ranges, guarantee): (Vec<[f64; 2]>, Guarantee)| ProvenStretch { low: ranges[0][0], high: ranges[0][1], guarantee };
         let mut found: Vec<ProvenStretch> = pieces.into_iter().map(stretch).collect();
         found.sort_by(|one, other| one.low.total_cmp(&other.low));
@@ -78,6 +81,6 @@ impl ProvenLine {
     ///
     /// As [`ProvenLine::prove`], of the family that was proven, and if the watch ends it.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
-        certify(family, self.pieces.iter().map(|ProvenStretch { low, high, .. }| vec![[*low, *high]]).collect(), watch)
+        certify(family, None, self.pieces.iter().map(|ProvenStretch { low, high, .. }| vec![[*low, *high]]).collect(), watch)
     }
 }

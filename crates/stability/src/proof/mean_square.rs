@@ -15,6 +15,7 @@
 //! Y − L(Y) is positive definite on all of the span if it is at all ends of the slopes, radius included. Y is looked for at a number in the middle, and need not be exact. If it is positive definite too, every number is *stable*; if an
 //! entry of its diagonal is below zero, every one is *unstable* ([`positive`](crate::mean_square::positive)).
 
+use super::certificate::MomentCertificate;
 use super::corners::{check_units, enclosed};
 use super::growing::{ENDLESS, Growing, Motion, nu};
 use super::span::StepSpan;
@@ -50,7 +51,8 @@ impl<'a> GrowingMoments<'a> {
     pub(super) fn decide(&self, low: u64, high: u64) -> Result<Option<Proven>, ProofError> {
         let mut all = Some(Proven::Stable);
         for (motion, independent) in &self.motions {
-            let found = if high == 2 { of_two(motion, independent) } else { Frame { motion, independent }.decide(low, high)? };
+            let found =
+                if high == 2 { of_two(motion, independent) } else { Frame { motion, independent }.decide(low, high)?.map(|(proven, _)| proven) };
             match found {
                 Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
                 Some(Proven::Stable) => {}
@@ -58,6 +60,20 @@ impl<'a> GrowingMoments<'a> {
             }
         }
         Ok(all)
+    }
+
+    /// The verdict on those numbers with all by which it can be checked; `None` if there is none, and of two peers, of which a radius decides.
+    pub(super) fn certify(&self, low: u64, high: u64) -> Result<Option<(Proven, Vec<MomentCertificate>)>, ProofError> {
+        let mut all = Vec::new();
+        let mut is_decided = high > 2;
+        for (motion, independent) in self.motions.iter().filter(|_| high > 2) {
+            match (Frame { motion, independent }).decide(low, high)? {
+                Some((Proven::Unstable, moment)) => return Ok(Some((Proven::Unstable, vec![moment]))),
+                Some((Proven::Stable, moment)) => all.push(moment),
+                None => is_decided = false,
+            }
+        }
+        Ok(is_decided.then_some((Proven::Stable, all)))
     }
 }
 
@@ -177,7 +193,7 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    fn decide(&self, low: u64, high: u64) -> Result<Option<Proven>, ProofError> {
+    fn decide(&self, low: u64, high: u64) -> Result<Option<(Proven, MomentCertificate)>, ProofError> {
         let nus = [low, high].map(|number| if number == ENDLESS { 0.0 } else { nu(number) });
         let middle = 0.5 * (nus[0] + nus[1]);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two numbers")]
@@ -230,7 +246,13 @@ impl Frame<'_> {
             && is_everywhere_positive(&left(&y.apart, &image.apart))
             && is_everywhere_positive(&left(&y.rest, &image.rest));
         // A sample that never arrives is held for ever.
-        Ok((holds && (proven == Proven::Unstable || self.independent.held.verdict() == Verdict::Stable)).then_some(proven))
+        let is_proven = holds && (proven == Proven::Unstable || self.independent.held.verdict() == Verdict::Stable);
+        let heard = match sampling {
+            Sampling::Combined(gains) => Some(gains),
+            Sampling::Whole => None,
+        };
+        let moment = || MomentCertificate::new(gamma, time, heard, depth, [&y.common, &y.apart, &y.rest].map(|one| &one.mean));
+        Ok(is_proven.then(|| (proven, moment())))
     }
 
     fn actions(&self, rows: &Rows) -> Vec<Action> {

@@ -8,6 +8,7 @@
 mod basis;
 mod certificate;
 mod corners;
+mod delays;
 mod discs;
 mod followed;
 mod growing;
@@ -26,7 +27,8 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-pub use certificate::{BoxCertificate, NumberCertificate, PartCertificate};
+pub(crate) use certificate::digits;
+pub use certificate::{BoxCertificate, MomentCertificate, NumberCertificate, PartCertificate};
 pub use discs::FreeCircle;
 pub use line::{ProvenLine, ProvenStretch};
 pub use number::{EveryNumber, MOST_FOLLOWED, NumberSpan, prove_every_number};
@@ -36,7 +38,11 @@ pub use steps::FrameState;
 
 use cohaptic_scene::Scene;
 
-use crate::{AnalysisError, FamilyError};
+use self::corners::{Common, Point};
+use self::span::StepSpan;
+use crate::lifted::Node;
+use crate::timetable::Timetable;
+use crate::{AnalysisError, FamilyError, Matrix};
 
 /// A proven verdict on all frames of a box.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -94,12 +100,25 @@ pub enum ProofError {
     OneKey,
     /// A key does more than to set numbers.
     #[error(
-        "{key} does more than to set gains, masses and dampings, and between two of its values there is no box: vary it by `--curve`, or ask `stability map` without --prove"
+        "{key} does more than to set gains, masses and dampings, or the delay of links, and between two of its values there is no box: vary it by `--curve`, or ask `stability map` without --prove"
     )]
     Key {
         /// The key.
         key: String,
     },
+    /// A range of delays with too many frames.
+    #[error("{key} has more than {most} delays of which each makes a frame of its own: expected a shorter range")]
+    Stretches {
+        /// The key.
+        key: String,
+        /// How many may.
+        most: usize,
+    },
+    /// Gains or masses depend on the number of peers.
+    #[error(
+        "gains or the mass of a copy depend on the number of peers, and a box of keys holds no such: expected average-position coordination without scaling and object.split-mass = false; or one number at a time, by `--curve scene.count=N`"
+    )]
+    Scaled,
     /// Numbers of peers that are none.
     #[error("expected numbers of peers from 2 on, the least first, such as 2.. or 2..100")]
     Numbers,
@@ -128,9 +147,6 @@ pub enum ProofError {
         "links leave something to chance: expected equal peers over equal links that lose independently and on which nothing overtakes, for every number of them in the mean square"
     )]
     UnequalChance,
-    /// Certificates are not written for second moments.
-    #[error("a proof in the mean square has no certificate: expected links that leave nothing to chance")]
-    NoCertificate,
     /// A law uses the ages of samples.
     #[error("the coordination uses the ages of samples, which are no gains: ask `stability point` for single scenes")]
     Ages,
@@ -149,6 +165,16 @@ pub enum ProofError {
         /// How many may.
         most: u32,
     },
+}
+
+/// The certificate of how the members of a class differ, if that is proven stable.
+pub(crate) fn stable_difference(members: &[usize], node: &Node, weight: f64, timetable: &Timetable, time: f64) -> Option<PartCertificate> {
+    let nodes = vec![node.clone()];
+    let points = [Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight) }];
+    let common = Common { timetable, tied: true, time };
+    let decision = discs::decide(&StepSpan::product(&corners::steps(&points, &[nodes], common).ok()?))?;
+    let part = PartCertificate::new(vec![members.to_vec()], true, corners::states(&points, common).ok()?, time, &decision.witness);
+    (decision.proven == Proven::Stable).then_some(part)
 }
 
 /// Refuses scenes of which a deterministic frame is not all.

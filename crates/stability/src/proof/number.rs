@@ -124,30 +124,42 @@ fn search(
 }
 
 impl EveryNumber {
-    /// The spans that are decided with all by which they can be checked, and the others. Of a span beyond all limits nothing can be checked, so that it counts as undecided there. Each is decided once more.
+    /// The spans that are decided with all by which they can be checked, halved as often as that takes, and the others. Of a span beyond all limits, and in the mean square of two peers, nothing can be checked, so that it counts as undecided there. Each is decided once more.
     ///
     /// # Errors
     ///
     /// As [`prove_every_number`], of the scene that was proven.
     pub fn certify(&self, scene: &Scene, watch: &dyn Watch) -> Result<Vec<NumberCertificate>, ProofError> {
-        if self.is_mean_square {
-            return Err(ProofError::NoCertificate);
-        }
-        let growing = Growing::new(scene, &NominalNetwork::of(scene)?)?;
-        let certificate = |NumberSpan { from, to, guarantee }: &NumberSpan| {
+        let network = NominalNetwork::of(scene)?;
+        let growing = Growing::new(scene, &network)?;
+        let moments = self.is_mean_square.then(|| GrowingMoments::new(&growing, &network)).transpose()?;
+        let mut found = Vec::new();
+        // An undecided span is halved, and the far half waits: with a certificate there is less room than without.
+        let mut waiting: Vec<NumberSpan> = self.pieces.iter().rev().copied().collect();
+        while let Some(NumberSpan { from, to, guarantee }) = waiting.pop() {
             if watch.stops() {
                 return Err(ProofError::Analysis(AnalysisError::Stopped));
             }
-            let mut parts = Vec::new();
-            let is_beyond = to.is_none() && self.without_limit.is_some();
-            let proven = if is_beyond || *guarantee == Guarantee::Undecided {
-                None
-            } else {
-                growing.decide(*from, to.unwrap_or(ENDLESS), Some(&mut parts))?
+            let (mut parts, mut of_moments) = (Vec::new(), Vec::new());
+            let is_open = guarantee == Guarantee::Undecided || to.is_none() && self.without_limit.is_some();
+            let end = to.unwrap_or(ENDLESS);
+            let proven = match &moments {
+                _ if is_open => None,
+                None => growing.decide(from, end, Some(&mut parts))?,
+                Some(moments) => moments.certify(from, end)?.map(|(proven, moments)| {
+                    of_moments = moments;
+                    proven
+                }),
             };
+            if proven.is_none() && !is_open && from < end {
+                let middle = if end / from > 4 { 2 * from } else { from.midpoint(end) };
+                waiting.push(NumberSpan { from: middle + 1, to, guarantee });
+                waiting.push(NumberSpan { from, to: Some(middle), guarantee });
+                continue;
+            }
             let guarantee = proven.map_or(Guarantee::Undecided, Guarantee::from);
-            Ok(NumberCertificate { from: *from, to: *to, guarantee, parts: needed(proven, parts) })
-        };
-        self.pieces.iter().map(certificate).collect()
+            found.push(NumberCertificate { from, to, guarantee, parts: needed(proven, parts), moments: of_moments });
+        }
+        Ok(found)
     }
 }

@@ -96,7 +96,7 @@ impl Found {
 
     /// All points of a case. Around those near a crossing there are boxes of many sizes, each with the point at another place.
     fn of(&mut self, case: &Case, change: &dyn Fn(&mut Followed<'_>)) {
-        let mut followed = Followed::new(&case.family).unwrap_or_else(|error| panic!("{}: {error}", case.name));
+        let mut followed = Followed::new(&case.family, None).unwrap_or_else(|error| panic!("{}: {error}", case.name));
         change(&mut followed);
         self.divide(case, &followed, case.ranges, &case.spread.iter().collect::<Vec<_>>(), 6);
         for (number, point) in case.near.iter().enumerate() {
@@ -151,7 +151,7 @@ const FAULTS: [(&str, Option<Mutation>, Change); 7] = [
 ];
 
 fn structures(followed: &mut Followed<'_>, change: impl Fn(&mut crate::structure::Structure)) {
-    followed.motions.iter_mut().for_each(|motion| change(&mut motion.structure));
+    followed.stretches.iter_mut().flat_map(|stretch| &mut stretch.motions).for_each(|motion| change(&mut motion.structure));
 }
 
 /// Each fault makes a box that holds a point of the other kind, or leaves more than half of the points undecided, which the test without faults refuses too.

@@ -26,6 +26,8 @@ pub struct ProvenRegion {
     pub attempts: usize,
     /// Whether nobody ended the proof; if somebody did, boxes that were not looked at are undecided too.
     pub is_whole: bool,
+    /// For which numbers of peers its verdicts hold.
+    every: Option<(u64, Option<u64>)>,
 }
 
 /// How finely a region is divided at most: each range into two to the power of this.
@@ -35,18 +37,19 @@ const MOST_WAITING: usize = 1 << 21;
 
 /// How a region is halved.
 pub(super) fn halving(halvings: u32) -> Halving {
-    Halving { times: halvings.min(MOST_HALVINGS), tolerance: None, most: MOST_WAITING / 4 }
+    Halving { times: halvings.min(MOST_HALVINGS), tolerance: None, most: MOST_WAITING / 4, whole: None }
 }
 
 impl ProvenRegion {
-    /// Decides a family with two keys over their ranges: boxes that are not decided are divided into four, up to `halvings` times. What comes out does not depend on the number of threads.
+    /// Decides a family with two keys over their ranges: boxes that are not decided are divided into four, up to `halvings` times. A key that is a delay of links is divided where a sample comes into force at another tick, and nowhere else.
+    /// With `every` a verdict holds for every number of peers from the first to the second, or without end, of the largest class of equal ones. What comes out does not depend on the number of threads.
     /// A box is an operation of the watch, which may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if there are not two keys that each do nothing but set gains, masses and dampings, and for scenes of which nothing can be proven.
-    pub fn prove(family: &Family, halvings: u32, watch: &dyn Watch) -> Result<Self, ProofError> {
-        Self::prove_with(family, halvings, &NothingKnown, watch)
+    /// [`ProofError`] if there are not two keys that each do nothing but set gains, masses and dampings, or delays for one of them, and for scenes of which nothing can be proven.
+    pub fn prove(family: &Family, halvings: u32, every: Option<(u64, Option<u64>)>, watch: &dyn Watch) -> Result<Self, ProofError> {
+        Self::prove_with(family, halvings, every, &NothingKnown, watch)
     }
 
     /// [`ProvenRegion::prove`], where boxes that are known are not decided again: what comes out is the same.
@@ -54,14 +57,22 @@ impl ProvenRegion {
     /// # Errors
     ///
     /// Those of [`ProvenRegion::prove`].
-    pub fn prove_with(family: &Family, halvings: u32, pieces: &dyn KnownPieces, watch: &dyn Watch) -> Result<Self, ProofError> {
-        let [x, y] = family.keys() else { return Err(ProofError::Keys) };
-        let followed = Followed::new(family)?;
-        let whole = vec![[x.low, x.high], [y.low, y.high]];
+    pub fn prove_with(
+        family: &Family,
+        halvings: u32,
+        every: Option<(u64, Option<u64>)>,
+        pieces: &dyn KnownPieces,
+        watch: &dyn Watch,
+    ) -> Result<Self, ProofError> {
+        if family.keys().len() != 2 {
+            return Err(ProofError::Keys);
+        }
+        let followed = Followed::new(family, every)?;
+        let halving = halving(halvings).but_for(followed.delay());
         let Halved { pieces, attempts, is_whole } =
-            halving(halvings).of(whole, 0, &|ranges| followed.look(ranges, pieces, watch).map(Some), watch)?;
+            halving.of(followed.beginnings(), 0, &|ranges| followed.look(ranges, pieces, watch).map(Some), watch)?;
         let boxes = pieces.into_iter().map(|(ranges, guarantee)| ProvenBox { x: ranges[0], y: ranges[1], guarantee }).collect();
-        Ok(Self { boxes, attempts, is_whole })
+        Ok(Self { boxes, attempts, is_whole, every })
     }
 
     /// The boxes with all by which they can be checked. Each is decided once more.
@@ -70,10 +81,10 @@ impl ProvenRegion {
     ///
     /// As [`ProvenRegion::prove`], of the family that was proven, and if the watch ends it.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
-        certify(family, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
+        certify(family, self.every, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
     }
 
-    /// The share of the area of the ranges with that verdict.
+    /// The share of the area of the ranges with that verdict. A single delay, such as none at all, has no area.
     #[must_use]
     pub fn share(&self, guarantee: Guarantee) -> f64 {
         let area = |boxes: &mut dyn Iterator<Item = &ProvenBox>| boxes.map(|one| (one.x[1] - one.x[0]) * (one.y[1] - one.y[0])).sum::<f64>();

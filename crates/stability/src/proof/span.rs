@@ -59,6 +59,12 @@ impl StepSpan {
         Self { slopes: vec![none.clone(); numbers], radius: none, mean }
     }
 
+    /// With radii that are larger by a factor.
+    pub(super) fn widened(mut self, by: f64) -> Self {
+        self.radius = self.radius.scaled(by);
+        self
+    }
+
     /// Over a box with one more number, which changes nothing.
     pub(super) fn with_another_number(mut self) -> Self {
         self.slopes.push(Matrix::zeros(self.mean.rows(), self.mean.columns()));

@@ -92,6 +92,17 @@ pub enum FrameState {
     },
 }
 
+impl FrameState {
+    /// The state of a row of a class whose own rows begin with 0.
+    pub(crate) fn of(class: usize, rows: Rows, row: usize) -> Self {
+        match row {
+            _ if rows.device.is_some_and(|device| row < device + 2) => Self::Device { class, velocity: row == 1 },
+            _ if row < rows.object + 2 => Self::Copy { class, velocity: row == rows.object + 1 },
+            _ => Self::Other { class, row },
+        }
+    }
+}
+
 /// What the operations of a step round, relative to the largest sum of the sizes of the terms of a row: fifteen operations in a row and the coefficients of the step maps, twice for the
 /// difference from the reference. Half of it is left for coefficients that differ by some roundings from those of the numbers meant.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -145,13 +156,8 @@ impl Plan {
         let mut names = Vec::new();
         for (place, node) in nodes.iter().enumerate() {
             let rows = node.rows(0);
-            let of = |row: usize| match row {
-                _ if rows.device.is_some_and(|device| row < device + 2) => FrameState::Device { class: place, velocity: row == 1 },
-                _ if row < rows.object + 2 => FrameState::Copy { class: place, velocity: row == rows.object + 1 },
-                _ => FrameState::Other { class: place, row },
-            };
             let reference = (place == 0 && !tied).then_some(rows.object);
-            names.extend((0..node.states()).filter(|row| Some(*row) != reference).map(of));
+            names.extend((0..node.states()).filter(|row| Some(*row) != reference).map(|row| FrameState::of(place, rows, row)));
         }
         let samples = self.live[0].iter();
         names.extend(samples.flat_map(|(class, number)| (0..channels).map(|channel| FrameState::Sample { class: *class, number: *number, channel })));

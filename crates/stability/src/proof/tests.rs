@@ -195,7 +195,7 @@ fn no_box_holds_a_point_that_contradicts_it() {
         (&["scene.count=3", "peers=[{ name = \"peer2\", device = { mass = 0.2 } }, { name = \"peer3\", contact = \"none\" }]"], GAINS),
     ] {
         let family = family(set, x, y);
-        let region = ProvenRegion::prove(&family, 5, &Unwatched).unwrap();
+        let region = ProvenRegion::prove(&family, 5, None, &Unwatched).unwrap();
         let mut scratch = crate::FamilyScratch::default();
         let mut decided = 0;
         for (number, one) in region.boxes.iter().enumerate().filter(|(_, one)| one.guarantee != Guarantee::Undecided) {
@@ -252,7 +252,7 @@ fn a_line_encloses_every_crossing() {
 #[test]
 fn finer_boxes_decide_more() {
     let family = family(&["scene.count=3"], GAINS[0], GAINS[1]);
-    let regions = [3, 5, 7].map(|halvings| ProvenRegion::prove(&family, halvings, &Unwatched).unwrap());
+    let regions = [3, 5, 7].map(|halvings| ProvenRegion::prove(&family, halvings, None, &Unwatched).unwrap());
     let open = regions.each_ref().map(|region| region.share(Guarantee::Undecided));
     assert!(open[0] > 2.0 * open[1] && open[1] > 2.0 * open[2], "{open:?}");
     for pair in regions.windows(2) {
@@ -263,8 +263,8 @@ fn finer_boxes_decide_more() {
 
 #[test]
 fn keys_that_do_more_than_to_set_numbers_are_refused() {
-    let refused = |set: &[&str], x: &str, y: &str| ProvenRegion::prove(&family(set, x, y), 3, &Unwatched).unwrap_err().to_string();
-    assert!(refused(&[], "link.delay=0ms..40ms", GAINS[1]).starts_with("link.delay does more than"));
+    let refused = |set: &[&str], x: &str, y: &str| ProvenRegion::prove(&family(set, x, y), 3, None, &Unwatched).unwrap_err().to_string();
+    assert!(refused(&[], "link.jitter=0ms..4ms", GAINS[1]).starts_with("link.jitter does more than"));
     assert!(refused(&["link.loss=5%"], GAINS[0], GAINS[1]).contains("leave something to chance"));
 }
 
@@ -280,9 +280,9 @@ fn the_product_of_the_steps_is_the_frame() {
         let node = structure.node(&scene, 0);
         let time = structure.time(&scene, std::slice::from_ref(&node));
         for (weight, tied, timetable) in [(1.0, structure.tied, &structure.timetable), (-1.0, true, structure.apart[0].as_ref().unwrap())] {
-            let point = corners::Point { nodes: vec![node.clone()], weights: Matrix::from_fn(1, 1, |_, _| weight) };
+            let point = Point { nodes: vec![node.clone()], weights: Matrix::from_fn(1, 1, |_, _| weight) };
             let product = StepSpan::product(
-                &corners::steps(std::slice::from_ref(&point), std::slice::from_ref(&point.nodes), corners::Common { timetable, tied, time }).unwrap(),
+                &corners::steps(std::slice::from_ref(&point), std::slice::from_ref(&point.nodes), Common { timetable, tied, time }).unwrap(),
             );
             let sampling = crate::lifted::Sampling::of(&point.nodes);
             let lifted = crate::lifted::Lifted { nodes: &point.nodes, weights: &point.weights, timetable, sampling, time, tied };
@@ -401,23 +401,25 @@ impl KnownPieces for Kept {
 fn blocks_make_the_proof_of_one_process() {
     let line = Family::new(SCENE, "two.toml".as_ref(), &[], vec![KeyRange::parse("object.mass=0.05..1").unwrap()]).unwrap();
     let region = family(&["scene.count=3"], GAINS[0], GAINS[1]);
-    for halvings in [0, 1, 5] {
-        let shared = SharedProof::of_region(&region, halvings);
-        assert_eq!(shared.blocks(), [1, 4, 64][[0, 1, 5].iter().position(|of| *of == halvings).unwrap()]);
+    // Delays of up to 7, up to 8 and up to 8.5 ms are three scenes, and never halved.
+    let delayed = family(&["scene.count=3"], "link.delay=7ms..8.5ms", GAINS[1]);
+    for (region, halvings, blocks) in [(&region, 0, 1), (&region, 1, 4), (&region, 5, 64), (&delayed, 0, 3), (&delayed, 2, 12)] {
+        let shared = SharedProof::of_region(region, halvings, None).unwrap();
+        assert_eq!(shared.blocks(), blocks);
         let (kept, done) = (Kept::default(), std::sync::Mutex::new(Vec::new()));
         let blocks: Vec<u64> = (0..shared.blocks()).rev().collect();
         for block in &blocks {
-            shared.look_at(&region, &[*block], &kept, |block| done.lock().unwrap().push(block), &Unwatched).unwrap();
+            shared.look_at(region, &[*block], &kept, |block| done.lock().unwrap().push(block), &Unwatched).unwrap();
             assert!(shared.is_known(*block, &kept));
         }
         assert_eq!(*done.lock().unwrap(), blocks);
         let looked_at = kept.0.lock().unwrap().1;
-        let whole = ProvenRegion::prove(&region, halvings, &Unwatched).unwrap();
-        assert_eq!(ProvenRegion::prove_with(&region, halvings, &kept, &Unwatched).unwrap(), whole);
+        let whole = ProvenRegion::prove(region, halvings, None, &Unwatched).unwrap();
+        assert_eq!(ProvenRegion::prove_with(region, halvings, None, &kept, &Unwatched).unwrap(), whole);
         // Neither the blocks nor the whole look at a piece twice, and the blocks look at no other pieces.
         assert_eq!((kept.0.lock().unwrap().1, looked_at), (looked_at, whole.attempts));
     }
-    let shared = SharedProof::of_line(&line, 1e-6);
+    let shared = SharedProof::of_line(&line, 1e-6).unwrap();
     let kept = Kept::default();
     let half: Vec<u64> = (0..64).filter(|block| block % 2 == 0).collect();
     shared.look_at(&line, &half, &kept, |_| (), &Unwatched).unwrap();

@@ -35,12 +35,14 @@
 //!
 //! V and the multipliers are checked with bounds of all rounding errors. Where there are none a motion that grows is looked for.
 
+mod certificate;
 mod contact_frame;
 mod growing;
 mod products;
 #[cfg(test)]
 mod tests;
 
+pub use certificate::{PushCertificate, SwitchingCertificate};
 pub use growing::GrowingMotion;
 
 use std::time::Duration;
@@ -52,11 +54,13 @@ use rayon::prelude::*;
 use self::contact_frame::{Contact, ContactFrame, Kind};
 use self::products::{Group, PartFrame, inequality};
 use crate::inequality::{Inequality, rate, search};
-use crate::lifted::{Lifted, Node};
+use crate::lifted::{Lifted, Node, Sampling};
 use crate::network::NominalNetwork;
 use crate::parts::lifted_part;
 use crate::pieces::{Piece, pieces};
+use crate::proof::{PartCertificate, stable_difference};
 use crate::structure::{Contacts, Structure, count};
+use crate::timetable::Timetable;
 use crate::{AnalysisError, Guarantee, Matrix, Method, PartKind, Watch};
 
 /// The answer of [`prove_switching`].
@@ -81,6 +85,8 @@ pub struct SwitchingMotion {
     pub growing: Option<GrowingMotion>,
     /// How long a frame is.
     pub frame: Duration,
+    /// Of a motion that is proven stable, the numbers by which that can be checked.
+    pub certificate: Option<SwitchingCertificate>,
 }
 
 /// Why nothing can be said of contacts that switch.
@@ -251,9 +257,10 @@ fn of_axis(
         return Err(AnalysisError::Stopped.into());
     }
     let frame = structure.timetable.frame;
-    let motion = |guarantee, rate, growing| SwitchingMotion { name: name.to_owned(), guarantee, rate, growing, frame };
-    if let Some((_, rate)) = proven {
-        return Ok((motion(Guarantee::Stable, Some(rate), None), takes_rest));
+    let motion = |guarantee, rate, growing| SwitchingMotion { name: name.to_owned(), guarantee, rate, growing, frame, certificate: None };
+    if let Some((solution, rate)) = proven {
+        let certificate = asked.certificate(axis, &structure, &nodes, &solution, rate);
+        return Ok((SwitchingMotion { certificate: Some(certificate), ..motion(Guarantee::Stable, Some(rate), None) }, takes_rest));
     }
     let growing = grows(&along, network, watch)?;
     let guarantee = if growing.is_some() { Guarantee::Unstable } else { Guarantee::Undecided };
@@ -271,8 +278,15 @@ struct Asked {
     groups: Vec<Group>,
     /// The frames of the parts that have contacts, the groups of these, and whether it is about differences.
     frames: Vec<(ContactFrame, Vec<usize>, bool)>,
+    /// Of each of these parts, which class its differences are of, and of each of its classes how many numbers of samples of earlier frames it has.
+    parts: Vec<(Option<usize>, Vec<usize>)>,
+    sampling: Sampling,
+    time: f64,
+    tied: bool,
     /// Whether every part without contacts is stable.
     rest_is_stable: bool,
+    /// The certificates of these parts, of those that have one.
+    rest: Vec<PartCertificate>,
 }
 
 impl Asked {
@@ -295,8 +309,17 @@ impl Asked {
         if rows > MOST_ROWS {
             return Err(SwitchingError::TooLarge { ticks, states, rows, most: MOST_ROWS });
         }
-        let mut asked =
-            Self { frames: vec![(ContactFrame::new(&quotient, contacts.clone()), (0..groups.len()).collect(), false)], groups, rest_is_stable: true };
+        let history = |timetable: &Timetable| timetable.depth.iter().map(|depth| depth * quotient.sampling.channels()).collect::<Vec<_>>();
+        let mut asked = Self {
+            frames: vec![(ContactFrame::new(&quotient, contacts.clone()), (0..groups.len()).collect(), false)],
+            parts: vec![(None, history(&structure.timetable))],
+            groups,
+            rest_is_stable: true,
+            rest: Vec::new(),
+            sampling: quotient.sampling,
+            time: quotient.time,
+            tied: structure.tied,
+        };
         for class in 0..structure.classes.len() {
             let Some(timetable) = &structure.apart[class] else { continue };
             let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
@@ -305,10 +328,18 @@ impl Asked {
             if own.is_empty() {
                 let part = lifted_part(&lifted, PartKind::Apart { peer: structure.classes[class][0] }, 1, Method::Reduced, watch)?;
                 asked.rest_is_stable &= part.radius.value + part.radius.error < 1.0;
+                asked.rest.extend(stable_difference(
+                    &structure.classes[class],
+                    &nodes[class],
+                    structure.difference_weight(),
+                    timetable,
+                    quotient.time,
+                ));
                 continue;
             }
             let at_zero = own.iter().map(|contact| Contact { node: 0, ..contacts[*contact] }).collect();
             asked.frames.push((ContactFrame::new(&lifted, at_zero), own, true));
+            asked.parts.push((Some(class), history(timetable)));
         }
         Ok(asked)
     }

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Checks a certificate of `cohaptic stability` with no part of the program that wrote it: of `map --prove`, `boundary --prove` or `point --every-number`.
+"""Checks a certificate of `cohaptic stability` with no part of the program that wrote it: of `map --prove`, `boundary --prove`, `point --every-number` or `point --switching`.
 
     python3 check_certificate.py certificate.json
 
-A certificate has a scene, boxes of one or two of its keys or spans of numbers of peers, and for each a verdict with the numbers by which it can be checked. This
+A certificate has a scene, boxes of one or two of its keys (and of 1/(N − 1), if they hold for every number N of peers) or spans of numbers of peers, and for each a verdict with the numbers by which it can be checked. This
 program writes down the frame of the scene over each from the equations of docs/model.md, with a bound of every rounding error, and checks that
 
 1. the boxes cover the whole range, once, or spans leave no number out;
@@ -11,6 +11,8 @@ program writes down the frame of the scene over each from the equations of docs/
    inverse of its coordinates V, nearly. Then no M of the box has an eigenvalue on the circle (Gershgorin 1931), and as many inside as A has
    diagonal entries that vanish there;
 3. with the circle |z| = 1 that is all of them, in every part of the scene: it is stable; or there is one outside of |z| = 1 in some part: unstable.
+
+In the mean square, and of contacts that open and close, it checks quadratic forms instead: `moments_over_box.py` and `pushes.py` say which.
 
 It needs Python 3.11 or later and nothing else. A scene that is not covered is refused, by name.
 """
@@ -20,13 +22,17 @@ import math
 import struct
 import sys
 import tomllib
+from decimal import Decimal
 from fractions import Fraction
 from itertools import product as tuples
 from operator import mul
 
 import scene as scenes
 from frame_over_box import KeyBox, NumberBox, Part, classes_of
+from moments_over_box import Moments, Span, is_everywhere_positive
+from pushes import PRODUCTS, PushBox, PushFrame, is_shape, without_pushes
 from scene import Scene
+from timing import Timing
 
 # The relative error of one operation, and of some in a row.
 EPS = 2.0**-52
@@ -44,6 +50,11 @@ class Refused(Exception):
 
 def scene_with(text: str, overrides: list) -> Scene:
     """The scene with keys set to values, as the program's --set does."""
+    return scenes.read(tables_with(text, overrides), text)
+
+
+def tables_with(text: str, overrides) -> dict:
+    """The tables of a scene with keys set to values."""
     root = tomllib.loads(text)
     for key, value in overrides:
         *path, last = key.split(".")
@@ -53,7 +64,7 @@ def scene_with(text: str, overrides: list) -> Scene:
             if not isinstance(table, dict):
                 raise Refused(f"a key that is not covered: {key}")
         table[last] = value
-    return scenes.read(root, text)
+    return root
 
 
 def override(text: str) -> tuple:
@@ -156,18 +167,88 @@ def check_part(frame, certificate) -> tuple:
     return sum(inside), size, kind, least
 
 
+DELAY = "link.delay"
+
+
 def check_box(document, box) -> str:
     """The verdict of a box of keys."""
-    corners = []
-    for place in range(2 ** len(document["keys"])):
-        values = [(key, box["ranges"][number][place >> number & 1]) for number, key in enumerate(document["keys"])]
-        corners.append(scene_of(document, values))
-    return check_verdict(lambda: KeyBox(corners, classes_of(corners)), box, corners)
+    keys, ranges = document["keys"], box["ranges"]
+    free = [place for place, key in enumerate(keys) if key != DELAY]
+    text = lambda place, value: (keys[place], f"{Decimal(repr(value)):f}{document['units'][place]}" if keys[place] == DELAY else value)
+    with_keys = lambda bits: scene_of(document, [text(place, of_key[place in free and bits >> free.index(place) & 1]) for place, of_key in enumerate(ranges[: len(keys)])])
+    corners = [with_keys(bits) for bits in range(2 ** len(free))]
+    if DELAY in keys:
+        place = keys.index(DELAY)
+        last = scene_of(document, [text(key, ranges[key][key == place]) for key in range(len(keys))])
+        if events(corners[0]) != events(last):
+            raise Refused("samples come into force at other ticks with the longest delay than with the shortest")
+    numbers = numbers_of_box(document, ranges[len(keys) :])
+    return check_verdict(lambda: KeyBox(corners, classes_of(corners), numbers), box, corners)
+
+
+def events(scene):
+    """When the samples of the first peer come into force at the second, which is later for none if a delay is shorter."""
+    timing = Timing(scene)
+    return timing.held(0, 1) - timing.t0, [(tick - timing.t0, sent - timing.t0) for tick, sent in timing.in_force(0, 1)]
+
+
+def ends_of_numbers(document):
+    """Between which ends 1/(N − 1) is."""
+    every = document["every_number"]
+    if every["from"] < 2 or every["to"] is not None and every["to"] < every["from"]:
+        raise Refused("numbers of peers that are none")
+    return Fraction(0) if every["to"] is None else Fraction(1, every["to"] - 1), Fraction(1, every["from"] - 1)
+
+
+def numbers_of_box(document, ranges):
+    """The ends of 1/(N − 1) of a box, exact where they are those of all of them."""
+    if document["every_number"] is None:
+        return None
+    (ends,) = ranges
+    whole = ends_of_numbers(document)
+    return [next((exact for exact in whole if float(exact) == end), Fraction(end)) for end in ends]
+
+
+def check_moments(scene, growing, span):
+    """Whether γ·Y − L(Y) is positive definite for every number of a span, Y being so too if it is stable, and not so if it is not: in the mean square (Krein & Rutman 1948)."""
+    box = NumberBox(scene, classes_of([scene]), growing, span["from"], span["to"], may_lose=True)
+    if len(span["moments"]) != 1:
+        raise Refused("expected one second moment")
+    (moment,) = span["moments"]
+    gamma = moment["factor"]
+    frame = Moments(box, span["from"], span["to"], moment["heard"], moment["time"], moment["depth"])
+    size = frame.bodies + frame.depth
+    blocks = []
+    for digits, rows in zip(moment["blocks"], (size + 1 - (frame.part.reference is not None), size + 2, 1)):
+        flat = doubles(digits)
+        if len(flat) != rows * rows:
+            raise Refused(f"expected a moment of {rows} rows")
+        block = [flat[row * rows : (row + 1) * rows] for row in range(rows)]
+        if block != [list(column) for column in zip(*block)]:
+            raise Refused("a moment that is not symmetric")
+        blocks.append(block)
+    whole = [frame.constant(block) for block in blocks]
+    if span["verdict"] == "stable":
+        holds = gamma <= 1 and all(map(is_everywhere_positive, whole))
+    else:
+        holds = gamma > 1 and any(block[place][place] < 0 for block in blocks for place in range(len(block)))
+    if not holds:
+        raise Refused("a moment, or a factor, that shows something else")
+    images = frame.image(*whole)
+    for block, image in zip(whole, images):
+        left = [[gamma * entry for entry in row] for row in block.mean]
+        rounded = [[EPS * abs(entry) for entry in row] for row in left]
+        if not is_everywhere_positive(Span(left, frame.constant(left).slopes, rounded).plus(image.negated())):
+            raise Refused("a frame leaves more of the second moment than its factor")
 
 
 def check_span(document, span) -> str:
     """The verdict of a span of numbers of peers."""
     scene = scene_of(document)
+    if span["moments"]:
+        check_moments(scene, document["growing"], span)
+        check_devices([scene])
+        return span["verdict"]
     return check_verdict(lambda: NumberBox(scene, classes_of([scene]), document["growing"], span["from"], span["to"]), span, [scene])
 
 
@@ -198,32 +279,112 @@ def check_verdict(make, certified, scenes) -> str:
     if verdict == "stable":
         if found != known:
             raise Refused("a part of the scene is missing")
-        for peer in (peer for scene in scenes for peer in scene.peers):
-            damping = peer.device_damping + (peer.arm[1] if peer.arm else 0.0)
-            if not peer.touches and not damping > 0:
-                raise Refused(f"the device of {peer.name} touches nothing and has no damping")
+        check_devices(scenes)
     if verdict not in ("stable", "unstable"):
         raise Refused(f"a verdict that is none: {verdict}")
     return verdict
 
 
+def check_devices(scenes):
+    """Refuses devices that touch nothing and do not come to rest."""
+    for peer in (peer for scene in scenes for peer in scene.peers):
+        damping = peer.device_damping + (peer.arm[1] if peer.arm else 0.0)
+        if not peer.touches and not damping > 0:
+            raise Refused(f"the device of {peer.name} touches nothing and has no damping")
+
+
+def check_motion(document, motion) -> str:
+    """The verdict on contacts along an axis that open and close."""
+    if motion["verdict"] == "undecided":
+        return "undecided"
+    if motion["verdict"] != "stable" or motion["axis"] != 0 or not 0 < motion["factor"] <= 1:
+        raise Refused("a verdict, or an axis, that is not covered")
+    root, pushes = without_pushes(tables_with(document["scene"], map(override, document["overrides"])))
+    scene = scenes.read(root, document["scene"])
+    box = PushBox(scene, pushes)
+    multipliers = doubles(motion["multipliers"])
+    numbers = {members[0]: place for place, members in enumerate(m for m in box.classes if scene.peers[m[0]].name in pushes)}
+    found = set()
+    for part in motion["parts"]:
+        members = list(map(tuple, part["members"]))
+        frame = PushFrame(box, part["difference"], members, part["states"], motion["heard"], motion["time"], pushes)
+        firsts = [members[c][0] for c in frame.contacts]
+        rows = len(frame.states) + len(frame.contacts)
+        flat = doubles(part["shape"])
+        if len(flat) != rows * rows or len(multipliers) != len(numbers) * frame.ticks * PRODUCTS:
+            raise Refused("a form, or multipliers, of another size")
+        shape = [flat[row * rows : (row + 1) * rows] for row in range(rows)]
+        at = lambda contact, tick: PRODUCTS * (numbers[contact] * frame.ticks + tick)
+        of_contacts = [[multipliers[at(first, tick) : at(first, tick) + PRODUCTS] for tick in range(frame.ticks)] for first in firsts]
+        if any(by < 0 for ticks in of_contacts for tick in ticks for by in tick[1:]):
+            raise Refused("a multiplier below zero")
+        weights = [1.0 if part["difference"] else float(len(members[c])) for c in frame.contacts]
+        if not is_shape(shape) or not frame.falls(shape, of_contacts, weights, motion["factor"]):
+            raise Refused("a form that is not shown to fall")
+        found.add((part["difference"], tuple(members)))
+    for part in motion["rest"]:
+        members = tuple(map(tuple, part["members"]))
+        within, size, kind, _ = check_part(Part(box, part["difference"], members, part["states"], part["heard"], part["time"]).frame(), part)
+        if kind != "around-zero" or part["circle"][1] > 1 or within < size or any(scene.peers[first].name in pushes for first, *_ in members):
+            raise Refused("not all eigenvalues are shown to be within the unit circle")
+        found.add((part["difference"], members))
+    if found != {(True, (members,)) for members in box.classes if len(members) > 1} | {(False, tuple(box.classes))}:
+        raise Refused("a part of the scene is missing")
+    check_devices([scene])
+    return "stable"
+
+
+def check_switching(document) -> str:
+    if not document["motions"]:
+        raise Refused("no motion")
+    words = [checked(check_motion, document, motion, motion["motion"] or "the motion") for motion in document["motions"]]
+    return "contacts that open and close: " + ", ".join(words)
+
+
 def check_cover(document):
-    """Refuses boxes that do not cover the range once: each is the range, or a part of a box that is no box, with all sides halved."""
-    left = {tuple(map(tuple, box["ranges"])) for box in document["boxes"]}
-    if len(left) != len(document["boxes"]):
-        raise Refused("a box stands there twice")
-    waiting = [tuple(map(tuple, document["ranges"]))]
-    while waiting:
-        box = waiting.pop()
-        if box in left:
-            left.remove(box)
-            continue
-        halves = [((low, (low + high) / 2), ((low + high) / 2, high)) for low, high in box]
-        if not left or not all(low < middle < high for (low, middle), (_, high) in halves):
-            raise Refused(f"nothing covers {box}")
-        waiting += tuples(*halves)
+    """Refuses boxes that do not cover the range once: each is the range, or a part of a box that is no box, with all sides halved. A delay is divided into stretches
+    between which there is no nanosecond, and 1/(N − 1) into pieces of its own for each box of keys."""
+    keys, ranges = document["keys"], document["ranges"]
+    pieces = {}
+    for box in document["boxes"]:
+        pieces.setdefault(tuple(map(tuple, box["ranges"][: len(keys)])), []).append(box["ranges"][len(keys) :])
+    for of_keys, of_numbers in pieces.items():
+        if document["every_number"] is None:
+            chained = of_numbers == [[]]
+        else:
+            of_numbers = sorted(ends for (ends,) in of_numbers)
+            low, high = map(float, ends_of_numbers(document))
+            chained = (of_numbers[0][0], of_numbers[-1][1]) == (low, high) and all(one[1] == other[0] for one, other in zip(of_numbers, of_numbers[1:]))
+        if not chained:
+            raise Refused(f"numbers of peers are left out, or a box stands there twice: {of_keys}")
+    left = set(pieces)
+    for whole in beginnings(document, left):
+        waiting = [whole]
+        while waiting:
+            box = waiting.pop()
+            if box in left:
+                left.remove(box)
+                continue
+            halves = [[side] if key == DELAY else [(side[0], sum(side) / 2), (sum(side) / 2, side[1])] for key, side in zip(keys, box)]
+            if not left or not all(low < high for sides in halves if len(sides) > 1 for low, high in sides):
+                raise Refused(f"nothing covers {box}")
+            waiting += tuples(*halves)
     if left:
         raise Refused(f"beyond the range, or twice: {left.pop()}")
+
+
+def beginnings(document, boxes):
+    """The range, for each stretch of delays if one of the keys is a delay."""
+    whole = tuple(map(tuple, document["ranges"]))
+    if DELAY not in document["keys"]:
+        return [whole]
+    place = document["keys"].index(DELAY)
+    stretches = sorted({box[place] for box in boxes})
+    nanoseconds = lambda value: scenes.nanoseconds(f"{Decimal(repr(value)):f}{document['units'][place]}")
+    ends = [(nanoseconds(low), nanoseconds(high)) for low, high in stretches]
+    if (stretches[0][0], stretches[-1][1]) != whole[place] or any(one[1] + 1 != other[0] for one, other in zip(ends, ends[1:])):
+        raise Refused("delays are left out, or stand there twice")
+    return [(*whole[:place], stretch, *whole[place + 1 :]) for stretch in stretches]
 
 
 def check(document) -> str:
@@ -233,7 +394,9 @@ def check(document) -> str:
         return check_boxes(document)
     if kind == ["cohaptic", "stability-number-certificate"]:
         return check_spans(document)
-    raise Refused("not a certificate of a region or of numbers of peers")
+    if kind == ["cohaptic", "stability-switching-certificate"]:
+        return check_switching(document)
+    raise Refused("not a certificate of a region, of numbers of peers or of contacts")
 
 
 def checked(one, all_of, place, words) -> str:
@@ -246,10 +409,12 @@ def checked(one, all_of, place, words) -> str:
 
 def check_boxes(document) -> str:
     for key in document["keys"]:
-        if key not in KEYS:
-            raise Refused(f"a key that is not covered: {key}; expected gains, masses and dampings")
+        if key not in KEYS | {DELAY}:
+            raise Refused(f"a key that is not covered: {key}; expected gains, masses, dampings and link.delay")
+    document.setdefault("every_number", None)
     check_cover(document)
-    area = lambda box: math.prod(Fraction(high) - Fraction(low) for low, high in box["ranges"])
+    # A side without a length counts as one: a single delay, a single number of peers.
+    area = lambda box: math.prod(Fraction(high) - Fraction(low) or 1 for low, high in box["ranges"])
     shares = {"stable": Fraction(0), "unstable": Fraction(0), "undecided": Fraction(0)}
     for number, box in enumerate(document["boxes"], start=1):
         shares[checked(check_box, document, box, f"box {number} of {len(document['boxes'])}, {box['ranges']}")] += area(box)

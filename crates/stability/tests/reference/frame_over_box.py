@@ -136,13 +136,14 @@ def step(mass, damping, stiffness, span):
     return total[0][0], total[0][1], total[1][0], total[1][1], total[0][2] / mass, total[1][2] / mass
 
 
-def refuse(scene):
+def refuse(scene, may_lose=False):
     """Refuses what is not covered."""
     if scene.lag is not None or scene.horizon is not None or scene.own_age is not None:
         raise NotCovered("a law other than average-position and proportional-derivative")
     if len({(p.tick, p.offset, p.phase, p.compute_delay) for p in scene.peers}) > 1 or scene.peers[0].compute_delay:
         raise NotCovered("clocks that differ, or a compute delay")
-    if any(link != scene.links[0, 1] or link.loss or link.uniform_sd for link in scene.links.values()):
+    loses = lambda link: isinstance(link.loss, dict) or link.loss and not may_lose
+    if any(link != scene.links[0, 1] or loses(link) or link.uniform_sd for link in scene.links.values()):
         raise NotCovered("links that differ, or chance")
 
 
@@ -176,9 +177,13 @@ def law_factor(scene, nu, mu):
 
 
 class KeyBox:
-    """The scenes at the corners of a box of keys: key b is at its upper end where bit b of the corner's place is set."""
+    """The scenes at the corners of a box of keys: key b is at its upper end where bit b of the corner's place is set.
 
-    def __init__(self, corners, classes):
+    With `numbers`, two ends of ν = 1/(N − 1), it holds every number N of peers between them, of which those equal to the peers of the largest class (the last of
+    those that are as large) are more or fewer. Only weights may then depend on N: they are affine in ν.
+    """
+
+    def __init__(self, corners, classes, numbers=None):
         self.classes, self.scene = classes, corners[0]
         for scene in corners:
             refuse(scene)
@@ -189,8 +194,16 @@ class KeyBox:
         )
         self.numbers = [[of(scene, peer) for peer in scene.peers] for scene in corners]
         self.keys = len(corners).bit_length() - 1
-        # Coefficients of step maps that vary are numbers of their own.
-        self.steps, self.count = {}, self.keys
+        self.ends, self.growing = numbers, max(range(len(classes)), key=lambda c: (len(classes[c]), c))
+        self.others = Fraction(len(self.scene.peers) - len(classes[self.growing]))
+        if numbers is not None:
+            if len(classes[self.growing]) < 2:
+                raise NotCovered("no equal peers of which there are more and more")
+            scaled = self.scene.inverse_n or self.scene.proportional_derivative or any(peer.coupling_scaling for peer in self.scene.peers)
+            if self.scene.split or scaled:
+                raise NotCovered("gains or masses that depend on the number of peers")
+        # Coefficients of step maps that vary are numbers of their own, and so is ν.
+        self.steps, self.count = {}, self.keys + (numbers is not None)
         for peer in range(len(self.scene.peers)):
             for body in ("device", "copy"):
                 plants = self.plants(peer, body)
@@ -233,14 +246,31 @@ class KeyBox:
 
     def weight(self, row, column, difference):
         """Of the average of a class in what another hears."""
+        if self.ends is not None:
+            return affine_weight(self, row, column, difference)
         others = len(self.scene.peers) - 1
         return Fraction(-1, others) if difference else Fraction(len(self.classes[column]) - (row == column), others)
 
-    def weighed(self, by: Affine, weight) -> Affine:
-        return by.scaled(weight)
+    def weighed(self, by: Affine, weight) -> Scalar:
+        """A gain times the weight of what it hears."""
+        if self.ends is None:
+            return scalar(by.scaled(weight))
+        constant, of_nu = weight
+        low, high = (constant + of_nu * nu for nu in self.ends)
+        return times(scalar(by), scalar(between(low, high, self.keys, self.count)))
 
     def has_differences(self, members):
         return len(members) > 1
+
+
+def affine_weight(box, row, column, difference):
+    """Of the average of a class in what another hears where one class grows: a constant, and a multiple of ν."""
+    own = int(row == column)
+    if difference:
+        return Fraction(0), Fraction(-1)
+    if column == box.growing:
+        return Fraction(1), 1 - box.others - own
+    return Fraction(0), Fraction(len(box.classes[column]) - own)
 
 
 class NumberBox:
@@ -251,8 +281,8 @@ class NumberBox:
     are N times as large, and a device moves by 1/N of a force.
     """
 
-    def __init__(self, scene, classes, growing, low, high):
-        refuse(scene)
+    def __init__(self, scene, classes, growing, low, high, may_lose=False):
+        refuse(scene, may_lose)
         self.scene, self.classes = scene, classes
         self.growing = [growing in members for members in classes].index(True)
         self.others = Fraction(len(scene.peers) - len(classes[self.growing]))
@@ -322,20 +352,15 @@ class NumberBox:
         return [(self.base[0].kt * at_low, self.base[0].bt * at_low)]
 
     def weight(self, row, column, difference):
-        """A constant, and a multiple of ν."""
-        own = int(row == column)
-        if difference:
-            return Fraction(0), Fraction(-1)
-        if column == self.growing:
-            return Fraction(1), 1 - self.others - own
-        return Fraction(0), Fraction(len(self.classes[column]) - own)
+        return affine_weight(self, row, column, difference)
 
-    def weighed(self, by: Affine, weight) -> Affine:
+    def weighed(self, by: Affine, weight) -> Scalar:
+        """A gain times the weight of what it hears."""
         law, heard, _ = self.factors
         constant, of_nu = weight
         share = by.mean / law.mean if law.mean else Fraction(0)
         parts = (law.scaled(share * constant), heard.scaled(share * of_nu))
-        return Affine(sum(part.mean for part in parts), tuple(map(sum, zip(*(part.slopes for part in parts)))))
+        return scalar(Affine(sum(part.mean for part in parts), tuple(map(sum, zip(*(part.slopes for part in parts))))))
 
     def has_differences(self, members):
         grows = members == self.classes[self.growing]
@@ -503,7 +528,7 @@ class Part:
         for place, sender in enumerate(senders):
             for channel, by in enumerate(heard_by):
                 held = self.unit(size, bodies + place * len(heard_by) + channel)
-                force = force + held.times(scalar(self.box.weighed(by, self.weights[c][sender])))
+                force = force + held.times(self.box.weighed(by, self.weights[c][sender]))
         if not device:
             return self.move("copy", peer, (x, v), force)
         grasp = (device[0] - x).times(scalar(kc)) + (device[1] - v).times(of_velocity(bc))

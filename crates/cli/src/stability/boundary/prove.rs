@@ -25,7 +25,7 @@ const ROWS: &str = "proof.rows";
 /// Proves the line and shows or writes it, or does a shard of that.
 pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Sharing<'_>) -> Result<ExitCode, Failure> {
     let (families, tolerance) = (std::slice::from_ref(&order.family), order.options.tolerance);
-    let shared = SharedProof::of_line(&order.family, tolerance);
+    let shared = SharedProof::of_line(&order.family, tolerance).map_err(|error| failure(order, arguments, error))?;
     let mut header = order.header.clone();
     header[0] = format!("cohaptic {} stability boundary --prove: pieces looked at; the same command goes on from here", env!("CARGO_PKG_VERSION"));
     header.pop();
@@ -48,7 +48,7 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
         if arguments.certificate && line.is_whole {
             let pieces = line.certify(&order.family, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
             let given = Given { title: &order.title, text: &order.text, overrides: &arguments.scene.overrides.set };
-            files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], &pieces)?)?);
+            files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], None, &pieces)?)?);
         }
         if line.is_whole {
             proof_blocks::remove(folder, ROWS)?;

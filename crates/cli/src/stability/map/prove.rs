@@ -40,9 +40,11 @@ const ROWS: &str = "proof.rows";
 /// Proves the region of each variant and shows or writes it, or does a shard of that.
 pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, sharing: Sharing<'_>) -> Result<ExitCode, Failure> {
     let start = Clock::now();
-    let shared = SharedProof::of_region(&order.families[0], halvings);
+    let shared = SharedProof::of_region(&order.families[0], halvings, arguments.every_number).map_err(|error| failure(order, arguments, 0, error))?;
     let threads = usize::from(arguments.threads.unwrap_or(0));
-    let size = format!("halved {halvings} times");
+    let numbers =
+        arguments.every_number.map(|(from, to)| format!(", for every number from {from}{}", to.map_or_else(String::new, |to| format!(" to {to}"))));
+    let size = format!("halved {halvings} times{}", numbers.unwrap_or_default());
     let header = filling::header(order, arguments, ["stability map --prove: pieces looked at", &size, proof_blocks::ROW])?;
     let proofs = sharing.folder().map(|folder| Proofs {
         families: &order.families,
@@ -60,7 +62,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
     }
     let rows = proofs.map_or(Ok(Vec::new()), |proofs| proofs.rows(sharing))?;
     let watch = PieceWatch::new();
-    let prove = |(number, family)| ProvenRegion::prove_with(family, halvings, &Pieces::of(number, &rows, None), &watch);
+    let prove = |(number, family)| ProvenRegion::prove_with(family, halvings, arguments.every_number, &Pieces::of(number, &rows, None), &watch);
     let regions = on_threads(threads, || order.families.iter().enumerate().map(prove).collect::<Vec<_>>());
     drop(watch);
     let mut proofs = Vec::new();
@@ -89,8 +91,8 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_REGION,
-        &answer(order, &proofs, halvings, wall_s, &files),
-        || describe(order, &proofs, wall_s),
+        &answer(order, arguments, &proofs, wall_s, &files),
+        || describe(order, arguments, &proofs, wall_s),
         &files,
     )?;
     if proofs.iter().all(|proof| proof.region.is_whole) { Ok(ExitCode::SUCCESS) } else { Err(guarantee::ended()) }
@@ -105,7 +107,7 @@ fn certificates(order: &Order, arguments: &MapArguments, proofs: &[Proof], folde
         let overrides = order.variants[number].on_top_of(&arguments.scene.overrides.set);
         let given = Given { title: &order.title, text: &order.text, overrides: &overrides };
         let name = if number == 0 { "certificate.json".to_owned() } else { format!("certificate-{}.json", number + 1) };
-        files.push(write_into(folder, &name, certificate::of_boxes(&given, &[order.x(), order.y()], &boxes)?)?);
+        files.push(write_into(folder, &name, certificate::of_boxes(&given, &[order.x(), order.y()], arguments.every_number, &boxes)?)?);
     }
     Ok(files)
 }
@@ -115,7 +117,7 @@ fn failure(order: &Order, arguments: &MapArguments, variant: usize, error: Proof
 }
 
 /// The answer of `cohaptic stability map --prove --json`.
-fn answer(order: &Order, proofs: &[Proof], halvings: u32, wall_s: f64, files: &[String]) -> impl Serialize {
+fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64, files: &[String]) -> impl Serialize {
     let (x, y) = (order.x(), order.y());
     let regions = proofs.iter().map(|proof| {
         let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| proof.region.share(guarantee));
@@ -146,16 +148,24 @@ fn answer(order: &Order, proofs: &[Proof], halvings: u32, wall_s: f64, files: &[
         y_unit: y.unit.as_str(),
         y_range: [y.low, y.high],
         // How often each range was halved at most.
-        halvings: halvings,
+        halvings: arguments.prove,
+        // For which numbers of equal peers verdicts hold, the end `null` if there is none; absent: for the number of the scene.
+        #[serde(flatten)]
+        every: arguments.every_number.map(|(from, to)| document! { every_number: document! { from: from, to: to } }),
         regions: regions.collect::<Vec<_>>(),
         wall_s: wall_s,
         files: files,
     }
 }
 
-fn describe(order: &Order, proofs: &[Proof], wall_s: f64) -> String {
+fn describe(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64) -> String {
     let percent = |share: f64| format!("{} %", figure(100.0 * share, 4));
     let mut text = format!("{}\n\n", order.title);
+    if let Some((from, to)) = arguments.every_number {
+        let end = to.map_or_else(String::new, |to| format!(" to {to}"));
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "  for every number of equal peers from {from}{}:", if to.is_none() { " on" } else { &end });
+    }
     for (number, proof) in proofs.iter().enumerate() {
         let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| percent(proof.region.share(guarantee)));
         let name = if proofs.len() > 1 { format!("{}: ", proof.name) } else { String::new() };

@@ -2,7 +2,7 @@
 
 use cohaptic_answers::notes;
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Switching, Verdict, WorstVerdict};
+use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
 use cohaptic_units::print::Span;
 use serde::Serialize;
 
@@ -17,7 +17,7 @@ pub(super) fn of(
     judgement: &Judgement,
     worst: Option<&SceneWorstCase>,
     every: Option<&every_number::Proof>,
-    contacts: Option<&Switching>,
+    contacts: Option<&switching::Proof>,
 ) -> impl Serialize {
     let Judgement { verdict, analysis, mean_square } = judgement;
     let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);

@@ -12,8 +12,8 @@ use std::process::ExitCode;
 use cohaptic_answers::notes;
 use cohaptic_scene::{Scene, read_weights};
 use cohaptic_stability::{
-    Analysis, AnalysisError, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, analyse_spinning, has_chance,
-    judge_watched,
+    Analysis, AnalysisError, CHANGES_LEFT_OUT, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, analyse_spinning,
+    has_chance, judge_watched,
 };
 
 use crate::analysis_watch::AnalysisWatch;
@@ -31,7 +31,10 @@ fn ended() -> Failure {
 pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
     let scene = input::with(path, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
-    let judgement = match &arguments.graph {
+    if arguments.certificate.is_some() && (arguments.every_number.is_some() == arguments.switching) {
+        return Err(Failure::Input("--certificate is of one proof: expected --every-number or --switching".to_owned()));
+    }
+    let mut judgement = match &arguments.graph {
         Some(graph) => on_graph(&scene, graph, path)?,
         None => {
             let watch = AnalysisWatch::new();
@@ -47,9 +50,13 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let worst = worst::of(&scene, arguments, path)?;
     let every = every_number::of(&scene, arguments, path)?;
     let switching = switching::of(&scene, arguments, path)?;
+    if switching.is_some() {
+        // The answer itself covers it.
+        judgement.analysis.notes.iter_mut().for_each(|note| *note = note.replace(CHANGES_LEFT_OUT, "changing between them is judged apart, below"));
+    }
     let more = || {
         let every = every.as_ref().map(|every| every_number::words(&scene, every));
-        let switching = switching.as_ref().map(|switching| switching::words(switching, &notes(&judgement)));
+        let switching = switching.as_ref().map(|switching| switching::words(&switching.found, &notes(&judgement)));
         every.unwrap_or_default() + &switching.unwrap_or_default()
     };
     output::answer(
@@ -57,7 +64,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         DocumentSchema::STABILITY_POINT,
         &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref(), switching.as_ref()),
         || answer::describe(&scene, &judgement, worst.as_ref()) + &more(),
-        every.iter().filter_map(|every| every.file.as_ref()),
+        every.iter().filter_map(|every| every.file.as_ref()).chain(switching.iter().filter_map(|switching| switching.file.as_ref())),
     )?;
     Ok(ExitCode::SUCCESS)
 }

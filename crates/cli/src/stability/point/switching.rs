@@ -13,15 +13,31 @@ use crate::analysis_watch::Interruptible;
 use crate::arguments::PointArguments;
 use crate::document_schema::document;
 use crate::failure::{Failure, not_analysed};
+use crate::file::write_file;
 use crate::input;
 use crate::output::{self, figure};
+use crate::stability::certificate::{self, Given};
+
+/// An answer, and the file of its certificate.
+pub(super) struct Proof {
+    pub(super) found: Switching,
+    pub(super) file: Option<String>,
+}
 
 /// The answer about contacts that open and close, if it is asked for.
-pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Switching>, Failure> {
+pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Proof>, Failure> {
     if !arguments.switching {
         return Ok(None);
     }
-    prove_switching(scene, &Interruptible).map(Some).map_err(|error| match error {
+    let found = prove(scene, path)?;
+    let Some(file) = &arguments.certificate else { return Ok(Some(Proof { found, file: None })) };
+    let given = Given { title: &scene.title, text: &input::text(path)?, overrides: &arguments.scene.overrides.set };
+    write_file(file, certificate::of_switching(&given, &found)?)?;
+    Ok(Some(Proof { found, file: Some(output::path(file)) }))
+}
+
+fn prove(scene: &Scene, path: &Path) -> Result<Switching, Failure> {
+    prove_switching(scene, &Interruptible).map_err(|error| match error {
         SwitchingError::Analysis(AnalysisError::Stopped) => ended(),
         SwitchingError::Analysis(error) => not_analysed(path, &error),
         SwitchingError::NoContact | SwitchingError::Chance | SwitchingError::NoSpring { .. } | SwitchingError::TooLarge { .. } => {
@@ -31,7 +47,7 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
 }
 
 /// The part of the JSON document.
-pub(super) fn document(switching: &Switching) -> impl Serialize + use<> {
+pub(super) fn document(Proof { found: switching, file }: &Proof) -> impl Serialize + use<> {
     let motions = switching.motions.iter().map(|motion| {
         document! {
             // Which motion; empty if there is but one.
@@ -50,6 +66,9 @@ pub(super) fn document(switching: &Switching) -> impl Serialize + use<> {
         verdict: switching.guarantee().word(),
         motions: motions.collect::<Vec<_>>(),
         notes: switching.notes.clone(),
+        // The file of the certificate; absent if none is asked for.
+        #[serde(flatten)]
+        file: file.as_ref().map(|file| document! { file: file.clone() }),
     }
 }
 

@@ -21,10 +21,13 @@
 //!
 //! with S = R(e, e) + 2·T(e, v) + U(v, v). Their size does not depend on N. All links together are one of the things that links may do, which gives the lower bound; between
 //! the two the growth stays open.
+//!
+//! Rows of the second inequality are composed of rows of a frame; how far they may be off is bounded by [`Composed`].
 
 use cohaptic_scene::Scene;
 
 use super::channel::{Channel, Symbol};
+use super::composed::Composed;
 use super::prepared::Prepared;
 use super::{Combination, Links, Patterns, SceneWorstCaseError, WorstPart, of_combination};
 use crate::inequality::{Inequality, Part, Product, Row, holds, search};
@@ -217,60 +220,40 @@ impl Link {
         let inputs = states + self.depth;
         let unknowns = inputs + if apart { 2 * stretches } else { stretches };
         let unit = |place: usize, by: f64| -> Vec<f64> { (0..unknowns).map(|other| if other == place { by } else { 0.0 }).collect() };
-        let mut heard: Vec<Vec<f64>> = Vec::new();
+        let mut heard: Vec<Composed> = Vec::new();
         // A row of the frame, whose samples are those heard in stretches.
-        let composed = |row: &[f64], heard: &[Vec<f64>]| {
-            let mut entries = row[..states].to_vec();
-            entries.resize(unknowns, 0.0);
-            for (by, (_, age)) in row[states..].iter().zip(&frame.used) {
-                if let Some(row) = heard.get(age - 1) {
-                    entries.iter_mut().zip(row).for_each(|(entry, heard)| *entry += by * heard);
-                }
-            }
-            entries
+        let composed = |row: &[f64], heard: &[Composed]| {
+            let rows: Vec<Option<&Composed>> = frame.used.iter().map(|(_, age)| heard.get(age - 1)).collect();
+            Composed::of(row, states, &rows, unknowns, frame.error)
         };
         let sent = frame.sent_by(0).start;
         let own = if apart { -1.0 / others } else { 1.0 };
         for (stretch, age) in self.nominal.iter().enumerate() {
             // A sample that is sent in this frame does not depend on samples heard after it.
-            let sample = if *age == 0 { composed(frame.sent.row(sent), &heard) } else { unit(states + age - 1, 1.0) };
-            let mut row: Vec<f64> = sample.iter().map(|entry| own * entry).collect();
-            row[inputs + stretch] += 1.0;
-            if apart {
-                row[inputs + stretches + stretch] -= 1.0 / others;
-            }
-            heard.push(row);
+            let sample = if *age == 0 { composed(frame.sent.row(sent), &heard) } else { Composed::exact(unit(states + age - 1, 1.0)) };
+            let by_others = apart.then_some((inputs + stretches + stretch, -1.0 / others));
+            heard.push(sample.heard(own, inputs + stretch, by_others));
         }
         let reference = frame.reference().map(|row| composed(frame.states.row(row), &heard));
-        let moved = |mut row: Vec<f64>, by: f64| {
-            if let Some(reference) = &reference {
-                row.iter_mut().zip(reference).for_each(|(entry, moved)| *entry -= by * moved);
-            }
-            row
-        };
-        // Each row is composed of rows of the frame, of which no coefficient is above 2.
-        let error = 16.0 * (1.0 + frame.error) * frame.error.max(f64::EPSILON);
+        let moved = |row: Composed, by: f64| reference.as_ref().map_or_else(|| row.clone(), |reference| row.less(reference, by));
         let mut part = Part { unknowns, ..Part::empty(place, place) };
+        let put = |part: &mut Part, Composed { entries, error }: Composed| part.put(Row { entries, error });
         let kept = (0..frame.states.rows()).filter(|row| Some(*row) != frame.reference());
         for (state, row) in kept.enumerate() {
-            let entries = moved(composed(frame.states.row(row), &heard), frame.displacement(row));
-            let (after, before) = (part.put(Row { entries, error }), part.put(Row { entries: unit(state, rate), error: 0.0 }));
+            let after = put(&mut part, moved(composed(frame.states.row(row), &heard), frame.displacement(row)));
+            let before = part.put(Row { entries: unit(state, rate), error: 0.0 });
             part.after.rows.push(after);
             part.before.rows.push(before);
         }
         let newest = composed(frame.sent.row(sent), &heard);
+        let sample = |age: usize| if age == 0 { newest.clone() } else { Composed::exact(unit(states + age - 1, 1.0)) };
         for age in 0..self.depth {
-            let sample = if age == 0 { newest.clone() } else { unit(states + age - 1, 1.0) };
-            let (after, before) = (
-                part.put(Row { entries: moved(sample, frame.translation(1)), error }),
-                part.put(Row { entries: unit(states + age, rate), error: 0.0 }),
-            );
+            let after = put(&mut part, moved(sample(age), frame.translation(1)));
+            let before = part.put(Row { entries: unit(states + age, rate), error: 0.0 });
             part.after.rows.push(after);
             part.before.rows.push(before);
         }
-        let sample = |age: usize| if age == 0 { newest.clone() } else { unit(states + age - 1, 1.0) };
-        let step = |age: usize| sample(age).iter().zip(sample(age + 1)).map(|(newer, older)| newer - older).collect::<Vec<f64>>();
-        let steps: Vec<usize> = (0..self.depth).map(|age| part.put(Row { entries: step(age), error: if age == 0 { error } else { 0.0 } })).collect();
+        let steps: Vec<usize> = (0..self.depth).map(|age| put(&mut part, sample(age).less(&sample(age + 1), 1.0))).collect();
         let input = |part: &mut Part, first: usize, stretch: usize| part.put(Row { entries: unit(first + stretch, 1.0), error: 0.0 });
         let e: Vec<usize> = (0..stretches).map(|stretch| input(&mut part, inputs, stretch)).collect();
         let c: Vec<usize> = if apart { (0..stretches).map(|stretch| input(&mut part, inputs + stretches, stretch)).collect() } else { Vec::new() };

@@ -43,6 +43,7 @@
 //! arrive in one frame, which were not sent in one.
 
 mod channel;
+mod composed;
 mod each;
 mod error;
 mod frames;
