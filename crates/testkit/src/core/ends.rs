@@ -44,7 +44,7 @@ impl Ends {
 
     /// The receiver, of version 4.
     #[inline]
-    pub(super) const fn to_v4(&self) -> Option<(Ipv4Addr, u16)> {
+    pub(super) const fn receiver_v4(self) -> Option<(Ipv4Addr, u16)> {
         if self.is_six { None } else { Some((Ipv4Addr::from_bits(self.ips[1]), self.ports[1])) }
     }
 

@@ -87,6 +87,7 @@ impl Core {
     }
 
     /// When the network or a timer wants to be woken.
+    #[cfg_attr(not(feature = "tcp"), expect(clippy::needless_pass_by_ref_mut, reason = "only connections that are stuck are looked at twice"))]
     pub(crate) fn next_event(&mut self) -> Option<Instant> {
         let next = wire::earlier(self.wire.next(), self.timers.next());
         #[cfg(feature = "tcp")]

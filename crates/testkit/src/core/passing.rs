@@ -136,6 +136,7 @@ impl Core {
 
 impl Core {
     /// Deals with what has come out of the links.
+    #[cfg_attr(not(feature = "tcp"), expect(clippy::never_loop, reason = "only TCP has packets that do not leave their host"))]
     pub(super) fn take_arrivals(&mut self) {
         loop {
             while let Some((path, at, is_cut, parcel)) = self.wire.poll_plain() {
@@ -178,7 +179,7 @@ impl Core {
     /// The socket for which a datagram is with which nothing is special: over IPv4, to the only socket of its port, which hears all addresses and everybody.
     #[inline]
     fn plain_socket_for(&self, host: NodeId, ends: &Ends) -> Option<SocketId> {
-        let (address, port) = ends.to_v4()?;
+        let (address, port) = ends.receiver_v4()?;
         let id = self.hosts[host.index()].plain.filter(|(plain, _)| *plain == port)?.1;
         (self.plan.of(host).v4 == address).then_some(id)
     }

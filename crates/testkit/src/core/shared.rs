@@ -150,7 +150,7 @@ impl Shared {
         #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
         let (mut core, is_from_home) = match take_here() {
             Some(core) if core.run == self.run => (core, false),
-            other => (self.from_home(other), true),
+            other => (self.take_leaving(other), true),
         };
         #[cfg(feature = "tokio")]
         if let Clock::Tokio { origin } = self.clock
@@ -161,9 +161,9 @@ impl Shared {
         Guard { core: Some(core), shared: self, is_from_home }
     }
 
-    /// The state of another run that lies here stays here.
+    /// Takes the state from where others find it. That of another run, which may lie here, stays here.
     #[cold]
-    fn from_home(&self, other: Option<Box<Core>>) -> Box<Core> {
+    fn take_leaving(&self, other: Option<Box<Core>>) -> Box<Core> {
         if let Some(other) = other {
             put_here(other);
         }

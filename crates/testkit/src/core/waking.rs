@@ -39,6 +39,7 @@ impl Waiters {
         !self.first_waits && self.others.is_empty()
     }
 
+    #[cfg(feature = "tcp")]
     pub(super) fn clear(&mut self) {
         (self.first_waits, self.first) = (false, None);
         self.others.clear();
