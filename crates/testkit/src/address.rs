@@ -117,12 +117,19 @@ impl AddressPlan {
         self.owners.get(Self::place(address)).copied().flatten()
     }
 
+    #[inline]
+    pub(crate) fn owner_of_v4(&self, address: Ipv4Addr) -> Option<NodeId> {
+        let place = address.to_bits().wrapping_sub(FIRST.0 + 1);
+        self.owners.get(place as usize).copied().flatten()
+    }
+
     /// Where an address stands among the owners; behind them all if nobody can have had it.
     #[inline]
     fn place(address: IpAddr) -> usize {
         Addresses::number(address).and_then(|number| number.checked_sub(1)).map_or(usize::MAX, |place| place as usize)
     }
 
+    #[inline]
     pub(crate) fn of(&self, host: NodeId) -> Addresses {
         self.current[host.index()]
     }

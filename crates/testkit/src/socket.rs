@@ -27,6 +27,7 @@ use crate::core::{Shared, SocketId};
 /// - If no socket is at the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`], once the answer has come back over the
 ///   link: by the next call, or by the call that waits to receive.
 /// - A socket at `[::]` hears IPv6 only.
+/// - Another thread gets at it between two polls of tasks: a task that blocks its own thread until that is done waits for ever.
 /// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
 pub struct UdpSocket {
     shared: Arc<Shared>,

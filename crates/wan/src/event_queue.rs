@@ -129,6 +129,18 @@ impl<E: Event> EventQueue<E> {
         self.push_calendar(event);
     }
 
+    /// Adds the event of that key that is made. It is made where it is stored: one that is handed on is written in parts and read as a whole, for which a processor
+    /// waits.
+    #[inline(always)]
+    pub(crate) fn push_made(&mut self, key: &E::Key, make: impl FnOnce() -> E) {
+        if self.in_order && self.ordered.back().is_none_or(|last| last.key() <= *key) {
+            self.len += 1;
+            self.ordered.push_back(make());
+        } else {
+            self.push(make());
+        }
+    }
+
     /// Takes the first event if it is not later than `now`.
     #[inline(always)]
     pub fn pop_due(&mut self, now: Instant) -> Option<E> {

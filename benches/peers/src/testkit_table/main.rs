@@ -2,6 +2,7 @@
 //!
 //! `--smoke` runs every row once with the least work: its figures say nothing. `udp` and `tcp` print the tables of one of them only.
 
+mod on_bare;
 mod on_testkit;
 mod on_turmoil;
 mod program;
@@ -32,8 +33,9 @@ impl Effort {
     }
 }
 
-/// What the issue of the test kit asks for.
-const ASKED_RATIO: f64 = 10.0;
+/// What the issues of the test kit ask for: with datagrams all the time, on its own executor and on tokio; with a question now and then.
+const ASKED_STEADY: [f64; 2] = [8.0, 3.0];
+const ASKED_SELDOM: f64 = 10.0;
 const ASKED_PAIR: f64 = 20.0;
 
 /// The subjects of a table, in its order.
@@ -42,7 +44,12 @@ enum Subject {
     Kit(Kind),
     /// With this tick.
     Turmoil(Duration),
+    /// The program alone.
+    Bare,
 }
+
+/// Where turmoil stands among them.
+const TURMOIL: usize = 3;
 
 const SUBJECTS: [Subject; 5] = [
     Subject::Kit(Kind::Own),
@@ -52,6 +59,12 @@ const SUBJECTS: [Subject; 5] = [
     Subject::Turmoil(Duration::from_micros(100)),
 ];
 
+/// Those of the steady program.
+const STEADY: [Subject; 6] = {
+    let [own, tokio, timers, turmoil, finer] = SUBJECTS;
+    [own, tokio, timers, turmoil, finer, Subject::Bare]
+};
+
 impl Subject {
     const fn name(self) -> &'static str {
         match self {
@@ -60,6 +73,7 @@ impl Subject {
             Self::Kit(Kind::TokioTimers) => "testkit on tokio, tokio's timers",
             Self::Turmoil(tick) if tick.as_millis() == 1 => "turmoil, ticks of 1 ms",
             Self::Turmoil(_) => "turmoil, ticks of 100 µs",
+            Self::Bare => "a bare loop",
         }
     }
 
@@ -71,6 +85,7 @@ impl Subject {
                 let (errors, said) = on_turmoil::run(tick, hosts, stream);
                 (errors, Some(said))
             }
+            Self::Bare => (on_bare::run(hosts, stream), None),
         }
     }
 
@@ -79,6 +94,7 @@ impl Subject {
         match self {
             Self::Kit(kind) => on_testkit::seldom(kind, wait, count),
             Self::Turmoil(tick) => on_turmoil::seldom(tick, wait, count),
+            Self::Bare => unreachable!("it has the steady program only"),
         }
     }
 }
@@ -143,10 +159,10 @@ fn steady(effort: Effort) {
     println!("| ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |");
     for (hosts, period, count) in [(2, 1, 20_000), (10, 1, 2_000), (2, 8, 2_500), (3, 8, 2_500)] {
         let stream = Stream { period: Duration::from_millis(period), count: effort.part_of(count) };
-        let results = rounds(effort, &SUBJECTS, |subject| subject.steady(hosts, stream));
+        let results = rounds(effort, &STEADY, |subject| subject.steady(hosts, stream));
         let speeds: Vec<f64> =
             results.iter().map(|times| stream.length().as_secs_f64() / median(times.iter().map(|(time, _)| *time).collect())).collect();
-        for ((subject, times), speed) in SUBJECTS.iter().zip(&results).zip(&speeds) {
+        for ((subject, times), speed) in STEADY.iter().zip(&results).zip(&speeds) {
             let (errors, said) = times[0].1;
             let rate = speed * f64::from(hosts * (hosts - 1)) / stream.period.as_secs_f64();
             let mean = errors.sum / u32::try_from(errors.packets).unwrap_or(u32::MAX);
@@ -154,16 +170,20 @@ fn steady(effort: Effort) {
             println!(
                 "| {hosts} | {period} | {} | {speed:.0} | {:.1}× | {rate:.0} | {} | {} | {said:.3} |",
                 subject.name(),
-                speed / speeds[3],
+                speed / speeds[TURMOIL],
                 micros(mean),
                 micros(errors.worst)
             );
         }
     }
+    let [own, tokio] = ASKED_STEADY;
     println!(
-        "\nAsked for is {ASKED_RATIO}× turmoil. The test kit saves the ticks in which nothing happens: with traffic like the paper's (3 hosts, every 8 ms) and in most programs"
+        "\nAsked for is {own}× turmoil, and {tokio}× on tokio, with a datagram each millisecond. The *bare loop* (`on_bare.rs`) runs the same program without links, addresses,"
     );
-    println!("(below) these are nearly all of them. Where each tick has datagrams, it is they that cost, with both.");
+    println!(
+        "sockets, records and wakers: what lies between it and the test kit is all that the test kit does. With traffic like the paper's (3 hosts, every 8 ms) and in most"
+    );
+    println!("programs (below) nothing happens in nearly all of turmoil's ticks. Where each tick has datagrams, it is they that cost.");
     println!(
         "\nWith ticks of 100 µs turmoil is not finer: its hosts run on tokio's paused clock, whose timers are rounded up to milliseconds, so that each tick takes one"
     );
@@ -173,7 +193,7 @@ fn steady(effort: Effort) {
 fn seldom(effort: Effort) {
     println!("## A question now and then\n");
     println!(
-        "A client asks, a server answers over links of {} ms, and the client waits so long before it asks again. Asked for: {ASKED_RATIO}× turmoil.\n",
+        "A client asks, a server answers over links of {} ms, and the client waits so long before it asks again. Asked for: {ASKED_SELDOM}× turmoil.\n",
         DELAY.as_millis()
     );
     println!("| wait | | simulated s per s | against turmoil |");
@@ -184,7 +204,7 @@ fn seldom(effort: Effort) {
         let results = rounds(effort, &SUBJECTS, |subject| subject.seldom(wait, count));
         let speeds: Vec<f64> = results.iter().map(|times| simulated / median(times.iter().map(|(time, ())| *time).collect())).collect();
         for (subject, speed) in SUBJECTS.iter().zip(&speeds) {
-            println!("| {} ms | {} | {speed:.0} | {:.1}× |", wait.as_millis(), subject.name(), speed / speeds[3]);
+            println!("| {} ms | {} | {speed:.0} | {:.1}× |", wait.as_millis(), subject.name(), speed / speeds[TURMOIL]);
         }
     }
     println!();

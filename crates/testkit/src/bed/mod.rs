@@ -373,6 +373,8 @@ where
     let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
     watched.is_of(&shared);
     let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
+    // After it is known that no other one runs on this thread.
+    let _here = shared.stay();
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let outcome = Rc::new(RefCell::new(None));
     let (future, slot) = (program(Bed::new(Arc::clone(&shared))), Rc::clone(&outcome));

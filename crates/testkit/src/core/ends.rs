@@ -1,6 +1,6 @@
 //! The two ends of a packet, in as few bytes as they take: the event queue moves them.
 
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4};
 
 use crate::address::Addresses;
 
@@ -34,6 +34,18 @@ impl Ends {
             IpAddr::V6(_) => Addresses::number(ip).unwrap_or(0),
         };
         Self { ips: [short(from.ip()), short(to.ip())], ports: [from.port(), to.port()], is_six: to.is_ipv6(), kind }
+    }
+
+    /// As [`Ends::new`], of version 4.
+    #[inline]
+    pub(super) const fn of_v4(from: SocketAddrV4, to: SocketAddrV4, kind: Kind) -> Self {
+        Self { ips: [from.ip().to_bits(), to.ip().to_bits()], ports: [from.port(), to.port()], is_six: false, kind }
+    }
+
+    /// The receiver, of version 4.
+    #[inline]
+    pub(super) const fn receiver_v4(self) -> Option<(Ipv4Addr, u16)> {
+        if self.is_six { None } else { Some((Ipv4Addr::from_bits(self.ips[1]), self.ports[1])) }
     }
 
     #[inline]

@@ -4,14 +4,16 @@ mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
 mod face;
+mod octets;
 mod passing;
+mod shared;
 mod sockets;
 #[cfg(feature = "tcp")]
 mod tcp;
 mod waking;
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::Arc;
 use std::task::Waker;
 
 use cohaptic_units::Instant;
@@ -20,13 +22,15 @@ use cohaptic_wan::{LinkModel, NodeId, Path};
 use crate::address::{self, AddressPlan};
 use crate::file::LinkChange;
 use crate::trace::Happening;
-use crate::wire::{self, Recorded, Settings, Wire};
+use crate::wire::{self, Settings, Wire};
 use ends::{Ends, Kind};
 use face::Face;
 use sockets::Sockets;
 use waking::Woken;
 
+pub(crate) use octets::Octets;
 pub(crate) use passing::Outgoing;
+pub(crate) use shared::{Clock, Shared};
 pub(crate) use sockets::{Datagram, SocketId};
 #[cfg(feature = "tcp")]
 pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
@@ -40,10 +44,13 @@ pub(crate) struct Core {
     pub(crate) entropy: entropy::Entropy,
     hosts: Vec<HostState>,
     sockets: Sockets,
+    spare: octets::Spare,
     #[cfg(feature = "tcp")]
     tcp: tcp::Tcp,
     pub(crate) woken: Woken,
     face: Arc<Face>,
+    /// Which run it is the state of.
+    run: u64,
 }
 
 pub(crate) type Parcel = wire::Parcel<Ends>;
@@ -66,15 +73,23 @@ impl Core {
             entropy: entropy::Entropy::new(seed),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
+            spare: octets::Spare::default(),
             #[cfg(feature = "tcp")]
             tcp: tcp::Tcp::new(seed, names.len()),
             woken: Woken::default(),
+            run: 0,
         }
     }
 
+    /// Whether other threads look at it while a task has its own: at a record, or at what laws did.
+    fn is_looked_at(&self) -> bool {
+        self.settings.traces || self.settings.keeps_packets || self.settings.laws.iter().next().is_some()
+    }
+
     /// When the network or a timer wants to be woken.
+    #[cfg_attr(not(feature = "tcp"), expect(clippy::needless_pass_by_ref_mut, reason = "only connections that are stuck are looked at twice"))]
     pub(crate) fn next_event(&mut self) -> Option<Instant> {
-        let next = [self.wire.next(), self.timers.next()].into_iter().flatten().min();
+        let next = wire::earlier(self.wire.next(), self.timers.next());
         #[cfg(feature = "tcp")]
         let next = self.with_tcp_timers(next);
         next
@@ -119,123 +134,6 @@ impl Core {
     pub(crate) fn set_link(&mut self, path: Path, link: LinkModel) {
         self.wire.set_link(self.now(), path, link);
         self.take_arrivals();
-    }
-}
-
-/// The state machine, and how what belongs to tasks gets at it.
-pub(crate) struct Shared {
-    core: Mutex<Core>,
-    clock: Clock,
-    face: Arc<Face>,
-}
-
-/// The source of the time.
-pub(crate) enum Clock {
-    /// The executor of this crate, by [`Core::pass`].
-    Own,
-    /// Tokio's paused clock.
-    #[cfg(feature = "tokio")]
-    Tokio {
-        /// Its time at [`Instant::ZERO`].
-        origin: tokio::time::Instant,
-    },
-}
-
-impl Shared {
-    pub(crate) fn new(core: Core, clock: Clock) -> Self {
-        Self { face: Arc::clone(&core.face), core: Mutex::new(core), clock }
-    }
-
-    /// The time.
-    #[inline]
-    pub(crate) fn now(&self) -> Instant {
-        match self.clock {
-            Clock::Own => self.face.now(),
-            #[cfg(feature = "tokio")]
-            Clock::Tokio { .. } => self.lock().now(),
-        }
-    }
-
-    /// See [`Face::note_call`].
-    #[inline]
-    pub(crate) fn note_call(&self) {
-        self.face.note_call();
-    }
-
-    /// See [`Face::count_poll`].
-    #[cfg(feature = "tokio")]
-    pub(crate) fn count_poll(&self) -> Option<u64> {
-        self.face.count_poll()
-    }
-
-    /// The time, unless the state is held: for a look from another thread.
-    pub(crate) fn try_now(&self) -> Option<Instant> {
-        self.try_core().map(|core| core.now())
-    }
-
-    /// What was recorded so far, unless the state is held.
-    pub(crate) fn try_recorded(&self) -> Option<Recorded> {
-        self.try_core().map(|core| core.wire.recorded())
-    }
-
-    /// Not held for long: a loop of tokio takes the state again and again, each time for a moment.
-    fn try_core(&self) -> Option<MutexGuard<'_, Core>> {
-        (0..10_000).find_map(|_| match self.core.try_lock() {
-            Ok(core) => Some(core),
-            Err(TryLockError::Poisoned(held)) => Some(held.into_inner()),
-            Err(TryLockError::WouldBlock) => {
-                std::thread::yield_now();
-                None
-            }
-        })
-    }
-
-    /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.
-    pub(crate) fn lock(&self) -> Guard<'_> {
-        #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
-        let mut core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
-        match self.clock {
-            Clock::Own => {}
-            #[cfg(feature = "tokio")]
-            Clock::Tokio { origin } => {
-                // Once the run is over, tokio's clock is that of the machine.
-                if tokio::runtime::Handle::try_current().is_ok() {
-                    let now = Instant::ZERO + origin.elapsed();
-                    if now > core.now() {
-                        core.pass_until(now);
-                    }
-                }
-            }
-        }
-        Guard { core: Some(core) }
-    }
-}
-
-/// The state, as long as it is held.
-pub(crate) struct Guard<'a> {
-    core: Option<MutexGuard<'a, Core>>,
-}
-
-impl std::ops::Deref for Guard<'_> {
-    type Target = Core;
-
-    fn deref(&self) -> &Core {
-        self.core.as_ref().expect("it is there until the guard is dropped")
-    }
-}
-
-impl std::ops::DerefMut for Guard<'_> {
-    fn deref_mut(&mut self) -> &mut Core {
-        self.core.as_mut().expect("it is there until the guard is dropped")
-    }
-}
-
-impl Drop for Guard<'_> {
-    fn drop(&mut self) {
-        let Some(mut core) = self.core.take() else { return };
-        let Some(woken) = core.woken.take() else { return };
-        drop(core);
-        woken.into_iter().for_each(Waker::wake);
     }
 }
 
@@ -288,6 +186,8 @@ struct HostState {
     is_idle: bool,
     /// The sockets of a port, by version (6 or not) and port.
     ports: BTreeMap<(bool, u16), Vec<SocketId>>,
+    /// The port and the socket of the last plain datagram, until a socket of the host is bound, connected or closed: see [`Core::arrive`].
+    plain: Option<(u16, SocketId)>,
     /// The port that is given next to a socket that asks for none.
     next_port: u16,
 }
@@ -312,7 +212,7 @@ impl Core {
         if std::mem::replace(&mut state.is_down, true) {
             return;
         }
-        state.ports.clear();
+        (state.ports, state.plain) = (BTreeMap::new(), None);
         let now = self.now();
         for socket in self.sockets.all_of(host) {
             socket.die(now, &mut self.woken);
@@ -330,7 +230,7 @@ impl Core {
         self.wire.note(Happening::Killed(host));
         let state = &mut self.hosts[host.index()];
         state.is_idle = true;
-        state.ports.clear();
+        (state.ports, state.plain) = (BTreeMap::new(), None);
         let now = self.now();
         for socket in self.sockets.all_of(host) {
             socket.die(now, &mut self.woken);

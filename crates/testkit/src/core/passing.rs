@@ -1,11 +1,12 @@
 //! The way of a datagram: from a socket into its link, and from the link to a socket.
 
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4};
 
 use bytes::Bytes;
 use cohaptic_wan::{NodeId, Path};
 
+use super::sockets::SocketState;
 use super::{Core, Datagram, Ends, Kind, Parcel, SocketId};
 use crate::trace::Lost;
 use crate::wire::Arrival;
@@ -14,29 +15,55 @@ use crate::wire::Arrival;
 const LONGEST: [usize; 2] = [65_507, 65_527];
 
 /// What a socket sends.
-#[derive(Clone, Debug)]
-pub(crate) struct Outgoing {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outgoing<'a> {
     /// The receiver; `None`: the peer to which the socket is connected.
-    pub(crate) to: Option<SocketAddr>,
-    pub(crate) bytes: Bytes,
+    pub(crate) to: Option<&'a SocketAddr>,
+    pub(crate) bytes: &'a [u8],
     pub(crate) ecn_capable: bool,
 }
 
+#[cold]
 fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
     Err(io::Error::new(kind, text))
 }
 
 impl Core {
     /// Sends a datagram, now.
-    pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing) -> io::Result<()> {
+    #[inline]
+    pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
         self.note_call();
-        self.check_alive(id)?;
-        let socket = self.sockets.get_mut(id);
-        if std::mem::take(&mut socket.refused) {
-            return refuse(io::ErrorKind::ConnectionRefused, "connection refused: no socket at the port of the peer".into());
+        let Some((path, addresses)) = self.plainly(id, &outgoing) else { return self.send_any(id, outgoing) };
+        let parcel = Parcel { addresses, bytes: self.spare.copy(outgoing.bytes), ecn_capable: outgoing.ecn_capable };
+        self.offer(path, parcel);
+        Ok(())
+    }
+
+    /// The way and the ends of a datagram with which nothing is special: over IPv4, from a socket without an error that is bound to all addresses, to another host.
+    /// What else may be said of a datagram need not be asked then: it took more time than all the rest of sending.
+    #[inline(always)]
+    fn plainly(&self, id: SocketId, outgoing: &Outgoing<'_>) -> Option<(Path, Ends)> {
+        let socket = self.sockets.get(id);
+        let (SocketAddr::V4(local), SocketAddr::V4(to)) = (&socket.local, outgoing.to.or(socket.peer.as_ref())?) else { return None };
+        let receiver = self.plan.owner_of_v4(*to.ip())?;
+        let is_plain = local.ip().is_unspecified()
+            && receiver != socket.host
+            && to.port() != 0
+            && outgoing.bytes.len() <= LONGEST[0]
+            && !socket.refused
+            && socket.died.is_none();
+        let from = SocketAddrV4::new(self.plan.of(socket.host).v4, local.port());
+        is_plain.then(|| (Path { from: socket.host, to: receiver }, Ends::of_v4(from, *to, Kind::Datagram)))
+    }
+
+    #[inline(never)]
+    fn send_any(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
+        let socket = self.sockets.get(id);
+        if socket.died.is_some() || socket.refused {
+            return Err(self.error_of(id));
         }
         let (host, local, may_broadcast) = (socket.host, socket.local, socket.may_broadcast);
-        let Some(mut to) = outgoing.to.or(socket.peer) else {
+        let Some(mut to) = outgoing.to.copied().or(socket.peer) else {
             return refuse(io::ErrorKind::NotConnected, "the socket is not connected; use `send_to`, or `connect` before".into());
         };
         let len = outgoing.bytes.len();
@@ -59,7 +86,7 @@ impl Core {
         }
         let from = SocketAddr::new(self.source(host, local.ip(), to.ip())?, local.port());
         let addresses = Ends::new(from, to, Kind::Datagram);
-        let parcel = Parcel { addresses, bytes: outgoing.bytes, ecn_capable: outgoing.ecn_capable };
+        let parcel = Parcel { addresses, bytes: self.spare.copy(outgoing.bytes), ecn_capable: outgoing.ecn_capable };
         if to.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
             if !may_broadcast {
                 return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
@@ -99,6 +126,7 @@ impl Core {
     }
 
     /// Hands a packet to its link.
+    #[inline(always)]
     pub(super) fn offer(&mut self, path: Path, parcel: Parcel) {
         if self.wire.offer(path, parcel).is_ok() {
             self.take_arrivals();
@@ -108,8 +136,14 @@ impl Core {
 
 impl Core {
     /// Deals with what has come out of the links.
+    #[cfg_attr(not(feature = "tcp"), expect(clippy::never_loop, reason = "only TCP has packets that do not leave their host"))]
     pub(super) fn take_arrivals(&mut self) {
         loop {
+            while let Some((path, at, is_cut, parcel)) = self.wire.poll_plain() {
+                if !is_cut {
+                    let _ = self.arrive(path.to, at, parcel, false, path.from);
+                }
+            }
             while let Some(Arrival { packet, at, parcel, marked, is_cut }) = self.wire.poll() {
                 let Path { from, to } = packet.path;
                 let end = if is_cut { Err(Lost::Cut) } else { self.arrive(to, at, parcel, marked, from) };
@@ -129,15 +163,29 @@ impl Core {
         let _ = self.arrive(host, self.now(), parcel, false, host);
     }
 
+    #[inline(always)]
     fn arrive(&mut self, host: NodeId, at: cohaptic_units::Instant, parcel: Parcel, marked: bool, from: NodeId) -> Result<(), Lost> {
         #[cfg(feature = "tcp")]
         if parcel.addresses.kind == Kind::Segment {
-            return self.arrive_segment(host, &parcel.bytes, marked);
+            return self.arrive_segment(host, &parcel.bytes.into(), marked);
         }
-        let state = &self.hosts[host.index()];
-        if state.is_down {
+        if self.hosts[host.index()].is_down {
             return Err(Lost::HostDown);
         }
+        let Some(id) = self.plain_socket_for(host, &parcel.addresses) else { return self.arrive_anywhere(host, at, parcel, marked, from) };
+        self.arrive_at(id, at, parcel, marked)
+    }
+
+    /// The socket for which a datagram is with which nothing is special: over IPv4, to the only socket of its port, which hears all addresses and everybody.
+    #[inline]
+    fn plain_socket_for(&self, host: NodeId, ends: &Ends) -> Option<SocketId> {
+        let (address, port) = ends.receiver_v4()?;
+        let id = self.hosts[host.index()].plain.filter(|(plain, _)| *plain == port)?.1;
+        (self.plan.of(host).v4 == address).then_some(id)
+    }
+
+    #[inline(never)]
+    fn arrive_anywhere(&mut self, host: NodeId, at: cohaptic_units::Instant, parcel: Parcel, marked: bool, from: NodeId) -> Result<(), Lost> {
         let (from_address, to_address) = (parcel.addresses.from(), parcel.addresses.to());
         let ip = to_address.ip();
         let is_for_all = ip == IpAddr::V4(Ipv4Addr::BROADCAST);
@@ -150,27 +198,46 @@ impl Core {
             }
             return Err(Lost::NoSocket);
         };
+        self.note_plain(host, id);
+        self.arrive_at(id, at, parcel, marked)
+    }
+
+    /// Hands a packet to its socket.
+    #[inline(always)]
+    fn arrive_at(&mut self, id: SocketId, at: cohaptic_units::Instant, parcel: Parcel, marked: bool) -> Result<(), Lost> {
         let socket = self.sockets.get_mut(id);
         match parcel.addresses.kind {
             #[cfg(feature = "tcp")]
             Kind::Segment => {}
             // Only a connected socket is told, as with Linux: another one could not know of whom it speaks.
             Kind::Unreachable => {
-                if socket.peer == Some(from_address) {
+                if socket.peer == Some(parcel.addresses.from()) {
                     socket.refused = true;
                     socket.wake_readers(&mut self.woken);
                 }
             }
             Kind::Datagram => {
-                if socket.held + parcel.bytes.len() > self.settings.receive_buffer {
+                let held = socket.held + parcel.bytes.len();
+                if held > self.settings.receive_buffer {
                     return Err(Lost::BufferFull);
                 }
-                socket.held += parcel.bytes.len();
-                socket.inbox.push_back(Datagram { from: from_address, bytes: parcel.bytes, at, ecn_capable: parcel.ecn_capable, marked, to: ip });
+                socket.held = held;
+                let Parcel { addresses: ends, bytes, ecn_capable } = parcel;
+                socket.inbox.push_back(Datagram { ends, bytes, at, ecn_capable, marked });
                 socket.wake_readers(&mut self.woken);
             }
         }
         Ok(())
+    }
+
+    /// Remembers the socket for which a packet was, if all plain datagrams to its port are for it.
+    fn note_plain(&mut self, host: NodeId, id: SocketId) {
+        let SocketState { local: SocketAddr::V4(local), peer: None, .. } = self.sockets.get(id) else { return };
+        let state = &mut self.hosts[host.index()];
+        let is_only = state.ports.get(&(false, local.port())).is_some_and(|bound| bound.len() == 1);
+        if is_only && local.ip().is_unspecified() {
+            state.plain = Some((local.port(), id));
+        }
     }
 
     /// The socket of a host for which a packet is: one that is connected to its sender before one that is not, one that is bound to its address before one that
@@ -195,7 +262,7 @@ impl Core {
         // As long as that of ICMP (RFC 792): its header, and the header and the first eight bytes of what could not be delivered. The addresses say all that is
         // needed here.
         let addresses = parcel.addresses.back(Kind::Unreachable);
-        let answer = Parcel { addresses, bytes: Bytes::from_static(&[0; 36]), ecn_capable: false };
+        let answer = Parcel { addresses, bytes: Bytes::from_static(&[0; 36]).into(), ecn_capable: false };
         if host == sender { self.hand_over(host, answer) } else { self.offer(Path { from: host, to: sender }, answer) }
     }
 }

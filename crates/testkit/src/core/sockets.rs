@@ -5,11 +5,12 @@ use std::io;
 use std::net::{IpAddr, SocketAddr};
 use std::task::Waker;
 
-use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
 use super::Core;
+use super::ends::Ends;
+use super::octets::Octets;
 use super::waking::{Waiters, Woken};
 
 /// A socket, until it is closed.
@@ -18,18 +19,48 @@ pub(crate) struct SocketId(usize);
 
 /// A datagram in the buffer of a socket.
 #[derive(Clone, Debug)]
-#[cfg_attr(not(feature = "quinn"), allow(dead_code, reason = "congestion and the own address are asked for by the adapters of protocols"))]
+#[cfg_attr(not(feature = "quinn"), allow(dead_code, reason = "the adapters of protocols ask for congestion"))]
 pub(crate) struct Datagram {
-    pub(crate) from: SocketAddr,
-    pub(crate) bytes: Bytes,
+    pub(super) ends: Ends,
+    pub(crate) bytes: Octets,
     /// When it arrived.
     pub(crate) at: Instant,
     /// Whether its sender understands marks.
-    pub(crate) ecn_capable: bool,
+    pub(super) ecn_capable: bool,
     /// Whether an active queue marked it.
-    pub(crate) marked: bool,
+    pub(super) marked: bool,
+}
+
+impl Datagram {
+    #[inline]
+    pub(crate) fn from(&self) -> SocketAddr {
+        self.ends.from()
+    }
+
+    /// Copies what fits into a buffer; gives the length.
+    #[inline]
+    pub(crate) fn copy_to(&self, buffer: &mut [u8]) -> usize {
+        let len = self.bytes.len().min(buffer.len());
+        buffer[..len].copy_from_slice(&self.bytes[..len]);
+        len
+    }
+}
+
+/// What the adapters of protocols ask for.
+#[cfg(feature = "quinn")]
+impl Datagram {
     /// The address to which it was sent.
-    pub(crate) to: IpAddr,
+    pub(crate) fn to(&self) -> IpAddr {
+        self.ends.to().ip()
+    }
+
+    pub(crate) const fn ecn_capable(&self) -> bool {
+        self.ecn_capable
+    }
+
+    pub(crate) const fn marked(&self) -> bool {
+        self.marked
+    }
 }
 
 #[derive(Debug)]
@@ -77,10 +108,12 @@ impl Sockets {
         SocketId(self.places.len() - 1)
     }
 
+    #[inline]
     pub(super) fn get(&self, id: SocketId) -> &SocketState {
         self.places[id.0].as_ref().expect("a socket is open as long as its number is held")
     }
 
+    #[inline]
     pub(super) fn get_mut(&mut self, id: SocketId) -> &mut SocketState {
         self.places[id.0].as_mut().expect("a socket is open as long as its number is held")
     }
@@ -111,6 +144,7 @@ impl Core {
         let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
         let id = self.sockets.insert(state);
         self.hosts[host.index()].ports.entry((six, port)).or_default().push(id);
+        self.hosts[host.index()].plain = None;
         Ok(id)
     }
 
@@ -149,6 +183,7 @@ impl Core {
     pub(crate) fn close(&mut self, id: SocketId) {
         let Some(state) = self.sockets.places[id.0].take() else { return };
         self.sockets.free.push(id.0);
+        self.hosts[state.host.index()].plain = None;
         let key = (state.local.is_ipv6(), state.local.port());
         if let Some(bound) = self.hosts[state.host.index()].ports.get_mut(&key) {
             bound.retain(|other| *other != id);
@@ -159,9 +194,14 @@ impl Core {
     }
 
     /// Fails if the socket died with its host.
+    #[inline]
     pub(crate) fn check_alive(&self, id: SocketId) -> io::Result<()> {
         let socket = self.sockets.get(id);
-        let Some(at) = socket.died else { return Ok(()) };
+        socket.died.map_or(Ok(()), |at| self.refuse_dead(socket, at))
+    }
+
+    #[cold]
+    fn refuse_dead(&self, socket: &SocketState, at: Instant) -> io::Result<()> {
         let name = &self.plan.names()[socket.host.index()];
         let text = format!(
             "host `{name}` crashed at {} s, and this socket ({}) with it; after `Host::restart`, bind a new one",
@@ -189,7 +229,9 @@ impl Core {
                 format!("a socket at {local} cannot reach {peer}, which is of the other version of IP"),
             ));
         }
-        self.sockets.get_mut(id).peer = Some(peer);
+        let socket = self.sockets.get_mut(id);
+        socket.peer = Some(peer);
+        self.hosts[socket.host.index()].plain = None;
         Ok(())
     }
 
@@ -206,21 +248,31 @@ impl Core {
         &mut self.sockets.get_mut(id).may_broadcast
     }
 
-    /// The next datagram, which is taken out unless it is only peeked at; `None` if there is none.
-    pub(crate) fn receive(&mut self, id: SocketId, peek: bool) -> io::Result<Option<Datagram>> {
-        self.check_alive(id)?;
+    /// Looks at the next datagram, which is taken out unless it is only peeked at; `None` if there is none. It is looked at where it lies: to move it out took as long as
+    /// all else.
+    #[inline]
+    pub(crate) fn receive<T>(&mut self, id: SocketId, peek: bool, look: impl FnOnce(&Datagram) -> T) -> io::Result<Option<T>> {
         let socket = self.sockets.get_mut(id);
-        if std::mem::take(&mut socket.refused) {
-            return Err(io::Error::new(io::ErrorKind::ConnectionRefused, "connection refused: no socket at the port of the peer"));
+        if socket.died.is_some() || socket.refused {
+            return Err(self.error_of(id));
         }
-        if peek {
-            return Ok(socket.inbox.front().cloned());
+        let Some(datagram) = socket.inbox.front() else { return Ok(None) };
+        let seen = look(datagram);
+        if !peek && let Some(Datagram { bytes, .. }) = socket.inbox.pop_front() {
+            socket.held -= bytes.len();
+            self.spare.put(bytes);
         }
-        let datagram = socket.inbox.pop_front();
-        if let Some(datagram) = &datagram {
-            socket.held -= datagram.bytes.len();
+        Ok(Some(seen))
+    }
+
+    /// The error that a socket has, which is taken out.
+    #[cold]
+    pub(super) fn error_of(&mut self, id: SocketId) -> io::Error {
+        if let Err(died) = self.check_alive(id) {
+            return died;
         }
-        Ok(datagram)
+        self.sockets.get_mut(id).refused = false;
+        io::Error::new(io::ErrorKind::ConnectionRefused, "connection refused: no socket at the port of the peer")
     }
 
     /// Whether [`Core::receive`] has something to say.

@@ -5,35 +5,56 @@ use std::task::{RawWakerVTable, Waker};
 /// The wakers of tasks that wait for one thing.
 #[derive(Debug, Default)]
 pub(super) struct Waiters {
-    waiting: Vec<Waker>,
-    /// One that was woken: most often the same task waits again.
-    known: Option<Waker>,
+    /// Whether the first one waits. It is kept when it was woken: most often the same task waits again, and then nothing is moved.
+    first_waits: bool,
+    first: Option<Waker>,
+    others: Vec<Waker>,
 }
 
 impl Waiters {
     /// A task waits, once.
     #[inline]
     pub(super) fn wait(&mut self, waker: &Waker) {
-        if self.waiting.iter().any(|waiting| waiting.will_wake(waker)) {
+        if self.first.as_ref().is_some_and(|first| first.will_wake(waker)) {
+            self.first_waits = true;
             return;
         }
-        let known = self.known.take().filter(|known| known.will_wake(waker));
-        self.waiting.push(known.unwrap_or_else(|| waker.clone()));
+        self.wait_as_another(waker);
+    }
+
+    #[inline(never)]
+    fn wait_as_another(&mut self, waker: &Waker) {
+        if self.others.iter().any(|waiting| waiting.will_wake(waker)) {
+            return;
+        }
+        // They are woken in the order in which they came: others wait only while the first one does.
+        if self.first_waits {
+            self.others.push(waker.clone());
+        } else {
+            (self.first_waits, self.first) = (true, Some(waker.clone()));
+        }
     }
 
     pub(super) const fn is_empty(&self) -> bool {
-        self.waiting.is_empty()
+        !self.first_waits && self.others.is_empty()
     }
 
+    #[cfg(feature = "tcp")]
     pub(super) fn clear(&mut self) {
-        self.waiting.clear();
+        (self.first_waits, self.first) = (false, None);
+        self.others.clear();
     }
 
     /// All go on.
     #[inline]
     pub(super) fn wake(&mut self, woken: &mut Woken) {
-        for waker in self.waiting.drain(..) {
-            self.known = woken.wake(waker).or_else(|| self.known.take());
+        if std::mem::take(&mut self.first_waits)
+            && let Some(first) = &self.first
+        {
+            woken.wake_by_ref(first);
+        }
+        if !self.others.is_empty() {
+            self.others.drain(..).for_each(|waker| woken.wake(waker));
         }
     }
 }
@@ -52,26 +73,33 @@ impl Woken {
         self.own = Some(waker.vtable());
     }
 
-    /// Wakes now if it may, and gives the waker back then.
+    /// Wakes now if it may.
     #[inline]
-    pub(super) fn wake(&mut self, waker: Waker) -> Option<Waker> {
+    pub(super) fn wake_by_ref(&mut self, waker: &Waker) {
         if self.own.is_some_and(|own| std::ptr::eq(own, waker.vtable())) {
             waker.wake_by_ref();
-            return Some(waker);
+        } else {
+            self.later.push(waker.clone());
         }
-        self.later.push(waker);
-        None
+    }
+
+    /// Wakes now if it may.
+    pub(super) fn wake(&mut self, waker: Waker) {
+        if self.own.is_some_and(|own| std::ptr::eq(own, waker.vtable())) {
+            waker.wake();
+        } else {
+            self.later.push(waker);
+        }
     }
 
     /// Whether some wait for that.
-    #[cfg(feature = "tokio")]
+    #[inline]
     pub(crate) const fn is_any(&self) -> bool {
         !self.later.is_empty()
     }
 
-    /// Those that are to be woken once nobody holds the state; `None`: there are none.
-    #[inline]
-    pub(crate) fn take(&mut self) -> Option<Vec<Waker>> {
-        (!self.later.is_empty()).then(|| std::mem::take(&mut self.later))
+    /// Those that are to be woken once nobody holds the state.
+    pub(crate) fn take(&mut self) -> Vec<Waker> {
+        std::mem::take(&mut self.later)
     }
 }

@@ -77,7 +77,7 @@ impl NodeRun {
             return;
         };
         let addresses = Ports { from: from_port, to: address.port(), is_six: address.is_ipv6() };
-        let parcel = Parcel { addresses, bytes, ecn_capable };
+        let parcel = Parcel { addresses, bytes: bytes.into(), ecn_capable };
         let path = Path { from, to };
         if to == from {
             // It does not leave the node, and so meets no link.
@@ -113,7 +113,7 @@ impl NodeRun {
             let ip = if ports.is_six { addresses.v6.into() } else { addresses.v4.into() };
             std::net::SocketAddr::new(ip, port)
         };
-        self.arrived.push_back((to, Packet { from: address(from, ports.from), to: address(to, ports.to), bytes, marked }));
+        self.arrived.push_back((to, Packet { from: address(from, ports.from), to: address(to, ports.to), bytes: bytes.into(), marked }));
     }
 
     /// Hands over what has arrived, in its order, and what arrives at once because of it.

@@ -41,7 +41,7 @@ impl AsyncUdpSocket for VirtualSocket {
         if !self.may_send_from(transmit.src_ip) {
             return Ok(());
         }
-        match self.socket.send_now(Some(transmit.destination), transmit.contents, transmit.ecn.is_some()) {
+        match self.socket.send_now(Some(&transmit.destination), transmit.contents, transmit.ecn.is_some()) {
             // The host has crashed.
             Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => Err(error),
             // As quinn's own sockets do: what cannot be sent is lost, and the protocol finds out by itself.
@@ -52,17 +52,17 @@ impl AsyncUdpSocket for VirtualSocket {
     fn poll_recv(&self, cx: &mut Context<'_>, buffers: &mut [IoSliceMut<'_>], metas: &mut [RecvMeta]) -> Poll<io::Result<usize>> {
         let mut count = 0;
         for (buffer, meta) in buffers.iter_mut().zip(metas) {
-            let taken = if count == 0 {
-                match self.socket.poll_take(cx, false) {
-                    Poll::Ready(taken) => taken?,
+            let filled = if count == 0 {
+                match self.socket.poll_look(cx, false, |datagram| fill(buffer, datagram)) {
+                    Poll::Ready(filled) => filled?,
                     Poll::Pending => return Poll::Pending,
                 }
             } else {
                 // An error comes again with the next call.
-                let Ok(taken) = self.socket.try_take(false) else { break };
-                taken
+                let Ok(filled) = self.socket.try_look(false, |datagram| fill(buffer, datagram)) else { break };
+                filled
             };
-            *meta = fill(buffer, &taken);
+            *meta = filled;
             count += 1;
         }
         Poll::Ready(Ok(count))
@@ -79,14 +79,13 @@ impl AsyncUdpSocket for VirtualSocket {
 
 /// Copies a datagram, cut off where the buffer ends, and describes it.
 fn fill(buffer: &mut [u8], datagram: &Datagram) -> RecvMeta {
-    let len = datagram.bytes.len().min(buffer.len());
-    buffer[..len].copy_from_slice(&datagram.bytes[..len]);
-    let ecn = match (datagram.marked, datagram.ecn_capable) {
+    let len = datagram.copy_to(buffer);
+    let ecn = match (datagram.marked(), datagram.ecn_capable()) {
         (true, _) => Some(EcnCodepoint::Ce),
         (false, true) => Some(EcnCodepoint::Ect0),
         (false, false) => None,
     };
-    RecvMeta { addr: datagram.from, len, stride: len, ecn, dst_ip: Some(datagram.to) }
+    RecvMeta { addr: datagram.from(), len, stride: len, ecn, dst_ip: Some(datagram.to()) }
 }
 
 /// Sending never waits.

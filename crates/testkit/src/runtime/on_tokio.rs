@@ -16,21 +16,22 @@
 
 use std::cell::RefCell;
 use std::future::{Future, poll_fn};
-use std::panic::{AssertUnwindSafe, Location, catch_unwind, resume_unwind};
+use std::panic::Location;
 use std::pin::{Pin, pin};
 use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::task::{Context, Poll, Waker};
+use std::task::{Context, Poll, Wake, Waker};
 use std::time::Duration;
 
 use cohaptic_units::Instant;
 use tokio::task::LocalSet;
 
-use super::own::{nothing_will_happen, time_stands_still};
+use super::own::{Executor, is_any_ready, nothing_will_happen, time_stands_still};
 use crate::bed::{Bed, Recorder};
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
-use crate::task::{Spawner, Task, Tasks};
+use crate::task::Tasks;
 use crate::watch::Watched;
 use crate::wire::Recorded;
 
@@ -40,58 +41,92 @@ const TICK: u64 = 1_000_000;
 /// If tokio has jumped so far because there was nothing else to jump to, nothing will ever happen.
 const NEVER: Duration = Duration::from_secs(365 * 24 * 3600);
 
-/// What the hook and the pump share.
-#[derive(Default)]
-struct Idle(Mutex<IdleState>);
+/// Stands for no instant at all: never.
+const NO_INSTANT: u64 = u64::MAX;
 
-#[derive(Default)]
-struct IdleState {
-    /// The instant for which the pump has set its timer.
-    armed: Option<Instant>,
-    /// Wakes the pump.
-    pump: Option<Waker>,
+/// How many tasks are polled before tokio goes on: as many as it polls of a `LocalSet`.
+const POLLS: u32 = 61;
+
+/// What the hook and the pump share.
+struct Idle {
+    /// The instant for which the pump has set its timer \[ns\].
+    armed: AtomicU64,
+    /// The pump is to set its timer anew.
+    is_wanted: AtomicBool,
+    /// Where the hook has left the clock \[ns\], if nothing runs between it and the executor that could move it; else [`NO_INSTANT`].
+    moved: AtomicU64,
+    /// Other threads may have the state, because tokio parks its thread.
+    is_parked: AtomicBool,
+    /// Wakes the pump, and the executor.
+    main: Mutex<Option<Waker>>,
+}
+
+impl Default for Idle {
+    fn default() -> Self {
+        Self {
+            armed: AtomicU64::new(NO_INSTANT - 1),
+            is_wanted: AtomicBool::new(true),
+            moved: AtomicU64::new(NO_INSTANT),
+            is_parked: AtomicBool::new(false),
+            main: Mutex::new(None),
+        }
+    }
 }
 
 impl Idle {
-    fn lock(&self) -> std::sync::MutexGuard<'_, IdleState> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Wakes the executor, which is polled next: tokio polls the future of its `block_on` before tasks.
+    fn wake(&self, now: Instant) {
+        self.moved.store(now.as_nanos(), Ordering::Relaxed);
+        if let Some(main) = &*self.main.lock().unwrap_or_else(PoisonError::into_inner) {
+            main.wake_by_ref();
+        }
     }
 
     /// Tokio is about to park its thread: all wait.
     fn notice(&self, shared: &Shared) {
+        let mut core = shared.lock();
         loop {
-            let mut core = shared.lock();
             let (now, next) = (core.now(), core.next_event());
-            // Tokio has jumped over it.
+            // Tokio has jumped over it, or it was moved to.
             let is_due = next.is_some_and(|next| next <= now);
             if is_due {
                 core.pass(now);
             }
+            if is_any_ready() {
+                // What woke one has woken the executor.
+                self.moved.store(core.now().as_nanos(), Ordering::Relaxed);
+                return;
+            }
             if core.woken.is_any() {
                 return;
             }
-            drop(core);
             if is_due {
                 continue;
             }
-            match step(now, next) {
-                Some(to) => {
-                    advance(to.saturating_duration_since(now));
-                    if floor(to) == to {
-                        // What tokio has for this millisecond goes off first.
-                        return;
-                    }
-                }
-                None => {
-                    let state = self.lock();
-                    if state.armed != Some(armed(next))
-                        && let Some(pump) = &state.pump
-                    {
-                        pump.wake_by_ref();
-                    }
-                    return;
-                }
+            let Some(to) = step(now, next) else { break };
+            advance(to.saturating_duration_since(now));
+            if floor(to) == to {
+                // What tokio has for this millisecond goes off first.
+                drop(core);
+                return self.wake(to);
             }
+            core.pass(to);
+        }
+        let (armed, now) = (armed(core.next_event()), core.now());
+        drop(core);
+        if self.armed.load(Ordering::Relaxed) != armed {
+            self.is_wanted.store(true, Ordering::Relaxed);
+            return self.wake(now);
+        }
+        // What blocks elsewhere, such as a task of `spawn_blocking`, may want it.
+        self.is_parked.store(true, Ordering::Relaxed);
+        shared.bring_home();
+    }
+
+    /// Tokio has parked its thread, or has not because of something.
+    fn resume(&self, shared: &Shared) {
+        if self.is_parked.swap(false, Ordering::Relaxed) {
+            shared.bring_here();
         }
     }
 }
@@ -101,9 +136,9 @@ const fn floor(at: Instant) -> Instant {
     Instant::from_nanos(at.as_nanos() / TICK * TICK)
 }
 
-/// For when the pump sets its timer if that is the next event; `Instant::ZERO` stands for never.
-fn armed(next: Option<Instant>) -> Instant {
-    next.map_or(Instant::ZERO, floor)
+/// For when the pump sets its timer if that is the next event.
+fn armed(next: Option<Instant>) -> u64 {
+    next.map_or(NO_INSTANT, |next| floor(next).as_nanos())
 }
 
 /// Up to when the clock is to be moved by hand; `None` if tokio may jump.
@@ -111,43 +146,8 @@ fn step(now: Instant, next: Option<Instant>) -> Option<Instant> {
     let whole = floor(now).saturating_add_nanos(TICK);
     match next {
         Some(next) if next < whole => Some(next.max(now)),
-        _ if floor(now) < now => Some(whole),
+        _ if floor(now) < now || next == Some(whole) => Some(whole),
         _ => None,
-    }
-}
-
-/// Starts tasks in a set of tokio's that stays on this thread.
-struct Local {
-    shared: Arc<Shared>,
-    set: Rc<LocalSet>,
-    panic: Rc<RefCell<Panic>>,
-}
-
-/// The panic of a task, and the waker of the run that is to be told.
-#[derive(Default)]
-struct Panic {
-    payload: Option<Box<dyn std::any::Any + Send>>,
-    main: Option<Waker>,
-}
-
-impl Spawner for Local {
-    fn start(&self, task: Rc<Task>) {
-        let (panic, shared) = (Rc::clone(&self.panic), Arc::clone(&self.shared));
-        self.set.spawn_local(poll_fn(move |cx| {
-            // Tokio would keep a panic until the task is joined; a test is to fail.
-            let poll = || {
-                if let Some(patience) = shared.count_poll() {
-                    time_stands_still(&shared, patience, Some(&task));
-                }
-                task.poll(cx)
-            };
-            catch_unwind(AssertUnwindSafe(poll)).unwrap_or_else(|payload| {
-                let mut panic = panic.borrow_mut();
-                panic.payload.get_or_insert(payload);
-                panic.main.take().into_iter().for_each(Waker::wake);
-                Poll::Ready(())
-            })
-        }));
     }
 }
 
@@ -178,6 +178,7 @@ where
     let idle = Arc::new(Idle::default());
     let known: Arc<OnceLock<Arc<Shared>>> = Arc::default();
     let (hook_idle, hook_known, pulse) = (Arc::clone(&idle), Arc::clone(&known), Arc::clone(&watched.pulse));
+    let (back_idle, back_known) = (Arc::clone(&idle), Arc::clone(&known));
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_time()
         .start_paused(true)
@@ -187,94 +188,121 @@ where
                 hook_idle.notice(shared);
             }
         })
+        .on_thread_unpark(move || {
+            if let Some(shared) = back_known.get() {
+                back_idle.resume(shared);
+            }
+        })
         .build()
         .unwrap_or_else(|error| panic!("tokio cannot be started: {error}"));
     let guard = runtime.enter();
     // The clock stands still, so this is the instant from which tokio counts milliseconds.
     let origin_of_time = tokio::time::Instant::now();
+    let executor = Executor::new();
+    let mut core = core;
+    core.woken.trust(&executor.waker());
     let shared = Arc::new(Shared::new(core, Clock::Tokio { origin: origin_of_time }));
     drop(guard);
     watched.is_of(&shared);
-    let panic = Rc::new(RefCell::new(Panic::default()));
-    let set = Rc::new(LocalSet::new());
-    let tasks = Rc::new(Tasks::new(
-        Box::new(Local { shared: Arc::clone(&shared), set: Rc::clone(&set), panic: Rc::clone(&panic) }),
-        hosts,
-        Arc::clone(&watched.pulse),
-    ));
+    let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
     let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let _ = known.set(Arc::clone(&shared));
-    runtime.block_on(set.run_until(async {
+    runtime.block_on(async {
+        // Tasks that the program starts with tokio's `spawn_local` live in this set. It is polled when it is woken, which `run_until` does each time.
+        let mut set = LocalSet::new();
+        let _local = set.enter();
+        let _here = shared.stay();
         let outcome = Rc::new(RefCell::new(None));
         let (future, slot) = (program(Bed::new(Arc::clone(&shared))), Rc::clone(&outcome));
-        let main = tasks.spawn(None, origin, async move {
+        let mut main = pin!(tasks.spawn(None, origin, async move {
             let came_out = future.await;
             *slot.borrow_mut() = Some(came_out);
-        });
-        let mut main = pin!(main);
+        }));
         let mut pump = pin!(pump(&shared, &tasks, &idle, origin_of_time));
+        let mut woken: Option<Arc<SetWaker>> = None;
         poll_fn(|cx| {
-            {
-                let mut panic = panic.borrow_mut();
-                if let Some(payload) = panic.payload.take() {
-                    drop(panic);
-                    resume_unwind(payload);
+            let woken = woken.get_or_insert_with(|| {
+                executor.begin(Some(cx.waker()));
+                *idle.main.lock().unwrap_or_else(PoisonError::into_inner) = Some(cx.waker().clone());
+                Arc::new(SetWaker { is_woken: AtomicBool::new(true), main: cx.waker().clone() })
+            });
+            let moved = idle.moved.swap(NO_INSTANT, Ordering::Relaxed);
+            let synced = shared.sync((moved != NO_INSTANT).then(|| Instant::from_nanos(moved)));
+            let mut left = POLLS;
+            let all_wait = executor.run_some(|| {
+                if let Some(patience) = shared.count_poll() {
+                    time_stands_still(&shared, patience, executor.last().as_deref());
                 }
-                panic.main = Some(cx.waker().clone());
-            }
-            if main.as_mut().poll(cx).is_ready() {
+                left -= 1;
+                left > 0 && tokio::task::coop::has_budget_remaining()
+            });
+            if main.is_finished() && main.as_mut().poll(cx).is_ready() {
                 return Poll::Ready(());
             }
-            // It never ends.
-            pump.as_mut().poll(cx)
+            if all_wait {
+                // It never ends.
+                let _: Poll<()> = pump.as_mut().poll(cx);
+            } else {
+                cx.waker().wake_by_ref();
+            }
+            drop(synced);
+            if woken.is_woken.swap(false, Ordering::Relaxed) {
+                // Without tasks it is over, until there is one.
+                let _: Poll<()> = Pin::new(&mut set).poll(&mut Context::from_waker(&Arc::clone(woken).into()));
+            }
+            Poll::Pending
         })
         .await;
         outcome.take().unwrap_or_else(|| panic!("the program was stopped before it was over: do not abort it, or the runtime"))
-    }))
+    })
+}
+
+/// Wakes the executor, which polls the set then.
+struct SetWaker {
+    is_woken: AtomicBool,
+    main: Waker,
+}
+
+impl Wake for SetWaker {
+    fn wake(self: Arc<Self>) {
+        Self::wake_by_ref(&self);
+    }
+
+    fn wake_by_ref(self: &Arc<Self>) {
+        self.is_woken.store(true, Ordering::Relaxed);
+        self.main.wake_by_ref();
+    }
 }
 
 /// Sets the timer to which tokio may jump, and tells when nothing will ever happen.
 async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::Instant) {
     let mut timer = pin!(tokio::time::sleep_until(origin + NEVER));
-    let mut deadline = origin + NEVER;
+    // When the timer goes off, since the run began.
+    let mut due = NEVER;
     poll_fn(|cx| {
-        loop {
-            let (now, next) = {
-                let mut core = shared.lock();
-                (core.now(), core.next_event())
-            };
-            if next.is_some_and(|next| next <= now) {
-                // Due: it was moved to, or has come by tokio's own jump.
-                shared.lock().pass(now);
-                continue;
-            }
-            {
-                let mut state = idle.lock();
-                if !state.pump.as_ref().is_some_and(|known| known.will_wake(cx.waker())) {
-                    state.pump = Some(cx.waker().clone());
-                }
-                let wanted = armed(next);
-                if state.armed != Some(wanted) {
-                    state.armed = Some(wanted);
-                    deadline = if next.is_some() {
-                        origin + Duration::from_nanos(wanted.as_nanos())
-                    } else {
-                        origin + Duration::from_nanos(now.as_nanos()) + NEVER
-                    };
-                    timer.as_mut().reset(deadline);
-                }
-            }
-            if timer.as_mut().poll(cx).is_ready() {
-                if next.is_none() {
-                    nothing_will_happen(shared, tasks);
-                }
-                // The millisecond of the next event has come, or one before it; the hook does the rest. The timer is not to go off again.
-                timer.as_mut().reset(origin + NEVER);
-                let _ = timer.as_mut().poll(cx);
-            }
+        let since = Duration::from_nanos(shared.now().as_nanos());
+        // Most often the hook moves the clock by hand, and the timer stands where it did.
+        if !idle.is_wanted.load(Ordering::Relaxed) && since < due {
             return Poll::Pending;
         }
+        idle.is_wanted.store(false, Ordering::Relaxed);
+        let next = shared.lock().next_event();
+        let wanted = armed(next);
+        if idle.armed.swap(wanted, Ordering::Relaxed) != wanted {
+            due = if next.is_some() { Duration::from_nanos(wanted) } else { since + NEVER };
+            timer.as_mut().reset(origin + due);
+        }
+        if timer.as_mut().poll(cx).is_ready() {
+            if next.is_none() {
+                nothing_will_happen(shared, tasks);
+            }
+            // The millisecond of the next event has come, or one before it; the hook does the rest. The timer is not to go off again.
+            due = NEVER;
+            timer.as_mut().reset(origin + NEVER);
+            let _ = timer.as_mut().poll(cx);
+        }
+        Poll::Pending
     })
     .await
 }

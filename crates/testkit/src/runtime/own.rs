@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Wake, Waker};
 
 use cohaptic_units::print::Seconds;
@@ -17,15 +17,57 @@ use crate::core::Shared;
 use crate::task::{Named, Spawner, Task, Tasks};
 
 thread_local! {
-    /// The tasks that can go on of the executor that runs on this thread, and its number.
-    static HERE: (Cell<u64>, RefCell<VecDeque<usize>>) = const { (Cell::new(0), RefCell::new(VecDeque::new())) };
+    static HERE: Here = const { Here { executor: Cell::new(0), ready: RefCell::new(VecDeque::new()), main: RefCell::new(None), waits: Cell::new(false) } };
+}
+
+/// What the executor that runs on a thread has there.
+struct Here {
+    /// Its number.
+    executor: Cell<u64>,
+    /// The tasks that can go on.
+    ready: RefCell<VecDeque<usize>>,
+    /// Wakes the executor, where it is itself a task of another one.
+    main: RefCell<Option<Waker>>,
+    /// Whether it waits to be woken.
+    waits: Cell<bool>,
+}
+
+impl Here {
+    #[inline]
+    fn push(&self, number: usize) {
+        self.ready.borrow_mut().push_back(number);
+        if self.waits.replace(false)
+            && let Some(main) = &*self.main.borrow()
+        {
+            main.wake_by_ref();
+        }
+    }
+}
+
+/// Whether a task can go on of the executor that runs on this thread.
+#[cfg(feature = "tokio")]
+pub(crate) fn is_any_ready() -> bool {
+    HERE.with(|here| !here.ready.borrow().is_empty())
 }
 
 /// The tasks that other threads have woken.
 #[derive(Default)]
 struct Elsewhere {
     is_any: AtomicBool,
-    numbers: Mutex<Vec<usize>>,
+    woken: Mutex<WokenElsewhere>,
+}
+
+#[derive(Default)]
+struct WokenElsewhere {
+    numbers: Vec<usize>,
+    /// Wakes the executor, where it is itself a task of another one.
+    main: Option<Waker>,
+}
+
+impl Elsewhere {
+    fn lock(&self) -> MutexGuard<'_, WokenElsewhere> {
+        self.woken.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// Where a task is.
@@ -42,18 +84,23 @@ impl Wake for Place {
     }
 
     fn wake_by_ref(self: &Arc<Self>) {
-        let is_here = HERE.try_with(|(executor, ready)| {
-            let is_here = executor.get() == self.executor;
+        let is_here = HERE.try_with(|here| {
+            let is_here = here.executor.get() == self.executor;
             // What another thread does meanwhile to the mark polls the task once in vain, and not too seldom.
             if is_here && !self.is_queued.load(Ordering::Relaxed) {
                 self.is_queued.store(true, Ordering::Relaxed);
-                ready.borrow_mut().push_back(self.number);
+                here.push(self.number);
             }
             is_here
         });
         if is_here != Ok(true) && !self.is_queued.swap(true, Ordering::Relaxed) {
-            self.elsewhere.numbers.lock().unwrap_or_else(PoisonError::into_inner).push(self.number);
-            self.elsewhere.is_any.store(true, Ordering::Relaxed);
+            let main = {
+                let mut woken = self.elsewhere.lock();
+                woken.numbers.push(self.number);
+                self.elsewhere.is_any.store(true, Ordering::Relaxed);
+                woken.main.clone()
+            };
+            main.into_iter().for_each(Waker::wake);
         }
     }
 }
@@ -68,7 +115,6 @@ pub(crate) struct Executor {
     last: Rc<Cell<usize>>,
 }
 
-#[derive(Clone)]
 struct Slot {
     task: Rc<Task>,
     place: Arc<Place>,
@@ -113,12 +159,10 @@ impl Executor {
     pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
         let patience = shared.lock().settings.patience;
         let mut polls = 0;
-        HERE.with(|(executor, ready)| {
-            executor.set(self.number);
-            ready.borrow_mut().clear();
-        });
+        self.begin(None);
         while !is_over() {
             tasks.turns();
+            shared.hand_out();
             if self.poll_one() {
                 polls += 1;
                 if polls > patience {
@@ -138,14 +182,48 @@ impl Executor {
         }
     }
 
+    /// Runs on this thread from now on. `main` wakes it, where it is itself a task of another executor.
+    pub(crate) fn begin(&self, main: Option<&Waker>) {
+        HERE.with(|here| {
+            if here.executor.replace(self.number) != self.number {
+                here.ready.borrow_mut().clear();
+            }
+            here.main.replace(main.cloned());
+            here.waits.set(false);
+        });
+        if let Some(main) = main {
+            self.elsewhere.lock().main = Some(main.clone());
+        }
+    }
+
+    /// Polls tasks until none can go on, or `goes_on` says no after one of them; says whether none can.
+    #[cfg(feature = "tokio")]
+    pub(crate) fn run_some(&self, mut goes_on: impl FnMut() -> bool) -> bool {
+        while self.poll_one() {
+            if !goes_on() {
+                return false;
+            }
+        }
+        HERE.with(|here| here.waits.set(true));
+        true
+    }
+
+    /// The task that was polled last, unless it is over.
+    pub(crate) fn last(&self) -> Option<Rc<Task>> {
+        self.slots.borrow().get(self.last.get()).and_then(Option::as_ref).map(|slot| Rc::clone(&slot.task))
+    }
+
     /// Polls the task that has waited longest; says whether there was one.
     fn poll_one(&self) -> bool {
         if self.elsewhere.is_any.load(Ordering::Relaxed) {
-            self.elsewhere.is_any.store(false, Ordering::Relaxed);
-            let numbers = std::mem::take(&mut *self.elsewhere.numbers.lock().unwrap_or_else(PoisonError::into_inner));
-            HERE.with(|(_, ready)| ready.borrow_mut().extend(numbers));
+            let numbers = {
+                let mut woken = self.elsewhere.lock();
+                self.elsewhere.is_any.store(false, Ordering::Relaxed);
+                std::mem::take(&mut woken.numbers)
+            };
+            HERE.with(|here| here.ready.borrow_mut().extend(numbers));
         }
-        let Some(number) = HERE.with(|(_, ready)| ready.borrow_mut().pop_front()) else { return false };
+        let Some(number) = HERE.with(|here| here.ready.borrow_mut().pop_front()) else { return false };
         self.last.set(number);
         // The task may start others while it is polled, which get other places.
         let Some(slot) = self.slots.borrow_mut().get_mut(number).and_then(Option::take) else { return true };
@@ -161,8 +239,7 @@ impl Executor {
 
     /// Gives up, because time does not pass.
     fn give_up(&self, shared: &Shared, polls: u64) -> ! {
-        let slot = self.slots.borrow()[self.last.get()].clone();
-        time_stands_still(shared, polls, slot.as_ref().map(|slot| &*slot.task))
+        time_stands_still(shared, polls, self.last().as_deref())
     }
 }
 

@@ -18,7 +18,7 @@ impl UdpSocket {
     ///
     /// [`io::ErrorKind::ConnectionRefused`] if the peer has told that nobody is at its port.
     pub async fn recv(&self, buffer: &mut [u8]) -> io::Result<usize> {
-        Ok(self.take(false).await?.copy_to(buffer).0)
+        self.look(false, |datagram| datagram.copy_to(buffer)).await
     }
 
     /// Receives a datagram; gives its length and its sender.
@@ -27,7 +27,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub async fn recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
-        Ok(self.take(false).await?.copy_to(buffer))
+        self.look(false, |datagram| (datagram.copy_to(buffer), datagram.from())).await
     }
 
     /// Receives a datagram into the free room of a buffer; gives its length.
@@ -36,7 +36,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub async fn recv_buf(&self, buffer: &mut impl BufMut) -> io::Result<usize> {
-        Ok(self.take(false).await?.put_into(buffer).0)
+        self.look(false, |datagram| datagram.put_into(buffer)).await
     }
 
     /// Receives a datagram into the free room of a buffer; gives its length and its sender.
@@ -45,7 +45,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub async fn recv_buf_from(&self, buffer: &mut impl BufMut) -> io::Result<(usize, SocketAddr)> {
-        Ok(self.take(false).await?.put_into(buffer))
+        self.look(false, |datagram| (datagram.put_into(buffer), datagram.from())).await
     }
 
     /// Receives a datagram; gives its length, its sender, and when it arrived, to the nanosecond.
@@ -54,9 +54,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub async fn recv_from_at(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr, Instant)> {
-        let datagram = self.take(false).await?;
-        let (len, from) = datagram.copy_to(buffer);
-        Ok((len, from, datagram.at))
+        self.look(false, |datagram| (datagram.copy_to(buffer), datagram.from(), datagram.at)).await
     }
 
     /// Looks at the next datagram and leaves it; gives its length.
@@ -65,7 +63,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub async fn peek(&self, buffer: &mut [u8]) -> io::Result<usize> {
-        Ok(self.take(true).await?.copy_to(buffer).0)
+        self.look(true, |datagram| datagram.copy_to(buffer)).await
     }
 
     /// Looks at the next datagram and leaves it; gives its length and its sender.
@@ -74,7 +72,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub async fn peek_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
-        Ok(self.take(true).await?.copy_to(buffer))
+        self.look(true, |datagram| (datagram.copy_to(buffer), datagram.from())).await
     }
 
     /// The sender of the next datagram, which is left.
@@ -83,7 +81,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub async fn peek_sender(&self) -> io::Result<SocketAddr> {
-        Ok(self.take(true).await?.from)
+        self.look(true, Datagram::from).await
     }
 
     /// Receives a datagram if there is one.
@@ -92,7 +90,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`]; [`io::ErrorKind::WouldBlock`] if there is none.
     pub fn try_recv(&self, buffer: &mut [u8]) -> io::Result<usize> {
-        Ok(self.try_take(false)?.copy_to(buffer).0)
+        self.try_look(false, |datagram| datagram.copy_to(buffer))
     }
 
     /// Receives a datagram if there is one.
@@ -101,7 +99,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
-        Ok(self.try_take(false)?.copy_to(buffer))
+        self.try_look(false, |datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
     /// Receives a datagram into the free room of a buffer if there is one.
@@ -110,7 +108,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_recv_buf(&self, buffer: &mut impl BufMut) -> io::Result<usize> {
-        Ok(self.try_take(false)?.put_into(buffer).0)
+        self.try_look(false, |datagram| datagram.put_into(buffer))
     }
 
     /// Receives a datagram into the free room of a buffer if there is one.
@@ -119,7 +117,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_recv_buf_from(&self, buffer: &mut impl BufMut) -> io::Result<(usize, SocketAddr)> {
-        Ok(self.try_take(false)?.put_into(buffer))
+        self.try_look(false, |datagram| (datagram.put_into(buffer), datagram.from()))
     }
 
     /// Looks at the next datagram if there is one.
@@ -128,7 +126,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_peek(&self, buffer: &mut [u8]) -> io::Result<usize> {
-        Ok(self.try_take(true)?.copy_to(buffer).0)
+        self.try_look(true, |datagram| datagram.copy_to(buffer))
     }
 
     /// Looks at the next datagram if there is one.
@@ -137,7 +135,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_peek_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
-        Ok(self.try_take(true)?.copy_to(buffer))
+        self.try_look(true, |datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
     /// The sender of the next datagram if there is one.
@@ -146,7 +144,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_peek_sender(&self) -> io::Result<SocketAddr> {
-        Ok(self.try_take(true)?.from)
+        self.try_look(true, Datagram::from)
     }
 
     /// Receives a datagram, or sees to it that the task is woken when there is one.
@@ -166,7 +164,7 @@ impl UdpSocket {
     /// As [`UdpSocket::recv`].
     #[cfg(feature = "tokio")]
     pub fn poll_recv_from(&self, cx: &mut Context<'_>, buffer: &mut tokio::io::ReadBuf<'_>) -> Poll<io::Result<SocketAddr>> {
-        self.poll_take(cx, false).map_ok(|datagram| datagram.fill(buffer))
+        self.poll_look(cx, false, |datagram| datagram.fill(buffer))
     }
 
     /// Looks at the next datagram, or sees to it that the task is woken when there is one; gives its sender.
@@ -176,7 +174,7 @@ impl UdpSocket {
     /// As [`UdpSocket::recv`].
     #[cfg(feature = "tokio")]
     pub fn poll_peek_from(&self, cx: &mut Context<'_>, buffer: &mut tokio::io::ReadBuf<'_>) -> Poll<io::Result<SocketAddr>> {
-        self.poll_take(cx, true).map_ok(|datagram| datagram.fill(buffer))
+        self.poll_look(cx, true, |datagram| datagram.fill(buffer))
     }
 
     /// Looks at the sender of the next datagram, or sees to it that the task is woken when there is one.
@@ -185,7 +183,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn poll_peek_sender(&self, cx: &mut Context<'_>) -> Poll<io::Result<SocketAddr>> {
-        self.poll_take(cx, true).map_ok(|datagram| datagram.from)
+        self.poll_look(cx, true, Datagram::from)
     }
 
     /// Waits until something can be received.
@@ -211,20 +209,23 @@ impl UdpSocket {
         Poll::Pending
     }
 
-    pub(crate) fn try_take(&self, peek: bool) -> io::Result<Datagram> {
+    /// What is seen of a datagram, if there is one.
+    pub(crate) fn try_look<T>(&self, peek: bool, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
         let mut core = self.shared.lock();
         core.note_call();
-        core.receive(self.id, peek)?.ok_or_else(|| io::ErrorKind::WouldBlock.into())
+        core.receive(self.id, peek, look)?.ok_or_else(|| io::ErrorKind::WouldBlock.into())
     }
 
-    async fn take(&self, peek: bool) -> io::Result<Datagram> {
-        poll_fn(|cx| self.poll_take(cx, peek)).await
+    /// What is seen of the next datagram.
+    async fn look<T>(&self, peek: bool, mut look: impl FnMut(&Datagram) -> T) -> io::Result<T> {
+        poll_fn(|cx| self.poll_look(cx, peek, &mut look)).await
     }
 
-    pub(crate) fn poll_take(&self, cx: &Context<'_>, peek: bool) -> Poll<io::Result<Datagram>> {
+    #[inline]
+    pub(crate) fn poll_look<T>(&self, cx: &Context<'_>, peek: bool, look: impl FnOnce(&Datagram) -> T) -> Poll<io::Result<T>> {
         let mut core = self.shared.lock();
-        match core.receive(self.id, peek) {
-            Ok(Some(datagram)) => Poll::Ready(Ok(datagram)),
+        match core.receive(self.id, peek, look) {
+            Ok(Some(seen)) => Poll::Ready(Ok(seen)),
             Err(error) => Poll::Ready(Err(error)),
             Ok(None) => {
                 core.wait_to_read(self.id, cx.waker());
@@ -235,22 +236,16 @@ impl UdpSocket {
 }
 
 impl Datagram {
-    fn copy_to(&self, buffer: &mut [u8]) -> (usize, SocketAddr) {
-        let len = self.bytes.len().min(buffer.len());
-        buffer[..len].copy_from_slice(&self.bytes[..len]);
-        (len, self.from)
-    }
-
-    fn put_into(&self, buffer: &mut impl BufMut) -> (usize, SocketAddr) {
+    fn put_into(&self, buffer: &mut impl BufMut) -> usize {
         let len = self.bytes.len().min(buffer.remaining_mut());
         buffer.put_slice(&self.bytes[..len]);
-        (len, self.from)
+        len
     }
 
     #[cfg(feature = "tokio")]
     fn fill(&self, buffer: &mut tokio::io::ReadBuf<'_>) -> SocketAddr {
         let len = self.bytes.len().min(buffer.remaining());
         buffer.put_slice(&self.bytes[..len]);
-        self.from
+        self.from()
     }
 }

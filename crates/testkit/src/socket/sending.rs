@@ -4,8 +4,6 @@ use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
 
-use bytes::Bytes;
-
 use super::UdpSocket;
 use crate::address::ToSocketAddrs;
 use crate::core::Outgoing;
@@ -37,7 +35,7 @@ impl UdpSocket {
     /// As [`UdpSocket::send`]; [`io::ErrorKind::HostUnreachable`] if no host ever had that address.
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn send_to(&self, bytes: &[u8], to: impl ToSocketAddrs) -> io::Result<usize> {
-        self.send_now(Some(to.to_socket_addr()?), bytes, false)
+        self.send_now(Some(&to.to_socket_addr()?), bytes, false)
     }
 
     /// Sends to an address; gives the length.
@@ -46,7 +44,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::send_to`].
     pub fn try_send_to(&self, bytes: &[u8], to: SocketAddr) -> io::Result<usize> {
-        self.send_now(Some(to), bytes, false)
+        self.send_now(Some(&to), bytes, false)
     }
 
     /// Sends to the peer; ready at once.
@@ -67,9 +65,9 @@ impl UdpSocket {
         Poll::Ready(self.try_send_to(bytes, to))
     }
 
-    pub(crate) fn send_now(&self, to: Option<SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
+    pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
         let ecn_capable = ecn_capable || self.options.is_ecn_capable();
-        let outgoing = Outgoing { to, bytes: Bytes::copy_from_slice(bytes), ecn_capable };
+        let outgoing = Outgoing { to, bytes, ecn_capable };
         self.shared.lock().send(self.id, outgoing)?;
         Ok(bytes.len())
     }

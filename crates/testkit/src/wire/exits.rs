@@ -6,6 +6,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{DropCause, Fate, Network, PacketEvent, PacketRecord, Path};
 
 use super::Parcel;
+use crate::core::Octets;
 use crate::hit::Verdict;
 
 /// What comes out of a link. Its copies are counted as the links of a network without access lines count them: 0, 1, 2.
@@ -158,6 +159,6 @@ fn flip<A>(out: &mut Out<A>, bit: u64) {
     if let Some(byte) = usize::try_from(bit / 8).ok().and_then(|place| bytes.get_mut(place)) {
         *byte ^= 1 << (bit % 8);
     }
-    out.payload.bytes = bytes.into();
+    out.payload.bytes = Octets::Own(bytes);
     out.record.damaged = true;
 }

@@ -41,6 +41,12 @@ impl Recording {
         Self { trace: Trace::new(hosts), packets: Vec::new(), traces, digests, keeps_packets }
     }
 
+    /// Whether anything is recorded.
+    #[inline]
+    pub(super) const fn is_on(&self) -> bool {
+        self.traces || self.keeps_packets
+    }
+
     #[inline]
     pub(super) fn note(&mut self, at: Instant, what: Happening) {
         if self.traces {
@@ -87,5 +93,5 @@ impl Recording {
 
 /// What a link says of a packet, as the row of its log.
 fn seen<A>(out: &Out<A>) -> Seen {
-    PacketEvent { record: out.record, payload: out.payload.bytes.clone(), damage: out.damage.clone() }
+    PacketEvent { record: out.record, payload: out.payload.bytes.clone().into(), damage: out.damage.clone() }
 }

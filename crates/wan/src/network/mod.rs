@@ -211,9 +211,8 @@ impl<P: Clone> Network<P> {
             }
         };
         let info = info.into();
-        let packet = InNetwork { sequence, offered: now, entered: now, path, size: SizeAndMarks::new(info), payload };
         let line = if self.lines.uplinks[from.index()].is_some() { LineId::Uplink(from) } else { LineId::Link(link) };
-        self.offer(now, line, packet, None);
+        self.offer(now, line, None, || InNetwork { sequence, offered: now, entered: now, path, size: SizeAndMarks::new(info), payload });
         Ok(())
     }
 
@@ -315,6 +314,20 @@ impl<P: Clone> Network<P> {
         None
     }
 
+    /// As [`Network::poll_event`], as long as no packet can be dropped, marked, copied or damaged on its way, and none was dropped that was not polled: from where to
+    /// where the packet came, when, and what it carries. `None` says nothing about other events: ask [`Network::poll_event`] then.
+    #[must_use]
+    #[inline(always)]
+    pub fn poll_mere_arrival(&mut self) -> Option<(Path, Instant, P)> {
+        if self.has_inner_events || !self.traffic.happened.is_empty() {
+            return None;
+        }
+        // Without inner events nobody is woken, and no packet has another line before it.
+        let Pending { at, entered, turn, path, payload, .. } = self.traffic.pending.pop_due(self.now)?;
+        self.lines.get_mut(turn.line()).deliver(entered, at);
+        payload.map(|payload| (path, at, payload))
+    }
+
     /// Changes the model of a link from `now` on: see [`crate::Link::set_model`].
     ///
     /// # Errors
@@ -411,7 +424,7 @@ impl<P: Clone> Network<P> {
         };
         let Some(next) = next else { return Some(self.arrive(at, line, packet)) };
         self.lines.get_mut(line).deliver(entered, at);
-        self.offer(at, next, InNetwork { entered: at, ..packet }, None);
+        self.offer(at, next, None, || InNetwork { entered: at, ..packet });
         None
     }
 
@@ -437,14 +450,27 @@ impl<P: Clone> Network<P> {
     fn send(&mut self, now: Instant, path: Path, size: SizeAndMarks, payload: P, words: Option<Words>) {
         let link = self.link(path);
         let sequence = self.lines.links[link.index()].offered();
-        let packet = InNetwork { sequence, offered: now, entered: now, path, size, payload };
-        self.offer(now, LineId::Link(link), packet, words);
+        self.offer(now, LineId::Link(link), words, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
-    /// Offers a packet to a line; its first random words may have been drawn before.
+    /// Offers a packet to a line; its first random words may have been drawn before. The packet is made where it is known what becomes of it, so that one that only
+    /// propagates is written once.
     #[inline(always)]
-    fn offer(&mut self, now: Instant, line: LineId, packet: InNetwork<P>, words: Option<Words>) {
-        if self.has_filters && self.is_filtered(now, line, &packet) {
+    fn offer(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: impl FnOnce() -> InNetwork<P>) {
+        if self.has_filters {
+            return self.offer_filtered(now, line, words, packet());
+        }
+        match self.lines.get_mut(line).offer(now, words) {
+            Outcome::Arrives(at) => self.traffic.schedule(at, line, packet()),
+            Outcome::Dropped(cause) => self.drop(now, line, cause, packet()),
+            Outcome::Enters => self.enter_engine(now, line, packet()),
+        }
+    }
+
+    /// As [`Network::offer`], where links have filters.
+    #[inline(never)]
+    fn offer_filtered(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: InNetwork<P>) {
+        if self.is_filtered(now, line, &packet) {
             return self.drop(now, line, DropCause::Filter, packet);
         }
         match self.lines.get_mut(line).offer(now, words) {
@@ -455,7 +481,6 @@ impl<P: Clone> Network<P> {
     }
 
     /// Whether the line's filter takes the packet.
-    #[inline(never)]
     fn is_filtered(&mut self, now: Instant, line: LineId, packet: &InNetwork<P>) -> bool {
         let offered = Offered { sequence: packet.sequence, now, info: packet.size.info(), payload: &packet.payload };
         self.lines.get_mut(line).filters(&offered)

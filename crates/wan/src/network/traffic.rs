@@ -37,7 +37,9 @@ impl<P> Traffic<P> {
         if let Some(awaited) = &mut self.awaited {
             awaited.schedule(at, path.to);
         }
-        self.pending.push(Pending { at, sequence, offered, entered, turn: Turn::arrival(line), path, size, payload: Some(payload) });
+        let turn = Turn::arrival(line);
+        let key = (at, turn, sequence, path, size.copy());
+        self.pending.push_made(&key, || Pending { at, sequence, offered, entered, turn, path, size, payload: Some(payload) });
     }
 
     /// The line's engine must be woken.

@@ -59,7 +59,7 @@ impl Core {
         let path = Path { from: host, to: receiver };
         let packet = self.wire.next_packet(path);
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
-        let parcel = Parcel { addresses, bytes: segment.to_packet().into(), ecn_capable: segment.ecn != Ecn::NotCapable };
+        let parcel = Parcel { addresses, bytes: Bytes::from(segment.to_packet()).into(), ecn_capable: segment.ecn != Ecn::NotCapable };
         // Over a way that is cut it is lost, as others are.
         let _ = self.wire.offer(path, parcel);
         if self.wire.recording().traces {

@@ -28,7 +28,7 @@ impl Core {
         let first = self.tcp.timers.first().map(|(at, ..)| *at);
         match (first, others) {
             (Some(_), None) if self.is_stuck() => None,
-            _ => [first, others].into_iter().flatten().min(),
+            _ => crate::wire::earlier(first, others),
         }
     }
 

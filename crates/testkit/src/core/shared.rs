@@ -1,0 +1,309 @@
+//! How tasks get at the state machine.
+//!
+//! The state lies with the thread that polls the tasks of a run: each call takes it from there and puts it back, which costs a few moves where a mutex costs two
+//! atomic operations. A datagram makes six or seven calls, and they were a quarter of its time. Another thread waits until the executor hands the state out between two
+//! polls. Where somebody else looks at the state while a task has the thread (the watchdog at the record of a run), it lies behind the mutex all the time.
+
+use std::cell::Cell;
+use std::mem::ManuallyDrop;
+#[cfg(feature = "tokio")]
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::Waker;
+
+use cohaptic_units::Instant;
+
+use super::Core;
+use super::face::Face;
+use crate::wire::Recorded;
+
+thread_local! {
+    /// The state of the run whose tasks this thread polls, unless it is in use. Nothing is to be dropped with the thread, so that no access asks whether that was
+    /// done: [`Stay`] has taken the state away before.
+    static HERE: Cell<ManuallyDrop<Option<Box<Core>>>> = const { Cell::new(ManuallyDrop::new(None)) };
+}
+
+#[inline]
+fn take_here() -> Option<Box<Core>> {
+    ManuallyDrop::into_inner(HERE.with(|here| here.replace(ManuallyDrop::new(None))))
+}
+
+#[inline]
+fn put_here(core: Box<Core>) {
+    HERE.with(|here| here.set(ManuallyDrop::new(Some(core))));
+}
+
+/// The state machine, and how what belongs to tasks gets at it.
+pub(crate) struct Shared {
+    /// The state while it does not lie with the thread of the run.
+    home: Mutex<Option<Box<Core>>>,
+    /// Somebody has put the state into `home`.
+    returned: Condvar,
+    /// How many threads wait for that.
+    asking: AtomicUsize,
+    /// Which run it is of.
+    run: u64,
+    /// Whether the state stays in `home`, where other threads see it.
+    stays: bool,
+    /// Whether the time is that of tokio's clock, so that it need not be asked: while the executor of this crate polls, only a task of its own could move it.
+    #[cfg(feature = "tokio")]
+    is_synced: AtomicBool,
+    clock: Clock,
+    face: Arc<Face>,
+}
+
+/// The source of the time.
+pub(crate) enum Clock {
+    /// The executor of this crate, by [`Core::pass`].
+    Own,
+    /// Tokio's paused clock.
+    #[cfg(feature = "tokio")]
+    Tokio {
+        /// Its time at [`Instant::ZERO`].
+        origin: tokio::time::Instant,
+    },
+}
+
+impl Shared {
+    pub(crate) fn new(core: Core, clock: Clock) -> Self {
+        static RUNS: AtomicU64 = AtomicU64::new(1);
+        let run = RUNS.fetch_add(1, Ordering::Relaxed);
+        let (face, stays) = (Arc::clone(&core.face), core.is_looked_at());
+        let home = Mutex::new(Some(Box::new(Core { run, ..core })));
+        Self {
+            home,
+            returned: Condvar::new(),
+            asking: AtomicUsize::new(0),
+            run,
+            stays,
+            #[cfg(feature = "tokio")]
+            is_synced: AtomicBool::new(false),
+            clock,
+            face,
+        }
+    }
+
+    /// The time.
+    #[inline]
+    pub(crate) fn now(&self) -> Instant {
+        match self.clock {
+            Clock::Own => self.face.now(),
+            #[cfg(feature = "tokio")]
+            Clock::Tokio { .. } if self.is_synced.load(Ordering::Relaxed) => self.face.now(),
+            #[cfg(feature = "tokio")]
+            Clock::Tokio { .. } => self.lock().now(),
+        }
+    }
+
+    /// Follows tokio's clock, and then not until the guard is dropped. `moved` is where the clock stands, if that is known: to ask it takes four atomic operations.
+    #[cfg(feature = "tokio")]
+    pub(crate) fn sync(&self, moved: Option<Instant>) -> Synced<'_> {
+        if moved.is_none() {
+            drop(self.lock());
+        }
+        self.is_synced.store(true, Ordering::Relaxed);
+        let mut core = self.lock();
+        if let Some(moved) = moved.filter(|moved| *moved > core.now()) {
+            core.pass_until(moved);
+        }
+        Synced(self)
+    }
+
+    /// See [`Face::note_call`].
+    #[inline]
+    pub(crate) fn note_call(&self) {
+        self.face.note_call();
+    }
+
+    /// See [`Face::count_poll`].
+    #[cfg(feature = "tokio")]
+    pub(crate) fn count_poll(&self) -> Option<u64> {
+        self.face.count_poll()
+    }
+
+    /// The time, unless the state is held: for a look from another thread.
+    pub(crate) fn try_now(&self) -> Option<Instant> {
+        if self.stays { self.try_home(|core| core.now()) } else { Some(self.face.now()) }
+    }
+
+    /// What was recorded so far, unless the state is held.
+    pub(crate) fn try_recorded(&self) -> Option<Recorded> {
+        if self.stays { self.try_home(|core| core.wire.recorded()) } else { Some(Recorded { ended: self.face.now(), ..Recorded::default() }) }
+    }
+
+    /// Not held for long: a loop of tokio takes the state again and again, each time for a moment.
+    fn try_home<T>(&self, look: impl Fn(&Core) -> T) -> Option<T> {
+        for _ in 0..10_000 {
+            if let Some(core) = self.lock_home().as_deref() {
+                return Some(look(core));
+            }
+            std::thread::yield_now();
+        }
+        None
+    }
+
+    /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.
+    #[inline]
+    pub(crate) fn lock(&self) -> Guard<'_> {
+        // The guard is made at the end: one that is handed on is written in parts and read as a whole, for which a processor waits.
+        #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
+        let (mut core, is_from_home) = match take_here() {
+            Some(core) if core.run == self.run => (core, false),
+            other => (self.take_leaving(other), true),
+        };
+        #[cfg(feature = "tokio")]
+        if let Clock::Tokio { origin } = self.clock
+            && !self.is_synced.load(Ordering::Relaxed)
+        {
+            follow(&mut core, origin, is_from_home);
+        }
+        Guard { core: Some(core), shared: self, is_from_home }
+    }
+
+    /// Takes the state from where others find it. That of another run, which may lie here, stays here.
+    #[cold]
+    fn take_leaving(&self, other: Option<Box<Core>>) -> Box<Core> {
+        if let Some(other) = other {
+            put_here(other);
+        }
+        self.take_home()
+    }
+
+    /// Waits until nobody else has the state.
+    fn take_home(&self) -> Box<Core> {
+        let mut home = self.lock_home();
+        loop {
+            if let Some(core) = home.take() {
+                return core;
+            }
+            self.asking.fetch_add(1, Ordering::Relaxed);
+            home = self.returned.wait(home).unwrap_or_else(PoisonError::into_inner);
+            self.asking.fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+
+    fn lock_home(&self) -> MutexGuard<'_, Option<Box<Core>>> {
+        self.home.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// This thread polls the tasks of the run until the guard is dropped.
+    pub(crate) fn stay(&self) -> Stay<'_> {
+        self.bring_here();
+        Stay(self)
+    }
+
+    /// Hands the state out to other threads that wait for it: between two polls.
+    #[inline]
+    pub(crate) fn hand_out(&self) {
+        if self.asking.load(Ordering::Relaxed) > 0 {
+            self.wait_for_others();
+        }
+    }
+
+    #[cold]
+    fn wait_for_others(&self) {
+        self.bring_home();
+        while self.asking.load(Ordering::Relaxed) > 0 {
+            std::thread::yield_now();
+        }
+        self.bring_here();
+    }
+
+    /// The state lies with this thread, unless others look at it.
+    pub(crate) fn bring_here(&self) {
+        if !self.stays {
+            put_here(self.take_home());
+        }
+    }
+
+    /// Others may have the state.
+    pub(crate) fn bring_home(&self) {
+        if let Some(core) = take_here() {
+            self.return_home(core);
+        }
+    }
+
+    fn return_home(&self, core: Box<Core>) {
+        *self.lock_home() = Some(core);
+        self.returned.notify_one();
+    }
+}
+
+/// The state lies with this thread until this is dropped.
+pub(crate) struct Stay<'a>(&'a Shared);
+
+impl Drop for Stay<'_> {
+    fn drop(&mut self) {
+        self.0.bring_home();
+    }
+}
+
+/// The time is that of tokio's clock until this is dropped.
+#[cfg(feature = "tokio")]
+pub(crate) struct Synced<'a>(&'a Shared);
+
+#[cfg(feature = "tokio")]
+impl Drop for Synced<'_> {
+    fn drop(&mut self) {
+        self.0.is_synced.store(false, Ordering::Relaxed);
+    }
+}
+
+/// The state, as long as it is held.
+pub(crate) struct Guard<'a> {
+    core: Option<Box<Core>>,
+    shared: &'a Shared,
+    /// Whether it goes back where others find it.
+    is_from_home: bool,
+}
+
+/// Lets time pass up to that of tokio's clock.
+#[cfg(feature = "tokio")]
+#[inline(never)]
+fn follow(core: &mut Core, origin: tokio::time::Instant, is_from_home: bool) {
+    // Once the run is over, tokio's clock is that of the machine; and other threads have that one always.
+    if !is_from_home || tokio::runtime::Handle::try_current().is_ok() {
+        let now = Instant::ZERO + origin.elapsed();
+        if now > core.now() {
+            core.pass_until(now);
+        }
+    }
+}
+
+impl std::ops::Deref for Guard<'_> {
+    type Target = Core;
+
+    #[inline]
+    fn deref(&self) -> &Core {
+        self.core.as_ref().expect("it is there until the guard is dropped")
+    }
+}
+
+impl std::ops::DerefMut for Guard<'_> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut Core {
+        self.core.as_mut().expect("it is there until the guard is dropped")
+    }
+}
+
+impl Drop for Guard<'_> {
+    #[inline]
+    fn drop(&mut self) {
+        let Some(mut core) = self.core.take() else { return };
+        let woken = if core.woken.is_any() { core.woken.take() } else { Vec::new() };
+        if self.is_from_home {
+            self.shared.return_home(core);
+        } else {
+            put_here(core);
+        }
+        if !woken.is_empty() {
+            wake_all(woken);
+        }
+    }
+}
+
+#[cold]
+fn wake_all(woken: Vec<Waker>) {
+    woken.into_iter().for_each(Waker::wake);
+}
