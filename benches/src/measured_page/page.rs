@@ -51,7 +51,7 @@ const ALONE: [(&str, &str, &str); 5] = [
     (
         "measured-cluster.md",
         "the same campaign by shards, by GNU parallel, by Dask and by Slurm, and the merge",
-        "cargo test --release -p cohaptic-cli --test cluster -- --ignored",
+        "cargo build --release && COHAPTIC_PROGRAM=target/release/cohaptic cargo test --workspace --test cluster -- --ignored",
     ),
 ];
 

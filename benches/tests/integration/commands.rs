@@ -40,7 +40,7 @@ fn kind(command: &str) -> Option<Kind> {
     if command.starts_with("cohaptic ") {
         return Some(Kind::Cohaptic);
     }
-    if command == "cargo test --release -p cohaptic-cli --test cluster -- --ignored" {
+    if command == "cargo build --release && COHAPTIC_PROGRAM=target/release/cohaptic cargo test --workspace --test cluster -- --ignored" {
         return Some(Kind::IgnoredTest);
     }
     if let Some(inside) = command.strip_prefix("cd benches/peers && ") {

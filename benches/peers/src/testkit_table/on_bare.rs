@@ -23,7 +23,7 @@ type Task = Pin<Box<dyn Future<Output = ()>>>;
 #[derive(Default)]
 struct World {
     now: Cell<u64>,
-    /// What is on its way: when it arrives, and where.
+    /// Datagrams on the way: when each arrives, and where.
     ring: RefCell<VecDeque<(u64, usize, Datagram)>>,
     hosts: Vec<HostState>,
     /// The host whose task is polled.

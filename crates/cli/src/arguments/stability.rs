@@ -166,7 +166,7 @@ pub(crate) struct MapArguments {
     #[arg(long, value_name = "HALVINGS", num_args = 0..=1, default_missing_value = "8", conflicts_with = "grid", value_parser = integer::<u32>(0, cohaptic_stability::MOST_HALVINGS.into()))]
     pub(crate) prove: Option<u32>,
     /// With --prove, for every number of equal peers from 2 on, or FROM.., or FROM..TO
-    #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, requires = "prove")]
+    #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, requires = "prove", conflicts_with = "grid")]
     pub(crate) every_number: Option<(u64, Option<u64>)>,
     /// With --prove, write certificate.json for each map into the folder of --out too: some 15 kB a box
     #[arg(long, requires = "prove", requires = "out")]

@@ -150,7 +150,7 @@ fn of_moment(moment: &MomentCertificate) -> impl Serialize {
         heard: moment.heard.map(|gains| [gains.stiffness, gains.damping]),
         // How many samples of frames before take part.
         depth: moment.depth,
-        // Of the mean of all peers, of differences from it, and of what is left of samples held.
+        // Of the mean of all peers, of differences from it, and of the rest of the samples held.
         blocks: moment.blocks.as_slice(),
     }
 }

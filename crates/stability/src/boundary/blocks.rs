@@ -7,7 +7,7 @@ use super::{Boundary, BoundaryOptions, End, by_value, go_on};
 use crate::map::{Scratches, nodes};
 use crate::{AnalysisError, Cell, Family, FamilyError, KeyRange, Watch};
 
-/// So many intervals between first samples are a block.
+/// The number of intervals between first samples in a block.
 const INTERVALS: usize = 8;
 
 /// A part of the range of a search.

@@ -123,7 +123,7 @@ fn go_on<E: Send>(
     Ok((seen, End::Settled))
 }
 
-/// What is known, by the bits of the value.
+/// Known radii, by the bits of the value.
 fn by_value(known: &[(f64, Cell)]) -> BTreeMap<u64, Cell> {
     known.iter().map(|(value, cell)| (value.to_bits(), *cell)).collect()
 }

@@ -28,8 +28,8 @@ use crate::{Matrix, Verdict};
 /// As good as without end: a weight of 1/(N − 1) is below a rounding.
 pub(super) const ENDLESS: u64 = 1 << 53;
 
-/// Where a verdict is to be checked, what is enclosed is this number of times as wide: the checker encloses with wider intervals than the prover.
-const WIDER: f64 = 8.0;
+/// Where a verdict is to be checked, radii are this number of times as wide: the checker encloses with wider intervals than the prover.
+pub(super) const WIDER: f64 = 8.0;
 
 /// A motion of the scene, in one combination of contacts: its classes, of which one grows.
 pub(super) struct Motion {

@@ -17,7 +17,7 @@
 
 use super::certificate::MomentCertificate;
 use super::corners::{check_units, enclosed};
-use super::growing::{ENDLESS, Growing, Motion, nu};
+use super::growing::{ENDLESS, Growing, Motion, WIDER, nu};
 use super::span::StepSpan;
 use super::steps::{StepMatrix, error};
 use super::{ProofError, Proven};
@@ -51,8 +51,11 @@ impl<'a> GrowingMoments<'a> {
     pub(super) fn decide(&self, low: u64, high: u64) -> Result<Option<Proven>, ProofError> {
         let mut all = Some(Proven::Stable);
         for (motion, independent) in &self.motions {
-            let found =
-                if high == 2 { of_two(motion, independent) } else { Frame { motion, independent }.decide(low, high)?.map(|(proven, _)| proven) };
+            let found = if high == 2 {
+                of_two(motion, independent)
+            } else {
+                Frame { motion, independent, wider: 1.0 }.decide(low, high)?.map(|(proven, _)| proven)
+            };
             match found {
                 Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
                 Some(Proven::Stable) => {}
@@ -66,8 +69,9 @@ impl<'a> GrowingMoments<'a> {
     pub(super) fn certify(&self, low: u64, high: u64) -> Result<Option<(Proven, Vec<MomentCertificate>)>, ProofError> {
         let mut all = Vec::new();
         let mut is_decided = high > 2;
+        let wider = if low < high { WIDER } else { 1.0 };
         for (motion, independent) in self.motions.iter().filter(|_| high > 2) {
-            match (Frame { motion, independent }).decide(low, high)? {
+            match (Frame { motion, independent, wider }).decide(low, high)? {
                 Some((Proven::Unstable, moment)) => return Ok(Some((Proven::Unstable, vec![moment]))),
                 Some((Proven::Stable, moment)) => all.push(moment),
                 None => is_decided = false,
@@ -190,6 +194,8 @@ fn row(size: usize, entries: &[(usize, f64)]) -> Matrix {
 struct Frame<'a> {
     motion: &'a Motion,
     independent: &'a Independent,
+    /// By what factor the radius of what a frame makes of second moments is larger.
+    wider: f64,
 }
 
 impl Frame<'_> {
@@ -241,7 +247,7 @@ impl Frame<'_> {
             of_states.chain(std::iter::repeat_n(sampling.translation(0, time), depth + 1)).collect()
         });
         let image = self.image(&y, &actions, (&common, &apart), &rows, &numbers, translation.as_deref());
-        let left = |y: &StepSpan, image: &StepSpan| numbers.constant(y.mean.scaled(gamma)).plus(&image.negated());
+        let left = |y: &StepSpan, image: &StepSpan| numbers.constant(y.mean.scaled(gamma)).plus(&image.negated().widened(self.wider));
         let holds = is_everywhere_positive(&left(&y.common, &image.common))
             && is_everywhere_positive(&left(&y.apart, &image.apart))
             && is_everywhere_positive(&left(&y.rest, &image.rest));

@@ -28,7 +28,7 @@ from itertools import product as tuples
 from operator import mul
 
 import scene as scenes
-from frame_over_box import KeyBox, NumberBox, Part, classes_of
+from frame_over_box import KeyBox, NoLimit, NumberBox, Part, classes_of
 from moments_over_box import Moments, Span, is_everywhere_positive
 from pushes import PRODUCTS, PushBox, PushFrame, is_shape, without_pushes
 from scene import Scene
@@ -249,7 +249,11 @@ def check_span(document, span) -> str:
         check_moments(scene, document["growing"], span)
         check_devices([scene])
         return span["verdict"]
-    return check_verdict(lambda: NumberBox(scene, classes_of([scene]), document["growing"], span["from"], span["to"]), span, [scene])
+    try:
+        return check_verdict(lambda: NumberBox(scene, classes_of([scene]), document["growing"], span["from"], span["to"]), span, [scene])
+    except NoLimit:
+        # A mass that is divided without end: only the numbers before are checked.
+        return "undecided"
 
 
 def scene_of(document, values=()) -> Scene:

@@ -22,6 +22,10 @@ class NotCovered(ValueError):
     """The scene has something of which nothing is said here."""
 
 
+class NoLimit(NotCovered):
+    """A mass is divided without end, which has a limit that this program does not compute."""
+
+
 @dataclass
 class Scalar:
     """A number over a box."""
@@ -315,7 +319,7 @@ class NumberBox:
         plants = numbers_of(self.scene, peer, mass, Fraction(1), Fraction(1))
         masses = [mass * mu if self.scene.split and not self.divides else mass for _, mu in ends]
         if 0 in masses:
-            raise NotCovered("a mass without a limit")
+            raise NoLimit("a mass without a limit")
         return {
             "device": ((plants.device,) * 2, tuple(mu if self.divides else Fraction(1) for _, mu in ends)),
             "copy": (tuple((of_end, *plants.copy[1:]) for of_end in masses), (Fraction(1),) * 2),

@@ -60,7 +60,7 @@ impl From<Octets> for Vec<u8> {
 pub(super) struct Spare(Vec<Vec<u8>>);
 
 impl Spare {
-    /// No more than so many are kept, none longer than that \[bytes\]: a megabyte at most.
+    /// The largest number that is kept, and the longest \[bytes\]: a megabyte at most.
     const MOST: usize = 512;
     const LONGEST: usize = 2048;
 

@@ -209,14 +209,14 @@ impl UdpSocket {
         Poll::Pending
     }
 
-    /// What is seen of a datagram, if there is one.
+    /// A view of a datagram, if there is one.
     pub(crate) fn try_look<T>(&self, peek: bool, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
         let mut core = self.shared.lock();
         core.note_call();
         core.receive(self.id, peek, look)?.ok_or_else(|| io::ErrorKind::WouldBlock.into())
     }
 
-    /// What is seen of the next datagram.
+    /// A view of the next datagram.
     async fn look<T>(&self, peek: bool, mut look: impl FnMut(&Datagram) -> T) -> io::Result<T> {
         poll_fn(|cx| self.poll_look(cx, peek, &mut look)).await
     }

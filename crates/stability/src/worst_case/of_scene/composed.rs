@@ -1,7 +1,7 @@
 //! Rows of a frame in which samples heard are put in as rows themselves, with a bound of what that may be off.
 //!
 //! Let r be a row of a frame as computed, (s, b) its coefficients of states and of samples heard, and let the exact one differ from it by δ, ‖δ‖ <= E, in sums of the sizes of entries.
-//! Let H_k be what is computed of the row heard as sample k, the exact one H_k + η_k, ‖η_k‖ <= ε_k. The exact composition is Σ (s + δ_s)·unit + Σ (b_k + δ_k)·(H_k + η_k), so that
+//! Let H_k be the computed row that is heard as sample k, the exact one H_k + η_k, ‖η_k‖ <= ε_k. The exact composition is Σ (s + δ_s)·unit + Σ (b_k + δ_k)·(H_k + η_k), so that
 //!
 //! ```text
 //! ‖exact − computed‖ <= E·max(1, max_k (‖H_k‖ + ε_k)) + Σ |b_k|·ε_k + γ·(‖s‖ + Σ |b_k|·‖H_k‖)
