@@ -178,7 +178,9 @@ fn merges(page: &mut String) {
         fs::remove_dir_all(work.path(&out)).unwrap();
         let _ = writeln!(page, "| {shards} | {} | {table:.0} | {time:.2} | {:.0} | {memory:.0} |", 10_000 * shards, table / time);
     }
-    page.push_str("\nA Parquet file ends with an index of its parts, which its writer keeps until then: 53 columns a part here, 60 kB. Nothing else grows.\n");
+    page.push_str(
+        "\nA Parquet file ends with an index of its parts, which its writer keeps until then: 53 columns a part here, 60 kB. Little else grows.\n",
+    );
 }
 
 /// The machine and the build.
