@@ -1,6 +1,6 @@
 //! Shards of proofs: the blocks of each proof, and their pieces as rows in a folder.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -42,7 +42,7 @@ pub(super) struct Proofs<'a> {
 pub(super) struct Pieces<'a> {
     /// Which of the proofs it is.
     number: usize,
-    known: HashMap<Vec<u64>, Guarantee>,
+    known: BTreeMap<Vec<u64>, Guarantee>,
     file: Option<&'a Mutex<(RowsFile, Option<Failure>)>>,
 }
 
@@ -57,7 +57,7 @@ impl<'a> Pieces<'a> {
     pub(super) fn of(number: usize, rows: &[Row], file: Option<&'a Mutex<(RowsFile, Option<Failure>)>>) -> Self {
         let piece = |(_, values): &Row| {
             let (place, values) = values.split_last()?;
-            let guarantee = WORDS.into_iter().zip([0.0, 1.0, 2.0]).find(|(_, number)| number == place)?.0;
+            let guarantee = WORDS.into_iter().zip([0.0, 1.0, 2.0]).find(|(_, number): &(_, f64)| number.to_bits() == place.to_bits())?.0;
             Some((values.iter().map(|value| value.to_bits()).collect(), guarantee))
         };
         Self { number, known: rows.iter().filter(|(of, _)| *of == number).filter_map(piece).collect(), file }

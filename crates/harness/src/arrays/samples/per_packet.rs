@@ -254,8 +254,8 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 continue;
             }
             let (quads, count) = (places.start / 4..places.end.div_ceil(4), count(places.len()));
-            for pair in 0..P {
-                let (x, v) = quads::mean(&held[pair][quads.clone()], count);
+            for (pair, held) in held.iter().enumerate() {
+                let (x, v) = quads::mean(&held[quads.clone()], count);
                 bodies.set_target(pair, peer, x, v);
             }
         }
