@@ -89,7 +89,7 @@ impl<const P: usize> InFlight<P> {
         if ticks >= HORIZON {
             return self.push_beyond(due, packet, overtakes);
         }
-        // Found by adding: a branch for what overtakes, which is one in four over links with jitter, costs more.
+        // Found by adding, without a branch.
         let packets = &mut self.wheel[slot(due) + usize::from(overtakes)];
         if packets.capacity() == 0 {
             *packets = self.emptied.pop().unwrap_or_default();

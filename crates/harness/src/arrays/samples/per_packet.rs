@@ -220,7 +220,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// The means are those of the samples held.
     #[inline(always)]
     pub(in crate::arrays) fn refresh<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
-        // Ten peers hear something new in seven of ten ticks: to ask for each of them how rows lie took 3 % of a run.
+        // Ten peers hear something new in seven of ten ticks: to ask for each of them how rows lie took 2 % of a run.
         let Rows::All { peers, .. } = self.rows else { return self.refresh_unequal(bodies) };
         if !self.sums.is_empty() {
             return self.refresh_unequal(bodies);
