@@ -104,7 +104,7 @@ fn certificates_of_lines_and_numbers_hold_too() {
         (UNEQUAL, "--set object.damping=0 --set peer.coupling.scaling=inverse-n", None),
         // A divided mass with damping: its step maps have four coefficients that vary.
         (EQUAL, "--set coordination.strategy=average-position", Some(false)),
-        (UNEQUAL, "--set object.damping=2", Some(false)),
+        (UNEQUAL, "--set object.damping=2", None),
     ] {
         let desk = Desk::with("scene.toml", scene);
         let document = desk.json(&format!("stability point scene.toml {options} --every-number --certificate numbers.json --json"));

@@ -28,7 +28,7 @@ from itertools import product as tuples
 from operator import mul
 
 import scene as scenes
-from frame_over_box import KeyBox, NoLimit, NumberBox, Part, classes_of
+from frame_over_box import KeyBox, NumberBox, Part, TooLight, classes_of
 from moments_over_box import Moments, Span, is_everywhere_positive
 from pushes import PRODUCTS, PushBox, PushFrame, is_shape, without_pushes
 from scene import Scene
@@ -251,8 +251,8 @@ def check_span(document, span) -> str:
         return span["verdict"]
     try:
         return check_verdict(lambda: NumberBox(scene, classes_of([scene]), document["growing"], span["from"], span["to"]), span, [scene])
-    except NoLimit:
-        # A mass that is divided without end: only the numbers before are checked.
+    except TooLight:
+        # The numbers before are checked all the same.
         return "undecided"
 
 

@@ -22,8 +22,8 @@ class NotCovered(ValueError):
     """The scene has something of which nothing is said here."""
 
 
-class NoLimit(NotCovered):
-    """A mass is divided without end, which has a limit that this program does not compute."""
+class TooLight(NotCovered):
+    """A mass that is divided without end, or until a tick moves it by far: this program does not compute its step."""
 
 
 @dataclass
@@ -126,7 +126,7 @@ def step(mass, damping, stiffness, span):
     x = [[Fraction(0), h, Fraction(0)], [-stiffness / mass * h, -damping / mass * h, h], [Fraction(0)] * 3]
     norm = max(sum(map(abs, row)) for row in x)
     if norm > 60:
-        raise NotCovered("a body that moves by far within a tick")
+        raise TooLight("a body that moves by far within a tick")
     grid = 2**400
     short = lambda number: Fraction(round(number * grid), grid)
     total, term, bound = [[Fraction(0)] * 3 for _ in range(3)], [[Fraction(i == j) for j in range(3)] for i in range(3)], Fraction(1)
@@ -319,7 +319,7 @@ class NumberBox:
         plants = numbers_of(self.scene, peer, mass, Fraction(1), Fraction(1))
         masses = [mass * mu if self.scene.split and not self.divides else mass for _, mu in ends]
         if 0 in masses:
-            raise NoLimit("a mass without a limit")
+            raise TooLight("a mass without a limit")
         return {
             "device": ((plants.device,) * 2, tuple(mu if self.divides else Fraction(1) for _, mu in ends)),
             "copy": (tuple((of_end, *plants.copy[1:]) for of_end in masses), (Fraction(1),) * 2),
