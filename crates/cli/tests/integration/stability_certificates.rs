@@ -34,6 +34,16 @@ pub(crate) fn check(desk: &Desk, file: &str) -> Output {
     Command::new("python3").arg(program).arg(desk.path(file)).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap()
 }
 
+/// With that value in that place the checker refuses the certificate, with one of these words.
+fn refuses(desk: &Desk, whole: &Value, place: &str, value: Value, words: &str) {
+    let mut changed = whole.clone();
+    *changed.pointer_mut(place).unwrap() = value;
+    desk.write("changed.json", changed.to_string());
+    let output = check(desk, "changed.json");
+    let refusal = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");
+}
+
 /// Whether there is a Python that can check; says so if there is none.
 pub(crate) fn can_check() -> bool {
     let can = Command::new("python3").args(["-c", "import tomllib"]).output().is_ok_and(|output| output.status.success());
@@ -180,12 +190,7 @@ fn certificates_of_moments_and_of_contacts_that_say_more_than_they_show_are_refu
         (&contacts, "/scene", scene(&contacts, "mass = 0.1", "mass = 0.001"), "not shown to fall|not dominant"),
     ];
     for (whole, place, value, words) in changes {
-        let mut changed = whole.clone();
-        *changed.pointer_mut(place).unwrap() = value;
-        desk.write("changed.json", changed.to_string());
-        let output = check(&desk, "changed.json");
-        let refusal = String::from_utf8(output.stderr).unwrap();
-        assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");
+        refuses(&desk, whole, place, value, words);
     }
 }
 
@@ -242,12 +247,7 @@ fn a_certificate_of_numbers_that_says_more_than_it_shows_is_refused() {
         ("/scene".to_owned(), whole["scene"].as_str().unwrap().replace("8ms\" }", "80ms\" }").into(), "not dominant|sample that is missing"),
         ("/growing".to_owned(), 7.into(), "not in list"),
     ] {
-        let mut changed = whole.clone();
-        *changed.pointer_mut(&place).unwrap() = value;
-        desk.write("changed.json", changed.to_string());
-        let output = check(&desk, "changed.json");
-        let refusal = String::from_utf8(output.stderr).unwrap();
-        assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");
+        refuses(&desk, &whole, &place, value, words);
     }
 }
 
@@ -287,11 +287,6 @@ fn a_certificate_that_says_more_than_it_shows_is_refused() {
         (scene("delay = \"8ms\"", "delay = \"8ms\", loss = \"5%\""), "chance"),
     ];
     for ((place, value), words) in changes {
-        let mut changed = whole.clone();
-        *changed.pointer_mut(&place).unwrap() = value;
-        desk.write("changed.json", changed.to_string());
-        let output = check(&desk, "changed.json");
-        let refusal = String::from_utf8(output.stderr).unwrap();
-        assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");
+        refuses(&desk, &whole, &place, value, words);
     }
 }
