@@ -61,6 +61,12 @@ pub fn peak_memory() -> String {
     field("/proc/self/status", "VmHWM").unwrap_or_else(|| "not told by this system".into())
 }
 
+/// The memory that this process holds beside its program and libraries.
+#[must_use]
+pub fn own_memory() -> String {
+    field("/proc/self/status", "RssAnon").unwrap_or_else(|| "not told by this system".into())
+}
+
 /// The median processor time of each work in a number of rounds, in which all take turns: a noisy moment hits all of them, and no row of a table alone.
 #[must_use]
 pub fn medians_in_turn<T>(works: &[impl Fn() -> T], rounds: usize) -> Vec<Duration> {

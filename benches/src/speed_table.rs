@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use cohaptic_benches::bare::Queue;
 use cohaptic_benches::effort::Effort;
-use cohaptic_benches::machine::{medians_in_turn, peak_memory, time};
+use cohaptic_benches::machine::{medians_in_turn, own_memory, peak_memory, time};
 use cohaptic_benches::scaling::{THREADS, Window};
 use cohaptic_benches::watched::{Onlooker, with_all_measures};
 use cohaptic_benches::{LINKS, Mesh, bare};
@@ -182,7 +182,6 @@ fn many_runs(work: Work) {
 /// How many times as long a run may take with all measures as one that is watched.
 const ASKED_OF_MEASURES: f64 = 2.0;
 
-/// Runs with all measures beside runs that are watched.
 /// One scene on two threads, and on as many as this machine has not.
 fn threads(work: Work) {
     println!("## One scene on many threads\n");
@@ -218,6 +217,7 @@ fn threads(work: Work) {
     println!();
 }
 
+/// Runs with all measures beside runs that are watched.
 fn measured_runs(work: Work) {
     println!("## Measures\n");
     println!(
@@ -306,14 +306,14 @@ impl Strategies for OverEvents {
     }
 }
 
-/// Name, processor time, and the most memory so far.
-type MemoryRow = (&'static str, Duration, String);
+/// Name, processor time, and the memory of its own and the most so far.
+type MemoryRow = (&'static str, Duration, String, String);
 
 fn memory(work: Work) -> Vec<MemoryRow> {
     let row = |&(name, seconds)| {
         let scene = Mesh { peers: 3, impaired: true }.scene(seconds * 1000, 1);
         let took = time(|| drop(black_box(Mesh::run(&scene))));
-        (name, took, peak_memory())
+        (name, took, own_memory(), peak_memory())
     };
     work.memory.iter().map(row).collect()
 }
@@ -321,11 +321,11 @@ fn memory(work: Work) -> Vec<MemoryRow> {
 fn print_memory(rows: &[MemoryRow]) {
     println!("## Memory\n");
     println!(
-        "The most memory that the process has held, after runs of 3 peers with jitter and loss, one after the other in one process, before all else on\nthis page.\n"
+        "After runs of 3 peers with jitter and loss, one after the other in one process, before all else on this page: the memory that the process holds of its own,\nand the most that it has held, in which the parts of the program are that were used.\n"
     );
-    println!("| simulated | took | most memory |");
-    println!("| --- | ---: | ---: |");
-    for (name, took, most) in rows {
-        println!("| {name} | {:.3} s | {most} |", took.as_secs_f64());
+    println!("| simulated | took | own memory | most memory |");
+    println!("| --- | ---: | ---: | ---: |");
+    for (name, took, own, most) in rows {
+        println!("| {name} | {:.3} s | {own} | {most} |", took.as_secs_f64());
     }
 }

@@ -60,6 +60,8 @@ pub struct Peer<const A: usize, D, S> {
     next_sequence: u64,
     /// What the peer's own clock shows.
     local_time: Instant,
+    /// The period of the tick in nanoseconds, which are counted on at each tick.
+    tick_nanos: u64,
     computed: Acting<A>,
     applied: Acting<A>,
 }
@@ -150,7 +152,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         }
         let (asked, local_time) = (Asked::by(&strategy), Instant::ZERO);
         let (rotation, stale_mean, next_sequence) = (None, false, 0);
-        Self { config, device, object, strategy, asked, held, rotation, stale_mean, next_sequence, local_time, computed: none, applied: none }
+        let tick_nanos = u64::try_from(config.tick.as_nanos()).unwrap_or(u64::MAX);
+        let (computed, applied) = (none, none);
+        Self { config, device, object, strategy, asked, held, rotation, stale_mean, next_sequence, local_time, tick_nanos, computed, applied }
     }
 
     /// The peer with a copy that turns, for a strategy that is a law: its samples carry attitudes.
@@ -259,7 +263,10 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
     pub fn handle_sample(&mut self, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
-        self.handle_extended(sample, &Extra::NONE)
+        if self.asked.kind != SampleKind::State {
+            return self.handle_extended(sample, &Extra::NONE);
+        }
+        Ok(self.accept(sample)?.map_or(Reception::Stale, |_| Reception::Newest))
     }
 
     /// [`Peer::handle_sample`] with what a sample for this peer says beyond position and velocity.
@@ -269,22 +276,26 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
     pub fn handle_extended(&mut self, sample: &Sample<A>, extra: &Extra<A>) -> Result<Reception, ReceiveError> {
+        let Some(place) = self.accept(sample)? else { return Ok(Reception::Stale) };
+        if self.asked.kind != SampleKind::State {
+            self.strategy.accept(place, &extra.numbers);
+            if let Some(rotation) = &mut self.rotation {
+                rotation.hold(place, &extra.attitude);
+            }
+        }
+        Ok(Reception::Newest)
+    }
+
+    /// Takes in position and velocity, and gives the place of their sender; `None` if they are not the newest.
+    #[inline(always)]
+    fn accept(&mut self, sample: &Sample<A>) -> Result<Option<usize>, ReceiveError> {
         if sample.session != self.config.session {
             return Err(ReceiveError::Session { found: sample.session });
         }
         let Some(place) = self.place_of(sample.sender) else { return Err(ReceiveError::Sender { sender: sample.sender }) };
-        if self.held.accept(place, sample.sequence, sample.sent, sample.state) {
-            self.stale_mean = true;
-            if self.asked.kind != SampleKind::State {
-                self.strategy.accept(place, &extra.numbers);
-                if let Some(rotation) = &mut self.rotation {
-                    rotation.hold(place, &extra.attitude);
-                }
-            }
-            Ok(Reception::Newest)
-        } else {
-            Ok(Reception::Stale)
-        }
+        let is_newest = self.held.accept(place, sample.sequence, sample.sent, sample.state);
+        self.stale_mean |= is_newest;
+        Ok(is_newest.then_some(place))
     }
 
     /// Step 3: computes the forces of this tick, where the next one follows after the period of the tick.
@@ -338,7 +349,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         if let Some(rotation) = &mut self.rotation {
             rotation.advance(now, span);
         }
-        self.local_time = self.local_time.saturating_add(self.config.tick);
+        self.local_time = self.local_time.saturating_add_nanos(self.tick_nanos);
     }
 
     /// What the peer's own clock shows: 0 at its first tick, and a tick more at each one after it.

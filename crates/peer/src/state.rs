@@ -23,11 +23,12 @@ impl<const A: usize> State<A> {
     #[must_use]
     #[inline]
     pub fn is_finite(&self) -> bool {
-        let mut finite = true;
+        // Nothing times a finite number is nothing, times any other NaN: half of the instructions that asking each number takes.
+        let mut nothing = 0.0;
         for axis in 0..A {
-            finite &= self.position[axis].is_finite() & self.velocity[axis].is_finite();
+            nothing += 0.0 * self.position[axis] + 0.0 * self.velocity[axis];
         }
-        finite
+        !nothing.is_nan()
     }
 }
 

@@ -160,6 +160,12 @@ impl<E: Event> EventQueue<E> {
         self.slab.take(place)
     }
 
+    /// Whether no event is due at `now`. `false` says nothing where it takes a search to know.
+    #[inline(always)]
+    pub(crate) fn is_idle_until(&self, now: Instant) -> bool {
+        if self.in_order { self.ordered.front().is_none_or(|first| first.at() > now) } else { self.front.front().is_some_and(|first| first.0 > now) }
+    }
+
     /// The instant of the first event.
     #[must_use]
     pub fn next_at(&self) -> Option<Instant> {

@@ -33,18 +33,38 @@ struct Receiver {
 }
 
 impl Receiver {
+    /// The place of a sender, or where it is to be put. Where all others send, each soon has the place that it has among them. Searches for senders and instants took a
+    /// fifth of the time of all measures of ten peers.
+    #[inline]
+    fn place_of(&self, from: usize, to: usize) -> Result<usize, usize> {
+        let likely = from - usize::from(from > to);
+        match self.sampled.get(likely) {
+            Some((sender, _)) if *sender == from => Ok(likely),
+            _ => self.sampled.binary_search_by_key(&from, |(sender, _)| *sender),
+        }
+    }
+
     /// A sample of one instant takes the place of one of another, if there was one.
     fn replace(&mut self, before: Option<Instant>, now: Instant) {
-        let place = |instants: &[(Instant, u64)], at: Instant| instants.binary_search_by_key(&at, |(instant, _)| *instant);
-        if let Some(Ok(place)) = before.map(|before| place(&self.instants, before)) {
+        // Mostly the oldest instant gives way to the newest.
+        if let Some(before) = before {
+            let place = match self.instants.first() {
+                Some((first, _)) if *first == before => Some(0),
+                _ => self.instants.binary_search_by_key(&before, |(instant, _)| *instant).ok(),
+            };
+            let place = place.expect("each sample held is counted");
             self.instants[place].1 -= 1;
             if self.instants[place].1 == 0 {
                 self.instants.remove(place);
             }
         }
-        match place(&self.instants, now) {
-            Ok(place) => self.instants[place].1 += 1,
-            Err(place) => self.instants.insert(place, (now, 1)),
+        match self.instants.last_mut() {
+            Some((last, count)) if *last == now => *count += 1,
+            Some((last, _)) if *last > now => match self.instants.binary_search_by_key(&now, |(instant, _)| *instant) {
+                Ok(place) => self.instants[place].1 += 1,
+                Err(place) => self.instants.insert(place, (now, 1)),
+            },
+            _ => self.instants.push((now, 1)),
         }
     }
 }
@@ -73,7 +93,7 @@ impl Accumulator for Ages {
 
     fn on_hold(&mut self, row: &HoldRow) {
         let receiver = &mut self.receivers[row.to];
-        let before = match receiver.sampled.binary_search_by_key(&row.from, |(from, _)| *from) {
+        let before = match receiver.place_of(row.from, row.to) {
             Ok(place) => Some(std::mem::replace(&mut receiver.sampled[place].1, row.sampled)),
             Err(place) => {
                 receiver.sampled.insert(place, (row.from, row.sampled));

@@ -46,7 +46,7 @@ impl<const A: usize, D: Device<A>> Device<A> for DeviceModel<A, D> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
         match self {
             Self::Unsimulated(device) => device.advance(now, span, coupling_force),

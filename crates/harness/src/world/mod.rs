@@ -16,11 +16,11 @@ use cohaptic_peer::wire::{Extra, SampleKind};
 use cohaptic_peer::{Contact, Device, LastSent, Reception, SendWhen, State, Strategy};
 use cohaptic_scene::{Change, Scene, Topology};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
+use cohaptic_wan::{AccessLine, Fate, LinkModel, MereArrival, Network, NetworkConfig, NodeId, PacketInfo};
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::observer::{AnyObserver, Ended, HoldRow, InstantRow, SendRow, StateRow, TickRow, TurnRow};
+use crate::observer::{AnyObserver, Ended, HoldRow, InstantRow, SendRow, StateRow, TickRow};
 use crate::plan::Plan;
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
@@ -153,7 +153,10 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
         self.schedule.take(now, &mut self.ticking);
         self.send(now, observer, watch)?;
-        self.deliver(now, observer, watch)?;
+        // Where all peers are local, nobody asks the network what comes next.
+        if !(E::IS_EMPTY && self.network.is_idle_until(now)) {
+            self.deliver(now, observer, watch)?;
+        }
         self.compute_and_move(now, observer, watch)?;
         let discrepancy = self.measure_discrepancy();
         if watch.instants {
@@ -287,7 +290,15 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     /// Step 2: whatever has arrived is handed to its receiver.
     fn deliver(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
         self.network.handle_timeout(now).expect("instants come in order");
-        while let Some(event) = self.network.poll_event() {
+        let has_mere_arrivals = E::IS_EMPTY && self.kind == SampleKind::State && !watch.packets;
+        loop {
+            if has_mere_arrivals {
+                self.deliver_mere_arrivals(now, observer, watch)?;
+                if self.network.has_mere_arrivals_alone() {
+                    return Ok(());
+                }
+            }
+            let Some(event) = self.network.poll_event() else { return Ok(()) };
             if let Fate::Delivered(_) = event.fate {
                 let to = event.path.to.index();
                 let receiver = &mut self.members[to];
@@ -320,6 +331,23 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if watch.packets && event.fate.is_end() {
                 observer.on_packet(&event.record)?;
             }
+        }
+    }
+
+    /// What has arrived undamaged, with nothing else to happen before it, where nobody looks at packets and samples are states. It took a tenth of the instructions of ten peers off.
+    #[inline(always)]
+    fn deliver_mere_arrivals(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
+        while let Some(MereArrival { path, offered, payload, .. }) = self.network.poll_mere_arrival() {
+            let receiver = &mut self.members[path.to.index()];
+            match receiver.peer.handle_sample(self.datagrams.sample(payload)) {
+                Ok(Reception::Newest) if watch.holds => {
+                    observer.on_hold(&HoldRow { at: now, from: path.from.index(), to: path.to.index(), sampled: offered })?;
+                }
+                Ok(Reception::Newest) => {}
+                Ok(Reception::Stale) => receiver.stale_samples += 1,
+                Err(error) => unreachable!("peers of one scene understand each other: {error}"),
+            }
+            self.datagrams.release(payload);
         }
         Ok(())
     }
@@ -354,8 +382,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if watch.ticks {
                 let axes = self.axes;
                 let device = member.peer.device().state();
-                let coordination_torque = member.peer.rotation().map_or([0.0; 3], Rotation::coordination_torque);
-                observer.on_tick(&TickRow {
+                let tick = TickRow {
                     at: now,
                     peer: place,
                     device: row(&device, axes),
@@ -363,13 +390,12 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     target: row(&forces.target, axes),
                     coupling_force: &forces.coupling[..axes],
                     coordination_force: &forces.coordination[..axes],
-                    turn: member.peer.rotation().map(|rotation| TurnRow {
-                        object: rotation.copy(),
-                        device: rotation.device(),
-                        coupling_torque: &rotation.computed().coupling,
-                        coordination_torque: &coordination_torque,
-                    }),
-                })?;
+                    turn: None,
+                };
+                match member.peer.rotation() {
+                    None => observer.on_tick(&tick)?,
+                    Some(rotation) => turning::on_tick(observer, tick, rotation)?,
+                }
             }
             member.tick += 1;
             if watch.steps {

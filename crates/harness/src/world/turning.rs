@@ -1,9 +1,10 @@
 //! What a running scene keeps of an object that turns.
 
 use cohaptic_peer::Gains;
-use cohaptic_peer::rotation::{Attitude, Triple};
+use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
 use cohaptic_scene::Scene;
 
+use crate::observer::{AnyObserver, Ended, TickRow, TurnRow};
 use crate::spread::Spread;
 
 /// The attitudes of all copies, and changes of the gains on them.
@@ -44,4 +45,18 @@ impl Turning {
         let there = self.latest.iter().enumerate().filter(|(place, _)| is_there(*place));
         self.spread.take(there.map(|(_, attitude)| attitude.orientation));
     }
+}
+
+/// Shows a tick of a peer that turns. Apart from the loop over peers, where the larger row would be written for those that do not turn as well.
+#[inline(never)]
+pub(super) fn on_tick(observer: &mut AnyObserver<'_>, tick: TickRow<'_>, rotation: &Rotation) -> Result<(), Ended> {
+    observer.on_tick(&TickRow {
+        turn: Some(TurnRow {
+            object: rotation.copy(),
+            device: rotation.device(),
+            coupling_torque: &rotation.computed().coupling,
+            coordination_torque: &rotation.coordination_torque(),
+        }),
+        ..tick
+    })
 }

@@ -10,7 +10,7 @@ mod recording;
 use std::collections::VecDeque;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketInfo, Path};
+use cohaptic_wan::{Fate, LinkModel, LinkStats, MereArrival, Network, NetworkConfig, NodeId, PacketInfo, Path};
 
 use exits::{Out, counted};
 pub(crate) use hitting::HitCount;
@@ -190,8 +190,8 @@ impl<A: Clone> Wire<A> {
         if self.hitting.is_some() || self.recording.is_on() {
             return None;
         }
-        let (path, at, parcel) = self.network.poll_mere_arrival()?;
-        Some((path, at, self.cut[self.pair(path)], parcel))
+        let MereArrival { path, at, payload, .. } = self.network.poll_mere_arrival()?;
+        Some((path, at, self.cut[self.pair(path)], payload))
     }
 
     /// The next packet that has arrived. What becomes of it is told by [`Wire::ends`].

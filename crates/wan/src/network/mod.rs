@@ -74,6 +74,19 @@ pub struct Network<P> {
     has_filters: bool,
 }
 
+/// A packet that has arrived undamaged, of which nothing else is told.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct MereArrival<P> {
+    /// From where to where.
+    pub path: Path,
+    /// When it was offered to the network.
+    pub offered: Instant,
+    /// When it arrived.
+    pub at: Instant,
+    /// What it carries.
+    pub payload: P,
+}
+
 /// The links and the access lines.
 #[derive(Clone, Debug)]
 struct Lines<P> {
@@ -284,6 +297,14 @@ impl<P: Clone> Network<P> {
         self.traffic.pending.next_at()
     }
 
+    /// Whether nothing happens up to `now` and all that happened was polled, so that [`Network::handle_timeout`] can wait. `false` says nothing where it takes a
+    /// search to know.
+    #[must_use]
+    #[inline(always)]
+    pub fn is_idle_until(&self, now: Instant) -> bool {
+        self.traffic.happened.is_empty() && self.traffic.pending.is_idle_until(now)
+    }
+
     /// When [`Network::handle_timeout`] must be called next for a packet to reach one of the receivers of [`Network::awaiting`] in time; `None` if none is on
     /// the way to them. Never before the last instant given, once all events are polled. It may name an instant at which nothing reaches them: where an
     /// uplink wakes for packets to other nodes.
@@ -314,18 +335,24 @@ impl<P: Clone> Network<P> {
         None
     }
 
-    /// As [`Network::poll_event`], as long as no packet can be dropped, marked, copied or damaged on its way, and none was dropped that was not polled: from where to
-    /// where the packet came, when, and what it carries. `None` says nothing about other events: ask [`Network::poll_event`] then.
+    /// Whether mere arrivals are all that can come: no packet can be dropped, marked, copied or damaged on its way, and none was dropped that was not polled.
     #[must_use]
     #[inline(always)]
-    pub fn poll_mere_arrival(&mut self) -> Option<(Path, Instant, P)> {
-        if self.has_inner_events || !self.traffic.happened.is_empty() {
+    pub fn has_mere_arrivals_alone(&self) -> bool {
+        !self.has_inner_events && self.traffic.happened.is_empty()
+    }
+
+    /// As [`Network::poll_event`], as long as [`Network::has_mere_arrivals_alone`]. `None` says nothing about other events: ask [`Network::poll_event`] then.
+    #[must_use]
+    #[inline(always)]
+    pub fn poll_mere_arrival(&mut self) -> Option<MereArrival<P>> {
+        if !self.has_mere_arrivals_alone() {
             return None;
         }
         // Without inner events nobody is woken, and no packet has another line before it.
-        let Pending { at, entered, turn, path, payload, .. } = self.traffic.pending.pop_due(self.now)?;
+        let Pending { at, offered, entered, turn, path, payload, .. } = self.traffic.pending.pop_due(self.now)?;
         self.lines.get_mut(turn.line()).deliver(entered, at);
-        payload.map(|payload| (path, at, payload))
+        payload.map(|payload| MereArrival { path, offered, at, payload })
     }
 
     /// Changes the model of a link from `now` on: see [`crate::Link::set_model`].

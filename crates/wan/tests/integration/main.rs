@@ -18,6 +18,7 @@ mod fingerprints;
 mod kernel_tbf;
 mod laws;
 mod loss_laws;
+mod mere_arrivals;
 mod metamorphic;
 mod naive;
 mod oracle;

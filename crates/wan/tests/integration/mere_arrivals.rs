@@ -1,0 +1,59 @@
+//! Arrivals of which nothing else is told.
+
+use cohaptic_units::Instant;
+use cohaptic_wan::{Fate, MereArrival, NodeId};
+use proptest::prelude::*;
+
+use crate::random_links::{Plan, cases, plain_config, plan, sendings};
+
+/// Three nodes whose links decide at once.
+fn direct() -> impl Strategy<Value = Plan> {
+    let nowhere = || vec![None; 3];
+    proptest::collection::vec(plain_config(), 9).prop_map(move |links| Plan { nodes: 3, links, uplinks: nowhere(), downlinks: nowhere() })
+}
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    /// Polled where the network gives them, and as events where it does not, arrivals come in the same order at the same instants; a network that is said to be idle has
+    /// nothing to tell.
+    #[test]
+    fn mere_arrivals_are_the_events_of_their_packets(
+        plan in prop_oneof![3 => direct(), 1 => plan(3, 0.5)],
+        script in sendings(3),
+        general: bool,
+    ) {
+        let (mut plain, mut subject) = (plan.build(general), plan.build(general));
+        let mut now = Instant::ZERO;
+        for (number, sending) in (0..).zip(&script) {
+            now += sending.gap;
+            let is_idle = subject.is_idle_until(now);
+            for network in [&mut plain, &mut subject] {
+                network.handle_timeout(now).unwrap();
+            }
+            let mut expected = Vec::new();
+            while let Some(event) = plain.poll_event() {
+                expected.push((event.path, event.offered, event.at, event.payload, event.fate));
+            }
+            let mut found = Vec::new();
+            loop {
+                while let Some(MereArrival { path, offered, at, payload }) = subject.poll_mere_arrival() {
+                    found.push((path, offered, at, payload, Fate::Delivered(at)));
+                }
+                let Some(event) = subject.poll_event() else { break };
+                found.push((event.path, event.offered, event.at, event.payload, event.fate));
+            }
+            prop_assert!(!is_idle || found.is_empty());
+            prop_assert_eq!(&found, &expected);
+            for network in [&mut plain, &mut subject] {
+                network.handle_packet(now, sending.from, sending.to, sending.size, number).unwrap();
+            }
+        }
+        for from in 0..3 {
+            for to in (0..3).filter(|to| *to != from) {
+                let [from, to] = [from, to].map(NodeId::new);
+                prop_assert_eq!(plain.link_stats(from, to), subject.link_stats(from, to));
+            }
+        }
+    }
+}
