@@ -9,7 +9,7 @@ use cohaptic_benches::bare::Queue;
 use cohaptic_benches::effort::Effort;
 use cohaptic_benches::machine::{medians_in_turn, own_memory, peak_memory, time};
 use cohaptic_benches::scaling::{THREADS, Window};
-use cohaptic_benches::watched::{Onlooker, with_all_measures};
+use cohaptic_benches::watched::{Onlooker, Plotter, with_all_measures};
 use cohaptic_benches::{LINKS, Mesh, bare};
 use cohaptic_harness::measures::Measures;
 use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side};
@@ -64,6 +64,7 @@ fn main() -> Result<(), String> {
     queues(work);
     many_runs(work);
     threads(work);
+    watched_runs(work);
     measured_runs(work);
     strategies(work);
     print_memory(&memory);
@@ -175,6 +176,39 @@ fn many_runs(work: Work) {
         let speed = |time: Duration| (repetitions(mesh) * SIDE_BY_SIDE) as f64 / time.as_secs_f64();
         let (alone, together) = (speed(times[0]), speed(times[1]));
         println!("| {} | {} | {alone:.1} | {together:.1} | {:.2}× |", mesh.peers, mesh.links(), together / alone);
+    }
+    println!();
+}
+
+/// How many times as long a run may take of which positions are plotted as one that nobody watches.
+const ASKED_OF_PLOTS: f64 = 1.3;
+
+/// Runs of which only ticks are looked at.
+fn watched_runs(work: Work) {
+    println!("## Watched runs\n");
+    println!(
+        "The mesh above, of which nobody sees anything, positions are plotted as in a terminal, or an observer sees each row of each tick and keeps nothing. The median of\n{} rounds in which all of them alternate.\n",
+        work.rounds
+    );
+    println!("| peers | links | unwatched | plotted | times as long | asked for | each row | times as long |");
+    println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |");
+    let seconds = |mesh: Mesh| (work.seconds(mesh) / 4).max(1);
+    let scenes = Mesh::ALL.map(|mesh| mesh.scene(seconds(mesh) * 1000, 1));
+    let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
+    for scene in &scenes {
+        works.push(Box::new(|| drop(black_box(Mesh::run(scene)))));
+        works.push(Box::new(|| drop(black_box(Simulation::new(scene, Model::Least).run(&mut Plotter::new(scene))))));
+        works.push(Box::new(|| drop(black_box(Simulation::new(scene, Model::Least).run(&mut { Onlooker::OF_TICKS })))));
+    }
+    let times = medians_in_turn(&works, work.rounds);
+    for (mesh, times) in Mesh::ALL.into_iter().zip(times.chunks(3)) {
+        let [unwatched, plotted, seen] = [0, 1, 2].map(|run: usize| seconds(mesh) as f64 / times[run].as_secs_f64());
+        let (peers, links) = (mesh.peers, mesh.links());
+        println!(
+            "| {peers} | {links} | {unwatched:.0}× | {plotted:.0}× | {:.2} | {ASKED_OF_PLOTS} | {seen:.0}× | {:.2} |",
+            unwatched / plotted,
+            unwatched / seen
+        );
     }
     println!();
 }

@@ -63,7 +63,7 @@ impl Observer for Plotter {
     }
 
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Infallible> {
-        self.0.add_all(ticks.at(), ticks.positions(0));
+        self.0.add_positions(ticks, 0);
         Ok(())
     }
 }

@@ -217,7 +217,7 @@ impl Observer for &mut Watch {
 
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), RecordError> {
         if let Some(positions) = &mut self.positions {
-            positions.add_all(ticks.at(), ticks.positions(0));
+            positions.add_positions(ticks, 0);
         }
         if let Some(places) = &mut self.places
             && places.wants(ticks.at())

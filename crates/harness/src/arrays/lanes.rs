@@ -3,7 +3,7 @@
 use std::ops::{Add, BitAnd, Div, Mul, Sub};
 
 /// How many numbers are computed at once: a cache line, and one register of the widest processors.
-pub(super) const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
 /// Lanes numbers that have the same done to them. Each is rounded as it would be alone, so what they are computed with changes no bit.
 #[derive(Clone, Copy, Debug)]
@@ -43,13 +43,13 @@ impl Lanes {
 
 /// The smaller of two; if they are equal, or one is not a number, the second. One instruction, which [`f64::min`] is not.
 #[inline(always)]
-pub(super) fn smaller(one: f64, other: f64) -> f64 {
+pub(crate) fn smaller(one: f64, other: f64) -> f64 {
     if one < other { one } else { other }
 }
 
 /// The larger of two; if they are equal, or one is not a number, the second.
 #[inline(always)]
-pub(super) fn larger(one: f64, other: f64) -> f64 {
+pub(crate) fn larger(one: f64, other: f64) -> f64 {
     if one > other { one } else { other }
 }
 

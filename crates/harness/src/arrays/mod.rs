@@ -38,6 +38,7 @@ use blocks::{Blocks, LawOfLanes, Moved, law_of_lanes};
 use bodies::Bodies;
 use changes::Changes;
 use lanes::Lanes;
+pub(crate) use lanes::{WIDTH, larger, smaller};
 use place::Places;
 pub(crate) use run_watch::Onlooker;
 use run_watch::{RunWatch, Unwatched, WatchedTicks};

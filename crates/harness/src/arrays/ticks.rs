@@ -47,12 +47,14 @@ impl<'a> Ticks<'a> {
     /// If the scene has no such axis.
     #[inline]
     pub fn positions(&self, axis: usize) -> impl Iterator<Item = f64> {
+        self.blocks_of_positions(axis).zip(0..).flat_map(move |(positions, place)| positions[..WIDTH.min(self.peers - place * WIDTH)].iter().copied())
+    }
+
+    /// [`Ticks::positions`], eight at a time; beyond the last peer there is any number.
+    #[inline]
+    pub(crate) fn blocks_of_positions(&self, axis: usize) -> impl Iterator<Item = &[f64; WIDTH]> {
         let blocks = self.peers.div_ceil(WIDTH);
-        let blocks = &self.blocks[axis * blocks..(axis + 1) * blocks];
-        blocks.iter().zip(0..).flat_map(move |(block, place)| {
-            let positions: &[f64] = block.positions();
-            positions[..WIDTH.min(self.peers - place * WIDTH)].iter().copied()
-        })
+        self.blocks[axis * blocks..(axis + 1) * blocks].iter().map(Block::positions)
     }
 
     /// Where the copy of a peer is along an axis \[m\].

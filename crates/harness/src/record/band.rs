@@ -5,21 +5,45 @@ use std::time::Duration;
 
 use cohaptic_units::Instant;
 
+use crate::arrays::{Ticks, WIDTH, larger, smaller};
+
 /// Curves over the whole of a scene, each as (lowest, highest) in every span. A plot with one pixel for each span is exact.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, Debug)]
 pub struct Bands {
     duration: Duration,
     spans: usize,
     /// The width of a span \[ns\]; the last one may be cut short by the end.
     width: u64,
     curves: usize,
-    /// The lowest and the highest value by span, then curve: values added at an instant lies together. [`NOTHING`] where nothing was added.
-    extremes: Vec<(f64, f64)>,
+    /// The lowest and the highest values, eight curves at a time: by span, then by curve. [`Extremes::NONE`] where nothing was added, and beyond the last curve
+    /// nothing that means anything.
+    extremes: Vec<Extremes>,
     /// The span of the latest value, and the instants in it \[ns\]: finding a span takes a division.
     latest: (usize, Range<u64>),
 }
 
-const NOTHING: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+/// The lowest and the highest values of eight curves in a span.
+#[derive(Clone, Copy, Debug)]
+struct Extremes {
+    low: [f64; WIDTH],
+    high: [f64; WIDTH],
+}
+
+impl Extremes {
+    const NONE: Self = Self { low: [f64::INFINITY; WIDTH], high: [f64::NEG_INFINITY; WIDTH] };
+
+    /// Takes in a value of one curve, if it is finite: comparisons with what is not a number fail.
+    #[inline(always)]
+    fn take_in(&mut self, lane: usize, value: f64) {
+        let value = if value.abs() <= f64::MAX { value } else { f64::NAN };
+        self.low[lane] = smaller(value, self.low[lane]);
+        self.high[lane] = larger(value, self.high[lane]);
+    }
+
+    fn of(&self, lane: usize) -> (f64, f64) {
+        (self.low[lane], self.high[lane])
+    }
+}
 
 impl Bands {
     /// A number of curves over a scene of a duration, in a number of spans (at least one each).
@@ -28,7 +52,7 @@ impl Bands {
         let spans = spans.max(1);
         let width = duration.as_nanos().div_ceil(spans as u128).max(1);
         let width = u64::try_from(width).unwrap_or(u64::MAX);
-        Self { duration, spans, width, curves, extremes: vec![NOTHING; spans * curves], latest: (0, 0..0) }
+        Self { duration, spans, width, curves, extremes: vec![Extremes::NONE; spans * curves.div_ceil(WIDTH)], latest: (0, 0..0) }
     }
 
     /// Adds a value to a curve. A value that is not finite or beyond the end is left out.
@@ -38,32 +62,44 @@ impl Bands {
     /// If there is no such curve.
     pub fn add(&mut self, curve: usize, at: Instant, value: f64) {
         assert!(curve < self.curves, "there are {} curves", self.curves);
-        if let Some(slots) = self.slots(at) {
-            take_in(&mut slots[curve], value);
+        if let Some(span) = self.of_span(at) {
+            span[curve / WIDTH].take_in(curve % WIDTH, value);
         }
     }
 
-    /// Adds a value to each curve, in their order, as [`Bands::add`] does. Values beyond the last curve are left out.
+    /// Adds to each curve where the copy of a peer is along an axis, in the order of the peers, as [`Bands::add`] does. Eight at a time, this takes a fifth of the
+    /// instructions of one by one.
+    ///
+    /// # Panics
+    ///
+    /// If the scene has no such axis.
     #[inline]
-    pub fn add_all(&mut self, at: Instant, values: impl Iterator<Item = f64>) {
-        if let Some(slots) = self.slots(at) {
-            // Values come block by block, which is a loop in a loop as long as nobody asks for the next one.
-            let mut slots = slots.iter_mut();
-            values.for_each(|value| slots.next().into_iter().for_each(|slot| take_in(slot, value)));
+    pub fn add_positions(&mut self, ticks: &Ticks<'_>, axis: usize) {
+        if let Some(span) = self.of_span(ticks.at()) {
+            for (extremes, positions) in span.iter_mut().zip(ticks.blocks_of_positions(axis)) {
+                positions.iter().enumerate().for_each(|(lane, position)| extremes.take_in(lane, *position));
+            }
         }
     }
 
     /// The extremes of all curves in the span of an instant.
     #[inline]
-    fn slots(&mut self, at: Instant) -> Option<&mut [(f64, f64)]> {
+    fn of_span(&mut self, at: Instant) -> Option<&mut [Extremes]> {
         if !self.latest.1.contains(&at.as_nanos()) {
             let span = self.span(at)?;
             let begin = self.width.saturating_mul(span as u64);
             let end = Instant::ZERO.saturating_add(self.duration).as_nanos();
             self.latest = (span, begin..begin.saturating_add(self.width).min(end));
         }
-        let begin = self.latest.0 * self.curves;
-        Some(&mut self.extremes[begin..begin + self.curves])
+        let blocks = self.curves.div_ceil(WIDTH);
+        let begin = self.latest.0 * blocks;
+        Some(&mut self.extremes[begin..begin + blocks])
+    }
+
+    /// The extremes of a curve in a span; none if nothing was added.
+    fn extremes(&self, span: usize, curve: usize) -> Option<(f64, f64)> {
+        let extremes = self.extremes[span * self.curves.div_ceil(WIDTH) + curve / WIDTH].of(curve % WIDTH);
+        Some(extremes).filter(|(low, high)| low <= high)
     }
 
     /// In which span an instant lies; `None` at the end of the scene and beyond.
@@ -87,9 +123,16 @@ impl Bands {
     pub fn split(&self, parts: usize) -> Vec<Self> {
         let size = (self.curves / parts.max(1)).max(1);
         let part = |first: usize| {
-            let curves = size.min(self.curves - first);
-            let extremes = self.extremes.chunks(self.curves).flat_map(|span| &span[first..first + curves]);
-            Self { curves, extremes: extremes.copied().collect(), latest: (0, 0..0), ..*self }
+            let mut part = Self::new(self.duration, self.spans, size.min(self.curves - first));
+            for span in 0..self.spans {
+                for curve in 0..part.curves {
+                    if let Some((low, high)) = self.extremes(span, first + curve) {
+                        let extremes = &mut part.extremes[span * part.curves.div_ceil(WIDTH) + curve / WIDTH];
+                        (extremes.low[curve % WIDTH], extremes.high[curve % WIDTH]) = (low, high);
+                    }
+                }
+            }
+            part
         };
         (0..self.curves).step_by(size).map(part).collect()
     }
@@ -119,8 +162,12 @@ impl Bands {
     /// If there is no such curve.
     pub fn curve(&self, curve: usize) -> impl Iterator<Item = (f64, f64, f64)> {
         assert!(curve < self.curves, "there are {} curves", self.curves);
-        let spans = self.extremes.chunks(self.curves).map(move |span| span[curve]).enumerate();
-        spans.filter(|(_, extremes)| is_there(extremes)).map(|(span, (low, high))| (self.middle_of(span), low, high))
+        (0..self.spans).filter_map(move |span| self.extremes(span, curve).map(|(low, high)| (self.middle_of(span), low, high)))
+    }
+
+    /// The extremes of all curves in some spans.
+    fn all(&self, spans: Range<usize>) -> impl Iterator<Item = (f64, f64)> {
+        spans.flat_map(move |span| (0..self.curves).filter_map(move |curve| self.extremes(span, curve)))
     }
 
     /// The range of values worth showing, with a margin, and whether values beyond it are left out.
@@ -131,29 +178,15 @@ impl Bands {
     #[must_use]
     pub fn range(&self, sane: f64) -> (Range<f64>, bool) {
         let start = (0..self.curves()).find_map(|curve| self.curve(curve).next()).map_or(0.0, |(_, low, _)| low);
-        let reach_until = |span: usize| {
-            let values = self.extremes[..span * self.curves].iter().filter(|extremes| is_there(extremes));
-            values.map(|(low, high)| (low - start).abs().max((high - start).abs())).fold(0.0, f64::max)
-        };
+        let reach_until = |span: usize| self.all(0..span).map(|(low, high)| (low - start).abs().max((high - start).abs())).fold(0.0, f64::max);
         let (first, whole) = (reach_until(self.spans.div_ceil(10)), reach_until(self.spans));
         let limit = if whole > sane && whole > 1000.0 * first { (3.0 * first).max(0.1 * sane) } else { f64::INFINITY };
         let shown = |value: &f64| (value - start).abs() <= limit;
-        let values = || self.extremes.iter().filter(|extremes| is_there(extremes)).flat_map(|(low, high)| [*low, *high]);
+        let values = || self.all(0..self.spans).flat_map(|(low, high)| [low, high]);
         let (low, high) = values().filter(shown).fold((start, start), |(low, high), value| (low.min(value), high.max(value)));
         let margin = if high > low { 0.05 * (high - low) } else { start.abs().max(1e-3) };
         (low - margin..high + margin, values().any(|value| !shown(&value)))
     }
-}
-
-#[inline]
-fn take_in((low, high): &mut (f64, f64), value: f64) {
-    if value.is_finite() {
-        (*low, *high) = (low.min(value), high.max(value));
-    }
-}
-
-fn is_there((low, high): &(f64, f64)) -> bool {
-    low <= high
 }
 
 #[cfg(test)]

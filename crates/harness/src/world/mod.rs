@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_peer::coordination::Role;
-use cohaptic_peer::rotation::{Attitude, Rotation};
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{Extra, SampleKind};
 use cohaptic_peer::{Contact, Device, LastSent, Reception, SendWhen, State, Strategy};
 use cohaptic_scene::{Change, Scene, Topology};

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 #![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
 
+mod bands;
 mod hands;
 mod many_peers;
 mod pointers;
