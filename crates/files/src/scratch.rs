@@ -38,11 +38,11 @@ impl ScratchFile {
         Ok(Self { writer: BufWriter::with_capacity(1 << 16, file), trace: Trace(path) })
     }
 
-    /// What was written, from its beginning. The file is removed with the reader.
+    /// The bytes that were written, from the first on. The file is removed with the reader.
     ///
     /// # Errors
     ///
-    /// What the system says, of the last bytes that were written too.
+    /// What the system says, of the last bytes too.
     pub fn into_reader(self) -> io::Result<impl Read> {
         let Self { writer, trace } = self;
         let mut file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;

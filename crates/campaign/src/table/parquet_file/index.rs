@@ -1,7 +1,7 @@
 //! The index at the end of a Parquet file, a row group at a time.
 //!
-//! It says of each row group where its columns are, and what is in them: some kilobytes a part in the file, and ten times as much as values in memory. The library keeps
-//! it as a whole, in writing and in reading; a campaign may have 100,000 parts. Here it is put aside on the disk as it is written, and read as it lies there. What a row
+//! It has the places and the statistics of the columns of each row group: some kilobytes a part in the file, and several times as much in memory. The library keeps it
+//! as a whole, in writing and in reading; a campaign may have 100,000 parts. Here it is put aside on the disk as it is written, and read as it lies there. What a row
 //! group says is the library's to write and to read.
 //!
 //! Source: <https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift>, `FileMetaData`, and the README beside it for the end of a file.
