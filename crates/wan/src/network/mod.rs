@@ -198,7 +198,7 @@ impl<P: Clone> Network<P> {
     /// # Errors
     ///
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
-    #[inline]
+    #[inline(always)]
     pub fn handle_packet(&mut self, now: Instant, from: NodeId, to: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
         let path = self.path(from, to)?;
         let link = self.link(path);
@@ -314,18 +314,27 @@ impl<P: Clone> Network<P> {
         None
     }
 
-    /// As [`Network::poll_event`], as long as no packet can be dropped, marked, copied or damaged on its way, and none was dropped that was not polled: from where to
-    /// where the packet came, when, and what it carries. `None` says nothing about other events: ask [`Network::poll_event`] then.
-    #[must_use]
+    /// As [`Network::poll_event`], as long as no packet can be dropped, marked, copied or damaged on its way, and none was dropped that was not polled: `take` is told from
+    /// where to where the packet came, and when, and takes what it carries. `None` says nothing about other events: ask [`Network::poll_event`] then.
     #[inline(always)]
-    pub fn poll_mere_arrival(&mut self) -> Option<(Path, Instant, P)> {
+    pub fn take_mere_arrival<T>(&mut self, take: impl FnOnce(Path, Instant, &mut P) -> T) -> Option<T> {
         if self.has_inner_events || !self.traffic.happened.is_empty() {
             return None;
         }
+        let Self { now, traffic, lines, .. } = self;
         // Without inner events nobody is woken, and no packet has another line before it.
-        let Pending { at, entered, turn, path, payload, .. } = self.traffic.pending.pop_due(self.now)?;
-        self.lines.get_mut(turn.line()).deliver(entered, at);
-        payload.map(|payload| (path, at, payload))
+        let taken = traffic.pending.take_due(*now, |Pending { at, entered, turn, path, payload, .. }| {
+            lines.get_mut(turn.line()).deliver(*entered, *at);
+            payload.as_mut().map(|payload| take(*path, *at, payload))
+        });
+        taken.flatten()
+    }
+
+    /// Whether [`Network::poll_event`] may give something at the last instant given. `false` is certain.
+    #[must_use]
+    #[inline(always)]
+    pub fn may_have_events(&self) -> bool {
+        !self.traffic.happened.is_empty() || self.traffic.pending.may_be_due(self.now)
     }
 
     /// Changes the model of a link from `now` on: see [`crate::Link::set_model`].
