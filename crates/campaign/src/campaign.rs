@@ -340,10 +340,12 @@ impl Campaign {
 
     fn merge(&self) -> Result<(), CampaignError> {
         let format = self.plan.format();
-        let parts: Vec<_> = (0..self.parts.count()).map(|part| (self.folder.part(part, format), self.parts.len(part))).collect();
+        // A range of `u64` does not know its length.
+        let count = u32::try_from(self.parts.count()).unwrap_or(u32::MAX);
+        let parts = (0..count).map(u64::from).map(|part| (self.folder.part(part, format), self.parts.len(part)));
         let about = self.manifest.text();
         let path = self.folder.table(format);
-        let merged = write_whole(&path, |file| format.merge(file, self.head(&about), parts.iter().map(|(path, rows)| (path.as_path(), *rows))));
+        let merged = write_whole(&path, |file| format.merge(file, self.head(&about), parts));
         merged.map_err(|error| match error {
             TableError::Part { path, error } => unread(&path, *error, "remove it and repeat the command, which computes it again"),
             error @ (TableError::Io(_) | TableError::Content(_)) => unwritten(&path, error),

@@ -16,6 +16,7 @@
 //! ```
 
 mod lease;
+mod scratch;
 mod whole;
 
 use std::fs::File;
@@ -23,6 +24,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 pub use lease::{BEAT, Holder, Lease, Owner, STALE, Taking, leases};
+pub use scratch::ScratchFile;
 pub use whole::{PARTIAL, WholeFile, partial_name, write_whole, write_whole_by};
 
 /// The most bytes of a file that is read as a whole, 256 MiB: a scene, a trace, a replay, recorded motion, a table of a distribution, inputs,

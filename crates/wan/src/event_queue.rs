@@ -26,6 +26,8 @@ use core::cmp::Reverse;
 
 use cohaptic_units::Instant;
 
+use crate::ring::Ring;
+
 /// What an event is ordered by.
 pub trait Event {
     /// Compares first by instant, then by the fixed rule that breaks ties.
@@ -42,7 +44,7 @@ pub trait Event {
 #[derive(Clone, Debug)]
 pub struct EventQueue<E> {
     /// All events, while they come in order.
-    ordered: VecDeque<E>,
+    ordered: Ring<E>,
     in_order: bool,
     /// The events of the calendar, each in its place until it is taken.
     slab: Slab<E>,
@@ -88,7 +90,7 @@ impl<E: Event> EventQueue<E> {
     #[must_use]
     pub fn new() -> Self {
         Self {
-            ordered: VecDeque::new(),
+            ordered: Ring::new(),
             in_order: true,
             slab: Slab { places: Vec::new(), free: Vec::new() },
             front: VecDeque::new(),
@@ -121,7 +123,7 @@ impl<E: Event> EventQueue<E> {
         self.len += 1;
         if self.in_order {
             if self.ordered.back().is_none_or(|last| last.key() <= event.key()) {
-                self.ordered.push_back(event);
+                self.ordered.push(|| event);
                 return;
             }
             self.become_calendar();
@@ -135,7 +137,7 @@ impl<E: Event> EventQueue<E> {
     pub(crate) fn push_made(&mut self, key: &E::Key, make: impl FnOnce() -> E) {
         if self.in_order && self.ordered.back().is_none_or(|last| last.key() <= *key) {
             self.len += 1;
-            self.ordered.push_back(make());
+            self.ordered.push(make);
         } else {
             self.push(make());
         }
@@ -149,7 +151,7 @@ impl<E: Event> EventQueue<E> {
                 return None;
             }
             self.len -= 1;
-            return self.ordered.pop_front();
+            return self.ordered.pop();
         }
         if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
             return None;
@@ -160,10 +162,27 @@ impl<E: Event> EventQueue<E> {
         self.slab.take(place)
     }
 
-    /// Whether no event is due at `now`. `false` says nothing where it takes a search to know.
+    /// Shows the first event where it lies, if it is not later than `now`, and removes it: an event that is taken out is read as a whole while parts of it were just
+    /// written, for which a processor waits.
     #[inline(always)]
-    pub(crate) fn is_idle_until(&self, now: Instant) -> bool {
-        if self.in_order { self.ordered.front().is_none_or(|first| first.at() > now) } else { self.front.front().is_some_and(|first| first.0 > now) }
+    pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(&mut E) -> T) -> Option<T> {
+        if !self.in_order {
+            return self.pop_due(now).map(|mut event| take(&mut event));
+        }
+        let first = self.ordered.front_mut().filter(|first| first.at() <= now)?;
+        let taken = take(first);
+        self.len -= 1;
+        self.ordered.drop_front();
+        Some(taken)
+    }
+
+    /// Whether an event may be due at `now`. `false` is certain, `true` is where it takes no search to know.
+    #[inline(always)]
+    pub(crate) fn may_be_due(&self, now: Instant) -> bool {
+        if self.in_order {
+            return self.ordered.front().is_some_and(|first| first.at() <= now);
+        }
+        self.front.front().map_or(self.len > 0, |first| first.0 <= now)
     }
 
     /// The instant of the first event.
@@ -187,7 +206,8 @@ impl<E: Event> EventQueue<E> {
         self.in_order = false;
         self.ring.resize_with(RING, Vec::new);
         self.current = self.ordered.front().map_or(0, |first| self.bucket_of(first.at()));
-        for event in core::mem::take(&mut self.ordered) {
+        let mut ordered = core::mem::take(&mut self.ordered);
+        while let Some(event) = ordered.pop() {
             self.push_calendar(event);
         }
     }

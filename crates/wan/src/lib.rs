@@ -58,6 +58,7 @@ mod network;
 mod packet;
 pub mod parameters;
 pub mod random;
+mod ring;
 mod stages;
 
 pub use event_queue::{Event, EventQueue};
@@ -81,6 +82,7 @@ pub use network::stepped_links::SteppedLinks;
 pub use network::{AccessLine, MOST_NODES, MereArrival, Network, NetworkConfig, NetworkError};
 pub use packet::PacketInfo;
 pub use packet::damage::Damage;
+pub use ring::Ring;
 pub use stages::config::{LINK_PARAMETERS, Layout, LinkConfig};
 pub use stages::corruption::{Checksum, Corruption, Flips};
 pub use stages::delay::{Correlation, Delay, DelayError, Jitter};

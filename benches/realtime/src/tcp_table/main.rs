@@ -174,12 +174,6 @@ fn explain() {
     println!("## What makes the difference\n");
     println!("Measured, by these tables or by switching one cause off:\n");
     println!("- **Lateness.** The router is never early; how late it is, [measured-router.md](measured-router.md) tells. The test kit is exact.");
-    println!(
-        "- **Send buffers.** In the first row the test kit's buffer of 64 KiB runs empty once, a segment that is not full leaves in the middle, and Nagle's algorithm"
-    );
-    println!(
-        "  holds the last one back for a round trip. With a buffer of 4 MB, or with `set_nodelay(true)`, the test kit takes the 0.800 s of slow start's closed form."
-    );
     println!("- **Memory of a host.** *Kept* connections begin with the threshold of one before them, often one that lost packets at the beginning.");
     println!("- **Chance.** Links of both lose at random, not the same packets. With losses a row has the spread that its quartiles show.\n");
     println!("Known of Linux or of the router, and not switched off here, so that their parts in a row are a conjecture:\n");

@@ -169,20 +169,28 @@ impl Folder {
 
     /// Which parts are there.
     pub(crate) fn parts(&self, format: Format) -> Result<BTreeSet<u64>, CampaignError> {
-        let number = |path: &PathBuf| path.file_name()?.to_str()?.strip_prefix("part-")?.strip_suffix(&format!(".{}", format.name()))?.parse().ok();
-        Ok(self.named(|name| name.starts_with("part-"))?.iter().filter_map(number).collect())
+        let end = format!(".{}", format.name());
+        let mut parts = BTreeSet::new();
+        self.each(|name| parts.extend(name.strip_prefix("part-").and_then(|name| name.strip_suffix(&end)?.parse::<u64>().ok())))?;
+        Ok(parts)
     }
 
     /// The files with such names, sorted.
     fn named(&self, is_meant: impl Fn(&str) -> bool) -> Result<Vec<PathBuf>, CampaignError> {
-        let unreadable = |error| CampaignError::File { verb: "read", path: self.path.clone(), error };
         let mut found = Vec::new();
-        for entry in std::fs::read_dir(&self.path).map_err(unreadable)? {
-            let name = entry.map_err(unreadable)?.file_name();
-            found.extend(name.to_str().filter(|name| is_meant(name)).map(|name| self.path.join(name)));
-        }
+        self.each(|name| found.extend(is_meant(name).then(|| self.path.join(name))))?;
         found.sort_unstable();
         Ok(found)
+    }
+
+    /// Takes the names of all files.
+    fn each(&self, mut take: impl FnMut(&str)) -> Result<(), CampaignError> {
+        let unreadable = |error| CampaignError::File { verb: "read", path: self.path.clone(), error };
+        for entry in std::fs::read_dir(&self.path).map_err(unreadable)? {
+            let name = entry.map_err(unreadable)?.file_name();
+            name.to_str().into_iter().for_each(&mut take);
+        }
+        Ok(())
     }
 
     pub(crate) fn part(&self, part: u64, format: Format) -> PathBuf {
@@ -246,6 +254,7 @@ mod tests {
         for (name, swept) in [
             ("a/part-00012.parquet.partial", true),
             ("runs.csv.partial", true),
+            ("runs.parquet.index.partial", true),
             ("campaign.json.partial", true),
             ("a/part-00012.csv.node-7-1f.partial", true),
             ("part-00012.parquet", false),

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cohaptic_files::WholeFile;
 
@@ -46,16 +46,16 @@ fn unwritten(error: csv::Error) -> io::Error {
     }
 }
 
-pub(super) fn merge<'a>(to: &mut WholeFile, columns: &[Column], parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
+pub(super) fn merge(to: &mut WholeFile, columns: &[Column], parts: impl Iterator<Item = (PathBuf, u64)>) -> Result<(), TableError> {
     let mut header = Vec::new();
     csv::Writer::from_writer(&mut header).write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
     to.write_all(&header)?;
     let mut buffer = vec![0; 1 << 16];
     for (path, expected) in parts {
-        let mut part = open(path, &header, expected).map_err(TableError::of_part(path))?;
+        let mut part = open(&path, &header, expected).map_err(TableError::of_part(&path))?;
         // Not io::copy, which does not say on which side it failed.
         loop {
-            let read = part.read(&mut buffer).map_err(|error| TableError::of_part(path)(error.into()))?;
+            let read = part.read(&mut buffer).map_err(|error| TableError::of_part(&path)(error.into()))?;
             if read == 0 {
                 break;
             }

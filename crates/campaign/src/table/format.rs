@@ -37,7 +37,7 @@ impl Format {
     }
 
     /// One file with the rows of all parts, one after the other. Each is given with how many rows it must have.
-    pub(crate) fn merge<'a>(self, file: &mut WholeFile, head: Head<'_>, parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
+    pub(crate) fn merge(self, file: &mut WholeFile, head: Head<'_>, parts: impl ExactSizeIterator<Item = (PathBuf, u64)>) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::merge(file, head, parts),
             Self::Csv => comma_separated::merge(file, head.columns, parts),

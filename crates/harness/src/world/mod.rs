@@ -154,7 +154,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         self.schedule.take(now, &mut self.ticking);
         self.send(now, observer, watch)?;
         // Where all peers are local, nobody asks the network what comes next.
-        if !(E::IS_EMPTY && self.network.is_idle_until(now)) {
+        if !E::IS_EMPTY || self.network.may_have_events(now) {
             self.deliver(now, observer, watch)?;
         }
         self.compute_and_move(now, observer, watch)?;
@@ -337,7 +337,8 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     /// What has arrived undamaged, with nothing else to happen before it, where nobody looks at packets and samples are states. It took a tenth of the instructions of ten peers off.
     #[inline(always)]
     fn deliver_mere_arrivals(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
-        while let Some(MereArrival { path, offered, payload, .. }) = self.network.poll_mere_arrival() {
+        let arrived = |MereArrival { path, offered, payload, .. }: MereArrival<'_, Handle>| (path, offered, *payload);
+        while let Some((path, offered, payload)) = self.network.take_mere_arrival(arrived) {
             let receiver = &mut self.members[path.to.index()];
             match receiver.peer.handle_sample(self.datagrams.sample(payload)) {
                 Ok(Reception::Newest) if watch.holds => {

@@ -70,13 +70,20 @@ impl Connection {
             | State::TimeWait
             | State::Closed => return Err(Error::BrokenPipe),
         }
-        let room = self.send_capacity().saturating_sub(self.send.buffer.len());
-        let count = data.len().min(room);
+        let count = data.len().min(self.room());
         if count == 0 && !data.is_empty() {
             return Err(Error::WouldBlock);
         }
         self.send.buffer.write(&data[..count]);
         Ok(count)
+    }
+
+    /// How much can be written. As in Linux, memory is asked for a segment at a time, and one that is begun is filled: else one in the middle of a stream would be small,
+    /// and Nagle's algorithm would hold the last one back until that is answered.
+    fn room(&self) -> usize {
+        let room = self.send_capacity().saturating_sub(self.send.buffer.len());
+        let unsent = usize::try_from(self.send.buffer.end().saturating_sub(self.send.next)).unwrap_or(usize::MAX);
+        unsent.saturating_add(room).next_multiple_of(self.segment_size().max(1)) - unsent
     }
 
     /// What the send buffer holds \[byte\]: twice the congestion window, as Linux tunes it.

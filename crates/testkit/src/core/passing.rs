@@ -7,7 +7,7 @@ use bytes::Bytes;
 use cohaptic_wan::{NodeId, Path};
 
 use super::sockets::SocketState;
-use super::{Core, Datagram, Ends, Kind, Parcel, SocketId};
+use super::{Core, Ends, HostState, Kind, Parcel, SocketId};
 use crate::trace::Lost;
 use crate::wire::Arrival;
 
@@ -128,9 +128,19 @@ impl Core {
     /// Hands a packet to its link.
     #[inline(always)]
     pub(super) fn offer(&mut self, path: Path, parcel: Parcel) {
-        if self.wire.offer(path, parcel).is_ok() {
+        if self.wire.offer(path, parcel).is_ok() && self.wire.may_have_arrivals() {
             self.take_arrivals();
         }
+    }
+}
+
+impl HostState {
+    /// The socket for which a datagram is with which nothing is special: over IPv4, to the only socket of its port, which hears all addresses and everybody.
+    #[inline]
+    fn plain_socket_for(&self, own: Ipv4Addr, ends: &Ends) -> Option<SocketId> {
+        let (address, port) = ends.receiver_v4()?;
+        let id = self.plain.filter(|(plain, _)| *plain == port)?.1;
+        (own == address).then_some(id)
     }
 }
 
@@ -139,21 +149,57 @@ impl Core {
     #[cfg_attr(not(feature = "tcp"), expect(clippy::never_loop, reason = "only TCP has packets that do not leave their host"))]
     pub(super) fn take_arrivals(&mut self) {
         loop {
-            while let Some((path, at, is_cut, parcel)) = self.wire.poll_plain() {
-                if !is_cut {
-                    let _ = self.arrive(path.to, at, parcel, false, path.from);
+            let mut other = None;
+            while self.take_plain(&mut other) {
+                if let Some((path, at, parcel)) = other.take() {
+                    self.arrive_untold(path, at, parcel);
                 }
             }
-            while let Some(Arrival { packet, at, parcel, marked, is_cut }) = self.wire.poll() {
-                let Path { from, to } = packet.path;
-                let end = if is_cut { Err(Lost::Cut) } else { self.arrive(to, at, parcel, marked, from) };
-                self.wire.ends(packet, at, end);
+            if self.wire.may_have_arrivals() {
+                self.take_others();
             }
             #[cfg(feature = "tcp")]
             if self.take_from_loopback() {
                 continue;
             }
             return;
+        }
+    }
+
+    /// Takes the next packet that has come out of its link, if nobody asks for more than its arrival: into the buffer of its socket, if it is a datagram with which nothing
+    /// is special, and else into `other`. One that is lost in a cut is gone. Says whether there was one.
+    #[inline(always)]
+    fn take_plain(&mut self, other: &mut Option<(Path, cohaptic_units::Instant, Parcel)>) -> bool {
+        let Self { wire, hosts, plan, sockets, settings, woken, .. } = self;
+        let taken = wire.take_plain(|path, at, is_cut, parcel| {
+            if is_cut {
+                return;
+            }
+            let host = &hosts[path.to.index()];
+            let id = if host.is_down { None } else { host.plain_socket_for(plan.of(path.to).v4, &parcel.addresses) };
+            let Some(id) = id.filter(|_| parcel.addresses.kind == Kind::Datagram) else {
+                *other = Some((path, at, parcel.take()));
+                return;
+            };
+            // Nobody is told that a buffer was full.
+            let _ = sockets.get_mut(id).keep(at, parcel, false, settings.receive_buffer, woken);
+        });
+        taken.is_some()
+    }
+
+    /// A packet arrives, of whose end nobody is told.
+    #[inline(never)]
+    fn arrive_untold(&mut self, path: Path, at: cohaptic_units::Instant, parcel: Parcel) {
+        let _ = self.arrive(path.to, at, parcel, false, path.from);
+    }
+
+    /// What has come out of the links and is more than an arrival, or asked for.
+    #[inline(never)]
+    fn take_others(&mut self) {
+        while let Some(Arrival { packet, at, parcel, marked, is_cut }) = self.wire.poll() {
+            let Path { from, to } = packet.path;
+            let end = if is_cut { Err(Lost::Cut) } else { self.arrive(to, at, parcel, marked, from) };
+            self.wire.ends(packet, at, end);
         }
     }
 
@@ -172,16 +218,10 @@ impl Core {
         if self.hosts[host.index()].is_down {
             return Err(Lost::HostDown);
         }
-        let Some(id) = self.plain_socket_for(host, &parcel.addresses) else { return self.arrive_anywhere(host, at, parcel, marked, from) };
+        let Some(id) = self.hosts[host.index()].plain_socket_for(self.plan.of(host).v4, &parcel.addresses) else {
+            return self.arrive_anywhere(host, at, parcel, marked, from);
+        };
         self.arrive_at(id, at, parcel, marked)
-    }
-
-    /// The socket for which a datagram is with which nothing is special: over IPv4, to the only socket of its port, which hears all addresses and everybody.
-    #[inline]
-    fn plain_socket_for(&self, host: NodeId, ends: &Ends) -> Option<SocketId> {
-        let (address, port) = ends.receiver_v4()?;
-        let id = self.hosts[host.index()].plain.filter(|(plain, _)| *plain == port)?.1;
-        (self.plan.of(host).v4 == address).then_some(id)
     }
 
     #[inline(never)]
@@ -204,7 +244,7 @@ impl Core {
 
     /// Hands a packet to its socket.
     #[inline(always)]
-    fn arrive_at(&mut self, id: SocketId, at: cohaptic_units::Instant, parcel: Parcel, marked: bool) -> Result<(), Lost> {
+    fn arrive_at(&mut self, id: SocketId, at: cohaptic_units::Instant, mut parcel: Parcel, marked: bool) -> Result<(), Lost> {
         let socket = self.sockets.get_mut(id);
         match parcel.addresses.kind {
             #[cfg(feature = "tcp")]
@@ -216,16 +256,7 @@ impl Core {
                     socket.wake_readers(&mut self.woken);
                 }
             }
-            Kind::Datagram => {
-                let held = socket.held + parcel.bytes.len();
-                if held > self.settings.receive_buffer {
-                    return Err(Lost::BufferFull);
-                }
-                socket.held = held;
-                let Parcel { addresses: ends, bytes, ecn_capable } = parcel;
-                socket.inbox.push_back(Datagram { ends, bytes, at, ecn_capable, marked });
-                socket.wake_readers(&mut self.woken);
-            }
+            Kind::Datagram => return socket.keep(at, &mut parcel, marked, self.settings.receive_buffer, &mut self.woken),
         }
         Ok(())
     }

@@ -288,7 +288,7 @@ impl std::ops::DerefMut for Guard<'_> {
 }
 
 impl Drop for Guard<'_> {
-    #[inline]
+    #[inline(always)]
     fn drop(&mut self) {
         let Some(mut core) = self.core.take() else { return };
         let woken = if core.woken.is_any() { core.woken.take() } else { Vec::new() };

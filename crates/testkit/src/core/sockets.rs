@@ -1,17 +1,17 @@
 //! Sockets: where they are bound, what lies in their buffers, and the tasks that wait.
 
-use std::collections::VecDeque;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
 use std::task::Waker;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::NodeId;
+use cohaptic_wan::{NodeId, Ring};
 
-use super::Core;
 use super::ends::Ends;
 use super::octets::Octets;
 use super::waking::{Waiters, Woken};
+use super::{Core, Parcel};
+use crate::trace::Lost;
 
 /// A socket, until it is closed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -68,7 +68,7 @@ pub(crate) struct SocketState {
     pub(super) host: NodeId,
     pub(super) local: SocketAddr,
     pub(super) peer: Option<SocketAddr>,
-    pub(super) inbox: VecDeque<Datagram>,
+    pub(super) inbox: Ring<Datagram>,
     /// The bytes of the datagrams in `inbox`.
     pub(super) held: usize,
     readers: Waiters,
@@ -79,6 +79,23 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
+    /// Takes a datagram out of its parcel into the buffer, which holds that many bytes.
+    #[inline(always)]
+    pub(super) fn keep(&mut self, at: Instant, parcel: &mut Parcel, marked: bool, room: usize, woken: &mut Woken) -> Result<(), Lost> {
+        let held = self.held + parcel.bytes.len();
+        if held > room {
+            return Err(Lost::BufferFull);
+        }
+        self.held = held;
+        self.inbox.push(|| {
+            let Parcel { addresses: ends, bytes, ecn_capable } = parcel.take();
+            Datagram { ends, bytes, at, ecn_capable, marked }
+        });
+        self.wake_readers(woken);
+        Ok(())
+    }
+
+    #[inline]
     pub(super) fn wake_readers(&mut self, woken: &mut Woken) {
         self.readers.wake(woken);
     }
@@ -140,7 +157,7 @@ impl Core {
             port => port,
         };
         let local = SocketAddr::new(ip, port);
-        let (readers, inbox) = (Waiters::default(), VecDeque::new());
+        let (readers, inbox) = (Waiters::default(), Ring::new());
         let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
         let id = self.sockets.insert(state);
         self.hosts[host.index()].ports.entry((six, port)).or_default().push(id);
@@ -256,11 +273,12 @@ impl Core {
         if socket.died.is_some() || socket.refused {
             return Err(self.error_of(id));
         }
-        let Some(datagram) = socket.inbox.front() else { return Ok(None) };
+        let Some(datagram) = socket.inbox.front_mut() else { return Ok(None) };
         let seen = look(datagram);
-        if !peek && let Some(Datagram { bytes, .. }) = socket.inbox.pop_front() {
-            socket.held -= bytes.len();
-            self.spare.put(bytes);
+        if !peek {
+            socket.held -= datagram.bytes.len();
+            self.spare.put(std::mem::take(&mut datagram.bytes));
+            socket.inbox.drop_front();
         }
         Ok(Some(seen))
     }

@@ -110,7 +110,7 @@ impl Wake for Place {
 pub(crate) struct Executor {
     number: u64,
     elsewhere: Arc<Elsewhere>,
-    slots: Rc<RefCell<Vec<Option<Slot>>>>,
+    slots: Rc<RefCell<Vec<Option<Rc<Slot>>>>>,
     free: Rc<RefCell<Vec<usize>>>,
     last: Rc<Cell<usize>>,
 }
@@ -131,7 +131,7 @@ impl Spawner for Executor {
         let place = self.place(number);
         let waker = Waker::from(Arc::clone(&place));
         waker.wake_by_ref();
-        slots[number] = Some(Slot { task, place, waker });
+        slots[number] = Some(Rc::new(Slot { task, place, waker }));
     }
 }
 
@@ -226,13 +226,12 @@ impl Executor {
         let Some(number) = HERE.with(|here| here.ready.borrow_mut().pop_front()) else { return false };
         self.last.set(number);
         // The task may start others while it is polled, which get other places.
-        let Some(slot) = self.slots.borrow_mut().get_mut(number).and_then(Option::take) else { return true };
+        let Some(slot) = self.slots.borrow().get(number).and_then(Clone::clone) else { return true };
         slot.place.is_queued.store(false, Ordering::Relaxed);
         // A place that was given to another task wakes that one in vain, once.
         if slot.task.poll(&mut Context::from_waker(&slot.waker)).is_ready() {
+            self.slots.borrow_mut()[number] = None;
             self.free.borrow_mut().push(number);
-        } else {
-            self.slots.borrow_mut()[number] = Some(slot);
         }
         true
     }

@@ -97,7 +97,10 @@ impl Watched {
             (Kind::Own, None) => "the function that makes the program, or a waker,".to_owned(),
             #[cfg(feature = "tokio")]
             (Kind::Tokio, None) => {
-                "no task of the test bed, but one of `tokio::spawn` or `spawn_local`, or the function that makes the program,".to_owned()
+                // Tokio tells where a task was spawned, and which one is polled, only in its unstable build.
+                "no task of the test bed, but one of `tokio::spawn` or `spawn_local` (one of `Host::spawn` or `Bed::spawn` is named with its place), or the function that \
+                 makes the program,"
+                    .to_owned()
             }
         };
         let now = match shared.as_ref().map(|shared| shared.try_now()) {

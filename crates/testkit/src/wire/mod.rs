@@ -49,6 +49,14 @@ pub(crate) struct Parcel<A> {
     pub(crate) ecn_capable: bool,
 }
 
+impl<A: Copy> Parcel<A> {
+    /// The parcel, where nothing is to be left but its shape.
+    #[inline]
+    pub(crate) fn take(&mut self) -> Self {
+        Self { addresses: self.addresses, bytes: std::mem::take(&mut self.bytes), ecn_capable: self.ecn_capable }
+    }
+}
+
 /// The earlier of two instants that may not be there.
 #[inline]
 pub(crate) fn earlier(one: Option<Instant>, other: Option<Instant>) -> Option<Instant> {
@@ -183,15 +191,22 @@ impl<A: Clone> Wire<A> {
         Ok(())
     }
 
-    /// The next packet that has arrived, if nothing but arrivals can come and nobody asks for more of them than this: from where to where, when, and whether its
-    /// way is cut. [`Wire::poll`] gives those that this does not give. What else it tells of each took a fifth of the time of a datagram.
+    /// Shows the next packet that has arrived where it lies, if nothing but arrivals can come and nobody asks for more of them than this: from where to where, when, whether
+    /// its way is cut, and what travels, which may be taken. [`Wire::poll`] gives those that this does not give. What else it tells of each took a fifth of the time of a
+    /// datagram.
     #[inline(always)]
-    pub(crate) fn poll_plain(&mut self) -> Option<(Path, Instant, bool, Parcel<A>)> {
+    pub(crate) fn take_plain<T>(&mut self, take: impl FnOnce(Path, Instant, bool, &mut Parcel<A>) -> T) -> Option<T> {
         if self.hitting.is_some() || self.recording.is_on() {
             return None;
         }
-        let MereArrival { path, at, payload, .. } = self.network.poll_mere_arrival()?;
-        Some((path, at, self.cut[self.pair(path)], payload))
+        let Self { network, cut, hosts, .. } = self;
+        network.take_mere_arrival(|MereArrival { path, at, payload, .. }| take(path, at, cut[path.from.index() * *hosts + path.to.index()], payload))
+    }
+
+    /// Whether [`Wire::poll`] may give something. `false` is certain.
+    #[inline(always)]
+    pub(crate) fn may_have_arrivals(&self) -> bool {
+        self.hitting.is_some() || self.network.may_have_events(self.now)
     }
 
     /// The next packet that has arrived. What becomes of it is told by [`Wire::ends`].

@@ -7,6 +7,7 @@ mod handshake;
 mod like_tokio;
 mod limits;
 mod records;
+mod times;
 mod traps;
 
 use std::time::Duration;

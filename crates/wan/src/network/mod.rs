@@ -75,16 +75,16 @@ pub struct Network<P> {
 }
 
 /// A packet that has arrived undamaged, of which nothing else is told.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct MereArrival<P> {
+#[derive(PartialEq, Eq, Debug)]
+pub struct MereArrival<'a, P> {
     /// From where to where.
     pub path: Path,
     /// When it was offered to the network.
     pub offered: Instant,
     /// When it arrived.
     pub at: Instant,
-    /// What it carries.
-    pub payload: P,
+    /// What it carries, which may be taken out.
+    pub payload: &'a mut P,
 }
 
 /// The links and the access lines.
@@ -211,7 +211,7 @@ impl<P: Clone> Network<P> {
     /// # Errors
     ///
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
-    #[inline]
+    #[inline(always)]
     pub fn handle_packet(&mut self, now: Instant, from: NodeId, to: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
         let path = self.path(from, to)?;
         let link = self.link(path);
@@ -297,12 +297,12 @@ impl<P: Clone> Network<P> {
         self.traffic.pending.next_at()
     }
 
-    /// Whether nothing happens up to `now` and all that happened was polled, so that [`Network::handle_timeout`] can wait. `false` says nothing where it takes a
-    /// search to know.
+    /// Whether something may happen up to `now`, or has happened and was not polled. `false` is certain: then [`Network::handle_timeout`] and [`Network::poll_event`] can
+    /// wait.
     #[must_use]
     #[inline(always)]
-    pub fn is_idle_until(&self, now: Instant) -> bool {
-        self.traffic.happened.is_empty() && self.traffic.pending.is_idle_until(now)
+    pub fn may_have_events(&self, now: Instant) -> bool {
+        !self.traffic.happened.is_empty() || self.traffic.pending.may_be_due(now)
     }
 
     /// When [`Network::handle_timeout`] must be called next for a packet to reach one of the receivers of [`Network::awaiting`] in time; `None` if none is on
@@ -342,17 +342,20 @@ impl<P: Clone> Network<P> {
         !self.has_inner_events && self.traffic.happened.is_empty()
     }
 
-    /// As [`Network::poll_event`], as long as [`Network::has_mere_arrivals_alone`]. `None` says nothing about other events: ask [`Network::poll_event`] then.
-    #[must_use]
+    /// As [`Network::poll_event`], as long as [`Network::has_mere_arrivals_alone`]: `take` is shown the packet where it lies, and takes what it carries. `None` says nothing
+    /// about other events: ask [`Network::poll_event`] then.
     #[inline(always)]
-    pub fn poll_mere_arrival(&mut self) -> Option<MereArrival<P>> {
+    pub fn take_mere_arrival<T>(&mut self, take: impl FnOnce(MereArrival<'_, P>) -> T) -> Option<T> {
         if !self.has_mere_arrivals_alone() {
             return None;
         }
+        let Self { now, traffic, lines, .. } = self;
         // Without inner events nobody is woken, and no packet has another line before it.
-        let Pending { at, offered, entered, turn, path, payload, .. } = self.traffic.pending.pop_due(self.now)?;
-        self.lines.get_mut(turn.line()).deliver(entered, at);
-        payload.map(|payload| MereArrival { path, offered, at, payload })
+        let taken = traffic.pending.take_due(*now, |Pending { at, offered, entered, turn, path, payload, .. }| {
+            lines.get_mut(turn.line()).deliver(*entered, *at);
+            payload.as_mut().map(|payload| take(MereArrival { path: *path, offered: *offered, at: *at, payload }))
+        });
+        taken.flatten()
     }
 
     /// Changes the model of a link from `now` on: see [`crate::Link::set_model`].

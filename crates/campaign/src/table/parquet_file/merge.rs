@@ -1,0 +1,71 @@
+//! Puts parts into one file as they are, a row group each: nothing is decoded, and no more is held than one part says of its row group.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use cohaptic_files::WholeFile;
+use parquet::column::writer::ColumnCloseResult;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::RowGroupMetaData;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::file::writer::{SerializedRowGroupWriter, TrackedWrite};
+use parquet::schema::types::SchemaDescriptor;
+
+use super::index::{IndexWriter, MAGIC};
+use super::{about, properties, schema};
+use crate::table::Column;
+use crate::table::format::{Head, TableError, rows_missing};
+
+/// The bytes are those that a file writer of the library makes of the same row groups.
+pub(in crate::table) fn merge(file: &mut WholeFile, head: Head<'_>, parts: impl ExactSizeIterator<Item = (PathBuf, u64)>) -> Result<(), TableError> {
+    let schema = Arc::new(SchemaDescriptor::new(schema(head.columns)?));
+    let properties = properties(head);
+    let mut index = IndexWriter::create(file.path(), schema.clone())?;
+    // The format has 16 bits for the place of a row group, and a file with more row groups says of none where it is.
+    let has_places = i16::try_from(parts.len()).is_ok();
+    let mut to = TrackedWrite::new(file);
+    to.write_all(MAGIC)?;
+    for (place, (path, expected)) in (0..).zip(parts) {
+        let of_part = TableError::of_part(&path);
+        let part = cohaptic_files::open(&path, cohaptic_files::MOST_CAPTURE_BYTES).map_err(|error| of_part(error.into()))?;
+        let group = group(&part, head.columns, expected).map_err(of_part)?;
+        let place = if has_places { place } else { i32::MAX };
+        let mut copied = SerializedRowGroupWriter::new(schema.clone(), properties.clone(), &mut to, place, None);
+        append(&mut copied, &part, &group)?;
+        index.add(Arc::unwrap_or_clone(copied.close()?))?;
+    }
+    index.finish(&mut to, head.program, about(head))?;
+    Ok(to.flush()?)
+}
+
+/// The row group of a part that is as it was written.
+fn group(part: &File, columns: &[Column], expected: u64) -> Result<RowGroupMetaData, TableError> {
+    let reader = SerializedFileReader::new(part.try_clone()?)?;
+    let metadata = reader.metadata();
+    let described = metadata.file_metadata().schema_descr();
+    if described.columns().len() != columns.len() || columns.iter().enumerate().any(|(place, column)| described.column(place).name() != column.name) {
+        return Err(TableError::Content("other columns than this campaign has".to_owned()));
+    }
+    let found = u64::try_from(metadata.file_metadata().num_rows()).unwrap_or_default();
+    match metadata.row_groups() {
+        [group] if found == expected => Ok(group.clone()),
+        _ => Err(rows_missing(found, expected)),
+    }
+}
+
+pub(super) fn append<W: Write + Send>(to: &mut SerializedRowGroupWriter<'_, W>, part: &File, group: &RowGroupMetaData) -> Result<(), ParquetError> {
+    for column in group.columns() {
+        let close = ColumnCloseResult {
+            bytes_written: u64::try_from(column.compressed_size()).unwrap_or_default(),
+            rows_written: u64::try_from(group.num_rows()).unwrap_or_default(),
+            metadata: column.clone(),
+            bloom_filter: None,
+            column_index: None,
+            offset_index: None,
+        };
+        to.append_column(part, close)?;
+    }
+    Ok(())
+}
