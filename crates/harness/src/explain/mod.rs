@@ -109,13 +109,14 @@ pub fn explain(scene: &Scene) -> Explanation {
     let nanos = match &arrays {
         None => WITH_EVENTS,
         Some(shape) if shape.is_broadcast() => IN_ARRAYS,
+        Some(shape) if shape.is_carried() => Nanos { a_packet: WITH_EVENTS.a_packet, an_impaired_packet: WITH_EVENTS.an_impaired_packet, ..IN_ARRAYS },
         Some(_) => Nanos { a_packet: IN_ARRAYS.an_impaired_packet, ..IN_ARRAYS },
     };
     if let Some(shape) = arrays {
         rows.model(
             "runs of which nobody watches more than ticks",
             "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
-            "all tick together, and no link counts or damages packets; a run that is recorded has events, since packets are recorded",
+            "all tick together, and no line damages packets; a run that is recorded has events, since packets are recorded",
         );
         let (threads, why) = shape.threads();
         rows.model("threads of such a run, if nobody watches", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
