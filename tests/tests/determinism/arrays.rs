@@ -95,8 +95,8 @@ proptest! {
     #![proptest_config(cases(1500))]
 
     #[test]
-    fn one_scene_in_arrays_comes_to_what_its_events_come_to(drafts in drafts::alike(Just(1))) {
-        let scene = drafts[0].scene();
+    fn one_scene_in_arrays_comes_to_what_its_events_come_to(drafts in drafts::alike(Just(1)), relay: bool) {
+        let scene = Scene { relay, ..drafts[0].scene() };
         prop_assert!(same_shape(&scene, &scene), "it is run in arrays");
         let difference = difference(&run(&scene, Model::Least), &run(&scene, Model::General));
         prop_assert!(difference.is_none(), "{}", difference.unwrap());
@@ -216,12 +216,17 @@ fn what_a_network_carries_comes_to_the_same() {
         (jitter, "peer.uplink={ rate = \"400kbit\", queue = { limit = \"5 packets\" } }", true),
         (jitter, "peer.downlink={ delay = \"2ms\", jitter = \"1ms\", loss = \"3%\", rate = \"300kbit\" }", true),
         ("delay = \"5ms\"", "peer.uplink={ delay = \"1ms\" }", true),
+        (
+            jitter,
+            "peer.uplink={ rate = \"90kbit\", delay = \"4ms\", jitter = \"1ms\", duplicate = \"10%\" }|topology={ kind = \"star\", role = \"relay\" }",
+            true,
+        ),
         ("delay = \"0s\"", "peer.downlink={ duplicate = \"10%\" }", true),
         ("delay = \"24ms\", jitter = \"3ms\", limit = \"2 packets\"", "", false),
         ("replay = \"fates.csv\"", "", false),
     ];
     for (link, line, shares) in scenes {
-        let settings: Vec<String> = [line].into_iter().filter(|line| !line.is_empty()).map(str::to_owned).collect();
+        let settings: Vec<String> = line.split_terminator('|').map(str::to_owned).collect();
         let mut scene = Scene::parse(&mesh_text(9, link), &folder.path().join("mesh.toml"), &settings).unwrap();
         scene.duration = Duration::from_millis(1100);
         scene.peers.iter_mut().zip(0..).for_each(|(peer, place)| peer.phase = place % 3);

@@ -472,7 +472,7 @@ pub(crate) fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
             }
         }
     }
-    network
+    if scene.relay { network.with_relay() } else { network }
 }
 
 fn row<const A: usize>(state: &State<A>, axes: usize) -> StateRow<'_> {
