@@ -203,7 +203,7 @@ fn threads_come_to_what_one_comes_to() {
     }
 }
 
-/// Packets of several peers wait in one access line, links count what is inside, and a log says what becomes of each packet: alone, interrupted and diverging.
+/// Packets of several peers wait in one access line, links count packets inside, and a log has the fate of each packet: alone, interrupted and diverging.
 #[test]
 fn what_a_network_carries_comes_to_the_same() {
     let folder = tempfile::tempdir().unwrap();

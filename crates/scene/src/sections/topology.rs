@@ -17,7 +17,7 @@ enum Kind {
     Graph,
 }
 
-/// Who sends to whom, and how.
+/// The receivers of each peer, and the way to them.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Ways {
     /// `None`: everybody sends to everybody.

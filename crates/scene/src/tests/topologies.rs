@@ -104,7 +104,7 @@ fn strategies_that_need_all_others_are_refused() {
     assert!(error.contains("an object that turns is followed only where all peers send to all"), "{error}");
 }
 
-/// A relay changes the way of samples, and not who hears whom.
+/// A relay changes the way of samples alone: everybody hears everybody.
 #[test]
 fn a_relay_is_no_peer() {
     let star = scene("kind = \"star\"\nrole = \"relay\"", &[]);

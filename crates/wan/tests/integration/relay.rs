@@ -33,7 +33,7 @@ fn sent(network: &mut Network<u64>, from: usize, gaps: &[u64]) -> Vec<PacketEven
     events
 }
 
-/// An event without its path and copy: what was sent when, what became of it when, and in what state.
+/// An event without its path and copy: number, sending, end, fate, mark and damage.
 type Told = (u64, Instant, Instant, &'static str, bool, bool);
 
 fn told<L>(record: &PacketRecord<L>, later: Duration) -> Told {
@@ -46,7 +46,7 @@ fn told<L>(record: &PacketRecord<L>, later: Duration) -> Told {
 proptest! {
     #![proptest_config(cases(300))]
 
-    /// The uplink does with one packet what it does by itself, and each receiver sees that: what is lost, late, copied, marked or damaged is so for all.
+    /// The uplink does with one packet what it does by itself, and each receiver sees that: a loss, delay, copy, mark or damage is one for all.
     #[test]
     fn every_receiver_sees_what_one_link_does(seed: u64, uplink in any_stages(), gaps in proptest::collection::vec(0..20_000_u64, 1..60)) {
         let mut network = network(seed, &uplink);
@@ -88,7 +88,7 @@ fn what_needs_no_relay_is_as_without() {
     assert_eq!(events, [(2, Instant::ZERO + DOWN + Duration::from_millis(7))]);
 }
 
-/// Who waits for one receiver is woken for what a relay hands on to it.
+/// A driver that waits for one receiver is woken for packets that a relay hands on to it.
 #[test]
 fn a_receiver_behind_a_relay_is_awaited() {
     for uplink in [Delay::constant(Duration::from_millis(7)), Delay::default()] {
