@@ -39,7 +39,7 @@ pub fn links_csv<E>(summary: &Summary, mut write: impl FnMut(&[u8]) -> Result<()
     for from in 0..summary.peers.len() {
         let sender = LinkName::between(name(from), "");
         let mut last: Option<(&LinkStats, Range<usize>)> = None;
-        for (to, stats) in summary.links.from_sender(from) {
+        for (to, stats) in summary.links.sent_by(from) {
             rows.extend_from_slice(sender.as_str().as_bytes());
             rows.extend_from_slice(name(to).as_bytes());
             let counters = rows.len();
