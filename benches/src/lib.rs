@@ -15,6 +15,7 @@ pub mod kernel;
 pub mod machine;
 pub mod one_link;
 pub mod pages;
+pub mod records;
 pub mod scaling;
 pub mod turning;
 pub mod verdicts;

@@ -8,6 +8,7 @@ use std::time::Duration;
 use cohaptic_benches::bare::Queue;
 use cohaptic_benches::effort::Effort;
 use cohaptic_benches::machine::{medians_in_turn, own_memory, peak_memory, time};
+use cohaptic_benches::records;
 use cohaptic_benches::scaling::{THREADS, Window};
 use cohaptic_benches::watched::{Onlooker, Plotter, with_all_measures};
 use cohaptic_benches::{LINKS, Mesh, bare};
@@ -66,6 +67,7 @@ fn main() -> Result<(), String> {
     threads(work);
     watched_runs(work);
     measured_runs(work);
+    recorded_runs(work);
     strategies(work);
     print_memory(&memory);
     Ok(())
@@ -273,6 +275,46 @@ fn measured_runs(work: Work) {
         let (watched, measured) = (speed(times[0]), speed(times[1]));
         println!("| {} | {} | {watched:.0}× | {measured:.0}× | {:.2} | {ASKED_OF_MEASURES} |", mesh.peers, mesh.links(), watched / measured);
     }
+    println!();
+}
+
+/// How many bytes of records, and of rows of links, leave in a second \[MB\].
+const ASKED_OF_RECORDS: (f64, f64) = (200.0, 300.0);
+
+/// Runs that are recorded as CSV, beside runs of which the same rows are seen, and rows of links.
+fn recorded_runs(work: Work) {
+    println!("## Records\n");
+    println!(
+        "Bytes of CSV a second of processor time. *Records*: the mesh above with `--out`, files, synchronisation and pictures included, less a run whose ticks and packets are seen"
+    );
+    println!("and not kept. *Links*: rows of `--links`, handed on in memory. The median of {} rounds in which all alternate.\n", work.rounds);
+    println!("| peers | links | what | MB | MB/s | asked for |");
+    println!("| ---: | --- | --- | ---: | ---: | ---: |");
+    let folder = std::env::temp_dir().join(format!("cohaptic-speed-table-{}", std::process::id()));
+    let seconds = |mesh: Mesh| (work.seconds(mesh) / 20).max(1);
+    let scenes = Mesh::ALL.map(|mesh| mesh.scene(seconds(mesh) * 1000, 1));
+    let bytes: Vec<u64> = scenes.iter().map(|scene| records::csv_bytes(&records::record(scene, &folder))).collect();
+    let of_links = [200, 1000].map(|peers| Mesh { peers, impaired: true });
+    let summaries = of_links.map(|mesh| Mesh::run(&mesh.scene(work.seconds(mesh).min(2) * 100, 1)));
+    let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
+    for scene in &scenes {
+        works.push(Box::new(|| records::read(scene)));
+        works.push(Box::new(|| drop(records::record(scene, &folder))));
+    }
+    works.extend(summaries.iter().map(|summary| Box::new(|| _ = black_box(records::stream(summary))) as Box<dyn Fn()>));
+    let times = medians_in_turn(&works, work.rounds);
+    let row = |mesh: Mesh, what: &str, bytes: u64, time: Duration, asked: f64| {
+        let mega = bytes as f64 / 1e6;
+        println!("| {} | {} | {what} | {mega:.1} | {:.0} | {asked} |", mesh.peers, mesh.links(), mega / time.as_secs_f64());
+    };
+    let (of_records, of_rows) = ASKED_OF_RECORDS;
+    for ((mesh, bytes), times) in Mesh::ALL.into_iter().zip(bytes).zip(times.chunks(2)) {
+        row(mesh, "records", bytes, times[1].saturating_sub(times[0]), of_records);
+    }
+    for ((mesh, summary), time) in of_links.into_iter().zip(&summaries).zip(&times[2 * scenes.len()..]) {
+        row(mesh, "rows of links", records::stream(summary), *time, of_rows);
+    }
+    let _ = std::fs::remove_dir_all(&folder);
     println!();
 }
 

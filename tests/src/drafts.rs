@@ -5,6 +5,7 @@ use std::time::Duration;
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, SendWhen};
+use proptest::bool::weighted;
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
@@ -148,7 +149,7 @@ fn of_one_shape(scenes: impl Strategy<Value = usize>, with_timeline: bool) -> im
     let counts = prop_oneof![3 => 2..=5_usize, 1 => 6..=11_usize];
     (scenes, counts).prop_flat_map(move |(scenes, count)| {
         let drafts = vec((anything_among(Just(count)), direct_link(), vec((0..count, 1..count, direct_link()), 0..3)), scenes);
-        (drafts, any::<bool>(), 0.9..2.0).prop_map(move |(mut drafts, same_links, stiffer)| {
+        (drafts, any::<bool>(), weighted(0.3), 0.9..2.0).prop_map(move |(mut drafts, same_links, with_lines, stiffer)| {
             let has_arms = drafts.iter().any(|(draft, ..)| draft.peers.iter().any(|peer| matches!(peer.hand, DraftHand::Arm { .. })));
             let mut timeline = std::mem::take(&mut drafts[0].0.timeline);
             timeline.retain(|entry| with_timeline && !(has_arms && entry.contains("hand =")));
@@ -178,7 +179,9 @@ fn of_one_shape(scenes: impl Strategy<Value = usize>, with_timeline: bool) -> im
                 }
                 for (peer, like) in draft.peers.iter_mut().zip(&first.peers) {
                     (peer.tick, peer.offset, peer.drift, peer.phase) = (first.peers[0].tick, 0, 0, like.phase % (first.update / first.peers[0].tick));
-                    (peer.uplink, peer.downlink) = (None, None);
+                    if !with_lines {
+                        (peer.uplink, peer.downlink) = (None, None);
+                    }
                     if let Contact::Push(direction) = &mut peer.contact {
                         direction.axis %= first.axes;
                     }

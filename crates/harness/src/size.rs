@@ -77,8 +77,8 @@ impl Way {
         let in_arrays = if watched || model != Model::Least { None } else { Shape::of(scene, &Plan::new(scene, model, false), &FromScene).ok() };
         match in_arrays {
             Some((shape, _)) if shape.is_broadcast() => Self::Broadcast,
-            Some(_) => Self::Packets,
-            None => Self::Events,
+            Some((shape, _)) if !shape.is_carried() => Self::Packets,
+            Some(_) | None => Self::Events,
         }
     }
 

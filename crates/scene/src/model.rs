@@ -41,6 +41,8 @@ pub struct Scene {
     pub peers: Vec<PeerSpec>,
     /// The peers to which each peer sends; `None`: all others.
     pub topology: Option<Arc<Topology>>,
+    /// Whether a relay stands between the uplinks of peers and the links: a sample passes an uplink once, and the relay hands it on to each receiver.
+    pub relay: bool,
     /// The directed links between the peers; of no meaning between peers that are no neighbours in the topology.
     pub links: LinkTable,
     /// Changes while the scene runs, in order of time; equal instants in the order of the file.
@@ -68,6 +70,7 @@ impl fmt::Debug for Scene {
             integrator,
             peers,
             topology,
+            relay,
             links,
             timeline,
             measure,
@@ -83,6 +86,9 @@ impl fmt::Debug for Scene {
         }
         if let Some(topology) = topology {
             shown.field("topology", topology);
+        }
+        if *relay {
+            shown.field("relay", relay);
         }
         if let Some(measure) = measure {
             shown.field("measure", measure);

@@ -13,7 +13,7 @@ use cohaptic_units::Instant;
 use crate::context::SceneContext;
 use crate::model::{ChangeKind, Scene};
 use crate::sections::{
-    Header, Measured, PeerSources, Stepping, check_enough, read_coordination, read_expect, read_header, read_measure, read_names, read_object,
+    Header, Measured, PeerSources, Stepping, Ways, check_enough, read_coordination, read_expect, read_header, read_measure, read_names, read_object,
     read_peers, read_stepping, read_timeline, read_topology, refuse_rotational_keys, refuse_unlinked, rotation,
 };
 
@@ -116,7 +116,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let topology_node = root.get("topology");
     let topology = match topology_node {
         Some(node) => read_topology(node, file),
-        None => Some(None),
+        None => Some(Ways::default()),
     };
     let modulators = read_modulators(root.get("modulators"), file);
     let file = file.with_modulators(modulators.as_ref());
@@ -166,7 +166,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         Some(node) => read_expect(node, duration, has_probe, peers.as_deref(), context).map(Some),
         None => Some(None),
     };
-    if let Some(Some(topology)) = &topology {
+    if let Some(topology) = topology.as_ref().and_then(|ways| ways.neighbours.as_ref()) {
         refuse_unlinked(root.get("links"), None, topology, file);
         refuse_unlinked(timeline_node, Some("link"), topology, file);
         let mut expected = |key: &str| Some(&*root.get("expect")?.as_table()?.get(key)?.node);
@@ -189,7 +189,8 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         coordination: coordination?,
         integrator: stepping?.integrator,
         peers: peers?,
-        topology: topology?,
+        relay: topology.as_ref().is_some_and(|ways| ways.relay),
+        topology: topology?.neighbours,
         links: links.as_ref().and_then(LinkClasses::table)?,
         timeline: timeline?,
         measure: measure?,

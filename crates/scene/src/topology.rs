@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use cohaptic_linkfile::reading::named_file::{Fault, line_span};
+use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::Pull;
 use cohaptic_wan::LinkModel;
 
@@ -323,8 +324,14 @@ impl Scene {
 
     /// Why the scene cannot have its topology; `None` if it can.
     pub(crate) fn refused_topology(&self) -> Option<String> {
-        self.topology.as_ref()?;
         let strategy = self.coordination.strategy;
+        if self.relay && (self.sample_kind().is_personal() || strategy == Coordination::ClientServer) {
+            return Some(format!(
+                "the strategy {} sends each peer a sample of its own, and a relay hands one on to all: expected another strategy, or no role = \"relay\"",
+                strategy.name()
+            ));
+        }
+        self.topology.as_ref()?;
         if self.law(0).is_none() {
             return Some(format!(
                 "the strategy {} has every peer hear every other: expected kind = \"full\", or a strategy that follows the mean of what it hears",

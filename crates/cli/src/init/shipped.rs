@@ -56,6 +56,7 @@ shipped![
     "coordination/set-position-throw",
     "coordination/set-position",
     "coordination/smoothed-average-position",
+    "coordination/topology-relay",
     "coordination/topology-ring",
     "coordination/topology-star",
     "coordination/wave-throw",

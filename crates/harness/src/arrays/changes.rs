@@ -99,7 +99,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
                 ChangeKind::SendWhen(_) => unreachable!("the shape of a scene says that it has no dead bands"),
             }
         }
-        if self.shape.has_queues {
+        if self.shape.has_queues() {
             self.pass(tick);
         }
     }

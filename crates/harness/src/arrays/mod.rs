@@ -239,7 +239,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         now: Instant,
         (others, watch): (&mut impl Others<P, L>, &mut impl RunWatch<B, A, P>),
     ) -> [f64; L] {
-        if self.shape.has_queues && is_asked_before(tick) {
+        if self.shape.has_queues() && is_asked_before(tick) {
             self.pass(tick);
         }
         if tick == self.earliest_send {
@@ -247,7 +247,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         }
         match &mut self.samples {
             Samples::Broadcast(samples) => samples.deliver(tick),
-            Samples::PerPacket(samples) => samples.deliver(tick),
+            Samples::PerPacket(samples) => samples.deliver(tick, now),
         }
         self.bodies.move_hands(now);
         if self.leads.is_some() {
@@ -444,7 +444,7 @@ fn summary<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
         ticks,
         peers: members().map(|(part, peer)| part.peer_summary(peer, run)).collect(),
         links: links(parts, run, ticks, until),
-        access_lines: Vec::new(),
+        access_lines: if let Samples::PerPacket(samples) = &parts[0].samples { samples.access_lines(run) } else { Vec::new() },
         max_discrepancy,
         max_rotation_discrepancy: parts[0].bodies.max_rotation_discrepancy(run),
     }

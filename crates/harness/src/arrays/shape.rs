@@ -8,7 +8,7 @@ use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Coordination, EXACT_FROM, Integrator};
 use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{DirectLinks, LinkModel, SteppedLinks};
+use cohaptic_wan::{DirectLinks, LinkModel, MOST_NODES, SteppedLinks};
 
 use super::{nanos, threads};
 use crate::plan::{Plan, Ticking};
@@ -33,12 +33,23 @@ pub(crate) struct Shape {
     pub(super) phases: Vec<u64>,
     /// The size of a sample.
     pub(super) size: Bytes,
-    /// Whether the fate of a packet on some link may depend on later ones, or on a change of the timeline.
-    pub(super) has_queues: bool,
+    /// How the fates of packets become known.
+    pub(super) way: Way,
     /// The delay of all links, if they do nothing but delay, all alike, and lead from all to all.
     pub(super) delay: Option<Duration>,
     /// The neighbours of each peer, if they are not all others.
     pub(super) topology: Option<Arc<Topology>>,
+}
+
+/// How the fates of packets become known, if links do more than to delay all by the same span.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Way {
+    /// Each as it is sent.
+    Direct,
+    /// Each before its sender sends the next one: it may depend on later ones, or on a change of the timeline.
+    Stepped,
+    /// As time goes: packets of several peers share an access line, or a link counts those inside until they arrive, or replays a log.
+    Carried,
 }
 
 /// A year: far from where instants end, so that sums of a few need no care.
@@ -67,8 +78,18 @@ impl Shape {
     }
 
     /// Whether a run that diverges is to be run once more with events: queues have looked ahead of the end.
-    pub(crate) const fn looks_ahead(&self) -> bool {
-        self.has_queues
+    pub(crate) fn looks_ahead(&self) -> bool {
+        self.has_queues()
+    }
+
+    /// Whether the fate of a packet on some link is decided before it happens.
+    pub(super) fn has_queues(&self) -> bool {
+        self.way == Way::Stepped
+    }
+
+    /// Whether a network carries the packets.
+    pub(crate) fn is_carried(&self) -> bool {
+        self.way == Way::Carried
     }
 
     /// The first tick at or after an instant.
@@ -86,7 +107,15 @@ impl Shape {
         let links = scene.used_links();
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
         let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, size));
-        let delay = one_delay(scene).filter(|_| !links_change);
+        let lines = || scene.peers.iter().flat_map(|peer| [&peer.uplink, &peer.downlink]).flatten();
+        let has_lines = lines().next().is_some();
+        let delay = one_delay(scene).filter(|_| !links_change && !has_lines);
+        let is_stepped = links.iter().all(|(link, _)| SteppedLinks::takes(link)) && models_to_come(scene).all(SteppedLinks::takes);
+        let way = match (are_direct, is_stepped && !has_lines) {
+            (true, true) => Way::Direct,
+            (false, true) => Way::Stepped,
+            (_, false) => Way::Carried,
+        };
         let has_past = |law: BuiltIn| Law::<f64>::lag(&law) > 0 || Law::<f64>::memory(&law) > 0;
         let may_have_past = || has_past(law) || !scene.timeline.is_empty() && scene.laws_in_time(0).any(has_past);
         let sends_by_difference = |change: &Change| matches!(change.what, ChangeKind::SendWhen(_));
@@ -94,9 +123,9 @@ impl Shape {
         let changes_law = |change: &Change| matches!(change.what, ChangeKind::Coordination(_) | ChangeKind::Parameters(_));
         let fits = [
             (plan.ticking == Ticking::Lockstep && !plan.general_links, "peers tick at instants of their own"),
-            (scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()), "there are access lines, which links share"),
-            (are_direct || links.iter().all(|(link, _)| SteppedLinks::takes(link)), "a link damages, counts or replays packets"),
-            (scene.timeline.iter().all(|change| has_steps(&change.what)), "the timeline makes a link damage, count or replay packets"),
+            (links.iter().all(|(link, _)| !link.may_damage()), "a link damages packets"),
+            (lines().all(|line| !line.may_damage()), "an access line damages packets"),
+            (models_to_come(scene).all(|link| !link.may_damage()), "the timeline makes a link damage packets"),
             (scene.coordination.send_when.is_none() && !scene.timeline.iter().any(sends_by_difference), "there are dead bands"),
             (!scene.has_gains_by_peer(), "the gains follow the weight that a peer hears, so they differ from peer to peer"),
             (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
@@ -104,6 +133,10 @@ impl Shape {
             (scene.rotation.is_none() || !may_have_past(), "the law remembers, and the object turns"),
             // What each packet carries counts them in 16 bits.
             (scene.peers.len() <= usize::from(u16::MAX) || delay.is_some(), "there are more than 65,535 peers, over links that take memory"),
+            (
+                way != Way::Carried || scene.topology.is_some() || scene.peers.len() <= MOST_NODES,
+                "a network with access lines has at most 23,170 peers",
+            ),
             (scene.duration <= LONGEST && clock.tick <= LONGEST, "it lasts longer than a year"),
         ];
         if let Some((_, why)) = fits.into_iter().find(|(fits, _)| !fits) {
@@ -121,7 +154,7 @@ impl Shape {
             send_every: scene.samples_every(0),
             phases: scene.peers.iter().map(|peer| peer.phase).collect(),
             size,
-            has_queues: !are_direct,
+            way,
             delay,
             topology: scene.topology.clone(),
         };
@@ -129,19 +162,19 @@ impl Shape {
     }
 }
 
-/// Whether links after such a change are told when the next packet comes.
-fn has_steps(what: &ChangeKind) -> bool {
-    match what {
-        ChangeKind::Link(link) => SteppedLinks::takes(&link.config),
-        ChangeKind::AllLinks(links) => links.configs().iter().all(|link| SteppedLinks::takes(link)),
+/// The links that the timeline makes.
+fn models_to_come(scene: &Scene) -> impl Iterator<Item = &LinkModel> {
+    scene.timeline.iter().flat_map(|change| match &change.what {
+        ChangeKind::Link(link) => vec![&*link.config],
+        ChangeKind::AllLinks(links) => links.configs().iter().map(|link| &**link).collect(),
         ChangeKind::Contact { .. }
         | ChangeKind::Hand { .. }
         | ChangeKind::HandTorque { .. }
         | ChangeKind::Coordination(_)
         | ChangeKind::RotationalGains(_)
         | ChangeKind::Parameters(_)
-        | ChangeKind::SendWhen(_) => true,
-    }
+        | ChangeKind::SendWhen(_) => Vec::new(),
+    })
 }
 
 /// The delay of all links, if they have one and nothing else, and lead from all to all.
@@ -185,12 +218,15 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             change("link = \"all\", set = { rate = \"1Mbit\" }"),
             change("peer = \"peer1\", set = { hand = { force = 1 } }"),
             change("coordination = { stiffness = 2 }"),
+            "peer.uplink={ rate = \"1Mbit\" }".to_owned(),
+            "link.limit=\"9 packets\"".to_owned(),
+            change("link = \"all\", set = { limit = \"9 packets\" }"),
         ] {
             assert_eq!(refusal(&fits), None, "{fits}");
         }
         for (keys, expected) in [
             ("peer.clock.drift=\"10ppm\"".to_owned(), "instants of their own"),
-            ("peer.uplink={ rate = \"1Mbit\" }".to_owned(), "access lines"),
+            ("peer.downlink={ corrupt = 0.1 }".to_owned(), "an access line damages"),
             ("link.corrupt=0.1".to_owned(), "a link damages"),
             (change("link = \"all\", set = { corrupt = 0.1 }"), "the timeline makes a link damage"),
             ("coordination.send-when={ position = 0.001 }".to_owned(), "dead bands"),

@@ -5,6 +5,7 @@ use cohaptic_scene::{Change, FromScene, Scene};
 
 use super::Shape;
 use super::lanes::WIDTH;
+use super::shape::Way;
 use crate::plan::{Model, Plan};
 use crate::{NoObserver, Simulation, Summary};
 
@@ -43,7 +44,7 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
 /// half, of ten peers five sixths, and from sixteen peers on more than alone, since eight times the samples in flight do not fit into the nearest cache.
 /// Exact means are those of one run.
 fn pays(shape: &Shape, alike: usize) -> bool {
-    if shape.delay.is_some() { alike >= 5 && shape.peers <= EXACT_FROM } else { alike >= 7 && shape.peers <= 12 && !shape.has_queues }
+    if shape.delay.is_some() { alike >= 5 && shape.peers <= EXACT_FROM } else { alike >= 7 && shape.peers <= 12 && shape.way == Way::Direct }
 }
 
 /// Whether two scenes can be run side by side.

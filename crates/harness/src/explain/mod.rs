@@ -109,13 +109,16 @@ pub fn explain(scene: &Scene) -> Explanation {
     let nanos = match &arrays {
         None => WITH_EVENTS,
         Some(shape) if shape.is_broadcast() => IN_ARRAYS,
+        Some(shape) if shape.is_carried() => {
+            Nanos { a_packet: WITH_EVENTS.a_packet, an_impaired_packet: WITH_EVENTS.an_impaired_packet, ..IN_ARRAYS }
+        }
         Some(_) => Nanos { a_packet: IN_ARRAYS.an_impaired_packet, ..IN_ARRAYS },
     };
     if let Some(shape) = arrays {
         rows.model(
             "runs of which nobody watches more than ticks",
             "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
-            "all tick together, and no link counts or damages packets; a run that is recorded has events, since packets are recorded",
+            "all tick together, and no line damages packets; a run that is recorded has events, since packets are recorded",
         );
         let (threads, why) = shape.threads();
         rows.model("threads of such a run, if nobody watches", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
@@ -281,6 +284,10 @@ impl Rows {
     }
 
     fn topology(&mut self, scene: &Scene) {
+        if scene.relay {
+            let model = "a star: what a peer sends passes its uplink once, and a relay hands it on to all others";
+            self.model("topology", model, "[topology]: the hub is no peer and takes no time; links and downlinks lead on from it");
+        }
         let Some(topology) = &scene.topology else { return };
         let model = match topology.kind() {
             TopologyKind::Ring { neighbours } => format!("a ring: each hears {neighbours}, half of them on either side"),

@@ -76,7 +76,8 @@ pub(crate) fn push_f64(line: &mut Vec<u8>, value: f64) {
 /// The text of [`push_f64`], in two parts: the exponents of large numbers have no sign.
 pub(crate) fn parts(buffer: &mut zmij::Buffer, value: f64) -> (&str, &str) {
     let text = buffer.format(value);
-    match text.find("e+").filter(|_| value.abs() >= 1e16) {
+    // Looking for it takes as long as the digits.
+    match if value.abs() >= 1e16 { text.find("e+") } else { None } {
         Some(at) => (&text[..=at], &text[at + 2..]),
         None => (text, ""),
     }

@@ -1,10 +1,13 @@
 //! `links.csv`.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use cohaptic_wan::{DropCause, LinkStats};
+use cohaptic_units::Instant;
+use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
-use super::file::{RecordFile, push_display};
+use super::file::{RecordFile, push_display, push_seconds, push_whole};
 use crate::Summary;
 use crate::record::RecordError;
 
@@ -27,67 +30,103 @@ pub(crate) fn write(folder: &Path, summary: &Summary) -> Result<PathBuf, RecordE
 pub fn links_csv<E>(summary: &Summary, mut write: impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
     let causes = DropCause::ALL.map(DropCause::name).join(",");
     let mut rows = format!("link,offered,duplicated,delivered,{causes},in-flight,mean-delay-s\n").into_bytes();
-    let mut counters = Vec::new();
     let name = |peer: usize| summary.peers[peer].name.as_str();
     for line in &summary.access_lines {
-        let (from, to) = if line.uplink { (name(line.peer), "*") } else { ("*", name(line.peer)) };
-        counters.clear();
-        push_counters(&mut counters, &line.stats);
-        push_row(&mut rows, from, to, &counters);
+        let named = if line.uplink { LinkName::uplink(name(line.peer)) } else { LinkName::downlink(name(line.peer)) };
+        rows.extend_from_slice(named.as_str().as_bytes());
+        push_counters(&mut rows, &line.stats);
     }
     for from in 0..summary.peers.len() {
-        let mut last: Option<&LinkStats> = None;
-        for (to, peer) in summary.peers.iter().enumerate() {
-            let Some(stats) = summary.links.between(from, to) else { continue };
+        let sender = LinkName::between(name(from), "");
+        let mut last: Option<(&LinkStats, Range<usize>)> = None;
+        for (to, stats) in summary.links.sent_by(from) {
+            rows.extend_from_slice(sender.as_str().as_bytes());
+            rows.extend_from_slice(name(to).as_bytes());
+            let counters = rows.len();
             // Links that do the same have one entry: their counters are put into words once.
-            if !last.is_some_and(|last| std::ptr::eq(last, stats)) {
-                last = Some(stats);
-                counters.clear();
-                push_counters(&mut counters, stats);
+            match last {
+                Some((last, counters)) if std::ptr::eq(last, stats) => rows.extend_from_within(counters),
+                _ => push_counters(&mut rows, stats),
             }
-            push_row(&mut rows, name(from), &peer.name, &counters);
+            last = Some((stats, counters..rows.len()));
             if rows.len() >= PIECE {
                 write(&rows)?;
                 rows.clear();
+                last = None;
             }
         }
     }
     write(&rows)
 }
 
-#[inline]
-fn push_row(rows: &mut Vec<u8>, from: &str, to: &str, counters: &[u8]) {
-    for part in [from.as_bytes(), b"->", to.as_bytes(), counters] {
-        rows.extend_from_slice(part);
-    }
-}
-
 /// The columns of a row behind its name.
 fn push_counters(row: &mut Vec<u8>, stats: &LinkStats) {
-    for count in [stats.offered(), stats.duplicated(), stats.delivered()] {
-        push_count(row, count);
+    let counts = [stats.offered(), stats.duplicated(), stats.delivered()].into_iter();
+    let mut zeros = 0;
+    for count in counts.chain(DropCause::ALL.map(|cause| stats.dropped(cause))).chain([stats.in_flight()]) {
+        // Most causes drop nothing: their columns are written together.
+        if count == 0 {
+            zeros += 2;
+            continue;
+        }
+        row.extend_from_slice(&ZEROS[..zeros]);
+        zeros = 0;
+        row.push(b',');
+        push_whole(row, count);
     }
-    for cause in DropCause::ALL {
-        push_count(row, stats.dropped(cause));
-    }
-    push_count(row, stats.in_flight());
+    row.extend_from_slice(&ZEROS[..zeros]);
     row.push(b',');
     if let Some(delay) = stats.mean_delay() {
-        push_display(row, delay.as_secs_f64());
+        push_delay(row, delay);
     }
     row.push(b'\n');
 }
 
-/// A comma and a count. Most are zero; through [`std::fmt`] they take most of the time of a row.
-fn push_count(row: &mut Vec<u8>, mut count: u64) {
-    row.push(b',');
-    let first = row.len();
-    loop {
-        row.push(b'0' + (count % 10).to_le_bytes()[0]);
-        count /= 10;
-        if count == 0 {
-            break;
+/// As many columns without a count as a row may have one after the other.
+const ZEROS: [u8; 2 * (DropCause::ALL.len() + 4)] = {
+    let mut zeros = [b'0'; 2 * (DropCause::ALL.len() + 4)];
+    let mut at = 0;
+    while at < zeros.len() {
+        zeros[at] = b',';
+        at += 2;
+    }
+    zeros
+};
+
+/// Adds a delay as its seconds print as an `f64`. Below a second that is one division, which the nine digits after the point survive.
+fn push_delay(row: &mut Vec<u8>, delay: Duration) {
+    if delay.as_secs() == 0 {
+        push_seconds(row, Instant::ZERO.saturating_add(delay));
+    } else {
+        push_display(row, delay.as_secs_f64());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn delays_are_written_as_their_seconds_print(nanos in prop_oneof![0..2_000_000_000_u64, any::<u64>()], power in 0..9_u32) {
+            for delay in [nanos, nanos / 10_u64.pow(power) * 10_u64.pow(power)].map(Duration::from_nanos) {
+                let mut row = Vec::new();
+                push_delay(&mut row, delay);
+                prop_assert_eq!(String::from_utf8(row).unwrap(), format!("{}", delay.as_secs_f64()));
+            }
+        }
+
+        #[test]
+        fn counters_are_written_as_they_print(counts in proptest::collection::vec(prop_oneof![Just(0), 0..12_u64, 0..1_u64 << 40], DropCause::ALL.len() + 2)) {
+            let (offered, delivered) = (counts.iter().sum::<u64>() + 1, counts[0]);
+            let stats = LinkStats::counted(offered, delivered, 24_000_000 * u128::from(delivered), DropCause::ALL.into_iter().zip(counts[2..].iter().copied()));
+            let mut row = Vec::new();
+            push_counters(&mut row, &stats);
+            let dropped: String = counts[2..].iter().map(|count| format!(",{count}")).collect();
+            let delay = if delivered > 0 { "0.024" } else { "" };
+            prop_assert_eq!(String::from_utf8(row).unwrap(), format!(",{offered},0,{delivered}{dropped},{},{delay}\n", stats.in_flight()));
         }
     }
-    row[first..].reverse();
 }

@@ -100,6 +100,20 @@ impl LinkSummaries {
         if is_link { self.stats.get((from * (self.peers - 1) + to - usize::from(to > from)) / self.together) } else { None }
     }
 
+    /// The links from a peer of the scene, by receiver, without looking for each.
+    pub(crate) fn sent_by(&self, from: usize) -> impl Iterator<Item = (usize, &LinkStats)> {
+        let (neighbours, stats) = match &self.topology {
+            Some(topology) => (Some(topology.neighbours(from)), &self.stats[topology.places(from)]),
+            None => {
+                let entries = self.peers.saturating_sub(1) / self.together;
+                (None, &self.stats[from * entries..(from + 1) * entries])
+            }
+        };
+        let links = neighbours.map_or_else(|| self.peers.saturating_sub(1), <[u32]>::len);
+        let receiver = move |place: usize| neighbours.map_or_else(|| place + usize::from(place >= from), |neighbours| neighbours[place] as usize);
+        (0..links).map(receiver).zip(stats.iter().cycle())
+    }
+
     /// All of them, one by one.
     #[must_use]
     pub const fn iter(&self) -> EachLink<'_> {
@@ -214,6 +228,10 @@ mod tests {
             let list: Vec<LinkSummary> = one.iter().collect();
             assert_eq!((&one, format!("{one:#?}"), one.total()), (&other, format!("{list:#?}"), other.total()));
             assert_eq!((one.len(), list.len() as u64), (other.len(), peers * (peers - 1)));
+            for links in [&one, &other] {
+                let from = |from: usize| links.sent_by(from).map(move |(to, stats)| LinkSummary { from, to, stats: *stats });
+                assert_eq!((0..links.peers).flat_map(from).collect::<Vec<_>>(), list);
+            }
             assert_eq!((one.delivered_fraction(), one.mean_delay()), (other.delivered_fraction(), other.mean_delay()));
             assert!(list.iter().all(|link| link.from != link.to && one.between(link.from, link.to) == Some(&link.stats)));
             let places: Vec<(usize, usize)> = list.iter().map(|link| (link.from, link.to)).collect();
@@ -249,6 +267,8 @@ mod tests {
         assert_eq!((pairs, links.len()), (star.pairs().collect(), 6));
         assert_eq!((links.between(1, 2), links.between(3, 1), links.between(0, 2)), (Some(&stats(2, 2)), Some(&stats(5, 5)), None));
         assert_eq!(links.total(), stats(15, 15));
+        let numbers = |from: usize| links.sent_by(from).map(|(to, stats)| (to, stats.offered())).collect::<Vec<_>>();
+        assert_eq!((numbers(0), numbers(1), numbers(3)), (vec![(1, 0)], vec![(0, 1), (2, 2), (3, 3)], vec![(1, 5)]));
     }
 
     /// Counts of links are those of 10¹⁰ of them.

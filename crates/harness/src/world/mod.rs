@@ -480,7 +480,8 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 }
 
-fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
+/// The links and access lines of a scene.
+pub(crate) fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
     let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: plan.general_links };
     let link = |from: NodeId, to: NodeId| scene.links.between(from.index(), to.index()).clone();
     let mut network = match &scene.topology {
@@ -498,7 +499,7 @@ fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
             }
         }
     }
-    network
+    if scene.relay { network.with_relay() } else { network }
 }
 
 fn row<const A: usize>(state: &State<A>, axes: usize) -> StateRow<'_> {

@@ -353,7 +353,7 @@ static TOPOLOGY: Table = Table::of(&[&[
     usual("kind", Form::Words(&TOPOLOGIES), "\"full\"", "The neighbours of a peer"),
     optional("neighbours", Form::Integer(2, u16::MAX as u64), "Of a ring: how many, an even number; without it 2"),
     optional("hub", Form::Text, "Of a star: the name of a peer; without it the first"),
-    optional("role", Form::Words(&HUB_ROLES), "Of a hub; without it peer"),
+    optional("role", Form::Words(&HUB_ROLES), "Of the hub; without it peer"),
     optional("file", Form::File, "Of a graph: mutual weights, a row a peer"),
 ]]);
 const TOPOLOGIES: [(&str, &str); 4] = [
@@ -362,7 +362,7 @@ const TOPOLOGIES: [(&str, &str); 4] = [
     ("star", "the hub, or all others of the hub"),
     ("graph", "those with a weight above 0"),
 ];
-const HUB_ROLES: [(&str, &str); 1] = [("peer", "has a copy")];
+const HUB_ROLES: [(&str, &str); 2] = [("peer", "has a copy"), ("relay", "no peer: hands samples on")];
 
 static MEASURE: Table = Table::of(&[&[
     usual("names", Form::AnyOf(const { &[Form::Words(&[("all", "every measure")]), Form::List(&MEASURE_NAME)] }), "\"all\"", "Which measures"),

@@ -20,4 +20,4 @@ pub(crate) use object::read_object;
 pub(crate) use peers::{PeerSources, check_enough, read_names, read_peers};
 pub(crate) use rotation::{refuse_rotational_keys, rotation};
 pub(crate) use timeline::read_timeline;
-pub(crate) use topology::{read_topology, refuse_unlinked};
+pub(crate) use topology::{Ways, read_topology, refuse_unlinked};

@@ -17,8 +17,24 @@ enum Kind {
     Graph,
 }
 
-/// The topology; `Some(None)`: everybody sends to everybody.
-pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Option<Arc<Topology>>> {
+/// The receivers of each peer, and the way to them.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct Ways {
+    /// `None`: everybody sends to everybody.
+    pub(crate) neighbours: Option<Arc<Topology>>,
+    /// What a peer sends to all passes its uplink once, to a relay.
+    pub(crate) relay: bool,
+}
+
+/// What the hub of a star does.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Role {
+    Peer,
+    Relay,
+}
+
+/// The topology.
+pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
     const KINDS: [(&str, Kind); 4] = [("full", Kind::Full), ("star", Kind::Star), ("ring", Kind::Ring), ("graph", Kind::Graph)];
     let mut table = TableReader::new(node, context, "a table such as { kind = \"ring\", neighbours = 2 }")?;
     let kind = table.optional("kind", Kind::Full, |node, context| values::choice(node, context, &KINDS));
@@ -32,18 +48,10 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Option<
     };
     let neighbours =
         table.maybe("neighbours", |node, context| fits(node, Kind::Ring, "ring").then(|| read_neighbours(node, context))?.map(|count| (count, node)));
-    let hub = table.maybe("hub", |node, context| fits(node, Kind::Star, "star").then(|| read_peer_name(node, context))?);
-    table.maybe("role", |node, context| {
-        let fits = fits(node, Kind::Star, "star");
-        if fits && node.as_text() == Some("relay") {
-            context.fault_at(
-                node,
-                "a hub that only passes on what it hears is not simulated: expected \"peer\", a hub with a copy that hears all others",
-            );
-            return None;
-        }
-        fits.then(|| values::choice(node, context, &[("peer", ())]))?
-    })?;
+    let hub = table.maybe("hub", |node, context| fits(node, Kind::Star, "star").then(|| read_peer_name(node, context))?.map(|hub| (hub, node)));
+    let role = table.maybe("role", |node, context| {
+        fits(node, Kind::Star, "star").then(|| values::choice(node, context, &[("peer", Role::Peer), ("relay", Role::Relay)]))?
+    });
     let file = table.maybe("file", |node, context| {
         if !fits(node, Kind::Graph, "graph") {
             return None;
@@ -56,11 +64,18 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Option<
         table.require("file", "the name of a file of weights, a row a peer and numbers between commas");
     }
     table.finish();
-    let (neighbours, hub, file, peers) = (neighbours?, hub?, file?, peers?);
-    match kind? {
+    let (neighbours, hub, role, file, peers) = (neighbours?, hub?, role?, file?, peers?);
+    if role == Some(Role::Relay) {
+        if let Some((_, node)) = hub {
+            context.fault_at(node, "a relay passes on what it hears, and is no peer: expected no hub, or role = \"peer\"");
+            return None;
+        }
+        return Some(Ways { neighbours: None, relay: true });
+    }
+    let neighbours = match kind? {
         Kind::Full => Some(None),
         // Fewer than two peers are refused elsewhere.
-        Kind::Star => Topology::star(peers, hub.unwrap_or(0)).map(Arc::new).map(Some),
+        Kind::Star => Topology::star(peers, hub.map_or(0, |(hub, _)| hub)).map(Arc::new).map(Some),
         Kind::Ring => {
             let (count, node) = neighbours.map_or((2, node), |(count, node)| (count, node));
             let ring = Topology::ring(peers, count);
@@ -73,7 +88,8 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Option<
             ring.map(Arc::new).map(Some)
         }
         Kind::Graph => file.map(Some),
-    }
+    };
+    neighbours.map(|neighbours| Ways { neighbours, relay: false })
 }
 
 fn read_neighbours(node: &Node, context: Context<'_>) -> Option<usize> {

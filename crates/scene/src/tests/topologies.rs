@@ -67,7 +67,8 @@ fn what_is_no_topology_is_refused_at_its_place() {
         ("kind = \"ring\"\nneighbours = 0", "7:14: topology.neighbours: "),
         ("neighbours = 2", "6:14: topology.neighbours: only a topology of kind = \"ring\" has this key: expected that kind, or no such key"),
         ("kind = \"star\"\nhub = \"peer9\"", "7:7: topology.hub: there is no peer \"peer9\": expected"),
-        ("kind = \"star\"\nrole = \"relay\"", "7:8: topology.role: a hub that only passes on what it hears is not simulated: expected \"peer\""),
+        ("kind = \"star\"\nhub = \"peer1\"\nrole = \"relay\"", "7:7: topology.hub: a relay passes on what it hears, and is no peer: expected no hub"),
+        ("kind = \"ring\"\nrole = \"relay\"", "7:8: topology.role: only a topology of kind = \"star\" has this key"),
         ("kind = \"graph\"", "6:1: topology.file: missing key"),
         ("kind = \"ring\"\nfile = \"x.csv\"", "7:8: topology.file: only a topology of kind = \"graph\" has this key"),
     ] {
@@ -101,4 +102,22 @@ fn strategies_that_need_all_others_are_refused() {
     let turning = ["scene.axes=3", "object.inertia=[1, 1, 1]", "object.position=0"].map(str::to_owned);
     let error = Scene::parse(&four("kind = \"ring\""), Path::new("x.toml"), &turning).unwrap_err().to_string();
     assert!(error.contains("an object that turns is followed only where all peers send to all"), "{error}");
+}
+
+/// A relay changes the way of samples alone: everybody hears everybody.
+#[test]
+fn a_relay_is_no_peer() {
+    let star = scene("kind = \"star\"\nrole = \"relay\"", &[]);
+    assert_eq!((star.relay, star.topology.as_ref(), star.link_count()), (true, None, 12));
+    let full = parse(&four(""), &[]).unwrap();
+    assert!(!full.relay && !scene("kind = \"star\"\nrole = \"peer\"", &[]).relay);
+    assert_eq!(star.coordination_gains(star.coordination.gains, 1), full.coordination_gains(full.coordination.gains, 1));
+    // Records of a scene without a relay have the fingerprint that they had.
+    assert!(format!("{star:?}").contains("relay: true") && !format!("{full:?}").contains("relay"));
+    for strategy in ["wave", "client-server"] {
+        let overrides = [format!("coordination.strategy={strategy}"), "coordination.wave.impedance=1".to_owned()];
+        let overrides: Vec<&str> = overrides.iter().map(String::as_str).take(if strategy == "wave" { 2 } else { 1 }).collect();
+        let error = parse(&four("kind = \"star\"\nrole = \"relay\""), &overrides).unwrap_err().to_string();
+        assert!(error.contains("a relay hands one on to all"), "{error}");
+    }
 }

@@ -225,7 +225,11 @@ fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, Ana
         for (line, nominal) in [(AccessLine::Uplink(node), &lines.uplinks[place]), (AccessLine::Downlink(node), &lines.downlinks[place])] {
             let Some(nominal) = nominal else { continue };
             let (name, paths) = match line {
-                AccessLine::Uplink(_) => (format!("the uplink of {}", peer.name), others().map(|other| (place, other)).collect()),
+                // Before a relay a sample is one packet.
+                AccessLine::Uplink(_) => {
+                    let receivers = if scene.relay { 1 } else { peers };
+                    (format!("the uplink of {}", peer.name), others().take(receivers).map(|other| (place, other)).collect())
+                }
                 AccessLine::Downlink(_) => (format!("the downlink of {}", peer.name), others().map(|other| (other, place)).collect()),
             };
             rates.extend(rated(Some(nominal), lines.size, name, paths));
@@ -235,6 +239,9 @@ fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, Ana
             let name = format!("the link from {} to {}", peer.name, scene.peers[to].name);
             rates.extend(rated(lines.links.get(scene.links.config_between(place, to)), lines.size, name, vec![(place, to)]));
         }
+    }
+    if scene.relay {
+        network = network.with_relay();
     }
     let ways = (0..peers).map(|peer| Sampling::of(scene, peer, Duration::ZERO)).collect();
     let probe = Probe::new(network, peers, ways, info(lines.size));

@@ -76,6 +76,22 @@ fn samples_that_share_a_line_wait_for_each_other() {
     assert!(!shared.is_uniform());
 }
 
+/// Before a relay a sample is one packet for three receivers: 4 ms at 128 kbit/s. Three packets every 8 ms would be too many.
+#[test]
+fn before_a_relay_a_sample_is_one_packet() {
+    let rest = "link.delay = \"1ms\"\n[[peers]]\nname = \"peer1\"\nuplink = { rate = \"128kbit\", queue = { limit = \"unlimited\" } }";
+    let overrides = ["scene.count=4", "topology={ kind = \"star\", role = \"relay\" }", "peers.peer1.uplink.rate=63kbit"];
+    let relayed = network(rest, &overrides[..2]);
+    assert!((1..4).all(|to| *relayed.timing(0, to) == constant(5_000) && *relayed.timing(to, 0) == constant(1_000)));
+    let refused = |overrides| match NominalNetwork::of(&scene(rest, overrides)) {
+        Err(AnalysisError::Overloaded { line, load, rate }) => (line, load, rate),
+        Err(error) => panic!("{error}"),
+        Ok(_) => panic!("it carries all"),
+    };
+    assert_eq!(refused(&overrides[..1]), ("the uplink of peer1".to_owned(), 192_000.0, 128_000.0));
+    assert_eq!(refused(&overrides), ("the uplink of peer1".to_owned(), 64_000.0, 63_000.0));
+}
+
 /// 64 bytes every 8 ms are 64 kbit/s.
 #[test]
 fn what_no_line_carries_is_refused_unless_its_queue_is_short() {

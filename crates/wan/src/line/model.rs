@@ -141,6 +141,17 @@ impl LinkModel {
         }
     }
 
+    /// Whether bits of a packet may be flipped that arrives.
+    #[must_use]
+    pub fn may_damage(&self) -> bool {
+        match self {
+            Self::Fixed(config) => config.corruption.is_some(),
+            Self::Modulated(modulated) => modulated.configs().iter().any(|config| config.corruption.is_some()),
+            Self::Replay(log) => log.has_damage(),
+            Self::Kernel(netem) => netem.words.corrupt.is_some(),
+        }
+    }
+
     /// Whether this link draws random numbers for loss or for jitter as soon as a packet is offered.
     pub(crate) fn is_random(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_random)

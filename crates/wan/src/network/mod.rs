@@ -14,6 +14,7 @@ pub(crate) mod direct_links;
 pub(crate) mod id;
 mod paths;
 mod pending;
+mod relay;
 pub(crate) mod stepped_links;
 mod traffic;
 
@@ -72,6 +73,8 @@ pub struct Network<P> {
     /// Whether any link has ever drawn random numbers.
     is_random: bool,
     has_filters: bool,
+    /// Whether what a node sends to all passes its uplink once.
+    has_relay: bool,
 }
 
 /// A packet that has arrived undamaged, of which nothing else is told.
@@ -141,6 +144,7 @@ impl<P: Clone> Network<P> {
             has_inner_events: false,
             is_random: false,
             has_filters: false,
+            has_relay: false,
             config,
         };
         for from in (0..nodes).map(NodeId) {
@@ -179,6 +183,16 @@ impl<P: Clone> Network<P> {
         }
         self.has_inner_events = true;
         Ok(self)
+    }
+
+    /// Puts a relay between uplinks and links, before the first packet is sent: what a node sends with [`Network::handle_broadcast`] passes its uplink once, as one
+    /// packet of which the relay hands one on to each receiver at the instant at which it has come. If the uplink drops or copies it, each receiver has an event.
+    ///
+    /// A node sends all its packets to all, or none: their numbers are one sequence.
+    #[must_use]
+    pub fn with_relay(mut self) -> Self {
+        self.has_relay = true;
+        self
     }
 
     /// Drops every packet from one node to another of which the filter says so, before anything else happens to it.
@@ -239,6 +253,11 @@ impl<P: Clone> Network<P> {
         let info = info.into();
         if from.0 >= self.nodes {
             return Err(NetworkError::NoLink { from, to: from });
+        }
+        if self.has_relay && self.lines.uplinks[from.index()].is_some() {
+            self.let_pass(now)?;
+            self.send_to_relay(now, from, SizeAndMarks::new(info), payload);
+            return Ok(());
         }
         if !self.paths.is_empty() {
             let mut place = 0;
@@ -317,12 +336,18 @@ impl<P: Clone> Network<P> {
     #[must_use]
     #[inline(always)]
     pub fn poll_event(&mut self) -> Option<PacketEvent<P, Path>> {
+        if self.has_relay {
+            self.tell_each_receiver();
+        }
         if let Some(event) = self.traffic.happened.pop_front() {
             return Some(event);
         }
         while let Some(pending) = self.traffic.pending.pop_due(self.now) {
             if let Some(event) = self.happen(pending) {
                 return Some(event);
+            }
+            if self.has_relay {
+                self.tell_each_receiver();
             }
             // A packet that was dropped between two lines is waiting there.
             if let Some(event) = self.traffic.happened.pop_front() {
@@ -448,6 +473,11 @@ impl<P: Clone> Network<P> {
         };
         let packet = InNetwork { sequence, offered, entered, path, size, payload };
         let next = match line {
+            LineId::Uplink(_) if path.is_to_relay() => {
+                self.lines.get_mut(line).deliver(entered, at);
+                self.relay(at, packet);
+                return None;
+            }
             LineId::Uplink(_) => Some(LineId::Link(self.link(path))),
             LineId::Link(_) if self.has_inner_events && self.lines.downlinks[path.to.index()].is_some() => Some(LineId::Downlink(path.to)),
             LineId::Link(_) | LineId::Downlink(_) => None,

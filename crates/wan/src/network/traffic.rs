@@ -35,7 +35,8 @@ impl<P> Traffic<P> {
     pub(super) fn schedule(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) {
         let InNetwork { sequence, offered, entered, path, size, payload } = packet;
         if let Some(awaited) = &mut self.awaited {
-            awaited.schedule(at, path.to);
+            // From a relay it may go to any node.
+            if path.is_to_relay() { awaited.announce(at, line) } else { awaited.schedule(at, path.to) }
         }
         let turn = Turn::arrival(line);
         let key = (at, turn, sequence, path, size.copy());
@@ -61,6 +62,10 @@ impl<P> Traffic<P> {
     #[inline(always)]
     pub(super) fn take_damage(&mut self, packet: &InNetwork<P>) -> Option<Damage> {
         if packet.size.has(SizeAndMarks::DAMAGED) { self.find_damage(packet.path, packet.sequence, packet.size) } else { None }
+    }
+
+    pub(super) fn put_damage(&mut self, packet: &InNetwork<P>, damage: Damage) {
+        self.damages.insert((packet.path, packet.sequence, packet.size.copy()), damage);
     }
 
     #[cold]
@@ -91,7 +96,7 @@ impl<P> Sink<InNetwork<P>> for Exits<'_, P> {
     fn arrives(&mut self, at: Instant, packet: InNetwork<P>, copy: u8, marks: Marks) {
         let packet = self.marked(packet, copy, &marks);
         if let Some(damage) = marks.damage {
-            self.traffic.damages.insert((packet.path, packet.sequence, packet.size.copy()), damage);
+            self.traffic.put_damage(&packet, damage);
         }
         self.traffic.schedule(at, self.line, packet);
     }

@@ -24,4 +24,5 @@ mod naive;
 mod oracle;
 mod queue_laws;
 mod random_links;
+mod relay;
 mod some_links;

@@ -3,6 +3,7 @@
 //! Peers look at what has arrived at their ticks alone, and all tick together. So samples in flight lie in a wheel, by the tick at which it is in force, and
 //! nothing is sorted but the samples that are due together on a link on which one overtook another.
 
+mod carried;
 mod neighbours;
 
 use std::ops::Range;
@@ -18,7 +19,10 @@ use super::quads::{self, Quad};
 use super::rows::Rows;
 use super::{Sample, count};
 use crate::arrays::bodies::Bodies;
+use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
+use crate::summary::AccessSummary;
+use carried::Carrier;
 
 /// Set in the sequence number of a link on which one of the samples that are due overtakes another.
 const IS_OVERTAKEN: u64 = 1 << 63;
@@ -55,15 +59,19 @@ enum Links<const P: usize> {
     Direct(DirectLinks),
     /// They are told when each sender sends next.
     Stepped(SteppedLinks<Packet<P>>, PacketInfo),
+    /// They are part of a network, which is asked at each tick.
+    Carried(Carrier<P>),
 }
 
 impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// The receivers hold the initial states of the others, and nothing is on the way.
     pub(in crate::arrays) fn new(scenes: &[&Scene], initial: &[Sample<P, L>], shape: &Shape, receivers: Range<usize>) -> Self {
         let peers = scenes[0].peers.len();
-        let mut links = match shape.has_queues {
-            false => Links::Direct(DirectLinks::new(shape.end, shape.size)),
-            true => Links::Stepped(SteppedLinks::new(shape.end), PacketInfo { size: shape.size, ecn_capable: true }),
+        let info = PacketInfo { size: shape.size, ecn_capable: true };
+        let mut links = match shape.way {
+            Way::Direct => Links::Direct(DirectLinks::new(shape.end, shape.size)),
+            Way::Stepped => Links::Stepped(SteppedLinks::new(shape.end), info),
+            Way::Carried => Links::Carried(Carrier::new(scenes, info)),
         };
         let rows = Rows::new(peers, shape.topology.as_ref(), receivers.clone());
         for (receiver, to) in receivers.clone().enumerate() {
@@ -76,6 +84,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 match &mut links {
                     Links::Direct(links) => assert!(links.add(scene.seed, &name, model), "the shape of a scene says that its links are direct"),
                     Links::Stepped(links, _) => links.add(scene.seed, &name, model.clone()),
+                    Links::Carried(_) => {}
                 }
             }
         }
@@ -133,6 +142,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 let (receivers, sends) = (receivers.clone(), &**sends);
                 processor.dispatch(DirectSending { peers, receivers, links, senders, sends, sent, in_flight, at: (tick, now) });
             }
+            Links::Carried(carrier) => carrier.send(now, senders, sent),
             Links::Stepped(links, info) => {
                 let row = peers * L;
                 for ((receiver, peer), sender) in receivers.clone().enumerate().flat_map(|to| senders.iter().map(move |from| (to, *from))) {
@@ -177,6 +187,9 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         (from, to): (usize, usize),
         model: &LinkModel,
     ) {
+        if let Links::Carried(carrier) = &mut self.links {
+            return (0..L).for_each(|run| carrier.set_link(at, run, (from, to), model));
+        }
         let Self { rows, receivers, links: Links::Stepped(links, _), in_flight, .. } = self else { return };
         let receiver = to - receivers.start;
         let Some(column) = rows.column(receiver, from) else { return };
@@ -190,7 +203,11 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     }
 
     /// What has arrived is held from now on.
-    pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
+    #[inline(always)]
+    pub(in crate::arrays) fn deliver(&mut self, tick: u64, now: Instant) {
+        if matches!(self.links, Links::Carried(_)) {
+            return self.deliver_carried(now);
+        }
         if let Some(bucket) = self.in_flight.due(tick) {
             self.take_in(bucket);
         }
@@ -263,6 +280,9 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// At the end of the scene, which is at or before the tick after the latest: what has arrived by then.
     pub(in crate::arrays) fn finish(&mut self, latest: (u64, Instant)) {
+        if matches!(self.links, Links::Carried(_)) {
+            return self.deliver_carried(self.end);
+        }
         self.pass(latest, |_| Instant::MAX);
         if let Some(mut bucket) = self.in_flight.due(latest.0 + 1) {
             for packets in [&mut bucket.in_order, &mut bucket.overtaking] {
@@ -317,13 +337,19 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         }
         packets.sort_unstable_by_key(|packet| (packet.arrival, packet.sequence));
         for packet in &*packets {
-            let next = &mut self.next[packet.place as usize];
-            if packet.sequence >= *next {
-                *next = packet.sequence + 1;
-                self.hold::<true>(packet);
-            } else {
-                self.count_stale(packet);
-            }
+            self.take_in_one(packet);
+        }
+    }
+
+    /// Takes in a sample after all that arrived before it.
+    #[inline(always)]
+    fn take_in_one(&mut self, packet: &Packet<P>) {
+        let next = &mut self.next[packet.place as usize];
+        if packet.sequence >= *next {
+            *next = packet.sequence + 1;
+            self.hold::<true>(packet);
+        } else {
+            self.count_stale(packet);
         }
     }
 
@@ -358,6 +384,8 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             match &mut self.links {
                 Links::Direct(links) => links.forget(link, sent, packet.arrival),
                 Links::Stepped(links, _) => links.forget(link, sent, packet.arrival),
+                // It has counted what has arrived, and nothing lies in the wheel.
+                Links::Carried(_) => {}
             }
         }
     }
@@ -373,7 +401,13 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         Some(match &self.links {
             Links::Direct(links) => links.stats(link),
             Links::Stepped(links, _) => links.stats(link),
+            Links::Carried(carrier) => return carrier.stats(run, from, self.receivers.start + receiver),
         })
+    }
+
+    /// What the access lines of a run did, if there are any.
+    pub(in crate::arrays) fn access_lines(&self, run: usize) -> Vec<AccessSummary> {
+        if let Links::Carried(carrier) = &self.links { carrier.access_lines(run) } else { Vec::new() }
     }
 }
 

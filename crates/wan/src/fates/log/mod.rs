@@ -92,6 +92,11 @@ impl FateLog {
         &self.records[from..to]
     }
 
+    /// Whether any packet was damaged.
+    pub(crate) fn has_damage(&self) -> bool {
+        self.records.iter().any(|record| record.damaged)
+    }
+
     fn check(mut rows: Vec<Numbered>) -> Result<Self, FateLogError> {
         // The line comes last, so that equal rows stay as they were.
         rows.sort_by_key(|&(line, record)| (record.sequence, record.copy, record.fate.is_end(), record.at, line));

@@ -18,6 +18,9 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         sent: &[Sample<P, L>],
         next: impl Fn(usize) -> Instant,
     ) {
+        if let Links::Carried(carrier) = &mut self.links {
+            return carrier.send(now, senders, sent);
+        }
         let Self { rows, receivers, links, sends, in_flight, .. } = self;
         sends.fill(false);
         senders.iter().for_each(|sender| sends[*sender] = true);
@@ -56,6 +59,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                         }
                     }
                 }
+                Links::Carried(_) => {}
                 Links::Stepped(links, info) => {
                     for number in 0..row {
                         let sender = rows.sender(receiver, number / L);

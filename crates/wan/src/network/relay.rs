@@ -1,0 +1,71 @@
+//! A relay between uplinks and links: one packet up, one down to each receiver.
+
+use alloc::vec::Vec;
+
+use cohaptic_units::Instant;
+
+use super::Network;
+use super::id::{NodeId, Path};
+use super::pending::{InNetwork, LineId, SizeAndMarks};
+use crate::fates::record::{PacketEvent, PacketRecord};
+
+impl Path {
+    /// Of a packet that is not yet there for any receiver.
+    pub(super) const fn to_relay(from: NodeId) -> Self {
+        Self { from, to: from }
+    }
+
+    pub(super) fn is_to_relay(self) -> bool {
+        self.from == self.to
+    }
+}
+
+impl<P: Clone> Network<P> {
+    /// A packet enters the uplink of its sender.
+    pub(super) fn send_to_relay(&mut self, now: Instant, from: NodeId, size: SizeAndMarks, payload: P) {
+        let mut sequence = 0;
+        let mut place = 0;
+        while let Some(to) = self.places.receiver(from, place) {
+            if to != from {
+                let link = self.link(Path { from, to });
+                sequence = self.paths[link.index()];
+                self.paths[link.index()] += 1;
+            }
+            place += 1;
+        }
+        let path = Path::to_relay(from);
+        self.offer(now, LineId::Uplink(from), None, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
+    }
+
+    /// A packet has come out of its uplink, and enters the link to each receiver.
+    #[inline(never)]
+    pub(super) fn relay(&mut self, now: Instant, packet: InNetwork<P>) {
+        let damage = self.traffic.take_damage(&packet);
+        let from = packet.path.from;
+        let mut place = 0;
+        while let Some(to) = self.places.receiver(from, place) {
+            if to != from {
+                let path = Path { from, to };
+                let packet = InNetwork { entered: now, path, payload: packet.payload.clone(), ..packet };
+                if let Some(damage) = &damage {
+                    self.traffic.put_damage(&packet, damage.clone());
+                }
+                self.offer(now, LineId::Link(self.link(path)), None, || packet);
+            }
+            place += 1;
+        }
+    }
+
+    /// The next event, if an uplink before a relay has dropped or copied a packet, becomes one for each receiver.
+    pub(super) fn tell_each_receiver(&mut self) {
+        if !self.traffic.happened.front().is_some_and(|event| event.path.is_to_relay()) {
+            return;
+        }
+        let Some(event) = self.traffic.happened.pop_front() else { return };
+        let from = event.path.from;
+        let receivers = (0..).map_while(|place| self.places.receiver(from, place)).filter(|to| *to != from);
+        let on = |to| PacketEvent { record: PacketRecord { path: Path { from, to }, ..event.record }, ..event.clone() };
+        let events: Vec<PacketEvent<P, Path>> = receivers.map(on).collect();
+        events.into_iter().rev().for_each(|event| self.traffic.happened.push_front(event));
+    }
+}
