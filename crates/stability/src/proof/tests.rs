@@ -161,7 +161,41 @@ fn steps_that_grow_without_end_are_enclosed() {
                         let reach: f64 = span.slopes.iter().map(|slope| slope[(i, j)].abs()).sum::<f64>() + span.radius[(i, j)];
                         let off = (step.matrix[(i, j)] / by - span.mean[(i, j)]).abs();
                         assert!(off <= reach * (1.0 + 1e-9) + 1e-12, "{set:?} {times}: {off} {reach}");
+                        // Of one gain that grows, or of u and u², no effect of several numbers together is left for the radius.
+                        assert!(span.radius[(i, j)] <= 1e-9 * (1.0 + span.mean.largest()), "{set:?}: {}", span.radius[(i, j)]);
                     }
+                }
+            }
+        }
+    }
+}
+
+/// A law that looks back takes another combination of the past at each corner of a box of both gains: between them steps are enclosed all the same.
+#[test]
+fn steps_of_a_law_that_looks_back_are_enclosed_over_both_gains() {
+    let at = |stiffness: f64, damping: f64| {
+        let gains = [format!("coordination.stiffness={stiffness:?}"), format!("coordination.damping={damping:?}")];
+        let scene = scene(&["coordination.strategy=\"local-lag\"", &gains[0], &gains[1]]);
+        let network = crate::network::NominalNetwork::of(&scene).unwrap();
+        let contacts = crate::structure::Contacts { touching: vec![true; 2], at_wall: false, absent: vec![false; 2] };
+        let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
+        (Point { nodes: structure.nodes(&scene), weights: Matrix::from_fn(1, 1, |_, _| -1.0) }, structure)
+    };
+    let (low, high) = ([100.0, 0.5], [3000.0, 40.0]);
+    let corners: Vec<Point> = (0..4).map(|place| at([low[0], high[0]][place & 1], [low[1], high[1]][place >> 1]).0).collect();
+    let (_, structure) = at(1000.0, 5.0);
+    let common = Common { timetable: structure.apart[0].as_ref().unwrap(), tied: true, time: 0.01 };
+    for share in [0.1, 0.5, 0.8] {
+        let inside = at(low[0] + share * (high[0] - low[0]), low[1] + (1.0 - share) * (high[1] - low[1])).0;
+        let steps = corners::steps_of_each(&[corners.clone(), vec![inside]].concat(), common).unwrap();
+        for (step, exact) in steps[4].iter().enumerate() {
+            let span = StepSpan::of(steps[..4].iter().map(|steps| &steps[step]));
+            for i in 0..span.mean.rows() {
+                for j in 0..span.mean.columns() {
+                    let signs = [2.0 * share - 1.0, 1.0 - 2.0 * share];
+                    let centre = span.slopes.iter().zip(signs).map(|(slope, sign)| sign * slope[(i, j)]).sum::<f64>() + span.mean[(i, j)];
+                    let off = (exact.matrix[(i, j)] - centre).abs();
+                    assert!(off <= span.radius[(i, j)] + 1e-12, "{share}: {off} {}", span.radius[(i, j)]);
                 }
             }
         }
