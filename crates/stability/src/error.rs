@@ -37,7 +37,10 @@ pub enum AnalysisError {
         most: u128,
     },
     /// The strategy has no linear form.
-    #[error("{strategy} coordination cannot be taken apart by equal peers: only the general path follows it")]
+    #[error(
+        "{strategy} coordination is followed as a whole alone, not in parts of equal peers: ask `cohaptic stability point`, `map` or `boundary` for its radius, \
+         without --graph, --every-number, --prove, --switching, --losses-in-a-row and --delay-within"
+    )]
     OtherStrategy {
         /// Its name.
         strategy: &'static str,
@@ -71,6 +74,17 @@ pub enum AnalysisError {
         /// Why.
         why: String,
     },
+    /// The object turns, its motion does not split into scenes of one axis, and this analysis is of such alone.
+    #[error(
+        "{what} of an object that turns is there only where its motion splits into scenes of one axis, and here it does not: {why}; \
+         `cohaptic stability point`, `map` and `boundary` take all components together where nothing else is asked for"
+    )]
+    Unsplit {
+        /// The analysis.
+        what: &'static str,
+        /// Why it does not split.
+        why: &'static str,
+    },
     /// The object turns, and this analysis does not follow that.
     #[error("{what} does not follow an object that turns: expected a scene without object.inertia")]
     NoTurns {
@@ -78,7 +92,10 @@ pub enum AnalysisError {
         what: &'static str,
     },
     /// The scene has a topology, and this analysis does not follow it.
-    #[error("{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"")]
+    #[error(
+        "{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"; \
+         `cohaptic stability point`, `map` and `boundary` follow a topology where nothing else is asked for"
+    )]
     Topology {
         /// The analysis.
         what: &'static str,
@@ -91,7 +108,8 @@ pub enum AnalysisError {
     },
     /// Not all samples are sent.
     #[error(
-        "with coordination.send-when a sample depends on how far things have moved, which is not linear: simulations tell whether the scene is stable"
+        "with coordination.send-when a sample depends on how far things have moved, which is not linear: simulations tell whether the scene is stable, as in \
+         `cohaptic check`; or expected a scene without it"
     )]
     DeadBands,
     /// Ages of samples between clocks that differ.

@@ -36,7 +36,7 @@ pub(crate) fn split(scene: &Scene) -> Result<Vec<Piece<'_>>, &'static str> {
 /// [`split`] for an analysis of pieces alone.
 pub(crate) fn pieces<'a>(scene: &'a Scene, what: &'static str) -> Result<Vec<Piece<'a>>, AnalysisError> {
     refuse_topology(scene, what)?;
-    split(scene).map_err(|why| AnalysisError::Turns { what, why })
+    split(scene).map_err(|why| AnalysisError::Unsplit { what, why })
 }
 
 /// Refuses a topology, for an analysis that does not follow it.

@@ -8,6 +8,7 @@
 use std::time::Duration;
 
 use cohaptic_peer::Gains;
+use cohaptic_peer::wire::SampleKind;
 use cohaptic_scene::{PeerRotation, PeerSpec, Scene};
 
 use crate::lifted::{Body, Lifted, Node, Sampling};
@@ -156,6 +157,7 @@ impl Structure {
             law: self.law(scene, class),
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
             compute_delay: spec.compute_delay,
+            keeps_whole_past: false,
         }
     }
 
@@ -204,13 +206,17 @@ pub(crate) fn has_equal_clocks(scene: &Scene) -> bool {
 }
 
 /// Refuses laws that have no linear form, and laws that use the ages of samples between clocks that differ: ages then do not repeat from frame to frame.
-fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
+pub(crate) fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     let strategy = scene.coordination.strategy.name();
     let (first, peers) = (&scene.peers[0], scene.peers.len());
     // Of equal ticks the laws are equal.
     let other = (1..peers).filter(|peer| scene.peers[*peer].clock.tick != first.clock.tick);
     for peer in std::iter::once(0).chain(other) {
-        let law = linear_law(scene, peer).ok_or(AnalysisError::OtherStrategy { strategy })?;
+        // What samples of energies are for is not linear.
+        let none = || {
+            if scene.sample_kind() == SampleKind::Energy { AnalysisError::NoAnalysis { strategy } } else { AnalysisError::OtherStrategy { strategy } }
+        };
+        let law = linear_law(scene, peer).ok_or_else(none)?;
         if law.horizon.is_some() && !has_equal_clocks(scene) {
             return Err(AnalysisError::AgesByClocks { strategy });
         }

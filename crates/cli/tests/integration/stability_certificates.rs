@@ -29,6 +29,27 @@ peers = [
 link = { delay = "13ms" }
 "#;
 
+/// Two who push along two axes, and a link that is faster.
+const TWO_AXES: &str = r#"
+scene = { title = "Two directions", duration = "1s", axes = 2 }
+object = { mass = 0.45 }
+coordination = { strategy = "average-position", stiffness = 1000.0, damping = 20.0, update = "8ms" }
+peer = { contact = "none", device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+peers = [{ name = "left", contact = { push = "+x" } }, { name = "right", contact = { push = "-y" } }, { name = "third" }]
+link = { delay = "24ms" }
+links = [{ from = "left", to = "right", delay = "16ms" }]
+"#;
+/// Equal peers that hear one of their number later.
+const FAR: &str = r#"
+scene = { title = "One far away", duration = "1s" }
+object = { mass = 0.45 }
+coordination = { strategy = "average-position", stiffness = 400.0, damping = 5.0, update = "8ms" }
+peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+peers = [{ name = "far", contact = "none" }, { name = "a" }, { name = "b" }]
+link = { delay = "8ms" }
+links = [{ from = "far", to = "a", delay = "13ms" }, { from = "far", to = "b", delay = "13ms" }]
+"#;
+
 pub(crate) fn check(desk: &Desk, file: &str) -> Output {
     let program = concat!(env!("CARGO_MANIFEST_DIR"), "/../stability/tests/reference/check_certificate.py");
     Command::new("python3").arg(program).arg(desk.path(file)).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap()
@@ -58,15 +79,20 @@ fn certificates_hold_for_a_checker_that_shares_no_code() {
     if !can_check() {
         return;
     }
+    // Peers that are told apart by their links alone.
+    let alike = FAR.replace(", contact = \"none\"", "");
     for (scene, options) in [
+        (alike.as_str(), "--x coordination.stiffness=50..400 --y peer.coupling.stiffness=500..2500 --prove 3"),
         (EQUAL, "--x coordination.stiffness=100..1500 --y peer.coupling.stiffness=500..3500 --prove 3"),
         (EQUAL, "--x coordination.stiffness=100..6000 --y coordination.damping=0..60 --prove 3 --set coordination.strategy=average-position"),
         (EQUAL, "--x coordination.stiffness=50..300 --y peer.coupling.damping=0..20 --prove 3 --set coordination.damping=0 --set object.damping=15"),
         (UNEQUAL, "--x coordination.stiffness=20..400 --y peer.coupling.stiffness=500..2500 --prove 3"),
+        (FAR, "--x coordination.stiffness=50..400 --y peer.coupling.stiffness=500..2500 --prove 3"),
         (UNEQUAL, "--x coordination.stiffness=20..3000 --y peer.coupling.stiffness=500..2500 --prove 3"),
         (EQUAL, "--x object.mass=0.3..2 --y coordination.stiffness=100..1000 --prove 3 --set coordination.strategy=average-position"),
         (EQUAL, "--x object.mass=0.1..2 --y object.damping=0..5 --prove 3"),
         (EQUAL, "--x peer.device.mass=0.05..0.5 --y peer.device.damping=0..20 --prove 3"),
+        (EQUAL, "--x coordination.stiffness=10..2000 --y coordination.damping=0..20 --prove 3 --set coordination.strategy=extrapolated"),
     ] {
         let desk = Desk::with("scene.toml", scene);
         let document = desk.json(&format!("stability map scene.toml {options} --certificate --out out --json"));
@@ -111,9 +137,11 @@ fn certificates_of_lines_and_numbers_hold_too() {
             None,
         ),
         (UNEQUAL, "--set object.split-mass=false", None),
+        (FAR, "--set object.split-mass=false", Some(true)),
         (UNEQUAL, "--set object.damping=0 --set peer.coupling.scaling=inverse-n", None),
         // A divided mass with damping: its step maps have four coefficients that vary.
-        (EQUAL, "--set coordination.strategy=average-position", Some(false)),
+        (EQUAL, "--set coordination.strategy=average-position", Some(true)),
+        (EQUAL, "--set coordination.strategy=extrapolated --set object.split-mass=false --set link.delay=11ms", Some(true)),
         (UNEQUAL, "--set object.damping=2", None),
     ] {
         let desk = Desk::with("scene.toml", scene);
@@ -152,11 +180,31 @@ fn certificates_of_moments_and_of_contacts_hold_too() {
         let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
         assert!(output.status.success() && text.contains(words), "{options}: {text}{refusal}");
     }
+    desk.write("axes.toml", TWO_AXES);
     let push = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/network/push-contact.toml");
-    desk.text(&format!("stability point {push} --switching --certificate contacts.json"));
+    for (scene, words) in [(push, "contacts that open and close: stable"), ("axes.toml", "contacts that open and close: stable, stable")] {
+        desk.text(&format!("stability point {scene} --switching --certificate contacts.json"));
+        let output = check(&desk, "contacts.json");
+        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+        assert!(output.status.success() && text.contains(words), "{text}{refusal}");
+    }
+    // Of the second scene no axis may be missing, and none stand there twice.
+    let axes: Value = serde_json::from_str(&desk.read("contacts.json")).unwrap();
+    refuses(&desk, &axes, "/motions", Value::Array(axes["motions"].as_array().unwrap()[..1].to_vec()), "is missing");
+    refuses(&desk, &axes, "/motions/1", axes["motions"][0].clone(), "stands there twice");
+    refuses(
+        &desk,
+        &axes,
+        "/scene",
+        axes["scene"].as_str().unwrap().replace("\"16ms\"", "\"24ms\"").into(),
+        "not shown to fall|not dominant|nothing begins with|classes",
+    );
+    // Walls have no checker yet, and are refused by name.
+    desk.write("walls.toml", TWO_AXES.replace("mass = 0.45", "mass = 0.45, enclosure = { min = -0.1, max = 0.1, stiffness = 500.0, damping = 1.0 }"));
+    desk.text("stability point walls.toml --switching --certificate contacts.json");
     let output = check(&desk, "contacts.json");
-    let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
-    assert!(output.status.success() && text.contains("contacts that open and close: stable"), "{text}{refusal}");
+    let refusal = String::from_utf8(output.stderr).unwrap() + &String::from_utf8(output.stdout).unwrap();
+    assert!(refusal.contains("refused: ") && refusal.contains("walls"), "{refusal}");
 }
 
 /// Moments and forms that show something else are refused.

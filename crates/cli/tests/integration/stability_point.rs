@@ -160,6 +160,13 @@ fn the_worst_case_is_bounded_from_both_sides() {
     assert!(worst["sequence"].as_str().is_some_and(|words| !words.is_empty()));
     let text = desk.text("stability point paper.toml --losses-in-a-row 1 --delay-within 8ms..10ms");
     assert!(text.contains("worst case: ") && text.contains("growth a sending period between"), "{text}");
+    // Bounds that are more than 1 % apart are said to be so.
+    for (effort, is_open) in [("", false), ("--accuracy 1 --products 1 --set coordination.stiffness=1500", true)] {
+        let command = format!("stability point paper.toml --losses-in-a-row 2 {effort}");
+        let worst = &desk.json(&format!("{command} --json"))["worst_case"];
+        assert_eq!(number(worst, "upper") > 1.01 * number(worst, "lower"), is_open, "{worst:#}");
+        assert_eq!((worst["open"].as_bool(), desk.text(&command).contains("open: the bounds are ")), (Some(is_open), is_open), "{command}");
+    }
 }
 
 #[test]

@@ -111,8 +111,20 @@ fn delays_are_proven_tick_by_tick() {
         }
     }
     let region = desk.json("stability map equal.toml --x link.delay=0ms..4ms --y coordination.stiffness=100..6000 --prove 4 --json --out out");
-    let stable = region["regions"][0]["stable"].as_f64().unwrap();
+    let found = &region["regions"][0];
+    let stable = found["stable"].as_f64().unwrap();
     assert!(stable > 0.1 && stable < 1.0, "{region:#}");
+    // No delay at all is a line without an area: what is undecided on it is counted apart.
+    let rows = desk.read("out/proof.csv");
+    let mut lines = std::collections::BTreeMap::<&str, u64>::new();
+    rows.lines().filter(|row| row.starts_with("0.0,0.0,")).for_each(|row| *lines.entry(row.rsplit(',').next().unwrap()).or_default() += 1);
+    assert!(!lines.is_empty(), "{rows}");
+    for verdict in ["stable", "unstable", "undecided"] {
+        assert_eq!(found["lines"][verdict], lines.get(verdict).copied().unwrap_or(0), "{verdict}: {found}");
+    }
+    let text = desk.text("stability map equal.toml --x link.delay=0ms..4ms --y coordination.stiffness=100..6000 --prove 4");
+    let words = format!("and without an area, lines at a single delay: {} proven stable", lines.get("stable").copied().unwrap_or(0));
+    assert!(text.contains(&words), "{text}");
 }
 
 /// A box for every number of peers is one for each of them.
@@ -151,6 +163,30 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
         ("stability map equal.toml --x object.mass=1..2 --y coordination.damping=0..9 --prove 99", "99"),
     ] {
         desk.cohaptic(line).assert_refused(2, &[words]);
+    }
+    let set = |law: &str| format!("equal.toml --set coordination.strategy={law}");
+    let keys = "--along coordination.stiffness=100..6000 --prove";
+    let turned = "equal.toml --set scene.axes=3 --set object.inertia=2.7e-4 --set peers.peer1.grasp=[0.03,0,0]";
+    let loses = "equal.toml --set coordination.strategy=extrapolated --set link.loss=5%";
+    for (line, words) in [
+        (format!("point {} --every-number", set("wave")), "ask `cohaptic stability point`, `map` or `boundary` for its radius"),
+        (format!("boundary {} {keys}", set("wave")), "wave coordination is followed as a whole alone"),
+        (format!("point {} --losses-in-a-row 1", set("client-server")), "client-server coordination is followed as a whole alone"),
+        (format!("point {} --switching", set("set-position")), "set-position coordination has no analysis: simulations tell"),
+        (format!("point {} --every-number", set("passivity-control")), "passivity-control coordination has no analysis: simulations tell"),
+        (format!("point {} --losses-in-a-row 1", set("extrapolated")), "the worst case does not follow extrapolated coordination"),
+        (format!("point {loses} --every-number"), "ask `stability point` for one number of peers at a time"),
+        (format!("boundary {loses} {keys}"), "take the mean square, `stability point --losses-in-a-row` bounds all losses"),
+        (format!("point {turned} --every-number"), "the proof for every number of peers of an object that turns"),
+        (format!("boundary {turned} {keys}"), "take all components together where nothing else is asked for"),
+        (format!("point {turned} --losses-in-a-row 1"), "the worst case of an object that turns"),
+        (
+            "point equal.toml --every-number --set topology={kind=\"ring\",neighbours=2}".to_owned(),
+            "follow a topology where nothing else is asked for",
+        ),
+        ("point equal.toml --every-number --set coordination.send-when={position=0.001}".to_owned(), "expected a scene without it"),
+    ] {
+        desk.cohaptic(&format!("stability {line}")).assert_refused(2, &[words]);
     }
     let unequal = Desk::with("two.toml", TWO);
     unequal

@@ -65,6 +65,8 @@ pub(crate) struct Node {
     pub(crate) wall: Option<Gains>,
     /// Whether forces are applied one tick after they were computed.
     pub(crate) compute_delay: bool,
+    /// Whether position and velocity of the own states of the past are states each, and not only the combination that the law takes of them.
+    pub(crate) keeps_whole_past: bool,
 }
 
 /// Where a node's states stand among the rows.
@@ -78,7 +80,7 @@ pub(crate) struct Rows {
     pub(crate) pending: Option<usize>,
     /// The first of the numbers that the law remembers.
     pub(crate) memory: usize,
-    /// Where the law looks back: what it takes of the own states of the latest ticks, the newest first.
+    /// Where the law looks back: what it takes of the own states of the latest ticks, or position and velocity of each, the newest first.
     pub(crate) past: usize,
 }
 
@@ -128,7 +130,12 @@ impl Node {
     /// How many rows its states take.
     pub(crate) fn states(&self) -> usize {
         let bodies = if self.device.is_some() { 2 } else { 1 };
-        2 * bodies + if self.compute_delay { bodies } else { 0 } + self.law.memory.len() + self.looks_back()
+        2 * bodies + if self.compute_delay { bodies } else { 0 } + self.law.memory.len() + self.past_rows()
+    }
+
+    /// How many rows the own states of the past take.
+    fn past_rows(&self) -> usize {
+        self.looks_back() * if self.keeps_whole_past { 2 } else { 1 }
     }
 
     /// How many ticks the law looks back, where it does anything with what it sees there.
@@ -147,6 +154,8 @@ impl Node {
     pub(crate) fn displacement(&self, rows: Rows, row: usize, time: f64) -> f64 {
         if row == rows.object || Some(row) == rows.device {
             1.0
+        } else if row >= rows.past && self.keeps_whole_past {
+            if (row - rows.past).is_multiple_of(2) { 1.0 } else { 0.0 }
         } else if row >= rows.past {
             self.law.force.past.stiffness / self.past_unit(time)
         } else {
@@ -158,7 +167,7 @@ impl Node {
     pub(crate) fn rows(&self, first: usize) -> Rows {
         let device = self.device.map(|_| first);
         let object = first + if self.device.is_some() { 2 } else { 0 };
-        let past = first + self.states() - self.looks_back();
+        let past = first + self.states() - self.past_rows();
         Rows { device, object, pending: self.compute_delay.then_some(object + 2), memory: past - self.law.memory.len(), past }
     }
 
@@ -169,10 +178,16 @@ impl Node {
 
     /// The largest sum of the sizes of a row of one tick's matrix, in the units of `scale`: how much rounding errors grow in a tick at most.
     pub(crate) fn step_norm(&self, scale: Scale) -> f64 {
+        // One that is extrapolated without end counts by the gains alone, as its own row does.
+        self.step_norm_up_to(scale, 0.0)
+    }
+
+    /// The same where samples are extrapolated without end, and none is older than `oldest` \[s\].
+    pub(crate) fn step_norm_up_to(&self, scale: Scale, oldest: f64) -> f64 {
         let gain = |gains: Gains| gains.stiffness.abs() + gains.damping.abs() / scale.time;
         let wall = self.wall.map_or(0.0, gain);
-        // Samples are used up to the horizon at most; one that is without end counts by the gains alone, as its own row does.
-        let oldest = self.law.horizon.filter(|horizon| horizon.is_finite()).unwrap_or(0.0);
+        // Samples are used up to the horizon at most.
+        let oldest = self.law.horizon.map_or(0.0, |horizon| if horizon.is_finite() { horizon } else { oldest });
         let seen = |row: &LawRow| gain(row.own) + gain(row.past) + gain(row.heard) + row.ahead.abs() * oldest / scale.time;
         let remembered = |row: &LawRow| row.memory.iter().enumerate().map(|(place, by)| by.abs() / self.memory_unit(place, scale)).sum::<f64>();
         let coordination = match self.law.pull() {
@@ -264,6 +279,19 @@ impl Node {
     /// The oldest of the own states takes part in the force, and the present one is remembered.
     fn look_back(&self, z: &mut Matrix, rows: Rows, scale: Scale, on_object: &mut [f64]) {
         let (count, unit, gains) = (self.looks_back(), self.past_unit(scale.time), scale.gains(self.law.force.past));
+        if self.keeps_whole_past {
+            let oldest = rows.past + 2 * (count - 1);
+            let (x, v) = (z.row(oldest), z.row(oldest + 1));
+            for (force, (x, v)) in on_object.iter_mut().zip(x.iter().zip(v)) {
+                *force -= gains.stiffness * x + gains.damping * v;
+            }
+            z.move_rows(rows.past..oldest, rows.past + 2);
+            for column in 0..z.columns() {
+                z[(rows.past, column)] = z[(rows.object, column)];
+                z[(rows.past + 1, column)] = z[(rows.object + 1, column)];
+            }
+            return;
+        }
         for (force, oldest) in on_object.iter_mut().zip(z.row(rows.past + count - 1)) {
             *force -= unit * oldest;
         }

@@ -43,7 +43,7 @@ use crate::cost::PASSES;
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
-use crate::pieces::pieces;
+use crate::pieces::{refuse_topology, split};
 use crate::structure::{Contacts, Structure, count, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
 use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, Radius, Verdict, Watch};
@@ -136,7 +136,8 @@ pub fn mean_square_within(scene: &Scene, most: usize) -> Result<MeanSquare, Anal
 /// As for [`mean_square`]; [`AnalysisError::TooManyOperations`] beyond the limit, [`AnalysisError::Stopped`] if the watcher ends it.
 pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSquare, AnalysisError> {
     let limits = &Limits { unknowns: limits.unknowns.min(MOST_UNKNOWNS), ..*limits };
-    let pieces = pieces(scene, "the mean square")?;
+    refuse_topology(scene, "the mean square")?;
+    let pieces = split(scene).map_err(|why| AnalysisError::Turns { what: "the mean square", why })?;
     let network = NominalNetwork::of(scene)?;
     let mut notes = Vec::new();
     let mut combines = false;

@@ -3,6 +3,8 @@
 //! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of them is monotone in m and in b. So
 //! the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box.
 
+use std::borrow::Cow;
+
 use cohaptic_peer::{Gains, StepMap};
 
 use super::ProofError;
@@ -38,6 +40,8 @@ struct Frame {
     sampling: Sampling,
     scale: Scale,
     tied: bool,
+    /// Whether the own states of the past are states as a whole, since the corners take different combinations of them.
+    whole_past: bool,
 }
 
 impl Frame {
@@ -46,11 +50,21 @@ impl Frame {
         let sampling = Sampling::of(&all);
         let scale = Scale { time: common.time, compliance: points[0].nodes[0].compliance(common.time) };
         check_units(points, scale)?;
-        Ok(Self { plan: Plan::of(common.timetable, !sampling.is_silent(scale.time)), sampling, scale, tied: common.tied })
+        let whole_past = !takes_one_past(points, scale);
+        let ages = all.iter().any(|node| node.law.horizon.is_some());
+        Ok(Self { plan: Plan::of(common.timetable, !sampling.is_silent(scale.time), ages), sampling, scale, tied: common.tied, whole_past })
     }
 
     fn matrices(&self, point: &Point) -> Vec<StepMatrix> {
-        self.plan.matrices(Numbers { nodes: &point.nodes, weights: &point.weights, sampling: self.sampling, scale: self.scale, tied: self.tied })
+        let nodes = self.nodes(point);
+        self.plan.matrices(Numbers { nodes: &nodes, weights: &point.weights, sampling: self.sampling, scale: self.scale, tied: self.tied })
+    }
+
+    fn nodes<'p>(&self, point: &'p Point) -> Cow<'p, [Node]> {
+        if !self.whole_past {
+            return Cow::Borrowed(&point.nodes);
+        }
+        Cow::Owned(point.nodes.iter().map(|node| Node { keeps_whole_past: true, ..node.clone() }).collect())
     }
 }
 
@@ -73,7 +87,7 @@ pub(super) fn enclosed(points: &[Point], ends: &[Vec<Node>], matrices: impl Fn(&
 /// The states of a frame over the box that points enclose.
 pub(super) fn states(points: &[Point], common: Common<'_>) -> Result<States, ProofError> {
     let frame = Frame::of(points, common)?;
-    let names = frame.plan.states(&points[0].nodes, frame.sampling.channels(), frame.tied);
+    let names = frame.plan.states(&frame.nodes(&points[0]), frame.sampling.channels(), frame.tied);
     let heard = match frame.sampling {
         Sampling::Combined(gains) => Some(gains),
         Sampling::Whole => None,
@@ -89,23 +103,50 @@ pub(super) struct States {
     pub(super) heard: Option<Gains>,
 }
 
-/// The steps of a frame whose numbers grow without a limit, each divided by N/N₀: between `near`, points at N₀, and their limit. Steps are affine in N, T = A + N·B, so that N₀/N·T = N₀/N·A + N₀·B lies between
-/// T(N₀) and N₀·B, which is how far `far` is from there, the same points at 2·N₀.
-pub(super) fn steps_beyond(near: &[Point], far: &[Point], common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
-    let all: Vec<Point> = near.iter().chain(far).cloned().collect();
+/// The steps of a frame whose numbers grow without a limit with N, each divided by N/N₀ for `growing` of two numbers that do: points at N₀, 2·N₀ and 3·N₀.
+///
+/// With one, steps are affine in N, T = A + N·B, so that N₀/N·T = u·A + N₀·B, u = N₀/N from 0 to 1, lies between T(N₀) and N₀·B = T(2·N₀) − T(N₀).
+/// With two, T = A + N·B + N²·C, and (N₀/N)²·T = u²·A + u·L + Q with L = N₀·B and Q = N₀²·C lies between the four where u² and u are 0 or 1.
+pub(super) fn steps_beyond(at: [&[Point]; 3], growing: Growth, common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
+    let all: Vec<Point> = at.iter().flat_map(|points| points.iter().cloned()).collect();
     let frame = Frame::of(&all, common)?;
-    let [near, far] = [near, far].map(|points| points.iter().map(|point| frame.matrices(point)).collect::<Vec<_>>());
-    let limit = |near: &StepMatrix, far: &StepMatrix| {
-        let (near_matrix, far_matrix) = (&near.matrix, &far.matrix);
-        let matrix = Matrix::from_fn(near_matrix.rows(), near_matrix.columns(), |i, j| far_matrix[(i, j)] - near_matrix[(i, j)]);
-        // The difference rounds once, within the error of the farther.
-        StepMatrix { matrix, error: near.error + 2.0 * far.error }
+    let [near, far, third] = at.map(|points| points.iter().map(|point| frame.matrices(point)).collect::<Vec<_>>());
+    // Sums of a dozen of them at most, whose own roundings are small beside the errors.
+    let sum = |of: [&StepMatrix; 3], by: [f64; 3]| {
+        let matrix =
+            Matrix::from_fn(of[0].matrix.rows(), of[0].matrix.columns(), |i, j| of.iter().zip(by).map(|(step, by)| by * step.matrix[(i, j)]).sum());
+        StepMatrix { matrix, error: 32.0 * of.iter().map(|step| step.error).fold(0.0, f64::max) }
+    };
+    // By what T at N₀, 2·N₀ and 3·N₀ are multiplied at each corner but the last, which is T(N₀).
+    let corners: &[[f64; 3]] = match growing {
+        Growth::Linear => &[[-1.0, 1.0, 0.0]],
+        // Q = (T₃ − 2·T₂ + T₁)/2, L = T₂ − T₁ − 3·Q: Q, Q + A = T₁ − L, and Q + L.
+        Growth::Quadratic => &[[0.5, -1.0, 0.5], [3.5, -4.0, 1.5], [-2.0, 3.0, -1.0]],
     };
     let span = |step: usize| {
-        let limits: Vec<StepMatrix> = near.iter().zip(&far).map(|(near, far)| limit(&near[step], &far[step])).collect();
-        StepSpan::of(near.iter().map(|steps| &steps[step]).chain(&limits))
+        let of = |by: &[f64; 3]| {
+            near.iter().zip(&far).zip(&third).map(|((near, far), third)| sum([&near[step], &far[step], &third[step]], *by)).collect::<Vec<_>>()
+        };
+        let limits: Vec<StepMatrix> = corners.iter().flat_map(of).collect();
+        StepSpan::of(limits.iter().chain(near.iter().map(|steps| &steps[step])))
     };
     Ok((0..near[0].len()).map(span).collect())
+}
+
+/// How the steps of a frame grow with the number of peers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Growth {
+    /// As N: the gains of the law, or the effects of a force on a copy.
+    Linear,
+    /// As N²: both.
+    Quadratic,
+}
+
+/// The steps of a frame at each point, in the units of the first.
+#[cfg(test)]
+pub(super) fn steps_of_each(points: &[Point], common: Common<'_>) -> Result<Vec<Vec<StepMatrix>>, ProofError> {
+    let frame = Frame::of(points, common)?;
+    Ok(points.iter().map(|point| frame.matrices(point)).collect())
 }
 
 /// The points, each at the lower end of one more number and then each at its upper end.
@@ -113,22 +154,27 @@ pub(super) fn doubled(points: &[Point], at: impl Fn(&Point, bool) -> Point) -> V
     [false, true].into_iter().flat_map(|upper| points.iter().map(move |point| (point, upper))).map(|(point, upper)| at(point, upper)).collect()
 }
 
-/// Refuses laws whose states mean something else at each corner: numbers that are remembered in units of gains that vary, and ages.
+/// Refuses laws whose states mean something else at each corner: numbers that are remembered in units of gains that vary.
 pub(super) fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
     let units = |point: &Point| -> Vec<u64> {
-        let of = |node: &Node| {
-            let remembered = (0..node.law.memory.len()).map(|place| node.memory_unit(place, scale));
-            remembered.chain((node.looks_back() > 0).then(|| node.past_unit(scale.time))).map(f64::to_bits).collect::<Vec<_>>()
-        };
+        let of = |node: &Node| (0..node.law.memory.len()).map(|place| node.memory_unit(place, scale).to_bits()).collect::<Vec<_>>();
         point.nodes.iter().flat_map(of).collect()
     };
-    if points.iter().any(|point| point.nodes.iter().any(|node| node.law.horizon.is_some())) {
-        return Err(ProofError::Ages);
-    }
     if points.iter().any(|point| units(point) != units(&points[0])) {
         return Err(ProofError::Remembered);
     }
     Ok(())
+}
+
+/// Whether at each corner laws take the same combination of the own states of the past, but for some roundings, which the bounds of a step have room for.
+pub(super) fn takes_one_past(points: &[Point], scale: Scale) -> bool {
+    let shares = |point: &Point| -> Vec<f64> {
+        let of = |node: &Node| (node.looks_back() > 0).then(|| node.law.force.past.stiffness / node.past_unit(scale.time));
+        point.nodes.iter().filter_map(of).collect()
+    };
+    let first = shares(&points[0]);
+    let is_first = |share: (&f64, &f64)| (share.0 - share.1).abs() <= 8.0 * f64::EPSILON;
+    points.iter().map(shares).all(|shares| shares.len() == first.len() && shares.iter().zip(&first).all(is_first))
 }
 
 /// A body at each end, and the nodes that have it.

@@ -12,7 +12,7 @@ use cohaptic_peer::{Gains, StepMap};
 use cohaptic_scene::Scene;
 
 use super::certificate::{Certified, PartCertificate};
-use super::corners::{Common, Point, doubled, states, steps, steps_beyond};
+use super::corners::{Common, Growth, Point, doubled, states, steps, steps_beyond};
 use super::discs::decide;
 use super::span::StepSpan;
 use super::{ProofError, Proven};
@@ -52,7 +52,7 @@ pub(super) struct Growing {
 
 impl Growing {
     pub(super) fn new(scene: &Scene, network: &NominalNetwork) -> Result<Self, ProofError> {
-        let all = pieces(scene, "every number of peers")?;
+        let all = pieces(scene, "the proof for every number of peers")?;
         let (mut motions, mut least, mut first) = (Vec::new(), 2, 0);
         for (piece, combination) in pairs(&all, &mut false)? {
             let structure = Structure::of(&[&*piece.scene], network, &combination.contacts)?;
@@ -246,8 +246,8 @@ impl Motion {
         points
     }
 
-    /// Whether all numbers of peers from one on are proven unstable in a part of which either the gains of the law or the effects of a force on the copies grow with N, and nothing else changes but
-    /// towards a limit. A frame divided by N/N₀ a step is one of a box then, and an unstable one is so without the division.
+    /// Whether all numbers of peers from one on are proven unstable in a part of which the gains of the law or the effects of a force on the copies grow with N, or both, and nothing else changes but
+    /// towards a limit. A frame divided by N/N₀ a step, or by its square, is one of a box then, and an unstable one is so without the division.
     fn is_unstable_beyond(&self, from: u64, apart: Option<usize>) -> Result<bool, ProofError> {
         let [near, far, end] = [from, 2 * from, ENDLESS].map(|number| self.part(number, apart));
         let grows = |of: &dyn Fn(&Node) -> f64| of(&end[0]) > 2.0 * of(&far[0]);
@@ -260,7 +260,7 @@ impl Motion {
             && near.iter().zip(&end).all(|(near, end)| near.device == end.device);
         let third = self.part(3 * from, apart);
         let is_affine = |of: &dyn Fn(&Node) -> f64| (of(&third[0]) - 2.0 * of(&far[0]) + of(&near[0])).abs() <= 1e-12 * of(&third[0]).abs();
-        if law_grows == mass_vanishes || !has_limits || !is_affine(&gain) && law_grows || !is_affine(&force) && mass_vanishes {
+        if !law_grows && !mass_vanishes || !has_limits || !is_affine(&gain) && law_grows || !is_affine(&force) && mass_vanishes {
             return Ok(false);
         }
         let heard = [gain(&near[0]) * nu(from), gain(&end[0]) * nu(ENDLESS)];
@@ -273,7 +273,9 @@ impl Motion {
             self.corners(mixed.collect(), [&near, &end], heard, !law_grows, apart)
         };
         let time = self.structure.time(&self.scene, &self.nodes(from));
-        let span = StepSpan::product(&steps_beyond(&points(&near), &points(&far), self.common(apart, time))?);
+        let growth = if law_grows && mass_vanishes { Growth::Quadratic } else { Growth::Linear };
+        let [near, far, third] = [points(&near), points(&far), points(&third)];
+        let span = StepSpan::product(&steps_beyond([&near, &far, &third], growth, self.common(apart, time))?);
         Ok(decide(&span).is_some_and(|decision| decision.proven == Proven::Unstable))
     }
 

@@ -16,7 +16,7 @@
 //! entry of its diagonal is below zero, every one is *unstable* ([`positive`](crate::mean_square::positive)).
 
 use super::certificate::MomentCertificate;
-use super::corners::{check_units, enclosed};
+use super::corners::{check_units, enclosed, takes_one_past};
 use super::growing::{ENDLESS, Growing, Motion, WIDER, nu};
 use super::span::StepSpan;
 use super::steps::{StepMatrix, error};
@@ -41,6 +41,9 @@ pub(super) struct GrowingMoments<'a> {
 impl<'a> GrowingMoments<'a> {
     pub(super) fn new(growing: &'a Growing, network: &NominalNetwork) -> Result<Self, ProofError> {
         let of = |motion: &'a Motion| {
+            if motion.part(2, None).iter().any(|node| node.law.horizon.is_some()) {
+                return Err(ProofError::Ages { strategy: motion.scene.coordination.strategy.name() });
+            }
             let independent = Independent::of(&motion.scene, network, &motion.structure)?.ok_or(ProofError::UnequalChance)?;
             Ok::<_, ProofError>((motion, independent))
         };
@@ -210,6 +213,9 @@ impl Frame<'_> {
         let points = self.motion.corners(ends[0].clone(), [&ends[0], &ends[1]], [1.0, 1.0], true, Some(0));
         let scale = Scale { time, compliance: node.compliance(time) };
         check_units(&points, scale)?;
+        if !takes_one_past(&points, scale) {
+            return Err(ProofError::Remembered);
+        }
         let own = node.rows(0);
         let (depth, sent) = (self.independent.hazards.depth(), self.independent.timetable.sent[0]);
         let rows = Rows { states: node.states(), depth, sent, position: own.object };
@@ -369,7 +375,7 @@ fn moved(
         scratch.resize(size);
         node.tick(&mut z, own, |row| heard.row(row), External::default(), span, scale, &mut scratch);
     }
-    StepMatrix { matrix: z, error: error(std::slice::from_ref(node), scale) }
+    StepMatrix { matrix: z, error: error(std::slice::from_ref(node), scale, 0.0) }
 }
 
 /// What a delivery does: to rows from `held` on, of the sample at that row.

@@ -139,17 +139,22 @@ pub enum ProofError {
     },
     /// Something is left to chance.
     #[error(
-        "links leave something to chance, and a guarantee is about one sequence of events: expected links without jitter and loss; `stability point --losses-in-a-row` bounds all losses"
+        "links leave something to chance, and a guarantee is about one sequence of events: expected links without jitter and loss; `stability map` and `boundary` without --prove take the mean square, `stability point --losses-in-a-row` bounds all losses"
     )]
     Chance,
     /// Something is left to chance among peers that differ, or otherwise than independently.
     #[error(
-        "links leave something to chance: expected equal peers over equal links that lose independently and on which nothing overtakes, for every number of them in the mean square"
+        "links leave something to chance: expected equal peers over equal links that lose independently and on which nothing overtakes, for every number of them in the mean square; `stability point` without --every-number follows more"
     )]
     UnequalChance,
-    /// A law uses the ages of samples.
-    #[error("the coordination uses the ages of samples, which are no gains: ask `stability point` for single scenes")]
-    Ages,
+    /// A law uses the ages of samples, of which some are lost.
+    #[error(
+        "{strategy} coordination uses the ages of samples, which differ from link to link where some are lost: expected links without loss, or ask `stability point` for one number of peers at a time"
+    )]
+    Ages {
+        /// Its name.
+        strategy: &'static str,
+    },
     /// Numbers that a law remembers are measured by gains.
     #[error("the coordination remembers numbers whose unit is a gain that varies: ask `stability point` for single scenes")]
     Remembered,

@@ -8,6 +8,7 @@ use super::growing::{ENDLESS, Growing};
 use super::mean_square::GrowingMoments;
 use super::{Guarantee, ProofError, Proven};
 use crate::network::NominalNetwork;
+use crate::pieces::refuse_topology;
 use crate::{AnalysisError, Watch, has_chance};
 
 /// Numbers of peers from one to another, ends included, of which one verdict holds.
@@ -55,6 +56,7 @@ pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn
     if from < 2 || to.is_some_and(|to| to < from) {
         return Err(ProofError::Numbers);
     }
+    refuse_topology(scene, "the proof for every number of peers")?;
     let network = NominalNetwork::of(scene)?;
     let growing = Growing::new(scene, &network)?;
     let moments = has_chance(scene).then(|| GrowingMoments::new(&growing, &network)).transpose()?;

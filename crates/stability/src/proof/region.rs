@@ -84,7 +84,14 @@ impl ProvenRegion {
         certify(family, self.every, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
     }
 
-    /// The share of the area of the ranges with that verdict. A single delay, such as none at all, has no area.
+    /// How many boxes without an area have that verdict: those of a single delay, such as none at all, of which no share tells.
+    #[must_use]
+    pub fn lines(&self, guarantee: Guarantee) -> usize {
+        let is_line = |one: &&ProvenBox| one.x[0] >= one.x[1] || one.y[0] >= one.y[1];
+        self.boxes.iter().filter(is_line).filter(|one| one.guarantee == guarantee).count()
+    }
+
+    /// The share of the area of the ranges with that verdict. A single delay, such as none at all, has no area: see [`ProvenRegion::lines`].
     #[must_use]
     pub fn share(&self, guarantee: Guarantee) -> f64 {
         let area = |boxes: &mut dyn Iterator<Item = &ProvenBox>| boxes.map(|one| (one.x[1] - one.x[0]) * (one.y[1] - one.y[0])).sum::<f64>();

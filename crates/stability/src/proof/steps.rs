@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::Matrix;
 use crate::lifted::node::{External, Rows, Scale, Scratch};
 use crate::lifted::{Node, Sampling};
-use crate::timetable::{Event, Timetable};
+use crate::timetable::{Event, Instants, Timetable};
 
 /// A sample of a node: from 0 on those of this frame, −1 the last one of the frame before.
 type SampleName = (usize, i64);
@@ -20,7 +20,8 @@ type SampleName = (usize, i64);
 struct Tick {
     node: usize,
     span: Duration,
-    held: Vec<SampleName>,
+    /// And how old each is \[s\], where ages matter; otherwise 0.
+    held: Vec<(SampleName, f64)>,
 }
 
 /// What happens at one instant.
@@ -38,6 +39,8 @@ pub(super) struct Plan {
     steps: Vec<Step>,
     /// Before each step, and after the last one.
     live: Vec<Vec<SampleName>>,
+    /// The age of the oldest sample that is held at a tick \[s\], where ages matter; otherwise 0.
+    oldest: f64,
 }
 
 /// The numbers of a lifted system, and the units of its states.
@@ -108,9 +111,11 @@ impl FrameState {
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl Plan {
-    /// The steps of a timetable. `heard` says whether anything is heard at all.
-    pub(super) fn of(timetable: &Timetable, heard: bool) -> Self {
+    /// The steps of a timetable. `heard` says whether anything is heard at all, `ages` whether the ages of samples matter.
+    pub(super) fn of(timetable: &Timetable, heard: bool, ages: bool) -> Self {
         let nodes = timetable.sent.len();
+        let instants = ages.then(|| Instants::of(timetable, nodes));
+        let mut oldest = 0.0_f64;
         let mut held: Vec<BTreeMap<usize, i64>> = vec![BTreeMap::new(); nodes];
         if heard {
             for (to, from, sample) in &timetable.held {
@@ -139,7 +144,9 @@ impl Plan {
                     if steps.last().is_none_or(|step| step.ticks.iter().any(|tick| tick.node == node) || !step.ticks.is_empty() && step.at != at) {
                         steps.push(Step::default());
                     }
-                    let held = held[node].iter().map(|(from, sample)| (*from, *sample)).collect();
+                    let age = |(from, sample)| instants.as_ref().map_or(0.0, |instants| instants.age(from, sample, at, timetable.frame));
+                    let held: Vec<_> = held[node].iter().map(|(from, sample)| ((*from, *sample), age((*from, *sample)))).collect();
+                    oldest = held.iter().fold(oldest, |oldest, (_, age)| oldest.max(*age));
                     if let Some(step) = steps.last_mut() {
                         step.at = at;
                         step.ticks.push(Tick { node, span, held });
@@ -148,7 +155,7 @@ impl Plan {
             }
         }
         let live = live(&steps, &timetable.sent);
-        Self { steps, live }
+        Self { steps, live, oldest }
     }
 
     /// The states of the frame, in the order of its rows and columns.
@@ -205,11 +212,10 @@ impl Plan {
         scratch.resize(columns);
         for Tick { node, span, held } in ticks {
             let mut heard = Matrix::zeros(law_rows, columns);
-            for name in held {
+            for (name, age) in held {
                 let Some(sample) = store.get(name) else { continue };
                 for (channel, entries) in sample.iter().enumerate() {
-                    // Samples are taken as they are: their ages do not matter.
-                    for (row, by) in nodes[*node].heard(sampling, channel, 0.0, scale.time).enumerate() {
+                    for (row, by) in nodes[*node].heard(sampling, channel, *age, scale.time).enumerate() {
                         let weight = weights[(*node, name.0)] * by;
                         heard.row_mut(row).iter_mut().zip(entries).for_each(|(sum, entry)| *sum += weight * entry);
                     }
@@ -235,20 +241,20 @@ impl Plan {
                 next += 1;
             }
         }
-        StepMatrix { matrix, error: error(nodes, scale) }
+        StepMatrix { matrix, error: error(nodes, scale, self.oldest) }
     }
 }
 
-/// How far each entry of a step of nodes may be from the exact one.
-pub(super) fn error(nodes: &[Node], scale: Scale) -> f64 {
-    ROUNDING * nodes.iter().map(|node| node.step_norm(scale)).fold(1.0, f64::max)
+/// How far each entry of a step of nodes may be from the exact one; `oldest` is the age of the oldest sample \[s\], for laws that use it.
+pub(super) fn error(nodes: &[Node], scale: Scale, oldest: f64) -> f64 {
+    ROUNDING * nodes.iter().map(|node| node.step_norm_up_to(scale, oldest)).fold(1.0, f64::max)
 }
 
 /// Which samples are states before each step, and after the last: those sent before that are used from there on, in this frame or in a later one.
 fn live(steps: &[Step], sent: &[usize]) -> Vec<Vec<SampleName>> {
     let mut last: BTreeMap<SampleName, usize> = BTreeMap::new();
     for (place, step) in steps.iter().enumerate() {
-        for name in step.ticks.iter().flat_map(|tick| &tick.held) {
+        for (name, _) in step.ticks.iter().flat_map(|tick| &tick.held) {
             last.insert(*name, place);
         }
     }

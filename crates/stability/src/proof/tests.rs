@@ -55,6 +55,9 @@ fn every_number_is_judged_as_single_scenes_are() {
         &["object.split-mass=false", PD],
         &["object.split-mass=false", PD, "coordination.scaling=\"inverse-n\"", "peer.coupling.scaling=\"inverse-n\""],
         &["coordination.strategy=\"local-damping\""],
+        &["coordination.strategy=\"local-lag\""],
+        &["coordination.strategy=\"extrapolated\""],
+        &["coordination.strategy=\"extrapolated\"", "object.split-mass=false", "link.delay=3ms"],
         &["object.damping=2", "peer.device.damping=1"],
         &["peer.compute-delay=1"],
         &["scene.count=3", "peers=[{ name = \"peer1\", contact = \"none\" }]"],
@@ -114,6 +117,91 @@ fn numbers_of_which_other_numbers_say_nothing_are_found() {
     }
 }
 
+/// Where gains and the effects of forces both grow with N, numbers without end are decided too.
+#[test]
+fn numbers_beyond_all_are_decided_where_two_numbers_grow() {
+    let last = spans(&[PD], 2, None).spans.pop().unwrap();
+    assert_eq!((last.to, last.guarantee), (None, Guarantee::Unstable));
+}
+
+/// Steps divided by N/N₀, or by its square, lie within the box that is decided for all numbers from N₀ on.
+#[test]
+fn steps_that_grow_without_end_are_enclosed() {
+    let network = crate::network::NominalNetwork::of(&scene(&[PD])).unwrap();
+    let contacts = crate::structure::Contacts { touching: vec![true; 2], at_wall: false, absent: vec![false; 2] };
+    for (set, growth) in
+        [(&[PD][..], corners::Growth::Quadratic), (&[], corners::Growth::Linear), (&[PD, "object.split-mass=false"], corners::Growth::Linear)]
+    {
+        let scene = scene(set);
+        let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
+        let at = |number: usize| {
+            vec![Point { nodes: structure.nodes(&scene.scaled_for(number)), weights: Matrix::from_fn(1, 1, |_, _| -1.0 / count(number - 1)) }]
+        };
+        // Own samples are heard with gains times 1/(N − 1), which is a constant for PD; for AP it is taken to be one here.
+        let heard = |number: usize| {
+            at(number)
+                .into_iter()
+                .map(|point| if set.is_empty() { Point { weights: Matrix::from_fn(1, 1, |_, _| -1e-3), ..point } } else { point })
+                .collect::<Vec<_>>()
+        };
+        let nodes = structure.nodes(&scene);
+        let timetable = structure.apart[0].as_ref().unwrap();
+        let common = Common { timetable, tied: true, time: structure.time(&scene, &nodes) };
+        let near = 1000;
+        let box_of_all = corners::steps_beyond([&heard(near), &heard(2 * near), &heard(3 * near)], growth, common).unwrap();
+        for times in [1, 2, 3, 7, 100, 12_345] {
+            // In the units of the box: its compliance is that of the first point.
+            let points = [heard(near), heard(times * near)].concat();
+            let steps = corners::steps_of_each(&points, common).unwrap().pop().unwrap();
+            assert_eq!(steps.len(), box_of_all.len());
+            let by = if growth == corners::Growth::Quadratic { count(times * times) } else { count(times) };
+            for (span, step) in box_of_all.iter().zip(&steps) {
+                for i in 0..span.mean.rows() {
+                    for j in 0..span.mean.columns() {
+                        let reach: f64 = span.slopes.iter().map(|slope| slope[(i, j)].abs()).sum::<f64>() + span.radius[(i, j)];
+                        let off = (step.matrix[(i, j)] / by - span.mean[(i, j)]).abs();
+                        assert!(off <= reach * (1.0 + 1e-9) + 1e-12, "{set:?} {times}: {off} {reach}");
+                        // Of one gain that grows, or of u and u², no effect of several numbers together is left for the radius.
+                        assert!(span.radius[(i, j)] <= 1e-9 * (1.0 + span.mean.largest()), "{set:?}: {}", span.radius[(i, j)]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A law that looks back takes another combination of the past at each corner of a box of both gains: between them steps are enclosed all the same.
+#[test]
+fn steps_of_a_law_that_looks_back_are_enclosed_over_both_gains() {
+    let at = |stiffness: f64, damping: f64| {
+        let gains = [format!("coordination.stiffness={stiffness:?}"), format!("coordination.damping={damping:?}")];
+        let scene = scene(&["coordination.strategy=\"local-lag\"", &gains[0], &gains[1]]);
+        let network = crate::network::NominalNetwork::of(&scene).unwrap();
+        let contacts = crate::structure::Contacts { touching: vec![true; 2], at_wall: false, absent: vec![false; 2] };
+        let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
+        (Point { nodes: structure.nodes(&scene), weights: Matrix::from_fn(1, 1, |_, _| -1.0) }, structure)
+    };
+    let (low, high) = ([100.0, 0.5], [3000.0, 40.0]);
+    let corners: Vec<Point> = (0..4).map(|place| at([low[0], high[0]][place & 1], [low[1], high[1]][place >> 1]).0).collect();
+    let (_, structure) = at(1000.0, 5.0);
+    let common = Common { timetable: structure.apart[0].as_ref().unwrap(), tied: true, time: 0.01 };
+    for share in [0.1, 0.5, 0.8] {
+        let inside = at(low[0] + share * (high[0] - low[0]), low[1] + (1.0 - share) * (high[1] - low[1])).0;
+        let steps = corners::steps_of_each(&[corners.clone(), vec![inside]].concat(), common).unwrap();
+        for (step, exact) in steps[4].iter().enumerate() {
+            let span = StepSpan::of(steps[..4].iter().map(|steps| &steps[step]));
+            for i in 0..span.mean.rows() {
+                for j in 0..span.mean.columns() {
+                    let signs = [2.0 * share - 1.0, 1.0 - 2.0 * share];
+                    let centre = span.slopes.iter().zip(signs).map(|(slope, sign)| sign * slope[(i, j)]).sum::<f64>() + span.mean[(i, j)];
+                    let off = (exact.matrix[(i, j)] - centre).abs();
+                    assert!(off <= span.radius[(i, j)] + 1e-12, "{share}: {off} {}", span.radius[(i, j)]);
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn scenes_without_a_proof_are_refused_by_name() {
     let refused = |set: &[&str]| prove_every_number(&scene(set), 2, None, &Unwatched).unwrap_err().to_string();
@@ -122,11 +210,11 @@ fn scenes_without_a_proof_are_refused_by_name() {
         (&["link.loss=10%", "scene.count=3", "peers=[{ name = \"peer1\", contact = \"none\" }]"], "leave something to chance"),
         (&["peers=[{ name = \"peer2\", device = { mass = 0.2 } }]"], "no two peers are equal"),
         (&["peer.contact=\"none\"", "peer.device.damping=0"], "touches nothing"),
-        (&["coordination.strategy=\"extrapolated\""], "ages of samples"),
+        (&["coordination.strategy=\"extrapolated\"", "link.loss=10%"], "extrapolated coordination uses the ages of samples"),
         (&["coordination.strategy=\"passivity-control\""], "passivity-control"),
-        (&["coordination.strategy=\"client-server\""], "client-server coordination cannot be taken apart by equal peers"),
-        (&["coordination.strategy=\"wave\""], "wave coordination cannot be taken apart by equal peers"),
-        (&["scene.axes=3", "object.inertia=2.7e-4", "peers.peer1.grasp=[0.03, 0, 0]"], "every number of peers of an object that turns"),
+        (&["coordination.strategy=\"client-server\""], "client-server coordination is followed as a whole alone"),
+        (&["coordination.strategy=\"wave\""], "without --graph, --every-number, --prove"),
+        (&["scene.axes=3", "object.inertia=2.7e-4", "peers.peer1.grasp=[0.03, 0, 0]"], "`map` and `boundary` take all components together"),
     ] {
         let message = refused(set);
         assert!(message.contains(words), "{set:?}: {message}");
@@ -193,6 +281,14 @@ fn no_box_holds_a_point_that_contradicts_it() {
             ["object.mass=0.2..1", "coordination.stiffness=100..3000"],
         ),
         (&["scene.count=3", "peers=[{ name = \"peer2\", device = { mass = 0.2 } }, { name = \"peer3\", contact = \"none\" }]"], GAINS),
+        (&["scene.count=3", "coordination.strategy=\"extrapolated\""], GAINS),
+        (&["scene.count=3", "coordination.strategy=\"extrapolated\"", "coordination.extrapolated.horizon=10ms"], GAINS),
+        // Two gains that vary take another combination of the past at each corner, and one alone the same.
+        (&["scene.count=3", "coordination.strategy=\"local-lag\""], ["coordination.stiffness=100..1000", "coordination.damping=0..20"]),
+        (
+            &["scene.count=3", "coordination.strategy=\"local-lag\"", "coordination.damping=0"],
+            ["coordination.stiffness=100..1000", "object.mass=0.3..1"],
+        ),
     ] {
         let family = family(set, x, y);
         let region = ProvenRegion::prove(&family, 5, None, &Unwatched).unwrap();
@@ -271,8 +367,16 @@ fn keys_that_do_more_than_to_set_numbers_are_refused() {
 /// The steps of a frame multiply to the matrix of the frame: the same eigenvalues, but for zeros, as the analysis of the scene.
 #[test]
 fn the_product_of_the_steps_is_the_frame() {
-    for set in [&[][..], &["link.delay=24ms"], &["link.delay=3ms", "coordination.update=5ms"], &["peer.compute-delay=1"], &["coordination.damping=0"]]
-    {
+    for set in [
+        &[][..],
+        &["link.delay=24ms"],
+        &["link.delay=3ms", "coordination.update=5ms"],
+        &["peer.compute-delay=1"],
+        &["coordination.damping=0"],
+        &["coordination.strategy=\"extrapolated\"", "link.delay=11ms"],
+        &["coordination.strategy=\"extrapolated\"", "coordination.extrapolated.horizon=13ms", "link.delay=11ms"],
+        &["coordination.strategy=\"local-lag\""],
+    ] {
         let scene = scene(set);
         let network = crate::network::NominalNetwork::of(&scene).unwrap();
         let contacts = crate::structure::Contacts { touching: vec![true; 2], at_wall: false, absent: vec![false; 2] };

@@ -59,7 +59,7 @@ use crate::network::NominalNetwork;
 use crate::parts::lifted_part;
 use crate::pieces::{Piece, pieces};
 use crate::proof::{PartCertificate, stable_difference};
-use crate::structure::{Contacts, Structure, count};
+use crate::structure::{Contacts, Structure, check_laws, count};
 use crate::timetable::Timetable;
 use crate::{AnalysisError, Guarantee, Matrix, Method, PartKind, Watch};
 
@@ -158,6 +158,8 @@ pub fn prove_switching(scene: &Scene, watch: &dyn Watch) -> Result<Switching, Sw
     }
     let pieces = pieces(scene, "the proof of contacts that switch")?;
     let network = NominalNetwork::of(scene)?;
+    // A law without a verdict is refused before contacts are asked for.
+    check_laws(scene)?;
     let axes: Vec<(&Piece<'_>, usize, String)> = pieces.iter().flat_map(axes).collect();
     if axes.is_empty() {
         return Err(SwitchingError::NoContact);

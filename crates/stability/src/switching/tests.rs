@@ -212,5 +212,5 @@ fn what_cannot_be_asked_is_refused() {
     let fine = refused(&["coordination.update=80ms"]);
     assert!(matches!(fine, SwitchingError::TooLarge { rows: 150.., .. }), "{fine}");
     let law = refused(&["coordination.strategy=passivity-control"]);
-    assert!(matches!(law, SwitchingError::Analysis(AnalysisError::OtherStrategy { .. })), "{law}");
+    assert!(matches!(law, SwitchingError::Analysis(AnalysisError::NoAnalysis { .. })), "{law}");
 }

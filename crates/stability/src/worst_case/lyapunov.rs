@@ -15,7 +15,7 @@ use super::{barrier, join};
 use crate::{Matrix, Watch};
 
 /// The most unknowns for which a barrier's Hessian, whose factorisation costs their third power, is worth it.
-const MOST_UNKNOWNS: usize = 400;
+const MOST_UNKNOWNS: usize = 1300;
 /// Rounds of the first iteration, whose shapes hardly change after that.
 const ROUNDS: usize = 24;
 /// Factors with a Skeel condition number (‖|R||R⁻¹|‖_F) above this are not used: products in their coordinates would lose too many digits.

@@ -30,7 +30,7 @@ from operator import mul
 import scene as scenes
 from frame_over_box import KeyBox, NumberBox, Part, TooLight, classes_of
 from moments_over_box import Moments, Span, is_everywhere_positive
-from pushes import PRODUCTS, PushBox, PushFrame, is_shape, without_pushes
+from pushes import PRODUCTS, PushBox, PushFrame, axes_of, is_shape, without_pushes
 from scene import Scene
 from timing import Timing
 
@@ -187,9 +187,10 @@ def check_box(document, box) -> str:
 
 
 def events(scene):
-    """When the samples of the first peer come into force at the second, which is later for none if a delay is shorter."""
+    """When the samples of each peer come into force at each other, which is later for none if a delay is shorter."""
     timing = Timing(scene)
-    return timing.held(0, 1) - timing.t0, [(tick - timing.t0, sent - timing.t0) for tick, sent in timing.in_force(0, 1)]
+    of = lambda *link: (timing.held(*link) - timing.t0, [(tick - timing.t0, sent - timing.t0) for tick, sent in timing.in_force(*link)])
+    return [of(*link) for link in scene.links]
 
 
 def ends_of_numbers(document):
@@ -301,9 +302,9 @@ def check_motion(document, motion) -> str:
     """The verdict on contacts along an axis that open and close."""
     if motion["verdict"] == "undecided":
         return "undecided"
-    if motion["verdict"] != "stable" or motion["axis"] != 0 or not 0 < motion["factor"] <= 1:
-        raise Refused("a verdict, or an axis, that is not covered")
-    root, pushes = without_pushes(tables_with(document["scene"], map(override, document["overrides"])))
+    if motion["verdict"] != "stable" or not 0 < motion["factor"] <= 1:
+        raise Refused("a verdict that is not covered")
+    root, pushes = without_pushes(tables_of(document), motion["axis"])
     scene = scenes.read(root, document["scene"])
     box = PushBox(scene, pushes)
     multipliers = doubles(motion["multipliers"])
@@ -338,10 +339,17 @@ def check_motion(document, motion) -> str:
     return "stable"
 
 
+def tables_of(document) -> dict:
+    return tables_with(document["scene"], map(override, document["overrides"]))
+
+
 def check_switching(document) -> str:
     if not document["motions"]:
         raise Refused("no motion")
     words = [checked(check_motion, document, motion, motion["motion"] or "the motion") for motion in document["motions"]]
+    proven = [motion["axis"] for motion in document["motions"] if motion["verdict"] == "stable"]
+    if len(proven) == len(words) and proven != axes_of(tables_of(document)):
+        raise Refused("an axis along which contacts push is missing, or stands there twice")
     return "contacts that open and close: " + ", ".join(words)
 
 

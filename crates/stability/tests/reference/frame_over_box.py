@@ -4,7 +4,7 @@ The numbers are gains, coefficients of step maps, or what they are multiplied by
 beginning of a frame, go through what happens in the frame: sample, deliver, forces, move.
 
 The averages of the classes of equal peers are one part of the motion; how the members of a class differ is another, one peer that hears its own samples
-times −1/(N−1). Only average-position and proportional-derivative coordination between equal clocks and over equal links without chance are covered.
+times −1/(N−1). Only average-position, extrapolated and proportional-derivative coordination between equal clocks and over links without chance are covered.
 """
 
 import math
@@ -23,7 +23,7 @@ class NotCovered(ValueError):
 
 
 class TooLight(NotCovered):
-    """A mass that is divided without end, or until a tick moves it by far: this program does not compute its step."""
+    """A mass that is divided without end and has no damping, or a body that a tick moves by too far: this program does not compute its step."""
 
 
 @dataclass
@@ -44,6 +44,9 @@ class Affine:
 
     def scaled(self, by):
         return Affine(self.mean * by, tuple(slope * by for slope in self.slopes))
+
+    def plus(self, other):
+        return Affine(self.mean + other.mean, tuple(map(sum, zip(self.slopes, other.slopes))))
 
 
 def between(low, high, place, count) -> Affine:
@@ -120,35 +123,56 @@ class Frame:
     radius: list
 
 
+# Steps of bodies with a larger norm are those of a half of the tick, twice.
+SMALL = 8
+
+
 def step(mass, damping, stiffness, span):
-    """Increments of one step of m·a = f − b·v − k·x with f held: e00, e01, e10, e11, g0, g1, exact but for 10⁻⁴⁰ of what they are at most."""
+    """Increments of one step of m·a = f − b·v − k·x with f held: e00, e01, e10, e11, g0, g1, exact but for 10⁻⁴⁰ of what they are at most; without a mass their limits."""
     h = Fraction(span, 10**9)
+    if mass == 0:
+        if stiffness or not damping:
+            raise TooLight("a mass without a limit")
+        return Fraction(0), Fraction(0), Fraction(0), Fraction(-1), h / damping, 1 / damping
     x = [[Fraction(0), h, Fraction(0)], [-stiffness / mass * h, -damping / mass * h, h], [Fraction(0)] * 3]
-    norm = max(sum(map(abs, row)) for row in x)
-    if norm > 60:
-        raise TooLight("a body that moves by far within a tick")
+    size = lambda matrix: max(sum(map(abs, row)) for row in matrix)
+    halvings = 0
+    while size(x) > SMALL:
+        x = [[entry / 2 for entry in row] for row in x]
+        halvings += 1
+    norm = size(x)
     grid = 2**400
     short = lambda number: Fraction(round(number * grid), grid)
     total, term, bound = [[Fraction(0)] * 3 for _ in range(3)], [[Fraction(i == j) for j in range(3)] for i in range(3)], Fraction(1)
     number = 0
-    while number < 2 * norm + 4 or bound > Fraction(1, 10**60):
+    while number < 2 * norm + 4 or bound > Fraction(1, 10**102):
         number += 1
         term = [[short(sum(term[i][k] * x[k][j] for k in range(3)) / number) for j in range(3)] for i in range(3)]
         total = [[a + b for a, b in zip(*rows)] for rows in zip(total, term)]
         bound = bound * norm / number
+    # What is left out of the series is at most twice the last bound; terms are rounded some hundred times at most, to 2⁻⁴⁰¹, and grow by e⁸.
+    error = Fraction(1, 10**100)
+    for _ in range(halvings):
+        # exp(2X) − 1 = 2E + E² of E = exp(X) − 1.
+        error = short((2 + 2 * size(total) + error) * error) + Fraction(4, grid)
+        total = [[short(2 * total[i][j] + sum(total[i][k] * total[k][j] for k in range(3))) for j in range(3)] for i in range(3)]
+    if error > Fraction(1, 10**40):
+        raise TooLight("a body that moves by far within a tick")
     # The last column is for a force of the mass times 1 m/s².
     return total[0][0], total[0][1], total[1][0], total[1][1], total[0][2] / mass, total[1][2] / mass
 
 
 def refuse(scene, may_lose=False):
     """Refuses what is not covered."""
-    if scene.lag is not None or scene.horizon is not None or scene.own_age is not None:
-        raise NotCovered("a law other than average-position and proportional-derivative")
+    if scene.lag is not None or scene.own_age is not None:
+        raise NotCovered("a law other than average-position, extrapolated and proportional-derivative")
     if len({(p.tick, p.offset, p.phase, p.compute_delay) for p in scene.peers}) > 1 or scene.peers[0].compute_delay:
         raise NotCovered("clocks that differ, or a compute delay")
     loses = lambda link: isinstance(link.loss, dict) or link.loss and not may_lose
-    if any(link != scene.links[0, 1] or loses(link) or link.uniform_sd for link in scene.links.values()):
-        raise NotCovered("links that differ, or chance")
+    if any(loses(link) or link.uniform_sd for link in scene.links.values()):
+        raise NotCovered("links with chance")
+    if may_lose and len(set(map(repr, scene.links.values()))) > 1:
+        raise NotCovered("links that differ, in the mean square")
 
 
 @dataclass(frozen=True)
@@ -318,8 +342,6 @@ class NumberBox:
         mass = Fraction(self.scene.mass)
         plants = numbers_of(self.scene, peer, mass, Fraction(1), Fraction(1))
         masses = [mass * mu if self.scene.split and not self.divides else mass for _, mu in ends]
-        if 0 in masses:
-            raise TooLight("a mass without a limit")
         return {
             "device": ((plants.device,) * 2, tuple(mu if self.divides else Fraction(1) for _, mu in ends)),
             "copy": (tuple((of_end, *plants.copy[1:]) for of_end in masses), (Fraction(1),) * 2),
@@ -371,16 +393,27 @@ class NumberBox:
         return self.low - self.others > 1 if grows else len(members) > 1
 
 
-def classes_of(corners) -> list:
-    """The places of equal peers, in the order of the first of each."""
+def classes_of(corners, apart=lambda name: None) -> list:
+    """The places of peers that are equal, for `apart` too, over equal links, in the order of the first of each."""
     classes = {}
     for place in range(len(corners[0].peers)):
         alike = tuple(replace(scene.peers[place], name="") for scene in corners)
         # Of a device that touches nothing the coupling does not count.
         if not alike[0].touches:
             alike = tuple(replace(peer, coupling=(0.0, 0.0), coupling_scaling=False) for peer in alike)
-        classes.setdefault(repr(alike), []).append(place)
-    return [tuple(members) for members in classes.values()]
+        classes.setdefault((repr(alike), apart(corners[0].peers[place].name)), []).append(place)
+    return split_by_links([tuple(members) for members in classes.values()], corners[0].links)
+
+
+def split_by_links(classes, links):
+    """Takes classes apart until from one to another, and within each, all links are equal."""
+    def is_even(senders, receivers):
+        return len({repr(links.get((i, j))) for i in senders for j in receivers if i != j}) < 2
+
+    while uneven := next(((i, j) for i in classes for j in classes if not is_even(i, j)), None):
+        kept = [members for members in classes if members not in uneven]
+        classes = sorted(kept + [(member,) for members in set(uneven) for member in members])
+    return classes
 
 
 class Part:
@@ -423,7 +456,9 @@ class Part:
         return i != j or len(self.members[i]) > 1
 
     def heard(self):
-        """Of each number of a sample, what it is of position and velocity; and of each class, by what each number is multiplied in what its law hears."""
+        """Of each number of a sample, what it is of position and velocity; and of each class, by what each number is multiplied in what its law hears, but for what the age of a sample adds."""
+        if self.combined and self.box.scene.horizon is not None:
+            raise NotCovered("one number of a sample where its age counts")
         kt, bt = ([self.box.gain(peer, name) for peer in self.first] for name in ("kt", "bt"))
         constant = self.constant
         if not self.combined:
@@ -474,7 +509,8 @@ class Part:
         held = {pair: number_of(pair[0], timing.held(*link)) for pair, link in links.items()}
         due = {pair: timing.in_force(*link) for pair, link in links.items()}
         senders = [[i for i in classes if (i, c) in links] for c in classes]
-        ticks = [self.tick(c, senders[c], heard_by[c]) for c in classes]
+        ages = [()] * len(self.members)
+        ticks = [self.tick(c, senders[c], heard_by[c], ages[c]) for c in classes]
         peer = self.first[0]
         for instant in range(timing.first_tick(peer, timing.t0), timing.t1, scene.peers[peer].tick):
             # Samples of this instant, of where everything is.
@@ -488,6 +524,10 @@ class Part:
                 for tick, sent in arrivals:
                     if tick == instant:
                         held[pair] = number_of(pair[0], sent)
+            if scene.horizon is not None:
+                older = [[min(instant - sent_first[i] - held[i, c] * scene.update, scene.horizon) for i in senders[c]] for c in classes]
+                ticks = [ticks[c] if older[c] == ages[c] else self.tick(c, senders[c], heard_by[c], older[c]) for c in classes]
+                ages = older
             # What each number is of where everything is, by name: copies and devices, and the samples held.
             seen = {(c, place): row for c in classes for place, row in enumerate(bodies[c])}
             moved = []
@@ -519,8 +559,11 @@ class Part:
             shifted.append(combination(difference(fresh[channel] if fresh else {own: self.constant(1)}, of_shift), {**seen, own: row}))
         return shifted
 
-    def tick(self, c, senders, heard_by):
-        """Where a class moves in a tick, copy and device: what each is of where they are and of the samples held, for velocities multiplied by the time of the part."""
+    def tick(self, c, senders, heard_by, ages):
+        """Where a class moves in a tick, copy and device: what each is of where they are and of the samples held, for velocities multiplied by the time of the part.
+
+        Where ages [ns] are given, samples have moved on by their velocity for so long.
+        """
         peer = self.first[c]
         kc, bc, kt, bt = (self.box.gain(peer, name) for name in ("kc", "bc", "kt", "bt"))
         of_velocity = lambda gain: scalar(gain.scaled(1 / self.time))
@@ -531,6 +574,8 @@ class Part:
         force = zero - (x.times(scalar(kt)) + v.times(of_velocity(bt)))
         for place, sender in enumerate(senders):
             for channel, by in enumerate(heard_by):
+                if channel == 1 and ages:
+                    by = by.plus(kt.scaled(Fraction(ages[place], 10**9) / self.time))
                 held = self.unit(size, bodies + place * len(heard_by) + channel)
                 force = force + held.times(self.box.weighed(by, self.weights[c][sender]))
         if not device:

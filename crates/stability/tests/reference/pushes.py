@@ -7,7 +7,7 @@ With the depth δ of a contact (of its device relative to the copy, in the direc
 and where an arm holds the device and another the object at rest, with no contact pressed there, p·(δ − p) and f·(δ − p). So V(after) < V(before) for a form V > 0 of states and p, if V(after) − V(before) plus
 these products with multipliers (of the first of any sign, of the others not below zero) is below zero for all states, forces and depths p whatever.
 
-Walls, objects of more than one axis and clocks or links that differ are not covered.
+Along another axis than that in which it pushes a device touches nothing. Walls, objects that turn and clocks that differ are not covered.
 """
 
 from frame_over_box import EPS, KeyBox, NotCovered, Part, Row, classes_of, scalar
@@ -18,39 +18,56 @@ from timing import Timing
 PRODUCTS = 7
 
 
-def without_pushes(root):
-    """The tables of a scene with contacts that grasp in the place of those that push, and in which direction each peer pushes."""
-    root = {name: table for name, table in root.items() if name not in ("timeline", "measure")}
-    common = dict(root.get("peer", {}))
-    contact = common.get("contact", "grasp")
-    entries = [dict(entry) for entry in root.get("peers", [])]
-    pushes = {}
+# The directions of pushes, by axes.
+DIRECTIONS = {f"{sign}{axis}": (place, 1 if sign == "+" else -1) for place, axis in enumerate("xyz") for sign in "+-"}
+
+
+def contacts_of(root):
+    """The contact of each peer, by name."""
+    if "enclosure" in root["object"] or "inertia" in root["object"]:
+        raise NotCovered("walls, or an object that turns: a certificate of contacts that push alone can be checked")
+    contact = root.get("peer", {}).get("contact", "grasp")
     names = [f"peer{number + 1}" for number in range(root["scene"].get("count", 0))]
-    for name, own in [(name, contact) for name in names] + [(entry["name"], entry.get("contact", contact)) for entry in entries]:
-        if isinstance(own, dict):
-            if own.keys() != {"push"} or own["push"] not in ("+x", "-x"):
-                raise NotCovered(f"a contact that is not covered: {own}")
-            pushes[name] = 1 if own["push"] == "+x" else -1
+    own = {entry["name"]: entry.get("contact", contact) for entry in root.get("peers", [])}
+    return {**dict.fromkeys(names, contact), **own}
+
+
+def direction(contact):
+    """Along which axis a contact pushes, and to which side; `None` if it does not push."""
+    if not isinstance(contact, dict):
+        return None
+    if contact.keys() != {"push"} or contact["push"] not in DIRECTIONS:
+        raise NotCovered(f"a contact that is not covered: {contact}")
+    return DIRECTIONS[contact["push"]]
+
+
+def axes_of(root):
+    """The axes along which contacts push."""
+    return sorted({of[0] for of in map(direction, contacts_of(root).values()) if of})
+
+
+def without_pushes(root, axis):
+    """The tables of a scene along an axis, with contacts that grasp in the place of those that push along it and none in that of others, and to which side each peer pushes."""
+    root = {name: table for name, table in root.items() if name not in ("timeline", "measure")}
+    root["scene"] = {key: value for key, value in root["scene"].items() if key != "axes"}
+    sides = {name: direction(contact) for name, contact in contacts_of(root).items()}
+    pushes = {name: of[1] for name, of in sides.items() if of and of[0] == axis}
+    along = lambda contact: contact if not isinstance(contact, dict) else "grasp" if direction(contact)[0] == axis else "none"
+    common = dict(root.get("peer", {}))
+    entries = [dict(entry) for entry in root.get("peers", [])]
     for table in (common, *entries):
-        if isinstance(table.get("contact"), dict):
-            table["contact"] = "grasp"
+        if "contact" in table:
+            table["contact"] = along(table["contact"])
     return {**root, "peer": common, "peers": entries} if entries else {**root, "peer": common}, pushes
-
-
-def classes_with_pushes(scene, pushes):
-    """Classes of equal peers that push alike."""
-    classes = {}
-    for number, members in enumerate(classes_of([scene])):
-        for place in members:
-            classes.setdefault((number, pushes.get(scene.peers[place].name)), []).append(place)
-    return sorted(map(tuple, classes.values()))
 
 
 class PushBox(KeyBox):
     """One scene, as a box without numbers."""
 
     def __init__(self, scene, pushes):
-        super().__init__([scene], classes_with_pushes(scene, pushes))
+        if scene.horizon is not None:
+            raise NotCovered("contacts and samples that are extrapolated")
+        super().__init__([scene], classes_of([scene], pushes.get))
 
 
 class PushFrame:

@@ -128,6 +128,12 @@ fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64
             stable: stable,
             unstable: unstable,
             undecided: undecided,
+            // Boxes without an area, of a single delay, which no share shows.
+            lines: document! {
+                stable: proof.region.lines(Guarantee::Stable),
+                unstable: proof.region.lines(Guarantee::Unstable),
+                undecided: proof.region.lines(Guarantee::Undecided),
+            },
             boxes: proof.region.boxes.len(),
             certificates: proof.region.attempts,
             // Whether the proof was ended before it had looked at all boxes.
@@ -175,6 +181,13 @@ fn describe(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f
             "  {name}proven stable {stable} of the area, proven unstable {unstable}, undecided {undecided} ({})",
             Counted(proof.region.boxes.len(), "piece")
         );
+        let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| proof.region.lines(guarantee));
+        if stable + unstable + undecided > 0 {
+            let _ = writeln!(
+                text,
+                "    and without an area, lines at a single delay: {stable} proven stable, {unstable} proven unstable, {undecided} undecided"
+            );
+        }
         if number > 0 {
             let first = &proofs[0];
             let here = percent(both(&proof.region, Guarantee::Stable, &first.region, Guarantee::Unstable));

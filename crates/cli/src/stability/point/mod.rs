@@ -34,6 +34,10 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     if arguments.certificate.is_some() && (arguments.every_number.is_some() == arguments.switching) {
         return Err(Failure::Input("--certificate is of one proof: expected --every-number or --switching".to_owned()));
     }
+    // What they refuse is refused before a second moment is followed.
+    let every = every_number::of(&scene, arguments, path)?;
+    let switching = switching::of(&scene, arguments, path)?;
+    let worst = worst::of(&scene, arguments, path)?;
     let mut judgement = match &arguments.graph {
         Some(graph) => on_graph(&scene, graph, path)?,
         None => {
@@ -47,9 +51,6 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
             judged.map_err(|error| if error == AnalysisError::Stopped { ended() } else { not_analysed(path, &error) })?
         }
     };
-    let worst = worst::of(&scene, arguments, path)?;
-    let every = every_number::of(&scene, arguments, path)?;
-    let switching = switching::of(&scene, arguments, path)?;
     if switching.is_some() {
         // The answer itself covers it.
         judgement.analysis.notes.iter_mut().for_each(|note| *note = note.replace(CHANGES_LEFT_OUT, "changing between them is judged apart, below"));

@@ -42,6 +42,8 @@ pub(super) fn document(worst: &SceneWorstCase) -> impl Serialize {
         verdict: worst.verdict().word(),
         lower: worst.lower,
         upper: worst.upper,
+        // Whether the bounds are more than 1 % apart.
+        open: worst.is_open(),
         // The rate that quadratic certificates prove.
         certificate: worst.certificate,
         links: match worst.links {

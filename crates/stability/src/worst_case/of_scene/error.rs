@@ -16,7 +16,9 @@ pub enum SceneWorstCaseError {
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
     /// The law of the scene uses position and velocity of a sample by themselves, as one that extrapolates does.
-    #[error("the worst case does not follow {strategy} coordination, which uses the ages of samples: expected another strategy")]
+    #[error(
+        "the worst case does not follow {strategy} coordination, which uses the ages of samples: ask `cohaptic stability point` without bounds, which follows random loss in the mean square"
+    )]
     Ages {
         /// Its name.
         strategy: &'static str,

@@ -169,6 +169,9 @@ pub struct WorstPart {
     pub rounding: f64,
 }
 
+/// Bounds that are no farther apart than by this factor count as one number.
+const CLOSE: f64 = 1.01;
+
 impl SceneWorstCase {
     /// What the bounds say.
     #[must_use]
@@ -180,6 +183,12 @@ impl SceneWorstCase {
         } else {
             WorstVerdict::Undecided
         }
+    }
+
+    /// Whether the bounds are more than 1 % apart: then they leave open how fast the worst case grows.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.upper > CLOSE * self.lower
     }
 
     /// The part with the largest lower bound.
@@ -212,8 +221,8 @@ pub fn worst_case(scene: &Scene, patterns: &Patterns, effort: &Effort) -> Result
 ///
 /// As for [`worst_case`], and [`AnalysisError::Stopped`] if the watch ends it.
 pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, watch: &dyn Watch) -> Result<SceneWorstCase, SceneWorstCaseError> {
-    let network = patterns.network(scene)?;
     let pieces = pieces(scene, "the worst case")?;
+    let network = patterns.network(scene)?;
     let mut combines = false;
     let is_open = AtomicBool::new(false);
     let found: Vec<Vec<WorstPart>> = pairs(&pieces, &mut combines)?

@@ -272,6 +272,20 @@ fn a_loss_can_destabilise_a_scene_that_is_stable_in_the_mean_square() {
     assert_eq!(found.worst().sequence, "3 times received, 4 times lost, and again");
 }
 
+/// Peers and links that differ make parts of two dozen states, whose bounds meet soon too.
+#[test]
+fn bounds_of_shipped_scenes_of_many_states_meet() {
+    for (text, most) in [
+        (include_str!("../../../../../scenarios/network/phases.toml"), 10_000),
+        (include_str!("../../../../../scenarios/counterexamples/stability-tests.toml"), 10_000),
+        (include_str!("../../../../../scenarios/network/shared-access-line.toml"), 1_000),
+    ] {
+        let scene = Scene::parse(text, "shipped.toml".as_ref(), &[]).unwrap();
+        let found = worst_case(&scene, &patterns(1, None, Links::Together), &Effort::default()).unwrap();
+        assert!(!found.is_open() && found.upper < 1.002 * found.lower && found.products() < most, "{} {found:?}", scene.title);
+    }
+}
+
 /// The paper's stiffest setting is unstable at 24 ms if every sample arrives, and stable if every second or only every third one does: what is not heard
 /// cannot be answered too late. That helps against no pattern that may also lose nothing.
 #[test]
