@@ -131,16 +131,19 @@ impl<E: Event> EventQueue<E> {
         self.push_calendar(event);
     }
 
-    /// Adds the event of that key that is made. It is made where it is stored: one that is handed on is written in parts and read as a whole, for which a processor
-    /// waits.
+    /// Adds the event of that instant and that key that is made. It is made where it is stored: one that is handed on is written in parts and read as a whole, for which
+    /// a processor waits.
     #[inline(always)]
-    pub(crate) fn push_made(&mut self, key: &E::Key, make: impl FnOnce() -> E) {
-        if self.in_order && self.ordered.back().is_none_or(|last| last.key() <= *key) {
-            self.len += 1;
-            self.ordered.push(make);
-        } else {
-            self.push(make());
+    pub(crate) fn push_made(&mut self, at: Instant, key: &E::Key, make: impl FnOnce() -> E) {
+        self.len += 1;
+        if self.in_order {
+            if self.ordered.back().is_none_or(|last| last.key() <= *key) {
+                return self.ordered.push(make);
+            }
+            self.become_calendar();
         }
+        let place = self.slab.store(make);
+        self.push_entry((at, place));
     }
 
     /// Takes the first event if it is not later than `now`.
@@ -167,7 +170,13 @@ impl<E: Event> EventQueue<E> {
     #[inline(always)]
     pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(&mut E) -> T) -> Option<T> {
         if !self.in_order {
-            return self.pop_due(now).map(|mut event| take(&mut event));
+            if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
+                return None;
+            }
+            let (_, place) = self.front.pop_front()?;
+            self.len -= 1;
+            self.in_order = self.len == 0;
+            return self.slab.free(place, take);
         }
         let first = self.ordered.front_mut().filter(|first| first.at() <= now)?;
         let taken = take(first);
@@ -215,7 +224,7 @@ impl<E: Event> EventQueue<E> {
     #[inline]
     fn push_calendar(&mut self, event: E) {
         let at = event.at();
-        let place = self.slab.store(event);
+        let place = self.slab.store(|| event);
         self.push_entry((at, place));
     }
 
@@ -409,15 +418,33 @@ struct Slab<E> {
 }
 
 impl<E: Event> Slab<E> {
-    #[inline]
-    fn store(&mut self, event: E) -> u32 {
-        if let Some(place) = self.free.pop() {
-            self.places[place as usize] = Some(event);
-            return place;
+    #[inline(always)]
+    fn store(&mut self, make: impl FnOnce() -> E) -> u32 {
+        let place = self.free.pop().unwrap_or_else(|| self.grow());
+        let stored = &mut self.places[place as usize];
+        // It always is: where it is known, nothing is dropped there, and the event is not made elsewhere first.
+        if stored.is_none() {
+            *stored = Some(make());
         }
-        let place = u32::try_from(self.places.len()).expect("fewer than 2^32 events, 200 GB of them, are pending");
-        self.places.push(Some(event));
         place
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn grow(&mut self) -> u32 {
+        let place = u32::try_from(self.places.len()).expect("fewer than 2^32 events, 200 GB of them, are pending");
+        self.places.push(None);
+        place
+    }
+
+    /// Shows an event where it lies, and drops it there.
+    #[inline(always)]
+    fn free<T>(&mut self, place: u32, take: impl FnOnce(&mut E) -> T) -> Option<T> {
+        self.free.push(place);
+        let stored = &mut self.places[place as usize];
+        let taken = stored.as_mut().map(take);
+        *stored = None;
+        taken
     }
 
     #[inline]

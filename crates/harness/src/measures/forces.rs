@@ -6,6 +6,7 @@ use cohaptic_scene::Measure;
 
 use super::{Accumulator, Asked, Rows, mean_square_root};
 use crate::TickRow;
+use crate::arrays::larger;
 
 /// F_T on the copies.
 #[derive(Clone, Debug)]
@@ -37,12 +38,12 @@ impl Force {
         // The first tick of a peer is no jump.
         let known = latest.is_some();
         let latest = latest.get_or_insert_default();
+        self.count += force.len() as u64;
         for (component, latest) in force.iter().zip(latest) {
-            self.peak = self.peak.max(component.abs());
+            self.peak = larger(component.abs(), self.peak);
             self.squares += component * component;
-            self.count += 1;
             if known {
-                self.jump = self.jump.max((component - *latest).abs());
+                self.jump = larger((component - *latest).abs(), self.jump);
             }
             *latest = *component;
         }

@@ -57,18 +57,32 @@ impl<const A: usize, D: Device<A>> Device<A> for DeviceModel<A, D> {
 
 impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
     /// Moves to the next tick, with `commanded` the held part of the coordination force that was computed at this one.
+    #[inline]
     pub(super) fn advance_watched(
         &mut self,
         now: Instant,
         span: Duration,
         commanded: [f64; A],
-        (place, axes): (usize, usize),
+        row: (usize, usize),
         observer: &mut AnyObserver<'_>,
     ) -> Result<(), Ended> {
-        let late = std::mem::replace(&mut self.commanded, commanded);
-        let coordination = if self.peer.compute_delay() { late } else { commanded };
-        let before = self.moved_by_coordination();
-        let acting = *self.peer.applied();
+        if self.peer.rotation().is_some() {
+            self.advance_turning(now, span, commanded, row, observer)
+        } else {
+            self.advance_as(now, span, commanded, row, observer, None)
+        }
+    }
+
+    /// [`Member::advance_watched`] of a peer that turns: where no peer does, what it copies was a twentieth of the time of all measures.
+    #[inline(never)]
+    fn advance_turning(
+        &mut self,
+        now: Instant,
+        span: Duration,
+        commanded: [f64; A],
+        row: (usize, usize),
+        observer: &mut AnyObserver<'_>,
+    ) -> Result<(), Ended> {
         let turn = self.peer.rotation().map(|rotation| TurnStepRow {
             span,
             before: rotation.copy().rate,
@@ -78,6 +92,24 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
             coordination_torque: rotation.applied().coordination,
             own_damping: rotation.own_damping(),
         });
+        self.advance_as(now, span, commanded, row, observer, turn)
+    }
+
+    /// Moves to the next tick and shows the step, whose turn has no end yet.
+    #[inline(always)]
+    fn advance_as(
+        &mut self,
+        now: Instant,
+        span: Duration,
+        commanded: [f64; A],
+        (place, axes): (usize, usize),
+        observer: &mut AnyObserver<'_>,
+        turn: Option<TurnStepRow>,
+    ) -> Result<(), Ended> {
+        let late = std::mem::replace(&mut self.commanded, commanded);
+        let coordination = if self.peer.compute_delay() { late } else { commanded };
+        let before = self.moved_by_coordination();
+        let acting = *self.peer.applied();
         self.peer.advance(now, span);
         let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });
         let after = self.moved_by_coordination();

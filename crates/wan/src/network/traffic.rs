@@ -40,7 +40,7 @@ impl<P> Traffic<P> {
         }
         let turn = Turn::arrival(line);
         let key = (at, turn, sequence, path, size.copy());
-        self.pending.push_made(&key, || Pending { at, sequence, offered, entered, turn, path, size, payload: Some(payload) });
+        self.pending.push_made(at, &key, || Pending { at, sequence, offered, entered, turn, path, size, payload: Some(payload) });
     }
 
     /// The line's engine must be woken.
