@@ -32,7 +32,7 @@ struct Extremes {
 impl Extremes {
     const NONE: Self = Self { low: [f64::INFINITY; WIDTH], high: [f64::NEG_INFINITY; WIDTH] };
 
-    /// Takes in a value of one curve, if it is finite: comparisons with what is not a number fail.
+    /// Takes in a value of one curve, if it is finite: a comparison with NaN fails.
     #[inline(always)]
     fn take_in(&mut self, lane: usize, value: f64) {
         let value = if value.abs() <= f64::MAX { value } else { f64::NAN };

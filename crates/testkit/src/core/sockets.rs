@@ -79,7 +79,7 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
-    /// Takes a datagram out of its parcel into the buffer, which holds that many bytes.
+    /// Takes a datagram out of its parcel into the buffer, which holds this number of bytes.
     #[inline(always)]
     pub(super) fn keep(&mut self, at: Instant, parcel: &mut Parcel, marked: bool, room: usize, woken: &mut Woken) -> Result<(), Lost> {
         let held = self.held + parcel.bytes.len();

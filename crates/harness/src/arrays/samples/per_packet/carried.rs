@@ -1,4 +1,4 @@
-//! Samples over lines that many packets share, or that know the fate of a packet only when it arrives: a network carries them, as in a run with events.
+//! Samples over lines that packets of several peers share, or that know the fate of a packet only when it arrives: a network carries them, as in a run with events.
 
 use cohaptic_peer::State;
 use cohaptic_scene::Scene;
