@@ -207,7 +207,10 @@ pub(super) const DOCUMENTS: [Document; 23] = [
                 "each combination of contacts, in words (empty: as they are)",
             ),
             ("worst_case.verdict", "if asked for: `stable`, `undecided` or `unstable`"),
-            ("worst_case.lower, worst_case.upper, worst_case.open, worst_case.certificate", "bounds of the growth in `worst_case.step_s`, and whether over 1 % apart"),
+            (
+                "worst_case.lower, worst_case.upper, worst_case.open, worst_case.certificate",
+                "bounds of the growth in `worst_case.step_s`, and whether over 1 % apart",
+            ),
             ("worst_case.links, worst_case.step_s, worst_case.dimension, worst_case.products, worst_case.notes", "what was searched, and how far"),
             ("worst_case.sequence, worst_case.period", "the pattern that grows as the lower bound"),
             ("switching.verdict, switching.notes", "if asked for: `stable`, `unstable` or `undecided`, and what it takes for granted"),
