@@ -67,8 +67,8 @@ impl Bands {
         }
     }
 
-    /// Adds to each curve where the copy of a peer is along an axis, in the order of the peers, as [`Bands::add`] does. Eight at a time, this takes a fifth of the
-    /// instructions of one by one.
+    /// Adds to each curve where the copy of a peer is along an axis, in the order of the peers, as [`Bands::add`] does. Eight at a time, this takes half of the
+    /// instructions of one by one for ten peers, a third for fifty.
     ///
     /// # Panics
     ///

@@ -11,6 +11,7 @@ use parquet::file::properties::ReaderProperties;
 use parquet::file::reader::RowGroupReader;
 use parquet::file::serialized_reader::SerializedRowGroupReader;
 use parquet::file::statistics::Statistics;
+use parquet::schema::types::SchemaDescriptor;
 
 use super::index::IndexReader;
 use crate::table::format::{COMPLETE, GIST, Gist, Gists, RunColumns, TableError};
@@ -33,14 +34,17 @@ fn only_text(column: &ColumnChunkMetaData) -> Option<&[u8]> {
     (is_exact && least == greatest).then_some(least)
 }
 
+/// The place of a column.
+fn place_of(schema: &SchemaDescriptor, name: &str) -> Result<usize, TableError> {
+    let found = schema.columns().iter().position(|column| column.name() == name);
+    found.ok_or_else(|| TableError::Content(format!("no column {name}")))
+}
+
 pub(in crate::table) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> {
     let file = Arc::new(file);
     let mut index = IndexReader::open(&file)?;
     let described = index.schema().clone();
-    let place = |name: &str| {
-        let found = described.columns().iter().position(|column| column.name() == name);
-        found.ok_or_else(|| TableError::Content(format!("no column {name}")))
-    };
+    let place = |name: &str| place_of(&described, name);
     let (ending, discrepancy) = (place(GIST[0])?, place(GIST[1])?);
     while let Some(group) = index.next_group()? {
         let group = row_group(&file, &group)?;
@@ -68,10 +72,7 @@ pub(in crate::table) fn read_columns(file: File, names: &[&str]) -> Result<RunCo
     let file = Arc::new(file);
     let mut index = IndexReader::open(&file)?;
     let described = index.schema().clone();
-    let place = |name: &str| {
-        let found = described.columns().iter().position(|column| column.name() == name);
-        found.ok_or_else(|| TableError::Content(format!("no column {name}")))
-    };
+    let place = |name: &str| place_of(&described, name);
     let ending = place(GIST[0])?;
     let places = names.iter().map(|name| place(name)).collect::<Result<Vec<usize>, TableError>>()?;
     let mut read = RunColumns::of(names.len());
