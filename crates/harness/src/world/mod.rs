@@ -335,7 +335,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     /// What has arrived undamaged, with nothing else to happen before it, where nobody looks at packets. It took a tenth of the instructions of ten peers off.
     #[inline(always)]
     fn deliver_mere_arrivals(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
-        let arrived = |MereArrival { path, offered, payload, .. }: MereArrival<'_, Handle>| (path, offered, *payload);
+        let arrived = |MereArrival { path, offered, payload, .. }: MereArrival<Handle>| (path, offered, payload);
         while let Some((path, offered, payload)) = self.network.take_mere_arrival(arrived) {
             let to = path.to.index();
             let (receiver, sample) = (&mut self.members[to], self.datagrams.sample(payload));

@@ -4,10 +4,13 @@ use std::ops::Deref;
 
 use bytes::Bytes;
 
+use super::Parcel;
+use super::ends::Ends;
+
 /// What a packet carries.
 #[derive(Clone, Debug)]
 pub(crate) enum Octets {
-    /// Of a datagram that a socket sent: the memory goes back to [`Spare`] when it was read. It saves an allocation a datagram.
+    /// Of a datagram that a socket sent: the memory goes back to [`Spare`] when it was read.
     Own(Vec<u8>),
     /// Of anything else.
     Shared(Bytes),
@@ -55,58 +58,103 @@ impl From<Octets> for Vec<u8> {
     }
 }
 
-/// Memory of datagrams that were read.
+impl Octets {
+    /// Makes them a copy of others, in their own memory if they have some.
+    #[inline]
+    fn refill(&mut self, bytes: &[u8]) {
+        match self {
+            Self::Own(octets) => {
+                octets.clear();
+                octets.extend_from_slice(bytes);
+            }
+            Self::Shared(_) => *self = Self::Own(bytes.to_vec()),
+        }
+    }
+}
+
+/// Parcels that were read, with their memory. A parcel stays in its box from the socket that sends through the link and the buffer of the other socket to the program that
+/// reads: what carries it moves one word, where it moved seven, six times.
 #[derive(Debug, Default)]
-pub(super) struct Spare(Vec<Vec<u8>>);
+#[expect(clippy::vec_box, reason = "a box goes on its way and comes back: a parcel is never moved out of it")]
+pub(super) struct Spare(Vec<Box<Parcel>>);
 
 impl Spare {
     /// The largest number that is kept, and the longest \[bytes\]: a megabyte at most.
     const MOST: usize = 512;
     const LONGEST: usize = 2048;
 
-    /// A copy of what a program sends.
+    /// A parcel with a copy of what a program sends.
     #[inline]
-    pub(super) fn copy(&mut self, bytes: &[u8]) -> Octets {
-        let mut octets = self.0.pop().unwrap_or_default();
-        octets.clear();
-        octets.extend_from_slice(bytes);
-        Octets::Own(octets)
+    pub(super) fn copied(&mut self, addresses: Ends, bytes: &[u8], ecn_capable: bool) -> Box<Parcel> {
+        let Some(mut parcel) = self.0.pop() else { return boxed(addresses, Octets::Own(bytes.to_vec()), ecn_capable) };
+        (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);
+        parcel.bytes.refill(bytes);
+        parcel
+    }
+
+    /// A parcel of anything else.
+    #[cfg(feature = "tcp")]
+    pub(super) fn wrapped(&mut self, addresses: Ends, bytes: Bytes, ecn_capable: bool) -> Box<Parcel> {
+        let Some(mut parcel) = self.0.pop() else { return boxed(addresses, bytes.into(), ecn_capable) };
+        *parcel = Parcel { addresses, bytes: bytes.into(), ecn_capable };
+        parcel
     }
 
     /// What was read.
     #[inline]
-    pub(super) fn put(&mut self, octets: Octets) {
-        if let Octets::Own(octets) = octets
-            && octets.capacity() <= Self::LONGEST
-            && self.0.len() < Self::MOST
-        {
-            self.0.push(octets);
+    pub(super) fn put(&mut self, mut parcel: Box<Parcel>) {
+        if self.0.len() >= Self::MOST {
+            return;
         }
+        if !matches!(&parcel.bytes, Octets::Own(octets) if octets.capacity() <= Self::LONGEST) {
+            parcel.bytes = Octets::default();
+        }
+        self.0.push(parcel);
     }
+}
+
+#[cold]
+fn boxed(addresses: Ends, bytes: Octets, ecn_capable: bool) -> Box<Parcel> {
+    Box::new(Parcel { addresses, bytes, ecn_capable })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::ends::Kind;
     use super::*;
+
+    fn ends() -> Ends {
+        Ends::new("10.0.0.1:1".parse().unwrap(), "10.0.0.2:2".parse().unwrap(), Kind::Datagram)
+    }
+
+    fn parcel_of(bytes: Octets) -> Box<Parcel> {
+        boxed(ends(), bytes, false)
+    }
 
     #[test]
     fn memory_that_was_read_is_used_again() {
         let mut spare = Spare::default();
-        let octets = spare.copy(b"longer than the next one");
-        let place = octets.as_ptr();
-        spare.put(octets);
-        let next = spare.copy(b"next");
-        assert_eq!((&*next, next.as_ptr()), (&b"next"[..], place));
-        spare.put(Octets::Shared(Bytes::from_static(b"not ours")));
-        spare.put(spare_of(Spare::LONGEST + 1));
-        assert!(spare.0.is_empty());
-        for _ in 0..2 * Spare::MOST {
-            spare.put(spare_of(1));
-        }
-        assert_eq!(spare.0.len(), Spare::MOST);
+        let parcel = spare.copied(ends(), b"longer than the next one", true);
+        let places = (std::ptr::from_ref(&*parcel), parcel.bytes.as_ptr());
+        spare.put(parcel);
+        let next = spare.copied(ends().back(Kind::Datagram), b"next", false);
+        assert_eq!((&*next.bytes, next.ecn_capable, next.addresses.to()), (&b"next"[..], false, ends().from()));
+        assert_eq!((std::ptr::from_ref(&*next), next.bytes.as_ptr()), places);
     }
 
-    fn spare_of(capacity: usize) -> Octets {
-        Octets::Own(Vec::with_capacity(capacity))
+    #[test]
+    fn no_more_than_a_megabyte_is_kept() {
+        let mut spare = Spare::default();
+        for bytes in [Octets::Shared(Bytes::from_static(b"not ours")), Octets::Own(Vec::with_capacity(Spare::LONGEST + 1))] {
+            spare.put(parcel_of(bytes));
+            let Some(Octets::Own(kept)) = spare.0.first().map(|parcel| &parcel.bytes) else { panic!("the box is kept") };
+            assert_eq!(kept.capacity(), 0);
+            let filled = spare.copied(ends(), b"ours", false);
+            assert_eq!(&*filled.bytes, b"ours");
+        }
+        for _ in 0..2 * Spare::MOST {
+            spare.put(parcel_of(Octets::Own(Vec::with_capacity(1))));
+        }
+        assert_eq!(spare.0.len(), Spare::MOST);
     }
 }

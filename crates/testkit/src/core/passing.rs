@@ -3,7 +3,6 @@
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4};
 
-use bytes::Bytes;
 use cohaptic_wan::{NodeId, Path};
 
 use super::sockets::SocketState;
@@ -34,7 +33,7 @@ impl Core {
     pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
         self.note_call();
         let Some((path, addresses)) = self.plainly(id, &outgoing) else { return self.send_any(id, outgoing) };
-        let parcel = Parcel { addresses, bytes: self.spare.copy(outgoing.bytes), ecn_capable: outgoing.ecn_capable };
+        let parcel = self.spare.copied(addresses, outgoing.bytes, outgoing.ecn_capable);
         self.offer(path, parcel);
         Ok(())
     }
@@ -86,7 +85,7 @@ impl Core {
         }
         let from = SocketAddr::new(self.source(host, local.ip(), to.ip())?, local.port());
         let addresses = Ends::new(from, to, Kind::Datagram);
-        let parcel = Parcel { addresses, bytes: self.spare.copy(outgoing.bytes), ecn_capable: outgoing.ecn_capable };
+        let parcel = self.spare.copied(addresses, outgoing.bytes, outgoing.ecn_capable);
         if to.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
             if !may_broadcast {
                 return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
@@ -127,8 +126,8 @@ impl Core {
 
     /// Hands a packet to its link.
     #[inline(always)]
-    pub(super) fn offer(&mut self, path: Path, parcel: Parcel) {
-        if self.wire.offer(path, parcel).is_ok() && self.wire.may_have_arrivals() {
+    pub(super) fn offer(&mut self, path: Path, parcel: Box<Parcel>) {
+        if self.wire.offer(path, parcel) == Ok(true) {
             self.take_arrivals();
         }
     }
@@ -169,7 +168,7 @@ impl Core {
     /// Takes the next packet that has come out of its link, if nobody asks for more than its arrival: into the buffer of its socket, if it is a datagram with which nothing
     /// is special, and else into `other`. One that is lost in a cut is gone. Says whether there was one.
     #[inline(always)]
-    fn take_plain(&mut self, other: &mut Option<(Path, cohaptic_units::Instant, Parcel)>) -> bool {
+    fn take_plain(&mut self, other: &mut Option<(Path, cohaptic_units::Instant, Box<Parcel>)>) -> bool {
         let Self { wire, hosts, plan, sockets, settings, woken, .. } = self;
         let taken = wire.take_plain(|path, at, is_cut, parcel| {
             if is_cut {
@@ -178,7 +177,7 @@ impl Core {
             let host = &hosts[path.to.index()];
             let id = if host.is_down { None } else { host.plain_socket_for(plan.of(path.to).v4, &parcel.addresses) };
             let Some(id) = id.filter(|_| parcel.addresses.kind == Kind::Datagram) else {
-                *other = Some((path, at, parcel.take()));
+                *other = Some((path, at, parcel));
                 return;
             };
             // Nobody is told that a buffer was full.
@@ -189,7 +188,7 @@ impl Core {
 
     /// A packet arrives, of whose end nobody is told.
     #[inline(never)]
-    fn arrive_untold(&mut self, path: Path, at: cohaptic_units::Instant, parcel: Parcel) {
+    fn arrive_untold(&mut self, path: Path, at: cohaptic_units::Instant, parcel: Box<Parcel>) {
         let _ = self.arrive(path.to, at, parcel, false, path.from);
     }
 
@@ -204,16 +203,18 @@ impl Core {
     }
 
     /// Hands a packet that does not leave its host to its socket.
-    pub(super) fn hand_over(&mut self, host: NodeId, parcel: Parcel) {
+    pub(super) fn hand_over(&mut self, host: NodeId, parcel: Box<Parcel>) {
         // Loopback tells of no end: it is not the network.
         let _ = self.arrive(host, self.now(), parcel, false, host);
     }
 
     #[inline(always)]
-    fn arrive(&mut self, host: NodeId, at: cohaptic_units::Instant, parcel: Parcel, marked: bool, from: NodeId) -> Result<(), Lost> {
+    fn arrive(&mut self, host: NodeId, at: cohaptic_units::Instant, mut parcel: Box<Parcel>, marked: bool, from: NodeId) -> Result<(), Lost> {
         #[cfg(feature = "tcp")]
         if parcel.addresses.kind == Kind::Segment {
-            return self.arrive_segment(host, &parcel.bytes.into(), marked);
+            let bytes = std::mem::take(&mut parcel.bytes);
+            self.spare.put(parcel);
+            return self.arrive_segment(host, &bytes.into(), marked);
         }
         if self.hosts[host.index()].is_down {
             return Err(Lost::HostDown);
@@ -225,7 +226,7 @@ impl Core {
     }
 
     #[inline(never)]
-    fn arrive_anywhere(&mut self, host: NodeId, at: cohaptic_units::Instant, parcel: Parcel, marked: bool, from: NodeId) -> Result<(), Lost> {
+    fn arrive_anywhere(&mut self, host: NodeId, at: cohaptic_units::Instant, parcel: Box<Parcel>, marked: bool, from: NodeId) -> Result<(), Lost> {
         let (from_address, to_address) = (parcel.addresses.from(), parcel.addresses.to());
         let ip = to_address.ip();
         let is_for_all = ip == IpAddr::V4(Ipv4Addr::BROADCAST);
@@ -244,7 +245,7 @@ impl Core {
 
     /// Hands a packet to its socket.
     #[inline(always)]
-    fn arrive_at(&mut self, id: SocketId, at: cohaptic_units::Instant, mut parcel: Parcel, marked: bool) -> Result<(), Lost> {
+    fn arrive_at(&mut self, id: SocketId, at: cohaptic_units::Instant, parcel: Box<Parcel>, marked: bool) -> Result<(), Lost> {
         let socket = self.sockets.get_mut(id);
         match parcel.addresses.kind {
             #[cfg(feature = "tcp")]
@@ -256,7 +257,7 @@ impl Core {
                     socket.wake_readers(&mut self.woken);
                 }
             }
-            Kind::Datagram => return socket.keep(at, &mut parcel, marked, self.settings.receive_buffer, &mut self.woken),
+            Kind::Datagram => return socket.keep(at, parcel, marked, self.settings.receive_buffer, &mut self.woken),
         }
         Ok(())
     }
@@ -293,7 +294,7 @@ impl Core {
         // As long as that of ICMP (RFC 792): its header, and the header and the first eight bytes of what could not be delivered. The addresses say all that is
         // needed here.
         let addresses = parcel.addresses.back(Kind::Unreachable);
-        let answer = Parcel { addresses, bytes: Bytes::from_static(&[0; 36]).into(), ecn_capable: false };
+        let answer = self.spare.copied(addresses, &[0; 36], false);
         if host == sender { self.hand_over(host, answer) } else { self.offer(Path { from: host, to: sender }, answer) }
     }
 }

@@ -7,8 +7,6 @@ use std::task::Waker;
 use cohaptic_units::Instant;
 use cohaptic_wan::{NodeId, Ring};
 
-use super::ends::Ends;
-use super::octets::Octets;
 use super::waking::{Waiters, Woken};
 use super::{Core, Parcel};
 use crate::trace::Lost;
@@ -21,28 +19,31 @@ pub(crate) struct SocketId(usize);
 #[derive(Clone, Debug)]
 #[cfg_attr(not(feature = "quinn"), allow(dead_code, reason = "the adapters of protocols ask for congestion"))]
 pub(crate) struct Datagram {
-    pub(super) ends: Ends,
-    pub(crate) bytes: Octets,
+    parcel: Box<Parcel>,
     /// When it arrived.
     pub(crate) at: Instant,
-    /// Whether its sender understands marks.
-    pub(super) ecn_capable: bool,
     /// Whether an active queue marked it.
-    pub(super) marked: bool,
+    marked: bool,
 }
 
 impl Datagram {
     #[inline]
     pub(crate) fn from(&self) -> SocketAddr {
-        self.ends.from()
+        self.parcel.addresses.from()
     }
 
     /// Copies what fits into a buffer; gives the length.
     #[inline]
     pub(crate) fn copy_to(&self, buffer: &mut [u8]) -> usize {
-        let len = self.bytes.len().min(buffer.len());
-        buffer[..len].copy_from_slice(&self.bytes[..len]);
+        let bytes = self.bytes();
+        let len = bytes.len().min(buffer.len());
+        buffer[..len].copy_from_slice(&bytes[..len]);
         len
+    }
+
+    #[inline]
+    pub(crate) fn bytes(&self) -> &[u8] {
+        &self.parcel.bytes
     }
 }
 
@@ -51,11 +52,11 @@ impl Datagram {
 impl Datagram {
     /// The address to which it was sent.
     pub(crate) fn to(&self) -> IpAddr {
-        self.ends.to().ip()
+        self.parcel.addresses.to().ip()
     }
 
-    pub(crate) const fn ecn_capable(&self) -> bool {
-        self.ecn_capable
+    pub(crate) fn ecn_capable(&self) -> bool {
+        self.parcel.ecn_capable
     }
 
     pub(crate) const fn marked(&self) -> bool {
@@ -79,18 +80,15 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
-    /// Takes a datagram out of its parcel into the buffer, which holds this number of bytes.
+    /// Takes a datagram into the buffer, which holds this number of bytes.
     #[inline(always)]
-    pub(super) fn keep(&mut self, at: Instant, parcel: &mut Parcel, marked: bool, room: usize, woken: &mut Woken) -> Result<(), Lost> {
+    pub(super) fn keep(&mut self, at: Instant, parcel: Box<Parcel>, marked: bool, room: usize, woken: &mut Woken) -> Result<(), Lost> {
         let held = self.held + parcel.bytes.len();
         if held > room {
             return Err(Lost::BufferFull);
         }
         self.held = held;
-        self.inbox.push(|| {
-            let Parcel { addresses: ends, bytes, ecn_capable } = parcel.take();
-            Datagram { ends, bytes, at, ecn_capable, marked }
-        });
+        self.inbox.push(|| Datagram { parcel, at, marked });
         self.wake_readers(woken);
         Ok(())
     }
@@ -265,20 +263,18 @@ impl Core {
         &mut self.sockets.get_mut(id).may_broadcast
     }
 
-    /// Looks at the next datagram, which is taken out unless it is only peeked at; `None` if there is none. It is looked at where it lies: to move it out took as long as
-    /// all else.
+    /// Looks at the next datagram, which is taken out unless it is only peeked at; `None` if there is none.
     #[inline]
     pub(crate) fn receive<T>(&mut self, id: SocketId, peek: bool, look: impl FnOnce(&Datagram) -> T) -> io::Result<Option<T>> {
         let socket = self.sockets.get_mut(id);
         if socket.died.is_some() || socket.refused {
             return Err(self.error_of(id));
         }
-        let Some(datagram) = socket.inbox.front_mut() else { return Ok(None) };
+        let Some(datagram) = socket.inbox.front() else { return Ok(None) };
         let seen = look(datagram);
-        if !peek {
-            socket.held -= datagram.bytes.len();
-            self.spare.put(std::mem::take(&mut datagram.bytes));
-            socket.inbox.drop_front();
+        if !peek && let Some(datagram) = socket.inbox.pop() {
+            socket.held -= datagram.bytes().len();
+            self.spare.put(datagram.parcel);
         }
         Ok(Some(seen))
     }

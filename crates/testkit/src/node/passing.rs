@@ -83,8 +83,8 @@ impl NodeRun {
             // It does not leave the node, and so meets no link.
             return self.arrive(path, parcel, false);
         }
-        match self.wire.offer(path, parcel) {
-            Ok(()) => self.take_arrivals(),
+        match self.wire.offer(path, Box::new(parcel)) {
+            Ok(_) => self.take_arrivals(),
             Err(_) => self.counts[from.index()].cut += 1,
         }
     }
@@ -101,7 +101,7 @@ impl NodeRun {
                 self.wire.ends(packet, at, Err(Lost::HostDown));
             } else {
                 self.wire.ends(packet, at, Ok(()));
-                self.arrive(packet.path, parcel, marked);
+                self.arrive(packet.path, *parcel, marked);
             }
         }
     }

@@ -237,15 +237,15 @@ impl UdpSocket {
 
 impl Datagram {
     fn put_into(&self, buffer: &mut impl BufMut) -> usize {
-        let len = self.bytes.len().min(buffer.remaining_mut());
-        buffer.put_slice(&self.bytes[..len]);
+        let len = self.bytes().len().min(buffer.remaining_mut());
+        buffer.put_slice(&self.bytes()[..len]);
         len
     }
 
     #[cfg(feature = "tokio")]
     fn fill(&self, buffer: &mut tokio::io::ReadBuf<'_>) -> SocketAddr {
-        let len = self.bytes.len().min(buffer.remaining());
-        buffer.put_slice(&self.bytes[..len]);
+        let len = self.bytes().len().min(buffer.remaining());
+        buffer.put_slice(&self.bytes()[..len]);
         self.from()
     }
 }

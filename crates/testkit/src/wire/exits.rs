@@ -10,7 +10,7 @@ use crate::core::Octets;
 use crate::hit::Verdict;
 
 /// What comes out of a link. Its copies are counted as the links of a network without access lines count them: 0, 1, 2.
-pub(super) type Out<A> = PacketEvent<Parcel<A>, Path>;
+pub(super) type Out<A> = PacketEvent<Box<Parcel<A>>, Path>;
 
 /// The packets that were hit and have not arrived.
 #[derive(Clone)]
@@ -56,7 +56,7 @@ impl<A: Clone> Exits<A> {
     }
 
     /// What comes out next by now, of the links and of what was kept here.
-    pub(super) fn poll_with(&mut self, network: &mut Network<Parcel<A>>, now: Instant) -> Option<Out<A>> {
+    pub(super) fn poll_with(&mut self, network: &mut Network<Box<Parcel<A>>>, now: Instant) -> Option<Out<A>> {
         while let Some(event) = network.poll_event() {
             let out = self.take(counted(event));
             if out.is_some() {

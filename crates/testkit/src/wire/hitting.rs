@@ -65,7 +65,7 @@ impl HitCount {
 
 impl<A: Clone + Send + Sync + 'static> Hitting<A> {
     /// The laws as they begin, and the network with them; `None` if there are none.
-    pub(super) fn new(laws: &Laws, names: &[String], seed: u64, network: Network<Parcel<A>>) -> (Option<Box<Self>>, Network<Parcel<A>>) {
+    pub(super) fn new(laws: &Laws, names: &[String], seed: u64, network: Network<Box<Parcel<A>>>) -> (Option<Box<Self>>, Network<Box<Parcel<A>>>) {
         let mut hitting = Self { paths: BTreeMap::new(), exits: Exits::default(), drops: Arc::default() };
         let mut network = network;
         for given in laws.iter() {

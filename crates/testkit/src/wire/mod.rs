@@ -40,21 +40,13 @@ pub(crate) struct Settings {
     pub(crate) laws: Laws,
 }
 
-/// What travels: bytes, and the addresses that their owner writes on them.
+/// What travels: bytes, and the addresses that their owner writes on them. It is in a box that goes from the sender through its link to the receiver.
 #[derive(Clone, Debug)]
 pub(crate) struct Parcel<A> {
     pub(crate) addresses: A,
     pub(crate) bytes: Octets,
     /// Whether its sender understands marks.
     pub(crate) ecn_capable: bool,
-}
-
-impl<A: Copy> Parcel<A> {
-    /// The parcel, where nothing is to be left but its shape.
-    #[inline]
-    pub(crate) fn take(&mut self) -> Self {
-        Self { addresses: self.addresses, bytes: std::mem::take(&mut self.bytes), ecn_capable: self.ecn_capable }
-    }
 }
 
 /// The earlier of two instants that may not be there.
@@ -72,7 +64,7 @@ pub(crate) struct Arrival<A> {
     pub(crate) packet: PacketName,
     pub(crate) at: Instant,
     /// With the damage that the link did to it.
-    pub(crate) parcel: Parcel<A>,
+    pub(crate) parcel: Box<Parcel<A>>,
     /// Whether an active queue marked it.
     pub(crate) marked: bool,
     /// Whether the way of the packet is cut, so that it is lost here.
@@ -82,13 +74,14 @@ pub(crate) struct Arrival<A> {
 pub(crate) struct Wire<A> {
     now: Instant,
     hosts: usize,
-    network: Network<Parcel<A>>,
+    network: Network<Box<Parcel<A>>>,
     /// Links that become other ones, in order of time.
     changes: VecDeque<LinkChange>,
     /// By sender, then receiver: whether the way is cut.
     cut: Vec<bool>,
-    /// By sender, then receiver: how many packets were offered.
-    offered: Vec<u64>,
+    is_any_cut: bool,
+    /// Whether packets are hit or recorded.
+    is_watched: bool,
     /// Where packets are hit.
     hitting: Option<Box<Hitting<A>>>,
     recording: Recording,
@@ -104,6 +97,8 @@ impl<A: Clone + Send + Sync + 'static> Wire<A> {
     ) -> Self {
         let config = NetworkConfig { seed, nodes: names.to_vec(), general: false };
         let (hitting, network) = Hitting::new(&settings.laws, names, seed, Network::new(config, link));
+        let recording = Recording::new(names.to_vec(), settings);
+        let is_watched = hitting.is_some() || recording.is_on();
         Self {
             now: Instant::ZERO,
             hosts: names.len(),
@@ -111,8 +106,9 @@ impl<A: Clone + Send + Sync + 'static> Wire<A> {
             hitting,
             changes: changes.into(),
             cut: vec![false; names.len() * names.len()],
-            offered: vec![0; names.len() * names.len()],
-            recording: Recording::new(names.to_vec(), settings),
+            is_any_cut: false,
+            is_watched,
+            recording,
         }
     }
 }
@@ -158,49 +154,56 @@ impl<A: Clone> Wire<A> {
     }
 
     /// The name of the next packet that is offered to a link.
-    #[cfg(feature = "tcp")]
     pub(crate) fn next_packet(&self, path: Path) -> PacketName {
-        PacketName { path, sequence: self.offered[self.pair(path)], copy: 0 }
+        PacketName { path, sequence: self.network.offered(path.from, path.to).unwrap_or(0), copy: 0 }
     }
 
-    /// Hands a packet to its link. It is inlined, so that a packet is not written in parts, read as a whole and written again. Fails with the packet's name if the way is cut.
+    /// Hands a packet to its link, and says whether [`Wire::poll`] may give something. It fails if the way is cut.
     #[inline(always)]
-    pub(crate) fn offer(&mut self, path: Path, parcel: Parcel<A>) -> Result<(), Lost> {
-        let pair = self.pair(path);
-        let packet = PacketName { path, sequence: self.offered[pair], copy: 0 };
-        if self.cut[pair] {
+    pub(crate) fn offer(&mut self, path: Path, parcel: Box<Parcel<A>>) -> Result<bool, Lost> {
+        if self.is_watched || self.is_any_cut {
+            self.note_offer(path, &parcel)?;
+        }
+        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable: parcel.ecn_capable };
+        let offered = self.network.handle_packet_timed(self.now, path, info, parcel);
+        debug_assert!(offered.is_ok(), "hosts are checked, and time does not go back");
+        // All that was due has been polled: only this packet may have come out.
+        Ok(self.is_watched || !matches!(offered, Ok(Some(at)) if at > self.now))
+    }
+
+    /// Notes that a packet is offered to its link, and judges it. It fails if its way is cut.
+    #[inline(never)]
+    fn note_offer(&mut self, path: Path, parcel: &Parcel<A>) -> Result<(), Lost> {
+        let packet = self.next_packet(path);
+        if self.cut[self.pair(path)] {
             // It does not reach the link, so that it uses up none of the link's numbers.
             self.note(Happening::Lost { packet, why: Lost::Cut });
             return Err(Lost::Cut);
         }
-        let len = parcel.bytes.len();
         if self.recording.traces {
             let digest = if self.recording.digests { hash(&parcel.bytes) } else { 0 };
-            self.note(Happening::Sent { packet, len, digest });
+            self.note(Happening::Sent { packet, len: parcel.bytes.len(), digest });
         }
-        self.offered[pair] += 1;
-        let info = PacketInfo { size: cohaptic_units::Bytes::new(len as u64), ecn_capable: parcel.ecn_capable };
         if let Some(hitting) = &mut self.hitting {
             let verdict = hitting.judge(packet, self.now, &parcel.bytes);
             if verdict != Verdict::Pass {
                 self.note(Happening::Hit { packet, verdict });
             }
         }
-        let offered = self.network.handle_packet(self.now, path.from, path.to, info, parcel);
-        debug_assert_eq!(offered, Ok(()), "hosts are checked, and time does not go back");
         Ok(())
     }
 
-    /// Shows the next packet that has arrived where it lies, if nothing but arrivals can come and nobody asks for more of them than this: from where to where, when, whether
-    /// its way is cut, and what travels, which may be taken. [`Wire::poll`] gives those that this does not give. What else it tells of each took a fifth of the time of a
+    /// Takes the next packet that has arrived, if nothing but arrivals can come and nobody asks for more of them than this: from where to where, when, whether
+    /// its way is cut, and what travels. [`Wire::poll`] gives those that this does not give. What else it tells of each took a fifth of the time of a
     /// datagram.
     #[inline(always)]
-    pub(crate) fn take_plain<T>(&mut self, take: impl FnOnce(Path, Instant, bool, &mut Parcel<A>) -> T) -> Option<T> {
-        if self.hitting.is_some() || self.recording.is_on() {
+    pub(crate) fn take_plain<T>(&mut self, take: impl FnOnce(Path, Instant, bool, Box<Parcel<A>>) -> T) -> Option<T> {
+        if self.is_watched {
             return None;
         }
-        let Self { network, cut, hosts, .. } = self;
-        network.take_mere_arrival(|MereArrival { path, at, payload, .. }| take(path, at, cut[path.from.index() * *hosts + path.to.index()], payload))
+        let Self { network, cut, hosts, is_any_cut, .. } = self;
+        let is_cut = |path: Path| *is_any_cut && cut[path.from.index() * *hosts + path.to.index()];
+        network.take_mere_arrival(|MereArrival { path, at, payload, .. }| take(path, at, is_cut(path), payload))
     }
 
     /// Whether [`Wire::poll`] may give something. `false` is certain.
@@ -224,7 +227,7 @@ impl<A: Clone> Wire<A> {
                     let mut parcel = event.payload;
                     if let Some(damage) = &event.damage {
                         // A copy of it may be on its way still, undamaged.
-                        let mut bytes = Vec::from(parcel.bytes);
+                        let mut bytes = Vec::from(std::mem::take(&mut parcel.bytes));
                         damage.apply(&mut bytes);
                         parcel.bytes = Octets::Own(bytes);
                     }
@@ -262,6 +265,7 @@ impl<A: Clone> Wire<A> {
     pub(crate) fn set_cut(&mut self, path: Path, cut: bool) {
         let pair = self.pair(path);
         if path.from != path.to && std::mem::replace(&mut self.cut[pair], cut) != cut {
+            self.is_any_cut = self.cut.contains(&true);
             self.note(if cut { Happening::Cut(path) } else { Happening::Mended(path) });
         }
     }

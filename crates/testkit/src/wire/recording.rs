@@ -67,7 +67,7 @@ impl Recording {
     }
 
     /// The packets that have been recorded, and the ends of those that are in this network and behind it, from `now` on.
-    pub(super) fn followed_through<A: Clone>(&self, network: &Network<Parcel<A>>, mut exits: Exits<A>, mut now: Instant) -> Vec<Seen> {
+    pub(super) fn followed_through<A: Clone>(&self, network: &Network<Box<Parcel<A>>>, mut exits: Exits<A>, mut now: Instant) -> Vec<Seen> {
         let mut packets = self.packets.clone();
         if !self.keeps_packets {
             return packets;

@@ -79,15 +79,15 @@ pub struct Network<P> {
 
 /// A packet that has arrived undamaged, of which nothing else is told.
 #[derive(PartialEq, Eq, Debug)]
-pub struct MereArrival<'a, P> {
+pub struct MereArrival<P> {
     /// From where to where.
     pub path: Path,
     /// When it was offered to the network.
     pub offered: Instant,
     /// When it arrived.
     pub at: Instant,
-    /// What it carries, which may be taken out.
-    pub payload: &'a mut P,
+    /// What it carries.
+    pub payload: P,
 }
 
 /// The links and the access lines.
@@ -227,9 +227,57 @@ impl<P: Clone> Network<P> {
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
     #[inline(always)]
     pub fn handle_packet(&mut self, now: Instant, from: NodeId, to: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
+        self.handle_packet_timed(now, Path { from, to }, info, payload).map(|_| ())
+    }
+
+    /// As [`Network::handle_packet`]. Gives when the packet arrives, if nothing but the time until then can happen to it; else an event may wait to be polled.
+    ///
+    /// # Errors
+    ///
+    /// As [`Network::handle_packet`].
+    #[inline(always)]
+    pub fn handle_packet_timed(
+        &mut self,
+        now: Instant,
+        path: Path,
+        info: impl Into<PacketInfo>,
+        payload: P,
+    ) -> Result<Option<Instant>, NetworkError> {
+        let Path { from, to } = path;
         let path = self.path(from, to)?;
         let link = self.link(path);
-        self.let_pass(now)?;
+        check_time(&mut self.now, now)?;
+        let size = SizeAndMarks::new(info.into());
+        if self.has_inner_events || self.has_filters {
+            self.send_through(now, path, link, size, payload);
+            return Ok(None);
+        }
+        // Nothing is before this link or after it: only the link is asked.
+        let line = &mut self.lines.links[link.index()];
+        let sequence = line.offered();
+        let packet = InNetwork { sequence, offered: now, entered: now, path, size, payload };
+        match line.offer(now, None) {
+            Outcome::Arrives(at) => {
+                self.traffic.schedule(at, LineId::Link(link), packet);
+                Ok(Some(at))
+            }
+            Outcome::Dropped(cause) => {
+                self.drop(now, LineId::Link(link), cause, packet);
+                Ok(None)
+            }
+            Outcome::Enters => {
+                self.enter_engine(now, LineId::Link(link), packet);
+                Ok(None)
+            }
+        }
+    }
+
+    /// Takes a packet that may pass more than its link.
+    #[inline(never)]
+    fn send_through(&mut self, now: Instant, path: Path, link: LinkId, size: SizeAndMarks, payload: P) {
+        if self.has_inner_events {
+            self.let_happen(now);
+        }
         let sequence = match self.paths.get_mut(link.index()) {
             None => self.lines.links[link.index()].offered(),
             Some(count) => {
@@ -237,10 +285,8 @@ impl<P: Clone> Network<P> {
                 *count - 1
             }
         };
-        let info = info.into();
-        let line = if self.lines.uplinks[from.index()].is_some() { LineId::Uplink(from) } else { LineId::Link(link) };
-        self.offer(now, line, None, || InNetwork { sequence, offered: now, entered: now, path, size: SizeAndMarks::new(info), payload });
-        Ok(())
+        let line = if self.lines.uplinks[path.from.index()].is_some() { LineId::Uplink(path.from) } else { LineId::Link(link) };
+        self.offer(now, line, None, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
     /// Takes a packet from one node to each of the others that it has a link to, in their order: the same as [`Network::handle_packet`] for each, with what they share
@@ -367,18 +413,18 @@ impl<P: Clone> Network<P> {
         !self.has_inner_events && self.traffic.happened.is_empty()
     }
 
-    /// As [`Network::poll_event`], as long as [`Network::has_mere_arrivals_alone`]: `take` is shown the packet where it lies, and takes what it carries. `None` says nothing
+    /// As [`Network::poll_event`], as long as [`Network::has_mere_arrivals_alone`]: `take` is given the packet. `None` says nothing
     /// about other events: ask [`Network::poll_event`] then.
     #[inline(always)]
-    pub fn take_mere_arrival<T>(&mut self, take: impl FnOnce(MereArrival<'_, P>) -> T) -> Option<T> {
+    pub fn take_mere_arrival<T>(&mut self, take: impl FnOnce(MereArrival<P>) -> T) -> Option<T> {
         if !self.has_mere_arrivals_alone() {
             return None;
         }
         let Self { now, traffic, lines, .. } = self;
         // Without inner events nobody is woken, and no packet has another line before it.
         let taken = traffic.pending.take_due(*now, |Pending { at, offered, entered, turn, path, payload, .. }| {
-            lines.get_mut(turn.line()).deliver(*entered, *at);
-            payload.as_mut().map(|payload| take(MereArrival { path: *path, offered: *offered, at: *at, payload }))
+            lines.links[turn.link().index()].deliver(*entered, *at);
+            payload.take().map(|payload| take(MereArrival { path: *path, offered: *offered, at: *at, payload }))
         });
         taken.flatten()
     }
@@ -399,6 +445,13 @@ impl<P: Clone> Network<P> {
         let seed = self.config.seed;
         self.with_engine(LineId::Link(link), |line, outputs, exits| line.reconfigure(now, seed, &name, model, outputs, exits));
         Ok(())
+    }
+
+    /// How many packets a link was offered; `None` if there is none.
+    #[must_use]
+    pub fn offered(&self, from: NodeId, to: NodeId) -> Option<u64> {
+        let path = self.path(from, to).ok()?;
+        Some(self.lines.links.get(self.link(path).index())?.offered())
     }
 
     /// The counters of a link; `None` if there is none.

@@ -128,6 +128,12 @@ impl Turn {
         Self(Self::waking(line).0 + (3 << NUMBER_BITS))
     }
 
+    /// The link on which it happens, where there are links alone.
+    #[inline(always)]
+    pub(super) const fn link(self) -> LinkId {
+        LinkId(self.0 & ((1 << NUMBER_BITS) - 1))
+    }
+
     #[inline(always)]
     pub(super) fn line(self) -> LineId {
         let number = self.0 & ((1 << NUMBER_BITS) - 1);

@@ -37,7 +37,7 @@ proptest! {
             }
             let mut found = Vec::new();
             loop {
-                let arrived = |MereArrival { path, offered, at, payload }: MereArrival<'_, Payload>| (path, offered, at, *payload, Fate::Delivered(at));
+                let arrived = |MereArrival { path, offered, at, payload }: MereArrival<Payload>| (path, offered, at, payload, Fate::Delivered(at));
                 while let Some(arrival) = subject.take_mere_arrival(arrived) {
                     found.push(arrival);
                 }

@@ -5,7 +5,7 @@ use cohaptic_tcp::{Ecn, Flags, Segment, State};
 use cohaptic_wan::{NodeId, Path};
 
 use super::{ConnId, Core};
-use crate::core::{Ends, Kind, Parcel};
+use crate::core::{Ends, Kind};
 use crate::trace::{Happening, Lost, PacketName};
 
 impl Core {
@@ -59,7 +59,7 @@ impl Core {
         let path = Path { from: host, to: receiver };
         let packet = self.wire.next_packet(path);
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
-        let parcel = Parcel { addresses, bytes: Bytes::from(segment.to_packet()).into(), ecn_capable: segment.ecn != Ecn::NotCapable };
+        let parcel = self.spare.wrapped(addresses, segment.to_packet().into(), segment.ecn != Ecn::NotCapable);
         // Over a way that is cut it is lost, as others are.
         let _ = self.wire.offer(path, parcel);
         if self.wire.recording().traces {
