@@ -187,6 +187,6 @@ fn explain() {
     println!(
         "  what leaves together, so that a receiver acknowledges less often than the test kit's, which sees every packet. The packets of one segment come in a"
     );
-    println!("  burst, which a short queue (`limit 50`) drops. It is not the send buffer there: with 4 MB the test kit's row is the same to 0.2 %.");
+    println!("  burst, which a short queue may drop.");
     println!("- **HyStart.** Linux's CUBIC may leave slow start when round trips grow, before anything is lost. The test kit has no HyStart.");
 }
