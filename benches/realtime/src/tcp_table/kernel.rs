@@ -46,8 +46,8 @@ pub(crate) fn check() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// The times of connections between two hosts, all at once or one after the other. Of [`Tcp::Kept`] as many are made before, of which the kernel keeps what it learned.
-pub(crate) fn times(words: &str, work: Work, (count, at_once): (u32, bool), tcp: Tcp) -> Result<Times, Box<dyn Error>> {
+/// The times of connections between two hosts: their number, and how many stand at once. Of [`Tcp::Kept`] as many are made before, of which the kernel keeps what it learned.
+pub(crate) fn times(words: &str, work: Work, connections: (u32, u32), tcp: Tcp) -> Result<Times, Box<dyn Error>> {
     let rounds = if tcp == Tcp::Kept { 2 } else { 1 };
     let stop = &AtomicBool::new(false);
     let outcome = thread::scope(|scope| -> Outcome<Times> {
@@ -56,15 +56,15 @@ pub(crate) fn times(words: &str, work: Work, (count, at_once): (u32, bool), tcp:
         let ((server_runs, at_server), (listens, is_listening)) = (channel(), channel());
         let (serves, is_served) = channel();
         // If a client fails, it waits for ever: not within the scope.
-        let server = move || drop(serves.send(enter(1, &named, &at_server, tcp).and_then(|()| serve(&listens, work, rounds * count))));
+        let server = move || drop(serves.send(enter(1, &named, &at_server, tcp).and_then(|()| serve(&listens, work, rounds * connections.0))));
         thread::spawn(server);
         let client = scope.spawn(move || {
             enter(0, &named_too, &at_client, tcp)?;
             is_listening.recv()?;
             for _ in 1..rounds {
-                ask(work, count, at_once)?;
+                ask(work, connections)?;
             }
-            ask(work, count, at_once)
+            ask(work, connections)
         });
         let router = scope.spawn(move || route(&names, words, stop, &[client_runs, server_runs]));
         let times = client.join().unwrap_or_else(|_| Err("the thread of the clients has panicked".into()));
@@ -140,15 +140,17 @@ fn answer(mut stream: TcpStream, work: Work) -> io::Result<()> {
     stream.read(&mut [0]).map(drop)
 }
 
-fn ask(work: Work, count: u32, at_once: bool) -> Outcome<Times> {
-    if !at_once {
-        let all: Vec<_> = (0..count).map(|_| one(work)).collect();
-        return all.into_iter().map(|one| Ok(one?)).collect();
+/// `count` connections, of which `at_once` stand at a time.
+fn ask(work: Work, (count, at_once): (u32, u32)) -> Outcome<Times> {
+    let mut times = Times::new();
+    while let left @ 1.. = count as usize - times.len() {
+        let all: Outcome<Times> = thread::scope(|scope| {
+            let all: Vec<_> = (0..left.min(at_once as usize)).map(|_| scope.spawn(move || one(work))).collect();
+            all.into_iter().map(|one| Ok(one.join().map_err(|_| "the thread of a client has panicked")??)).collect()
+        });
+        times.extend(all?);
     }
-    thread::scope(|scope| {
-        let all: Vec<_> = (0..count).map(|_| scope.spawn(move || one(work))).collect();
-        all.into_iter().map(|one| Ok(one.join().map_err(|_| "the thread of a client has panicked")??)).collect()
-    })
+    Ok(times)
 }
 
 fn one(work: Work) -> io::Result<Duration> {
