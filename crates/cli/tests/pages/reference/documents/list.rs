@@ -11,7 +11,7 @@ pub(super) struct Document {
 /// What the router needs: two devices in namespaces.
 pub(super) const NAMESPACES: &str = "unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V";
 
-pub(super) const DOCUMENTS: [Document; 23] = [
+pub(super) const DOCUMENTS: [Document; 25] = [
     Document {
         command: "run",
         lines: &[
@@ -184,6 +184,7 @@ pub(super) const DOCUMENTS: [Document; 23] = [
             "cohaptic stability point scenarios/paper/5-1-pd-1000.toml --losses-in-a-row 1 --json",
             "cohaptic stability point scenarios/network/push-contact.toml --switching --json",
             "cohaptic stability point scenarios/counterexamples/two-fingers.toml --switching --json",
+            "cohaptic stability point scenarios/coordination/n3.toml --every-number --certificate proof.json --json",
         ],
         rows: &[
             ("title", "of the scene"),
@@ -220,6 +221,13 @@ pub(super) const DOCUMENTS: [Document; 23] = [
                 "switching.motions[].growth, switching.motions[].frames, switching.motions[].changes",
                 "of a motion that was found: by which factor it grows in a frame, over how many, with how many changes of contacts; `null` unless unstable",
             ),
+            ("every_number.peer", "the first of the equal peers"),
+            (
+                "every_number.spans[].from, every_number.spans[].to, every_number.spans[].verdict",
+                "numbers with one verdict; `to` is `null` without end",
+            ),
+            ("every_number.mean_square, every_number.without_limit", "whether losses count; which part has no limit, or `null`"),
+            ("every_number.certificates, every_number.file", "how many were tried; the file of `--certificate`"),
             ("notes", "what the verdict leaves out; where there are two radii, each note names its own"),
         ],
     },
@@ -245,6 +253,22 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         ],
     },
     Document {
+        command: "stability map --prove",
+        lines: &[
+            "cohaptic stability map scenarios/coordination/n3.toml --set object.split-mass=false --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --prove 2 --every-number 3..4 --out proof --json",
+        ],
+        rows: &[
+            ("title, x_key, x_unit, x_range, y_key, y_unit, y_range, files, wall_s", "as of a map"),
+            ("halvings", "of a range at most"),
+            ("every_number.from, every_number.to", "with `--every-number`"),
+            ("regions[].name, regions[].overrides, regions[].file", "the scene, then each `--curve`"),
+            ("regions[].stable, regions[].unstable, regions[].undecided", "shares of the area"),
+            ("regions[].lines.stable, regions[].lines.unstable, regions[].lines.undecided", "boxes of a single delay, without area"),
+            ("regions[].boxes, regions[].certificates, regions[].interrupted", "counts; whether boxes were left"),
+            ("regions[].stable_alone, regions[].unstable_alone", "shares proven otherwise for the first region"),
+        ],
+    },
+    Document {
         command: "stability boundary",
         lines: &["cohaptic stability boundary scenarios/paper/5-1-ap-2100.toml --along coordination.stiffness=100..6000 --tolerance 0.1 --json"],
         rows: &[
@@ -253,13 +277,19 @@ pub(super) const DOCUMENTS: [Document; 23] = [
             ("first", "the verdict at `low`"),
             ("crossings[].value, crossings[].from, crossings[].to", "where the verdict changes, and how"),
             ("marginal", "stretches that cannot be told from 1, each with `low` and `high`"),
-            (
-                "tolerance, samples, finest, coarsest",
-                "how exact a crossing is; how many values were looked at, and their least and greatest distance",
-            ),
+            ("tolerance, samples, finest, coarsest", "of a crossing; how many values, and their least and greatest distance"),
             ("settled", "`false` if it ended after 100000 values"),
             ("nominal", "at how many values chance is left out"),
             ("notes, files", "the parts left out; the files written"),
+        ],
+    },
+    Document {
+        command: "stability boundary --prove",
+        lines: &["cohaptic stability boundary scenarios/paper/5-1-ap-2100.toml --along coordination.stiffness=100..6000 --prove --json"],
+        rows: &[
+            ("title, key, unit, low, high, files", "as of a boundary"),
+            ("stretches[].low, stretches[].high, stretches[].verdict", "crossings lie in `undecided` ones"),
+            ("tolerance, certificates, interrupted", "length of an undecided stretch; counts; whether stretches were left"),
         ],
     },
     Document {
@@ -271,12 +301,9 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         rows: &[
             ("title, peer", "of the scene; which peer was pushed"),
             ("@Curve of an admittance", "of the scene as it stands"),
-            (
-                "mean_square.verdict, mean_square.radius, mean_square.error_bound",
-                "of the second moment, where links leave something to chance and it can be followed",
-            ),
+            ("mean_square.verdict, mean_square.radius, mean_square.error_bound", "of the second moment, where links leave something to chance"),
             ("curves[].name, curves[].overrides, curves[].@Curve of an admittance", "of each `--curve`"),
-            ("files, interrupted", "what was written; whether frequencies are missing because of Ctrl-C"),
+            ("files, interrupted", "what was written; whether frequencies are missing"),
         ],
     },
     Document {
@@ -289,21 +316,18 @@ pub(super) const DOCUMENTS: [Document; 23] = [
             ("late_ticks", "ticks later than the tolerance"),
             ("lateness_us.@Lateness", "of ticks"),
             ("release_lateness_us.@Lateness", "of datagrams to other programs"),
-            ("behind_us", "by how much logical time was behind the clock when the last event had happened"),
+            ("behind_us", "logical time behind the clock at the last event"),
             ("peers[].kind, peers[].name, peers[].position_m, peers[].velocity_m_s, peers[].stale_samples, peers[].refused_samples", "as of a run"),
             (
                 "peers[].seat.taken, peers[].seat.joined, peers[].seat.refused, peers[].seat.out_of_order",
-                "of peers that live elsewhere: samples taken, how often it joined, samples refused and out of order",
+                "of peers elsewhere: samples taken, joinings, samples refused and out of order",
             ),
-            (
-                "peers[].seat.late, peers[].seat.most_late_us",
-                "samples that came after their instant and counted at the next, and by how much at most",
-            ),
+            ("peers[].seat.late, peers[].seat.most_late_us", "samples counted at a later instant; the most"),
             ("link_totals.NAME, link_quantiles.NAME, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
             ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
             ("door.admitted, door.welcomed, door.refused.NAME", "datagrams; refused ones [by cause](live-protocol.md#why-a-datagram-is-refused)"),
             ("door.joinings, door.sent, door.nobody_there, door.send_failures.NAME, door.oversized, door.kernel_drops", "what else was counted"),
-            ("granted, refused_wishes", "what the system granted, and what it refused with the way out"),
+            ("granted, refused_wishes", "by the system"),
         ],
     },
     Document {
@@ -319,7 +343,7 @@ pub(super) const DOCUMENTS: [Document; 23] = [
                 "datagrams and copies that did not go out, but for those that the kernel dropped before they were read, which are in `ports`",
             ),
             ("release_error_us.@Lateness", "of sent datagrams"),
-            ("clamped_us.@Lateness", "of datagrams that were read after time had passed beyond their time stamp"),
+            ("clamped_us.@Lateness", "of datagrams read after their time stamp"),
             ("links[].from, links[].to, links[].@Counters", "of each directed link"),
             (
                 "links[].asked_mean_delay_s, links[].changes",
@@ -327,13 +351,13 @@ pub(super) const DOCUMENTS: [Document; 23] = [
             ),
             ("links[].delivered_bytes, links[].overload, links[].undeliverable", "as in [the report](relay.md#dropped-datagrams)"),
             ("ports[].name, ports[].address, ports[].received, ports[].sent", "of a proxy: `listen`, and all `clients` together"),
-            ("ports[].send_failures.NAME, ports[].oversized, ports[].receive_errors", "datagrams that were not sent or read; failures by reason"),
+            ("ports[].send_failures.NAME, ports[].oversized, ports[].receive_errors", "not sent or not read; failures by reason"),
             ("ports[].receive_buffer_bytes, ports[].kernel_drops", "what the system granted; `null` if it does not tell"),
             ("refused.NAME", "dropped on entry: `stranger`, `to-itself`, `no-room`, `overload`"),
             ("in_flight.packets, in_flight.bytes", "on their way at the end"),
-            ("unsent", "came out of their links and were not sent before the end"),
-            ("clients_without_socket", "clients for which no socket could be had"),
-            ("granted, refused_wishes", "what the system granted the thread, and what it refused"),
+            ("unsent", "out of their links, not sent before the end"),
+            ("clients_without_socket", "clients without a socket"),
+            ("granted, refused_wishes", "by the system"),
         ],
     },
     Document {
@@ -344,8 +368,8 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         rows: &[
             ("title, duration_s", "the file; how long it ran"),
             ("ending", "`complete` (`--for`), `interrupted` or `failed`"),
-            ("valid, release_error_us.@Lateness", "whether releases were as late as tolerated; how late"),
-            ("packets, dropped", "what came in at both devices; what did not go out, for any reason"),
+            ("valid, release_error_us.@Lateness", "as of the relay"),
+            ("packets, dropped", "what came in; what did not go out"),
             ("sides[].name, sides[].device", "left, right"),
             (
                 "sides[].received.packets, sides[].received.bytes, sides[].received.not_ip, sides[].received.malformed, sides[].received.passed, sides[].received.dropped",
@@ -356,11 +380,11 @@ pub(super) const DOCUMENTS: [Document; 23] = [
                 "sides[].written.packets, sides[].written.bytes, sides[].written.full, sides[].written.too_long, sides[].written.refused",
                 "to the device",
             ),
-            ("links[].name, links[].from, links[].to, links[].@Counters", "each link from the left, then from the right"),
+            ("links[].name, links[].from, links[].to, links[].@Counters", "from the left, then from the right"),
             ("links[].delivered_bytes, links[].overload, links[].asked_mean_delay_s, links[].changes", "as of the [relay](#relay)"),
             ("rules[].packets, rules[].bytes", "what each rule decided"),
             ("in_flight.packets, in_flight.bytes", "inside all links at the end"),
-            ("granted, refused_wishes", "what the system granted the thread, and what it refused"),
+            ("granted, refused_wishes", "by the system"),
         ],
     },
     Document {
@@ -368,7 +392,7 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         lines: &["cohaptic falcon probe --simulated --virtual-time --json"],
         rows: &[
             ("falcons[].@Falcon", "of each device"),
-            ("falcons[].opened, falcons[].error", "whether it could be opened, and why not; nothing more is known of one that was not"),
+            ("falcons[].opened, falcons[].error", "whether it could be opened, and why not"),
             ("falcons[].@Exchanges with a Falcon", "of each device"),
         ],
     },
@@ -400,7 +424,7 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         lines: &["cohaptic falcon simulate --for 1s --json"],
         rows: &[
             ("hand, seed, asked_n, ending, driver_error", "what was asked for, and how it ended"),
-            ("changes[].t_s, changes[].phase, changes[].light, more_changes", "phases as they came, the first hundred; how many more"),
+            ("changes[].t_s, changes[].phase, changes[].light, more_changes", "the first hundred phases; how many more"),
             ("@Exchanges with a Falcon", "what was exchanged"),
             ("forces.@Forces of a Falcon", "what became of the force"),
             (
@@ -417,7 +441,7 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         command: "link",
         lines: &["cohaptic link delay 20ms 2ms distribution normal loss 1% 25% duplicate 1% corrupt 1% rate 1mbit --packets 20000 --json"],
         rows: &[
-            ("asked.spec", "as it was written"),
+            ("asked.spec", "as written"),
             (
                 "asked.NAME",
                 "what follows from the laws: `mean_s`, `sd_s`, `least_s`, `quantiles_s`, `autocorrelation` (lags 1 to 10), `loss`, `loss_run_mean`, `loss_autocorrelation`, `duplicated`, `damaged`, `rate_bit_s`; what does not follow is left out",
@@ -425,7 +449,7 @@ pub(super) const DOCUMENTS: [Document; 23] = [
             ("achieved.NAME", "what was measured, with standard errors (`_se`) and intervals of 95 %, as defined by the RFCs; copies count"),
             ("compared[].name, compared[].asked, compared[].achieved, compared[].standard_error, compared[].outside", "the rows of the table"),
             ("fates.@Counters but mean_delay_s", "what became of the packets"),
-            ("packets_per_s, interrupted, files", "how fast; whether it was cut short; what was written"),
+            ("packets_per_s, interrupted, files", "how fast; whether cut short; what was written"),
         ],
     },
     Document {
@@ -439,21 +463,15 @@ pub(super) const DOCUMENTS: [Document; 23] = [
                 "skew.seconds_per_second, skew.standard_error, skew.interval_99, skew.significant, skew.location, skew.blocks",
                 "with `--skew`: the [drift](commands-network.md#fit)",
             ),
-            (
-                "matched.unmatched_sent, matched.unmatched_arrived, matched.ambiguous",
-                "of two captures: the packets that stand in one alone, or cannot be told apart",
-            ),
+            ("matched.unmatched_sent, matched.unmatched_arrived, matched.ambiguous", "of two captures: packets of one alone, or alike"),
         ],
     },
     Document {
         command: "paper",
         lines: &["cohaptic paper --quick --json"],
         rows: &[
-            (
-                "claims[].id, claims[].claim, claims[].paper, claims[].ours, claims[].verdict",
-                "what the paper says, what was computed, and the verdict",
-            ),
-            ("claims[].scene, claims[].how", "text of the scene that shows it, or `null`; how it was computed"),
+            ("claims[].id, claims[].claim, claims[].paper, claims[].ours, claims[].verdict", "the paper's figure, the computed one"),
+            ("claims[].scene, claims[].how", "its scene or `null`; how it was computed"),
             ("figures[].id, figures[].file, figures[].title", "`file` is `null` without `--out`"),
             ("wall_s", "the time it took"),
         ],
@@ -464,8 +482,8 @@ pub(super) const DOCUMENTS: [Document; 23] = [
         rows: &[
             ("rows[].subject, rows[].case, rows[].method, rows[].setting", "what was measured"),
             ("rows[].cost, rows[].cost_unit, rows[].error, rows[].error_unit", "`null` where there is no such number"),
-            ("rows[].reference, rows[].note", "what the error is against; what else is to be known"),
-            ("interrupted, wall_s", "whether it was cut short; the time it took"),
+            ("rows[].reference, rows[].note", "what the error is against; remarks"),
+            ("interrupted, wall_s", "whether cut short; the time"),
         ],
     },
     Document {
@@ -475,8 +493,8 @@ pub(super) const DOCUMENTS: [Document; 23] = [
             ("status, message", "the exit status; the message as on standard error, without `error:`"),
             ("place", "where a text is refused, else `null`"),
             ("place.file, place.argument", "the file (`null` for an option), and the argument, such as `--set link.dlay=8ms` (`null` for a file)"),
-            ("place.line, place.column, place.key", "both from 1; the dotted path or `null`"),
-            ("place.fault", "the fault and the expected form, in one line"),
+            ("place.line, place.column, place.key", "from 1; the dotted path or `null`"),
+            ("place.fault", "fault and expected form"),
         ],
     },
 ];

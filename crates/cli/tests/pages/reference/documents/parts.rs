@@ -11,7 +11,7 @@ pub(super) const PARTS: [Part; 7] = [
     Part {
         name: "Counters",
         rows: &[
-            ("offered, delivered", "packets that were sent into the line, and that came out"),
+            ("offered, delivered", "packets sent into the line, and out of it"),
             ("duplicated", "copies that the line made"),
             ("dropped.NAME", "packets by [cause](emulator.md#fates-and-causes)"),
             ("in_flight", "packets on the way at the end. The counters [balance](emulator.md#conservation)"),
