@@ -1,4 +1,4 @@
-//! Writes `docs/measured-tcp.md`: `cargo run --release -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md`. Takes about six minutes, and makes network
+//! Writes `docs/measured-tcp.md`: `cargo run --release -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md`. Takes about nine minutes, and makes network
 //! namespaces: it needs root, or `unshare -Urn` before the program. A number as argument replaces the 101 connections of a row.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of octets and connections")]
@@ -19,7 +19,7 @@ const CONNECTIONS: u32 = 101;
 const ALONE: u32 = 5;
 
 /// Connections of a long transfer, which are a load for the router.
-const FEW: u32 = 9;
+const FEW: u32 = 25;
 
 /// What all connections that stand at once may carry together, in bit/s. More is a load for the machine, on which Linux waits and the test kit does not: a row of 1 MB with
 /// jitter took Linux three times as long with 101 connections at once as with 5.
