@@ -18,7 +18,7 @@ const CONNECTIONS: u32 = 101;
 /// Connections of a row whose link has a rate: one after the other, since they would share it.
 const ALONE: u32 = 5;
 
-/// Connections of a long transfer, which are a load for the router.
+/// Connections of a row of long transfers over a link without a rate: each takes seconds, and few stand at once within [`LOAD`].
 const FEW: u32 = 25;
 
 /// What all connections that stand at once may carry together, in bit/s. More is a load for the machine, on which Linux waits and the test kit does not: a row of 1 MB with

@@ -12,6 +12,8 @@ mod awaited;
 mod config;
 pub(crate) mod direct_links;
 pub(crate) mod id;
+mod lines;
+mod passage;
 mod paths;
 mod pending;
 mod relay;
@@ -26,20 +28,19 @@ use cohaptic_units::Instant;
 use awaited::Awaited;
 pub use config::{AccessLine, NetworkConfig, NetworkError};
 use id::{LinkId, NodeId, Path};
+use lines::Lines;
 use paths::Paths;
 use pending::{InNetwork, LineId, Pending, SizeAndMarks};
-use traffic::{Exits, Traffic};
+use traffic::Traffic;
 
-use crate::fates::fate::{DropCause, Fate};
 use crate::fates::record::PacketEvent;
 use crate::fates::stats::LinkStats;
 use crate::line::Line;
-use crate::line::direct::Words;
 use crate::line::filter::{Filter, Offered};
 use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
 use crate::line::pipeline::{Outcome, TimeWentBack, check_time};
-use crate::packet::{Marks, Outputs, PacketInfo};
+use crate::packet::{Outputs, PacketInfo};
 
 /// The most nodes of a [`Network`] in which all have links to all: links are counted in 29 bits.
 pub const MOST_NODES: usize = 23_170;
@@ -88,15 +89,6 @@ pub struct MereArrival<P> {
     pub at: Instant,
     /// What it carries.
     pub payload: P,
-}
-
-/// The links and the access lines.
-#[derive(Clone, Debug)]
-struct Lines<P> {
-    /// By sender, then receiver; where all have links to all the diagonal is there too, and never used.
-    links: Vec<Line<P, InNetwork<P>>>,
-    uplinks: Vec<Option<Line<P, InNetwork<P>>>>,
-    downlinks: Vec<Option<Line<P, InNetwork<P>>>>,
 }
 
 impl<P: Clone> Network<P> {
@@ -503,149 +495,5 @@ impl<P: Clone> Network<P> {
             self.let_happen(now);
         }
         Ok(())
-    }
-
-    /// Lets all that is due happen, and keeps the arrivals until they are polled.
-    #[inline]
-    fn let_happen(&mut self, now: Instant) {
-        while let Some(pending) = self.traffic.pending.pop_due(now) {
-            if let Some(event) = self.happen(pending) {
-                self.traffic.happened.push_back(event);
-            }
-        }
-    }
-
-    /// Lets one pending event happen, and gives the arrival if it is a packet's last.
-    #[inline(always)]
-    fn happen(&mut self, pending: Pending<P>) -> Option<PacketEvent<P, Path>> {
-        let Pending { at, sequence, offered, entered, turn, path, size, payload } = pending;
-        let line = turn.line();
-        let Some(payload) = payload else {
-            self.wake(at, line);
-            return None;
-        };
-        let packet = InNetwork { sequence, offered, entered, path, size, payload };
-        let next = match line {
-            LineId::Uplink(_) if path.is_to_relay() => {
-                self.lines.get_mut(line).deliver(entered, at);
-                self.relay(at, packet);
-                return None;
-            }
-            LineId::Uplink(_) => Some(LineId::Link(self.link(path))),
-            LineId::Link(_) if self.has_inner_events && self.lines.downlinks[path.to.index()].is_some() => Some(LineId::Downlink(path.to)),
-            LineId::Link(_) | LineId::Downlink(_) => None,
-        };
-        let Some(next) = next else { return Some(self.arrive(at, line, packet)) };
-        self.lines.get_mut(line).deliver(entered, at);
-        self.offer(at, next, None, || InNetwork { entered: at, ..packet });
-        None
-    }
-
-    /// The packet comes out of the last of its lines.
-    #[inline(always)]
-    fn arrive(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) -> PacketEvent<P, Path> {
-        let line = self.lines.get_mut(line);
-        if packet.size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL) {
-            line.drop(DropCause::Checksum);
-            return self.traffic.event(packet, at, Fate::Dropped(DropCause::Checksum));
-        }
-        line.deliver(packet.entered, at);
-        self.traffic.event(packet, at, Fate::Delivered(at))
-    }
-
-    #[cold]
-    fn wake(&mut self, at: Instant, line: LineId) {
-        self.with_engine(line, |line, outputs, exits| line.wake(at, outputs, exits));
-    }
-
-    /// Offers a packet to its link where there are no uplinks; its first random words may have been drawn before.
-    #[inline(always)]
-    fn send(&mut self, now: Instant, path: Path, size: SizeAndMarks, payload: P, words: Option<Words>) {
-        let link = self.link(path);
-        let sequence = self.lines.links[link.index()].offered();
-        self.offer(now, LineId::Link(link), words, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
-    }
-
-    /// Offers a packet to a line; its first random words may have been drawn before. The packet is made where it is known what becomes of it, so that one that only
-    /// propagates is written once.
-    #[inline(always)]
-    fn offer(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: impl FnOnce() -> InNetwork<P>) {
-        if self.has_filters {
-            return self.offer_filtered(now, line, words, packet());
-        }
-        match self.lines.get_mut(line).offer(now, words) {
-            Outcome::Arrives(at) => self.traffic.schedule(at, line, packet()),
-            Outcome::Dropped(cause) => self.drop(now, line, cause, packet()),
-            Outcome::Enters => self.enter_engine(now, line, packet()),
-        }
-    }
-
-    /// As [`Network::offer`], where links have filters.
-    #[inline(never)]
-    fn offer_filtered(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: InNetwork<P>) {
-        if self.is_filtered(now, line, &packet) {
-            return self.drop(now, line, DropCause::Filter, packet);
-        }
-        match self.lines.get_mut(line).offer(now, words) {
-            Outcome::Arrives(at) => self.traffic.schedule(at, line, packet),
-            Outcome::Dropped(cause) => self.drop(now, line, cause, packet),
-            Outcome::Enters => self.enter_engine(now, line, packet),
-        }
-    }
-
-    /// Whether the line's filter takes the packet.
-    fn is_filtered(&mut self, now: Instant, line: LineId, packet: &InNetwork<P>) -> bool {
-        let offered = Offered { sequence: packet.sequence, now, info: packet.size.info(), payload: &packet.payload };
-        self.lines.get_mut(line).filters(&offered)
-    }
-
-    #[inline(never)]
-    fn enter_engine(&mut self, now: Instant, line: LineId, packet: InNetwork<P>) {
-        let marks = Marks {
-            congestion: packet.size.has(SizeAndMarks::MARKED),
-            damage: self.traffic.take_damage(&packet),
-            discarded_on_arrival: packet.size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL),
-        };
-        self.with_engine(line, |line, outputs, exits| line.enter(now, packet.size.info(), marks, packet, outputs, exits));
-    }
-
-    /// Lets a line's engine do something, and asks it when to be woken.
-    fn with_engine(&mut self, line: LineId, act: impl FnOnce(&mut Line<P, InNetwork<P>>, &mut Outputs<InNetwork<P>>, &mut Exits<'_, P>)) {
-        let engine = self.lines.get_mut(line);
-        let before = self.traffic.happened.len();
-        act(engine, &mut self.outputs, &mut Exits { traffic: &mut self.traffic, line });
-        if let Some(at) = engine.announce() {
-            self.traffic.announce(at, line);
-        }
-        if !self.has_inner_events && self.traffic.happened.len() > before {
-            // The engine stands for a direct pipeline: arrivals that wait to be polled came before this drop, as in `drop`.
-            let dropped = self.traffic.happened.split_off(before);
-            self.let_happen(self.now);
-            self.traffic.happened.extend(dropped);
-        }
-    }
-
-    /// The packet was dropped when it was offered.
-    #[inline(never)]
-    fn drop(&mut self, now: Instant, line: LineId, cause: DropCause, packet: InNetwork<P>) {
-        self.lines.get_mut(line).drop(cause);
-        if !self.has_inner_events {
-            // Arrivals that wait to be polled came before this drop.
-            self.let_happen(now);
-        }
-        let event = self.traffic.event(packet, now, Fate::Dropped(cause));
-        self.traffic.happened.push_back(event);
-    }
-}
-
-impl<P> Lines<P> {
-    #[inline(always)]
-    fn get_mut(&mut self, line: LineId) -> &mut Line<P, InNetwork<P>> {
-        let access = match line {
-            LineId::Link(link) => return &mut self.links[link.index()],
-            LineId::Uplink(node) => &mut self.uplinks[node.index()],
-            LineId::Downlink(node) => &mut self.downlinks[node.index()],
-        };
-        access.as_mut().expect("a packet is in an access line only where there is one")
     }
 }
