@@ -198,10 +198,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
                 "per_second, time_constant_s",
                 "the factor of the slowest disturbance in a second; after how long it is smaller by e, negative where it grows. `null` where the bounds of the radius leave more than a percent open",
             ),
-            (
-                "time_constant_bounds_s",
-                "the least and the most that the bounds of the radius allow; `null` where it cannot be told whether a disturbance grows",
-            ),
+            ("time_constant_bounds_s", "least and most, by the bounds of the radius; `null` where growth cannot be told"),
             ("parts[].@Parts of a scene", "of the worst combination of contacts"),
             (
                 "modes[].contacts, modes[].verdict, modes[].spectral_radius, modes[].error_bound, modes[].parts[].@Parts of a scene",
@@ -219,7 +216,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("switching.motions[].rate", "the factor by which a norm is proven to shrink in a frame; `null` unless stable"),
             (
                 "switching.motions[].growth, switching.motions[].frames, switching.motions[].changes",
-                "of a motion that was found: by which factor it grows in a frame, over how many, with how many changes of contacts; `null` unless unstable",
+                "of a motion found: its growth in a frame, its frames and changes of contacts; `null` unless unstable",
             ),
             ("every_number.peer", "the first of the equal peers"),
             (
@@ -260,7 +257,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
         rows: &[
             ("title, x_key, x_unit, x_range, y_key, y_unit, y_range, files, wall_s", "as of a map"),
             ("halvings", "of a range at most"),
-            ("every_number.from, every_number.to", "with `--every-number`; `to` is `null` without end"),
+            ("every_number.from, every_number.to", "with `--every-number`"),
             ("regions[].name, regions[].overrides, regions[].file", "the scene, then each `--curve`"),
             ("regions[].stable, regions[].unstable, regions[].undecided", "shares of the area"),
             ("regions[].lines.stable, regions[].lines.unstable, regions[].lines.undecided", "boxes of a single delay, without area"),
@@ -322,7 +319,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
                 "peers[].seat.taken, peers[].seat.joined, peers[].seat.refused, peers[].seat.out_of_order",
                 "of peers elsewhere: samples taken, joinings, samples refused and out of order",
             ),
-            ("peers[].seat.late, peers[].seat.most_late_us", "samples that came late and counted at the next instant; by how much at most"),
+            ("peers[].seat.late, peers[].seat.most_late_us", "late samples, counted at the next instant; the largest lateness"),
             ("link_totals.NAME, link_quantiles.NAME, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
             ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
             ("door.admitted, door.welcomed, door.refused.NAME", "datagrams; refused ones [by cause](live-protocol.md#why-a-datagram-is-refused)"),
@@ -338,17 +335,11 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("duration_s, ending", "how long it ran; `complete` (`--for`) or `interrupted`"),
             ("valid", "whether releases were as late as tolerated"),
             ("packets", "datagrams that came in. With the copies that links made: sent at all `ports`, `dropped`, `in_flight` and `unsent`"),
-            (
-                "dropped",
-                "datagrams and copies that did not go out, but for those that the kernel dropped before they were read, which are in `ports`",
-            ),
+            ("dropped", "datagrams and copies that did not go out; those that the kernel dropped unread are in `ports`"),
             ("release_error_us.@Lateness", "of sent datagrams"),
             ("clamped_us.@Lateness", "of datagrams read after time had passed their time stamp"),
             ("links[].from, links[].to, links[].@Counters", "of each directed link"),
-            (
-                "links[].asked_mean_delay_s, links[].changes",
-                "when the run began (`null` where only a recording knows); how often it was changed since",
-            ),
+            ("links[].asked_mean_delay_s, links[].changes", "at the beginning (`null` where only a recording knows); changes since"),
             ("links[].delivered_bytes, links[].overload, links[].undeliverable", "as in [the report](relay.md#dropped-datagrams)"),
             ("ports[].name, ports[].address, ports[].received, ports[].sent", "of a proxy: `listen`, and all `clients` together"),
             ("ports[].send_failures.NAME, ports[].oversized, ports[].receive_errors", "not sent or not read; failures by reason"),
