@@ -6,13 +6,14 @@
 mod block;
 mod law;
 
-use cohaptic_peer::coordination::{BuiltIn, Law};
-use cohaptic_peer::{Contact, Enclosure, Hand, HandForce, Motion, Plant, State, StepMap};
+use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
+use cohaptic_peer::{Contact, Enclosure, HandForce, Motion, Plant, State, StepMap};
 use cohaptic_scene::Scene;
-use cohaptic_units::Instant;
+use pulp::NullaryFnOnce;
 
 use super::lanes::{Lanes, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
+use super::processor::on_widest;
 use super::samples::Sample;
 use crate::plan::{DeviceChoice, touches};
 pub(super) use block::Block;
@@ -22,8 +23,9 @@ pub(super) use law::{LawOfLanes, law_of_lanes};
 
 /// All bodies on all axes.
 #[derive(Clone, Debug)]
-pub(super) struct Blocks<const A: usize> {
+pub(super) struct Blocks {
     places: Places,
+    axes: usize,
     blocks: Vec<Block>,
     /// By how much the samples held have moved on since they were sent, a block after another; empty for a law that does not ask.
     leads: Vec<Lanes>,
@@ -38,8 +40,6 @@ pub(super) struct Blocks<const A: usize> {
     late: Option<Vec<Late>>,
     /// The walls of each run, where any has some.
     walls: Option<Vec<Option<Enclosure>>>,
-    /// Hands whose force varies: peer, run and force.
-    hands: Vec<(usize, usize, HandForce<A>)>,
     /// The runs that have not ended.
     pub(super) goes_on: Mask,
 }
@@ -97,14 +97,12 @@ fn set_lane(motions: &mut Motions, lane: usize, motion: Motion) {
     (motions.position.0[lane], motions.velocity.0[lane]) = (motion.position, motion.velocity);
 }
 
-impl<const A: usize> Blocks<A> {
+impl Blocks {
     /// The bodies of runs of these scenes, all of which have that law, with numbers of their own. `devices` says what stands for the device of each peer, if anybody
     /// looks; otherwise only those move that ever touch their copies.
-    pub(super) fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
-        let moves = |peer: usize, run: usize| touches(scenes[run], peer) || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated);
+    pub(super) fn new<const A: usize>(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
         let tick = scenes[0].peers[0].clock.tick;
         let step = |plant: Plant, run: usize| plant.step(tick, scenes[run].integrator);
-        let hand = |peer: usize, run: usize| HandForce::of(scenes[run].peers[places.first + peer].hand.as_ref());
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
         for axis in 0..A {
@@ -119,7 +117,7 @@ impl<const A: usize> Blocks<A> {
                 set_lane(&mut block.object, spot.lane, initial.along(axis));
                 late[spot.block].is_late.set(spot.lane, config.compute_delay);
                 block.touch(spot.lane, config.contact);
-                if !moves(member, run) {
+                if !moves(scenes[run], member, devices) {
                     // Nothing depends on its device.
                     set_map(&mut block.device_map, spot.lane, &RESTING);
                     continue;
@@ -130,28 +128,23 @@ impl<const A: usize> Blocks<A> {
                 block.device.velocity.0[spot.lane] = device.velocity[axis];
                 block.coupling.stiffness.0[spot.lane] = config.coupling.stiffness;
                 block.coupling.damping.0[spot.lane] = config.coupling.damping;
-                let force: Option<[f64; A]> = hand(peer, run).constant();
+                let force: Option<[f64; A]> = HandForce::of(spec.hand.as_ref()).constant();
                 block.hand.0[spot.lane] = force.map_or(0.0, |force| force[axis]);
             }
         }
         let any_late = scenes.iter().any(|scene| scene.peers.iter().any(|peer| peer.compute_delay));
         let walls: Vec<Option<Enclosure>> = scenes.iter().map(|scene| scene.object.enclosure).collect();
-        let varying = |(peer, run): (usize, usize)| {
-            let hand = hand(peer, run);
-            (hand.constant().is_none() && moves(places.first + peer, run)).then_some((peer, run, hand))
-        };
-        let hands = (0..places.peers).flat_map(|peer| (0..places.runs).map(move |run| (peer, run))).filter_map(varying);
         Self {
             leads: if Law::<f64>::horizon(law).is_some() { vec![Lanes::ZERO; blocks.len()] } else { Vec::new() },
             memory: vec![0.0; blocks.len() * WIDTH * Law::<f64>::memory(law)],
             past: (0..Law::<f64>::lag(law)).flat_map(|_| blocks.iter().map(|block| block.object)).collect(),
             oldest: 0,
             places,
+            axes: A,
             blocks,
             object_map: object_map(scenes),
             late: any_late.then_some(late),
             walls: walls.iter().any(Option::is_some).then_some(walls),
-            hands: hands.collect(),
             goes_on: Mask::ALL,
         }
     }
@@ -165,9 +158,9 @@ impl<const A: usize> Blocks<A> {
     }
 
     /// Along each axis the least and the greatest position of the copies of a run.
-    pub(super) fn extremes(&self, run: usize) -> [(f64, f64); A] {
-        let places = |axis: usize| (0..self.places.peers).map(move |peer| self.object(axis, peer, run).0);
-        std::array::from_fn(|axis| places(axis).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (smaller(x, low), larger(x, high))))
+    pub(super) fn extremes(&self, run: usize) -> impl Iterator<Item = (f64, f64)> {
+        let positions = move |axis: usize| (0..self.places.peers).map(move |peer| self.object(axis, peer, run).0);
+        (0..self.axes).map(move |axis| positions(axis).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (smaller(x, low), larger(x, high))))
     }
 
     /// Copies and devices in that place.
@@ -176,13 +169,22 @@ impl<const A: usize> Blocks<A> {
         &self.blocks[place]
     }
 
+    /// How many runs there are.
+    pub(super) const fn runs(&self) -> usize {
+        self.places.runs
+    }
+
     /// The bodies of all peers, by axis.
-    pub(super) fn blocks(&self) -> &[Block] {
+    pub(super) fn of_all(&self) -> &[Block] {
         &self.blocks
     }
 
     /// What rows say of the peers in a place, before they move. `grasped` is FC of devices that hold no centres.
-    pub(super) fn seen(&self, place: usize, law: &impl LawOfLanes, grasped: Option<Lanes>) -> Seen {
+    pub(super) fn seen(&self, place: usize, law: &BuiltIn<Lanes>, grasped: Option<Lanes>) -> Seen {
+        law.visit(Look { blocks: self, place, grasped })
+    }
+
+    fn seen_by(&self, law: &impl LawOfLanes, place: usize, grasped: Option<Lanes>) -> Seen {
         let (block, remembered, lag) = (&self.blocks[place], law.remembered() * WIDTH, law.looks_back());
         let past = if lag > 0 { self.past[self.oldest * self.blocks.len() + place] } else { block.object };
         let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
@@ -200,7 +202,7 @@ impl<const A: usize> Blocks<A> {
 
     /// Puts positions and velocities of a peer into what it sends.
     #[inline(always)]
-    pub(super) fn add_to<const P: usize, const L: usize>(&self, sample: &mut Sample<P, L>, peer: usize) {
+    pub(super) fn add_to<const A: usize, const P: usize, const L: usize>(&self, sample: &mut Sample<P, L>, peer: usize) {
         for axis in 0..A {
             for run in 0..L {
                 (sample.position[axis][run], sample.velocity[axis][run]) = self.object(axis, peer, run);
@@ -248,23 +250,20 @@ impl<const A: usize> Blocks<A> {
 
     /// A device touches its copy in that way from now on, in all runs.
     pub(super) fn set_contact(&mut self, peer: usize, contact: Contact) {
-        for (spot, ..) in (0..A).flat_map(|axis| self.places.all(axis)).filter(|(_, other, _)| *other == peer) {
+        for (spot, ..) in (0..self.axes).flat_map(|axis| self.places.all(axis)).filter(|(_, other, _)| *other == peer) {
             self.blocks[spot.block].touch(spot.lane, contact);
         }
     }
 
-    /// A hand does that from now on, in all runs.
-    pub(super) fn set_hand(&mut self, peer: usize, hand: Option<&Hand>) {
-        let hand = HandForce::<A>::of(hand);
-        self.hands.retain(|(other, ..)| *other != peer);
-        match hand.constant() {
-            None => self.hands.extend((0..self.places.runs).map(|run| (peer, run, hand.clone()))),
-            Some(force) => {
-                for (axis, force) in force.into_iter().enumerate() {
-                    for (spot, ..) in self.places.all(axis).filter(|(_, other, _)| *other == peer) {
-                        self.blocks[spot.block].hand.0[spot.lane] = force;
-                    }
-                }
+    /// A hand pushes with that force from now on, in a run.
+    pub(super) fn set_hand<const A: usize>(&mut self, peer: usize, run: usize, force: [f64; A]) {
+        for (axis, force) in force.into_iter().enumerate() {
+            let Spot { block, lane } = self.places.spot(axis, peer, run);
+            let hands = &mut self.blocks[block].hand.0;
+            hands[lane] = force;
+            // The last of all fills the lanes that are left.
+            if peer + 1 == self.places.peers && run + 1 == self.places.runs {
+                hands[lane..].fill(force);
             }
         }
     }
@@ -283,29 +282,21 @@ impl<const A: usize> Blocks<A> {
         self.oldest = 0;
     }
 
-    /// Hands whose force varies take what it is now.
-    pub(super) fn move_hands(&mut self, now: Instant) {
-        for (peer, run, hand) in &self.hands {
-            let force = hand.at(now);
-            for (axis, force) in force.into_iter().enumerate() {
-                let Spot { block, lane } = self.places.spot(axis, *peer, *run);
-                let block = &mut self.blocks[block];
-                block.hand.0[lane] = force;
-                if peer + 1 == self.places.peers && run + 1 == self.places.runs {
-                    block.hand.0[lane..].fill(force);
-                }
-            }
-        }
+    /// Everybody computes forces by the law and moves to the next tick. `grasped` says what devices hold.
+    ///
+    /// The law is chosen at each tick, so that all loops over ticks, which are compiled for each kind of bodies and of observers, share what is compiled for each law.
+    #[inline(always)]
+    pub(super) fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>, grasped: &impl Grasped) -> Moved<L> {
+        law.visit(Advance::<_, L> { blocks: self, processor, grasped })
     }
 
-    /// Everybody computes forces by the law and moves to the next tick. `grasped` says what devices hold.
     #[inline(always)]
-    pub(super) fn advance<const L: usize>(&mut self, law: &impl LawOfLanes, grasped: &impl Grasped) -> Moved<L> {
+    fn advance_by<const L: usize>(&mut self, law: &impl LawOfLanes, grasped: &impl Grasped) -> Moved<L> {
         let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
         let per_axis = self.places.blocks();
         let (remembered, lag) = (law.remembered() * WIDTH, law.looks_back());
-        let oldest = self.oldest * A * per_axis;
-        for axis in 0..A {
+        let oldest = self.oldest * self.axes * per_axis;
+        for axis in 0..self.axes {
             let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
             for place in axis * per_axis..(axis + 1) * per_axis {
                 let block = &mut self.blocks[place];
@@ -353,7 +344,7 @@ impl<const A: usize> Blocks<A> {
     #[cold]
     fn look_at_each<const L: usize>(&self) -> [bool; L] {
         let mut finite = [true; L];
-        for axis in 0..A {
+        for axis in 0..self.axes {
             for (Spot { block, lane }, _, run) in self.places.all(axis) {
                 let block = &self.blocks[block];
                 let motions = [&block.device, &block.object].map(|motions| lane_of(motions, lane));
@@ -361,6 +352,61 @@ impl<const A: usize> Blocks<A> {
             }
         }
         finite
+    }
+}
+
+/// Whether a device moves: it may touch its copy, or is looked at.
+pub(super) fn moves(scene: &Scene, peer: usize, devices: Option<&[DeviceChoice]>) -> bool {
+    touches(scene, peer) || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated)
+}
+
+/// [`Blocks::advance`] by a law of its own type.
+struct Advance<'a, G, const L: usize> {
+    blocks: &'a mut Blocks,
+    processor: pulp::Arch,
+    grasped: &'a G,
+}
+
+impl<G: Grasped, const L: usize> LawVisitor<Lanes> for Advance<'_, G, L> {
+    type Output = Moved<L>;
+
+    #[inline(always)]
+    fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> Moved<L> {
+        let Self { blocks, processor, grasped } = self;
+        let tick = Tick { blocks, law, grasped };
+        // With wide registers a run of three or ten peers over constant delays takes six tenths of the time.
+        on_widest(processor, tick)
+    }
+}
+
+/// The motion of a tick.
+struct Tick<'a, W, G, const L: usize> {
+    blocks: &'a mut Blocks,
+    law: &'a W,
+    grasped: &'a G,
+}
+
+impl<W: LawOfLanes, G: Grasped, const L: usize> NullaryFnOnce for Tick<'_, W, G, L> {
+    type Output = Moved<L>;
+
+    #[inline(always)]
+    fn call(self) -> Moved<L> {
+        self.blocks.advance_by(self.law, self.grasped)
+    }
+}
+
+/// [`Blocks::seen`] by a law of its own type.
+struct Look<'a> {
+    blocks: &'a Blocks,
+    place: usize,
+    grasped: Option<Lanes>,
+}
+
+impl LawVisitor<Lanes> for Look<'_> {
+    type Output = Seen;
+
+    fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> Seen {
+        self.blocks.seen_by(law, self.place, self.grasped)
     }
 }
 

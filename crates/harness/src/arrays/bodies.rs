@@ -2,11 +2,11 @@
 
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::rotation::{Attitude, Triple};
-use cohaptic_peer::{Contact, Gains, Signal};
+use cohaptic_peer::{Contact, Gains, Hand, Signal};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::blocks::{Blocks, Centres, LawOfLanes, Moved, Seen};
+use super::blocks::{Blocks, Moved, Seen};
 use super::lanes::Lanes;
 use super::place::Places;
 use super::samples::Sample;
@@ -24,10 +24,10 @@ pub(super) trait Bodies<const A: usize, const P: usize> {
     fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self;
 
     /// How they go.
-    fn translations(&self) -> &Blocks<A>;
+    fn blocks(&self) -> &Blocks;
 
     /// How they go, to change what moves them.
-    fn translations_mut(&mut self) -> &mut Blocks<A>;
+    fn blocks_mut(&mut self) -> &mut Blocks;
 
     /// What a peer sends now.
     fn sample<const L: usize>(&self, peer: usize) -> Sample<P, L>;
@@ -35,12 +35,15 @@ pub(super) trait Bodies<const A: usize, const P: usize> {
     /// Replaces the means of a pair of numbers of the samples that a peer holds, in all runs.
     fn set_target<const L: usize>(&mut self, pair: usize, peer: usize, x: [f64; L], v: [f64; L]);
 
+    /// A hand does that from now on, in all runs.
+    fn set_hand(&mut self, peer: usize, hand: Option<&Hand>);
+
     /// Hands take the force and torque of now.
     fn move_hands(&mut self, now: Instant);
 
     /// A device touches its copy in that way from now on, in all runs.
     fn set_contact(&mut self, peer: usize, contact: Contact) {
-        self.translations_mut().set_contact(peer, contact);
+        self.blocks_mut().set_contact(peer, contact);
     }
 
     /// A hand turns its device by that torque from now on, in all runs, if the device turns.
@@ -51,14 +54,14 @@ pub(super) trait Bodies<const A: usize, const P: usize> {
 
     /// The damping of copies from now on is that of these scenes, in each run.
     fn set_damping(&mut self, scenes: &[&Scene]) {
-        self.translations_mut().set_damping(scenes);
+        self.blocks_mut().set_damping(scenes);
     }
 
     /// Everybody computes forces by the law and moves to the next tick.
-    fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L>;
+    fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>) -> Moved<L>;
 
     /// What rows say of the peers in a place, before they move.
-    fn seen(&self, place: usize, law: &impl LawOfLanes) -> SeenPlace<A>;
+    fn seen(&self, place: usize, law: &BuiltIn<Lanes>) -> SeenPlace<A>;
 
     /// How a device is turned; `None` if it does not turn.
     fn device_attitude(&self, _peer: usize, _run: usize) -> Option<Attitude> {
@@ -73,48 +76,5 @@ pub(super) trait Bodies<const A: usize, const P: usize> {
     /// The largest angle between two copies so far \[rad\]; `None` if they do not turn.
     fn max_rotation_discrepancy(&self, _run: usize) -> Option<f64> {
         None
-    }
-}
-
-impl<const A: usize> Bodies<A, A> for Blocks<A> {
-    fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
-        Self::new(places, scenes, law, devices)
-    }
-
-    #[inline(always)]
-    fn translations(&self) -> &Self {
-        self
-    }
-
-    #[inline(always)]
-    fn translations_mut(&mut self) -> &mut Self {
-        self
-    }
-
-    #[inline(always)]
-    fn sample<const L: usize>(&self, peer: usize) -> Sample<A, L> {
-        let mut sample = Sample::ZERO;
-        self.add_to(&mut sample, peer);
-        sample
-    }
-
-    #[inline(always)]
-    fn set_target<const L: usize>(&mut self, axis: usize, peer: usize, x: [f64; L], v: [f64; L]) {
-        self.set_target(axis, peer, x, v);
-    }
-
-    #[inline(always)]
-    fn move_hands(&mut self, now: Instant) {
-        self.move_hands(now);
-    }
-
-    #[inline(always)]
-    fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L> {
-        self.advance(law, &Centres)
-    }
-
-    fn seen(&self, place: usize, law: &impl LawOfLanes) -> SeenPlace<A> {
-        let blocks = self.blocks().len() / A;
-        SeenPlace { axes: std::array::from_fn(|axis| self.seen(axis * blocks + place, law, None)), turn: None }
     }
 }

@@ -79,7 +79,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
                 }
                 ChangeKind::Hand { peer, hand } => {
                     if let Some(peer) = self.member(*peer) {
-                        self.bodies.translations_mut().set_hand(peer, hand.as_ref());
+                        self.bodies.set_hand(peer, hand.as_ref());
                     }
                 }
                 ChangeKind::HandTorque { peer, torque } => {
@@ -139,7 +139,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
                 }
             }
         }
-        self.bodies.translations_mut().set_lag(Law::<f64>::lag(&laws[0]));
+        self.bodies.blocks_mut().set_lag(Law::<f64>::lag(&laws[0]));
         let then = self.scenes.map(|scene| scene.with_parameters(settings));
         self.bodies.set_damping(&then.each_ref());
         watch.change_damping(&then[0]);

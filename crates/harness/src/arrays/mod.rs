@@ -11,12 +11,14 @@ mod bodies;
 mod changes;
 mod lanes;
 mod place;
+mod processor;
 mod run_watch;
 mod samples;
 mod shape;
 mod side_by_side;
 mod threads;
 mod ticks;
+mod translations;
 mod turn;
 mod turning;
 
@@ -25,7 +27,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_peer::Lead;
-use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
+use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_scene::{Axes, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
@@ -34,18 +36,20 @@ use pulp::NullaryFnOnce;
 use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::plan::{DeviceChoice, Plan};
 use crate::summary::{Ending, LinkSummaries, PeerSummary, Summary};
-use blocks::{Blocks, LawOfLanes, Moved, law_of_lanes};
+use blocks::{Moved, law_of_lanes};
 use bodies::Bodies;
 use changes::Changes;
 use lanes::Lanes;
 pub(crate) use lanes::{WIDTH, larger, smaller};
 use place::Places;
+use processor::on_widest;
 pub(crate) use run_watch::Onlooker;
 use run_watch::{RunWatch, Unwatched, WatchedTicks};
 use samples::{Broadcast, PerPacket, Sample};
 pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
 pub use ticks::Ticks;
+use translations::Translations;
 use turning::{PAIRS, TurningBlocks};
 
 /// A run of a scene of that shape with that law, to its end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
@@ -61,9 +65,9 @@ fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; 
     let watch = Unwatched(keep_going);
     match scenes[0].axes {
         Axes::Three if scenes[0].rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, L>::new(scenes, shape, laws, None).run(watch),
-        Axes::One => Arrays::<Blocks<1>, 1, 1, L>::new(scenes, shape, laws, None).run(watch),
-        Axes::Two => Arrays::<Blocks<2>, 2, 2, L>::new(scenes, shape, laws, None).run(watch),
-        Axes::Three => Arrays::<Blocks<3>, 3, 3, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::One => Arrays::<Translations<1>, 1, 1, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::Two => Arrays::<Translations<2>, 2, 2, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::Three => Arrays::<Translations<3>, 3, 3, L>::new(scenes, shape, laws, None).run(watch),
     }
 }
 
@@ -72,9 +76,9 @@ pub(crate) fn run_watched(scene: &Scene, (shape, law): (Shape, BuiltIn), plan: &
     let (watch, scenes, laws, devices) = (WatchedTicks::new(scene, onlooker), [scene], [law], Some(plan.devices.as_slice()));
     let [summary] = match scene.axes {
         Axes::Three if scene.rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, 1>::new(scenes, shape, laws, devices).run(watch),
-        Axes::One => Arrays::<Blocks<1>, 1, 1, 1>::new(scenes, shape, laws, devices).run(watch),
-        Axes::Two => Arrays::<Blocks<2>, 2, 2, 1>::new(scenes, shape, laws, devices).run(watch),
-        Axes::Three => Arrays::<Blocks<3>, 3, 3, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::One => Arrays::<Translations<1>, 1, 1, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::Two => Arrays::<Translations<2>, 2, 2, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::Three => Arrays::<Translations<3>, 3, 3, 1>::new(scenes, shape, laws, devices).run(watch),
     };
     summary
 }
@@ -88,9 +92,9 @@ pub(crate) fn run_on_threads(
     keep_going: &mut dyn FnMut(Instant) -> bool,
 ) -> Option<Summary> {
     match scene.axes {
-        Axes::One => threads::run::<Blocks<1>, 1, 1>(scene, shape, law, threads, keep_going),
-        Axes::Two => threads::run::<Blocks<2>, 2, 2>(scene, shape, law, threads, keep_going),
-        Axes::Three => threads::run::<Blocks<3>, 3, 3>(scene, shape, law, threads, keep_going),
+        Axes::One => threads::run::<Translations<1>, 1, 1>(scene, shape, law, threads, keep_going),
+        Axes::Two => threads::run::<Translations<2>, 2, 2>(scene, shape, law, threads, keep_going),
+        Axes::Three => threads::run::<Translations<3>, 3, 3>(scene, shape, law, threads, keep_going),
     }
 }
 
@@ -183,9 +187,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         let (mut tick, last) = (0, self.shape.tick_at(self.shape.end));
         loop {
             let until = self.next_change().min(last);
-            // A copy, so that the law is a constant of the loop and nothing that is written can change it.
-            let law = self.law;
-            if law.visit(Stretch { arrays: &mut self, watch: &mut watch, ticks: tick..until }).is_break() {
+            if self.run_over(tick..until, &mut watch).is_break() {
                 break;
             }
             tick = until;
@@ -203,14 +205,14 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     }
 
     /// Runs all of them over those ticks, or until they have all ended.
-    fn run_over(&mut self, law: &impl LawOfLanes, ticks: Range<u64>, watch: &mut impl RunWatch<B, A, P>) -> ControlFlow<()> {
+    fn run_over(&mut self, ticks: Range<u64>, watch: &mut impl RunWatch<B, A, P>) -> ControlFlow<()> {
         let tick_nanos = nanos(self.shape.tick);
         for tick in ticks {
             let now = Instant::from_nanos(tick * tick_nanos);
             if self.finite.contains(&false) && self.end_diverged(tick, now) {
                 return ControlFlow::Break(());
             }
-            let discrepancy = self.step(law, tick, now, (&mut Nowhere, watch));
+            let discrepancy = self.step(tick, now, (&mut Nowhere, watch));
             let ticks = tick + 1;
             if !watch.after_motion(now, discrepancy[0]) || is_asked_before(ticks) && !watch.keep_going(now) {
                 self.end_all(ticks, |_| Ending::Interrupted(now));
@@ -232,13 +234,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// Everything that happens at a tick. Gives how far copies are apart \[m\].
     #[inline(always)]
-    fn step(
-        &mut self,
-        law: &impl LawOfLanes,
-        tick: u64,
-        now: Instant,
-        (others, watch): (&mut impl Others<P, L>, &mut impl RunWatch<B, A, P>),
-    ) -> [f64; L] {
+    fn step(&mut self, tick: u64, now: Instant, (others, watch): (&mut impl Others<P, L>, &mut impl RunWatch<B, A, P>)) -> [f64; L] {
         if self.shape.has_queues() && is_asked_before(tick) {
             self.pass(tick);
         }
@@ -253,7 +249,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         if self.leads.is_some() {
             self.extrapolate(now);
         }
-        let Moved { discrepancy, finite } = self.motion(law, now, watch);
+        let Moved { discrepancy, finite } = self.motion(now, watch);
         for (largest, discrepancy) in self.max_discrepancy.iter_mut().zip(discrepancy) {
             *largest = largest.max(discrepancy);
         }
@@ -263,10 +259,12 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// Means and motion of a tick.
     #[inline(always)]
-    fn motion(&mut self, law: &impl LawOfLanes, now: Instant, watch: &mut impl RunWatch<B, A, P>) -> Moved<L> {
-        let motion = Motion { law, now, watch, samples: &mut self.samples, bodies: &mut self.bodies };
-        // With wide registers a run of three or ten peers over constant delays takes six tenths of the time.
-        self.processor.dispatch(motion)
+    fn motion(&mut self, now: Instant, watch: &mut impl RunWatch<B, A, P>) -> Moved<L> {
+        if !matches!(&self.samples, Samples::Broadcast(samples) if samples.is_settled()) {
+            on_widest(self.processor, Means::<B, A, P, L> { samples: &mut self.samples, bodies: &mut self.bodies });
+        }
+        watch.before_motion(now, &self.bodies, &self.law);
+        self.bodies.advance::<L>(self.processor, &self.law)
     }
 
     /// Leads of a tick: what [`cohaptic_peer::Held::move_on`] gives, to the bit.
@@ -290,7 +288,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
                 lead.at(now)
             });
             for axis in 0..A {
-                self.bodies.translations_mut().set_lead::<L>(axis, peer, values.map(|value| value[axis]));
+                self.bodies.blocks_mut().set_lead::<L>(axis, peer, values.map(|value| value[axis]));
             }
         }
     }
@@ -353,7 +351,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     fn end(&mut self, run: usize, ticks: u64, ending: Ending) {
         let until = self.stop(run, ticks, ending);
         self.summaries[run] = Some(summary(std::slice::from_ref(self), run, ticks, ending, until, self.max_discrepancy[run]));
-        self.bodies.translations_mut().end(run);
+        self.bodies.blocks_mut().end(run);
     }
 
     /// A run ends after that number of ticks: nothing is on the way any more. Gives until when packets were delivered.
@@ -375,7 +373,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// What came out for a peer.
     fn peer_summary(&self, peer: usize, run: usize) -> PeerSummary {
-        let (position, velocity) = (0..A).map(|axis| self.bodies.translations().object(axis, peer, run)).unzip();
+        let (position, velocity) = (0..A).map(|axis| self.bodies.blocks().object(axis, peer, run)).unzip();
         let stale_samples = match &self.samples {
             Samples::Broadcast(_) => 0,
             Samples::PerPacket(samples) => samples.stale_samples(peer, run),
@@ -460,48 +458,23 @@ fn bodies_of<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
     B::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0], devices)
 }
 
-/// A run over some ticks. The loop is compiled for each law: where it chooses between laws at every tick, a run of three peers over constant delays takes a sixth
-/// longer.
-struct Stretch<'s, 'a, E, B, const A: usize, const P: usize, const L: usize> {
-    arrays: &'s mut Arrays<'a, B, A, P, L>,
-    watch: &'s mut E,
-    ticks: Range<u64>,
-}
-
-impl<E: RunWatch<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> LawVisitor<Lanes> for Stretch<'_, '_, E, B, A, P, L> {
-    type Output = ControlFlow<()>;
-
-    #[inline(never)]
-    fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> ControlFlow<()> {
-        self.arrays.run_over(law, self.ticks, self.watch)
-    }
-}
-
-/// Means and motion of a tick, compiled once for any processor and once for one that has AVX2: with wider registers, and not one rounding less.
-struct Motion<'a, W, E, B, const A: usize, const P: usize, const L: usize> {
-    law: &'a W,
-    now: Instant,
-    watch: &'a mut E,
+/// The means of the samples held.
+struct Means<'a, B, const A: usize, const P: usize, const L: usize> {
     samples: &'a mut Samples<P, L>,
     bodies: &'a mut B,
 }
 
-impl<W: LawOfLanes, E: RunWatch<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce
-    for Motion<'_, W, E, B, A, P, L>
-{
-    type Output = Moved<L>;
+impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce for Means<'_, B, A, P, L> {
+    type Output = ();
 
     #[inline(always)]
-    fn call(self) -> Moved<L> {
+    fn call(self) {
         match self.samples {
             Samples::Broadcast(samples) => samples.refresh(self.bodies),
             Samples::PerPacket(samples) => samples.refresh(self.bodies),
         }
-        self.watch.before_motion(self.now, self.bodies, self.law);
-        self.bodies.advance::<L>(self.law)
     }
 }
-
 /// Whether the observer is asked, before that tick, whether to go on.
 fn is_asked_before(tick: u64) -> bool {
     tick > 0 && tick.is_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS))

@@ -1,12 +1,13 @@
 //! Observers of runs in arrays.
 
+use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::rotation::{Attitude, Triple};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::blocks::{LawOfLanes, lane_of};
+use super::blocks::lane_of;
 use super::bodies::{Bodies, SeenPlace};
-use super::lanes::WIDTH;
+use super::lanes::{Lanes, WIDTH};
 use super::ticks::{Source, Ticks};
 use crate::observer::{InstantRow, StateRow, TickRow, TurnRow};
 
@@ -17,7 +18,7 @@ pub(super) trait RunWatch<B, const A: usize, const P: usize> {
 
     /// At that tick everything that arrives has arrived, and nobody has moved.
     #[inline(always)]
-    fn before_motion(&mut self, _now: Instant, _bodies: &B, _law: &impl LawOfLanes) {}
+    fn before_motion(&mut self, _now: Instant, _bodies: &B, _law: &BuiltIn<Lanes>) {}
 
     /// The damping of the law from now on is that of this scene.
     fn change_damping(&mut self, _scene: &Scene) {}
@@ -78,9 +79,9 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize> RunWatch<B, A, P> for Watc
     }
 
     #[inline(always)]
-    fn before_motion(&mut self, now: Instant, bodies: &B, law: &impl LawOfLanes) {
+    fn before_motion(&mut self, now: Instant, bodies: &B, law: &BuiltIn<Lanes>) {
         let source = Peers { at: now, bodies, law, damping: &self.damping };
-        self.onlooker.on_ticks(&Ticks::new(now, self.damping.len(), bodies.translations().blocks(), &source));
+        self.onlooker.on_ticks(&Ticks::new(now, self.damping.len(), bodies.blocks().of_all(), &source));
     }
 
     #[inline(always)]
@@ -90,10 +91,10 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize> RunWatch<B, A, P> for Watc
 }
 
 /// All peers before they move.
-struct Peers<'a, B, W, const A: usize, const P: usize> {
+struct Peers<'a, B, const A: usize, const P: usize> {
     at: Instant,
     bodies: &'a B,
-    law: &'a W,
+    law: &'a BuiltIn<Lanes>,
     damping: &'a [(f64, Triple)],
 }
 
@@ -116,7 +117,7 @@ impl<const A: usize> StateOfLane<A> {
     }
 }
 
-impl<B: Bodies<A, P>, W: LawOfLanes, const A: usize, const P: usize> Source for Peers<'_, B, W, A, P> {
+impl<B: Bodies<A, P>, const A: usize, const P: usize> Source for Peers<'_, B, A, P> {
     fn attitude(&self, peer: usize) -> Option<Attitude> {
         self.bodies.attitude(peer, 0)
     }

@@ -10,14 +10,12 @@ use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
+use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use self::barrier::Barrier;
-use super::blocks::LawOfLanes;
 use super::bodies::Bodies;
-use super::lanes::Lanes;
 use super::run_watch::Unwatched;
 use super::samples::Sample;
 use super::shape::Shape;
@@ -166,12 +164,6 @@ struct Part<'a, 'e, 'k, B, const A: usize, const P: usize> {
     keep_going: Option<&'k mut dyn FnMut(Instant) -> bool>,
 }
 
-/// Some ticks of the run of a thread.
-struct Stretch<'s, 'a, 'e, 'k, B, const A: usize, const P: usize> {
-    part: &'s mut Part<'a, 'e, 'k, B, A, P>,
-    ticks: Range<u64>,
-}
-
 /// Why the run of a thread ends early.
 enum Early {
     Diverged,
@@ -179,22 +171,13 @@ enum Early {
     Interrupted(u64),
 }
 
-impl<B: Bodies<A, P>, const A: usize, const P: usize> LawVisitor<Lanes> for Stretch<'_, '_, '_, '_, B, A, P> {
-    type Output = ControlFlow<Early>;
-
-    #[inline(never)]
-    fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> Self::Output {
-        self.part.run_over(law, self.ticks)
-    }
-}
-
 impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> Part<'a, '_, '_, B, A, P> {
     fn run(mut self) -> Option<Ended<'a, B, A, P>> {
         let (mut tick, last) = (0, self.arrays.shape.tick_at(self.arrays.shape.end));
         let nobody = &mut Unwatched(&mut |_| true);
         let (ending, ticks) = loop {
-            let (law, until) = (self.arrays.law, self.arrays.next_change().min(last));
-            match law.visit(Stretch { part: &mut self, ticks: tick..until }) {
+            let until = self.arrays.next_change().min(last);
+            match self.run_over(tick..until) {
                 ControlFlow::Break(Early::Diverged) => return None,
                 ControlFlow::Break(Early::Interrupted(ticks)) => break (Ending::Interrupted(self.arrays.shape.before(ticks).1), ticks),
                 ControlFlow::Continue(()) => tick = until,
@@ -219,15 +202,15 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> Part<'a, '_, '_, B, A,
         Some(Ended { part: arrays, ending, ticks, until, max_discrepancy: thread.max_discrepancy })
     }
 
-    fn run_over(&mut self, law: &impl LawOfLanes, ticks: Range<u64>) -> ControlFlow<Early> {
+    fn run_over(&mut self, ticks: Range<u64>) -> ControlFlow<Early> {
         let tick_nanos = nanos(self.arrays.shape.tick);
         for tick in ticks {
             if !self.thread.all_are_finite {
                 return ControlFlow::Break(Early::Diverged);
             }
             let now = Instant::from_nanos(tick * tick_nanos);
-            self.thread.extremes.extend(self.arrays.bodies.translations().extremes(0));
-            self.arrays.step(law, tick, now, (&mut self.thread, &mut Unwatched(&mut |_| true)));
+            self.thread.extremes.extend(self.arrays.bodies.blocks().extremes(0));
+            self.arrays.step(tick, now, (&mut self.thread, &mut Unwatched(&mut |_| true)));
             self.thread.is_finite &= self.arrays.finite[0];
             if is_asked_before(tick + 1) && !self.goes_on(now) {
                 return ControlFlow::Break(Early::Interrupted(tick + 1));

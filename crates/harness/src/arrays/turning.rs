@@ -4,16 +4,17 @@
 
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::rotation::{Attitude, DeviceRotation, RotationConfig, RotationStep, Spin, Triple};
-use cohaptic_peer::{Contact, Gains, Signal};
+use cohaptic_peer::{Contact, Gains, Hand, Signal};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use pulp::NullaryFnOnce;
 
-use super::blocks::{Blocks, Grasped, LawOfLanes, Moved};
+use super::blocks::{Blocks, Grasped, Moved};
 use super::bodies::{Bodies, SeenPlace};
 use super::lanes::{Lanes, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 use super::samples::Sample;
+use super::translations::Translations;
 use super::turn::{Computed, Handles, Shared, Steps, Turn};
 use crate::plan::DeviceChoice;
 use crate::spread::{Spread, squared_chord};
@@ -25,14 +26,13 @@ pub(super) const PAIRS: usize = 9;
 #[derive(Clone, Debug)]
 pub(super) struct TurningBlocks {
     places: Places,
-    translations: Blocks<3>,
+    translations: Translations<3>,
     turns: Vec<Turn>,
     shared: Shared,
     /// FC along each axis, by the place of its block.
     coupling: Vec<Lanes>,
     /// How far copies are turned apart, in each run.
     spreads: Vec<Spread>,
-    processor: pulp::Arch,
 }
 
 /// What devices hold of copies that turn: points off their centres.
@@ -52,7 +52,7 @@ impl TurningBlocks {
         let per_axis = self.places.blocks();
         let mut size = Lanes::ZERO;
         for (place, turn) in self.turns.iter_mut().enumerate() {
-            let blocks = [0, 1, 2].map(|axis| self.translations.block(axis * per_axis + place));
+            let blocks = [0, 1, 2].map(|axis| self.translations.blocks().block(axis * per_axis + place));
             let coupling = turn.tick(&self.shared, blocks);
             for (axis, coupling) in coupling.into_iter().enumerate() {
                 self.coupling[axis * per_axis + place] = coupling;
@@ -195,29 +195,28 @@ impl Bodies<3, PAIRS> for TurningBlocks {
         shared.set_gains(&of_runs.iter().map(|config| config.gains).collect::<Vec<_>>());
         Self {
             places,
-            translations: Blocks::new(places, scenes, law, devices),
+            translations: Translations::new(places, scenes, law, devices),
             turns,
             shared,
             coupling: vec![Lanes::ZERO; 3 * places.blocks()],
             spreads: vec![Spread::default(); places.runs],
-            processor: pulp::Arch::new(),
         }
     }
 
     #[inline(always)]
-    fn translations(&self) -> &Blocks<3> {
-        &self.translations
+    fn blocks(&self) -> &Blocks {
+        self.translations.blocks()
     }
 
     #[inline(always)]
-    fn translations_mut(&mut self) -> &mut Blocks<3> {
-        &mut self.translations
+    fn blocks_mut(&mut self) -> &mut Blocks {
+        self.translations.blocks_mut()
     }
 
     #[inline(always)]
     fn sample<const L: usize>(&self, peer: usize) -> Sample<PAIRS, L> {
         let mut sample = Sample::ZERO;
-        self.translations.add_to(&mut sample, peer);
+        self.blocks().add_to::<3, PAIRS, L>(&mut sample, peer);
         for run in 0..L {
             let Spot { block, lane } = self.places.spot(0, peer, run);
             let attitude = self.turns[block].attitude(lane);
@@ -267,6 +266,10 @@ impl Bodies<3, PAIRS> for TurningBlocks {
         self.shared.set_steps(scenes);
     }
 
+    fn set_hand(&mut self, peer: usize, hand: Option<&Hand>) {
+        self.translations.set_hand(peer, hand);
+    }
+
     fn move_hands(&mut self, now: Instant) {
         self.translations.move_hands(now);
         for handles in self.turns.iter_mut().filter_map(|turn| turn.handles.as_mut()) {
@@ -275,21 +278,20 @@ impl Bodies<3, PAIRS> for TurningBlocks {
     }
 
     #[inline(always)]
-    fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L> {
-        let processor = self.processor;
+    fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>) -> Moved<L> {
         let size = processor.dispatch(Turned(self));
-        let mut moved = self.translations.advance::<L>(law, &Points(&self.coupling));
-        let size = size & self.translations.goes_on;
+        let mut moved = self.translations.advance_grasped::<L>(processor, law, &Points(&self.coupling));
+        let size = size & self.blocks().goes_on;
         if !size.0.iter().sum::<f64>().is_finite() {
             self.look_at_each(&mut moved.finite);
         }
         moved
     }
 
-    fn seen(&self, place: usize, law: &impl LawOfLanes) -> SeenPlace<3> {
+    fn seen(&self, place: usize, law: &BuiltIn<Lanes>) -> SeenPlace<3> {
         let at = [0, 1, 2].map(|axis| axis * self.places.blocks() + place);
-        let Computed { coupling, torques, aligning } = self.turns[place].compute(&self.shared, at.map(|at| self.translations.block(at)));
-        let axes = std::array::from_fn(|axis| self.translations.seen(at[axis], law, Some(coupling[axis])));
+        let Computed { coupling, torques, aligning } = self.turns[place].compute(&self.shared, at.map(|at| self.translations.blocks().block(at)));
+        let axes = std::array::from_fn(|axis| self.blocks().seen(at[axis], law, Some(coupling[axis])));
         SeenPlace { axes, turn: Some((torques.on_copy, aligning)) }
     }
 

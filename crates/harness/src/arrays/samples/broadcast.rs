@@ -123,6 +123,12 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
         })
     }
 
+    /// Whether nothing that anybody holds has changed since the means were computed.
+    #[inline(always)]
+    pub(in crate::arrays) fn is_settled(&self) -> bool {
+        self.changed == Changed::Nothing
+    }
+
     /// Whether anything that a peer holds has changed since the means were computed.
     pub(in crate::arrays) fn has_changed(&self, peer: usize) -> bool {
         match self.changed {
@@ -135,9 +141,7 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
     /// The means are those of the samples held.
     #[inline(always)]
     pub(in crate::arrays) fn refresh<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
-        if std::mem::replace(&mut self.changed, Changed::Nothing) == Changed::Nothing {
-            return;
-        }
+        self.changed = Changed::Nothing;
         if self.sums.is_some() {
             self.refresh_exactly(bodies);
             return;
