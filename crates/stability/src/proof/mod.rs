@@ -13,6 +13,7 @@ mod discs;
 mod followed;
 mod growing;
 mod halving;
+mod heard;
 mod line;
 mod mean_square;
 #[cfg(test)]
@@ -20,7 +21,9 @@ mod mutation;
 mod number;
 #[cfg(test)]
 mod points;
+mod program;
 mod region;
+mod sampled_laws;
 mod shared;
 mod span;
 mod steps;
@@ -119,6 +122,25 @@ pub enum ProofError {
         "gains or the mass of a copy depend on the number of peers, and a box of keys holds no such: expected average-position coordination without scaling and object.split-mass = false; or one number at a time, by `--curve scene.count=N`"
     )]
     Scaled,
+    /// A box of keys and numbers of peers, with a law of which it is not followed.
+    #[error(
+        "{}: boxes of keys hold for one number of peers; expected no --every-number, or `stability point --every-number` for single scenes{}",
+        if *is_graph { "a scene with a [topology]" } else { what }, if *is_graph { " without a [topology]" } else { "" }
+    )]
+    OneNumber {
+        /// The strategy.
+        what: &'static str,
+        /// Whether it is a topology that is not followed.
+        is_graph: bool,
+    },
+    /// Waves between peers of several kinds.
+    #[error(
+        "waves between peers of {kinds} kinds: some bounce to and fro and move nothing, and a proof tells them apart among two kinds at most; expected equal peers and links, or `stability map` and `boundary` without --prove"
+    )]
+    KindsOfPeers {
+        /// How many kinds.
+        kinds: usize,
+    },
     /// Numbers of peers that are none.
     #[error("expected numbers of peers from 2 on, the least first, such as 2.. or 2..100")]
     Numbers,
@@ -175,7 +197,7 @@ pub enum ProofError {
 /// The certificate of how the members of a class differ, if that is proven stable.
 pub(crate) fn stable_difference(members: &[usize], node: &Node, weight: f64, timetable: &Timetable, time: f64) -> Option<PartCertificate> {
     let nodes = vec![node.clone()];
-    let points = [Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight) }];
+    let points = [Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight), impedance: 0.0 }];
     let common = Common { timetable, tied: true, time };
     let decision = discs::decide(&StepSpan::product(&corners::steps(&points, &[nodes], common).ok()?))?;
     let part = PartCertificate::new(vec![members.to_vec()], true, corners::states(&points, common).ok()?, time, &decision.witness);
