@@ -17,13 +17,13 @@ use super::corners::{Point, States, enclosed};
 use super::heard::{Heard, whole};
 use super::program::{Displacement, Operation, Program, Register, Sum};
 use super::span::StepSpan;
-use crate::Matrix;
 use crate::lifted::Node;
 use crate::lifted::node::{Body, Scale};
 use crate::linear_form::LinearLaw;
 use crate::network::NominalNetwork;
 use crate::structure::{Contacts, Structure, count};
 use crate::timetable::{Event, Timetable};
+use crate::{AnalysisError, Matrix};
 
 /// A law whose samples carry more than a state.
 #[derive(Clone, Debug)]
@@ -40,6 +40,10 @@ impl SampledLaw {
         let scene = scenes[0];
         let coordination = &scene.coordination;
         let word = |place: usize| coordination.settings.of(coordination.strategy).get(place);
+        // Frames of waves are written down below; no reference has confirmed a proof of one yet, so that none is given.
+        if coordination.strategy == Coordination::Wave {
+            return Err(AnalysisError::OtherStrategy { strategy: coordination.strategy.name() }.into());
+        }
         match coordination.strategy {
             Coordination::Wave => {
                 let structure = Structure::of_any_law(scenes, network, contacts, |_, _| false)?;

@@ -545,7 +545,6 @@ fn blocks_make_the_proof_of_one_process() {
 fn lines_of_other_linear_laws_are_judged_as_single_scenes_are() {
     const SERVER: &str = "coordination.strategy=\"client-server\"";
     const OBJECT: &str = "coordination.client-server.returns=\"object\"";
-    const WAVE: &str = "coordination.strategy=\"wave\"";
     const LOSS: &str = "link.loss={ packets = [1], every = 3 }";
     const ARM: &str = "peers=[{ name = \"peer2\", hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } } }]";
     const LOOSE: &str = "peers=[{ name = \"peer1\", contact = \"none\" }]";
@@ -556,12 +555,6 @@ fn lines_of_other_linear_laws_are_judged_as_single_scenes_are() {
         (&[SERVER, "scene.count=3", LOOSE, "link.delay=13ms"], "peer.coupling.damping=0..60"),
         (&[SERVER, "scene.count=3", ARM, "peer.compute-delay=1"], "peer.coupling.stiffness=50..2000"),
         (&[SERVER, "scene.count=3", LOSS], "object.mass=0.1..4"),
-        (&[WAVE], "peer.coupling.stiffness=500..60000"),
-        (&[WAVE, "scene.count=3", "link.delay=24ms"], "peer.coupling.damping=0..60"),
-        (&[WAVE, "scene.count=5", "link.delay=3ms"], "peer.coupling.stiffness=500..40000"),
-        (&[WAVE, "scene.count=4", LOOSE, "peer.phase=3"], "object.mass=0.2..2"),
-        (&[WAVE, "scene.count=3", ARM], "peer.device.damping=1..20"),
-        (&[WAVE, "scene.count=3", LOSS, "coordination.wave.on-loss=\"hold\""], "object.mass=0.2..2"),
         (&["scene.count=5", "topology={ kind = \"ring\", neighbours = 2 }"], "coordination.stiffness=100..4000"),
         (&["scene.count=6", "topology={ kind = \"ring\", neighbours = 4 }", PD], "coordination.stiffness=50..2000"),
         (&["scene.count=5", "topology={ kind = \"star\" }"], "coordination.stiffness=100..4000"),
