@@ -5,9 +5,12 @@
 //! scaled, and hears λ times its own samples: the scene is as many systems of one node. λ = 1 is there once for each connected part, which can be
 //! displaced as a whole.
 
+mod enclosed;
+
 use cohaptic_peer::coordination::Pull;
 use cohaptic_scene::{Scene, Topology, TopologyKind};
 
+pub(crate) use self::enclosed::EnclosedSpectrum;
 use crate::analysis::{Analysis, combinations, combine};
 use crate::lifted::{Lifted, Node};
 use crate::network::NominalNetwork;
@@ -155,15 +158,6 @@ pub(crate) fn node_on(scene: &Scene, structure: &Structure, degree: Option<f64>)
     Ok(node)
 }
 
-/// The eigenvalues of an averaging matrix, each between two numbers.
-#[derive(Clone, PartialEq, Debug)]
-pub(crate) struct EnclosedSpectrum {
-    /// Those that are not 1, each of which may stand there once for several.
-    pub(crate) others: Vec<[f64; 2]>,
-    /// How many, or how much weight, each peer hears, if all hear as much.
-    pub(crate) degree: Option<f64>,
-}
-
 /// An eigenvalue of an averaging matrix; 1 is known exactly.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Eigenvalue {
@@ -197,23 +191,6 @@ impl From<&Topology> for Graph {
 }
 
 impl Graph {
-    /// The eigenvalues of the averaging matrix but for 1, which each connected part has once, with bounds of all rounding.
-    pub(crate) fn enclosed_spectrum(&self, scene: &Scene) -> Result<EnclosedSpectrum, GraphError> {
-        let (spectrum, degree) = self.spectrum(scene)?;
-        let error = match self {
-            Self::Star => 0.0,
-            // −1/(N − 1) is rounded once. An angle below 2π is off by four roundings, a cosine by no more than its angle and one of its own, and a mean of them by one each and one more.
-            Self::Complete => f64::EPSILON,
-            Self::Ring { neighbours } => (32.0 + count(*neighbours)) * f64::EPSILON,
-            Self::Weighted(weights) => eigenvalue_error(weights, &spectrum),
-        };
-        let is_exact = |value: f64| value == 0.0 || value == -1.0;
-        let enclosed = |value: f64| if error == 0.0 && is_exact(value) { [value; 2] } else { [value - error, value + error] };
-        let others =
-            spectrum.iter().filter_map(|(eigenvalue, _)| if let Eigenvalue::Other(value) = eigenvalue { Some(enclosed(*value)) } else { None });
-        Ok(EnclosedSpectrum { others: others.collect(), degree })
-    }
-
     /// The different eigenvalues of the averaging matrix with their multiplicities; and how many (or how much weight) each peer hears, if all hear as much.
     #[expect(clippy::type_complexity, reason = "used once, above")]
     fn spectrum(&self, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>, Option<f64>), GraphError> {
@@ -269,30 +246,6 @@ fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>
     spectrum.extend(eigenvalues.into_iter().map(|value| (Eigenvalue::Other(value), 1)));
     let regular = degrees.iter().all(|degree| (degree - degrees[0]).abs() <= 1e-12 * degrees[0]);
     Ok((spectrum, regular.then_some(degrees[0])))
-}
-
-/// How far eigenvalues of D⁻¹W may be from those that were found, counted in order: for A = D^−½·W·D^−½ and any matrices U and Λ, the latter diagonal, each eigenvalue of A is within ‖A·U − U·Λ‖/σ of that of Λ in its place, σ being the least
-/// singular value of U (Cao, Xie & Li 1996).
-fn eigenvalue_error(weights: &Matrix, spectrum: &[(Eigenvalue, usize)]) -> f64 {
-    let size = weights.rows();
-    let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
-    let symmetric = faer::Mat::from_fn(size, size, |row, column| weights[(row, column)] / (degrees[row] * degrees[column]).sqrt());
-    let Ok(found) = symmetric.self_adjoint_eigen(faer::Side::Lower) else { return f64::INFINITY };
-    let (u, values) = (found.U(), found.S().column_vector());
-    let of_values = faer::Mat::from_fn(size, size, |row, column| u[(row, column)] * values[column]);
-    let residual = (&symmetric * u - of_values).norm_l2();
-    let skew = (u.transpose() * u - faer::Mat::<f64>::identity(size, size)).norm_l2();
-    // Sums of as many terms as there are peers, of sizes that add up to no more than the square of their number; degrees are such sums too, and 1 is their largest ratio.
-    let rounding = 8.0 * (count(size) + 8.0).powi(2) * f64::EPSILON;
-    let least = 1.0 - skew - rounding;
-    // The eigenvalues that are used were found without their vectors, and are those of Λ but for this.
-    let mut used: Vec<f64> =
-        spectrum.iter().filter_map(|(eigenvalue, _)| if let Eigenvalue::Other(value) = eigenvalue { Some(*value) } else { None }).collect();
-    used.sort_by(f64::total_cmp);
-    let mut sorted: Vec<f64> = values.iter().copied().collect();
-    sorted.sort_by(f64::total_cmp);
-    let apart = used.iter().zip(&sorted).map(|(used, of_vectors)| (used - of_vectors).abs()).fold(0.0, f64::max);
-    if least > 0.0 { (residual + rounding) / least.sqrt() + rounding + apart } else { f64::INFINITY }
 }
 
 /// How many parts of the graph are not connected with one another.

@@ -131,9 +131,6 @@ fn of_part(part: &PartCertificate) -> impl Serialize {
         // The members of its classes of equal peers, counted from 0, and whether it is how the members of one differ.
         members: part.members.as_slice(),
         difference: part.is_difference,
-        // On a graph, between which numbers the eigenvalue of its averaging matrix is; absent without one.
-        #[serde(flatten)]
-        weight: part.weight.map(|weight| document! { weight: weight }),
         states: part.states.iter().map(of_state).collect::<Vec<_>>(),
         // The gains K and B by which a sample is the number (K·x + B·v)/(K + B/time); null: its position and its velocity.
         heard: part.heard.map(|gains| [gains.stiffness, gains.damping]),
@@ -164,7 +161,6 @@ fn of_state(state: &FrameState) -> serde_json::Value {
         FrameState::Device { class, velocity } => serde_json::json!(["device", class, which(velocity)]),
         FrameState::Copy { class, velocity } => serde_json::json!(["copy", class, which(velocity)]),
         FrameState::Sample { class, number, channel } => serde_json::json!(["sample", class, number, channel]),
-        FrameState::Line { from, to, received, number } => serde_json::json!(["line", from, to, number, if received { "received" } else { "sent" }]),
         FrameState::Other { class, row } => serde_json::json!(["other", class, row]),
     }
 }

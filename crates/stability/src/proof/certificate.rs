@@ -86,8 +86,6 @@ pub struct PartCertificate {
     pub members: Vec<Vec<usize>>,
     /// Whether it is how the members of a class differ.
     pub is_difference: bool,
-    /// On a graph of peers, between which two numbers the eigenvalue of its averaging matrix is that the part belongs to; `None` without a graph.
-    pub weight: Option<[f64; 2]>,
     /// The states, in the order of rows of the coordinates. Positions are counted from the first copy where nothing ties the scene to ground, and velocities multiplied by `time`.
     pub states: Vec<FrameState>,
     /// The gains K and B by which a sample is the one number (K·x + B·v)/(K + B/time); `None`: its position and its velocity.
@@ -108,7 +106,7 @@ impl PartCertificate {
         let entries = (0..v.ncols()).flat_map(|column| (0..v.nrows()).map(move |row| v[(row, column)]));
         let coordinates = digits(entries.flat_map(|entry| [entry.re, entry.im]));
         let weights = digits(witness.weights.iter().copied());
-        Self { members, is_difference, weight: None, states: states.names, heard: states.heard, time, coordinates, weights, circle: witness.circle }
+        Self { members, is_difference, states: states.names, heard: states.heard, time, coordinates, weights, circle: witness.circle }
     }
 }
 

@@ -20,8 +20,6 @@ use crate::timetable::Timetable;
 pub(super) struct Point {
     pub(super) nodes: Vec<Node>,
     pub(super) weights: Matrix,
-    /// Of waves, the impedance of all lines at a copy together \[N·s/m\]; otherwise zero.
-    pub(super) impedance: f64,
 }
 
 /// What the corners of a box have in common.

@@ -10,7 +10,7 @@ use super::corners::{Common, Point, doubled, states, steps};
 use super::delays;
 use super::discs::decide;
 use super::growing::{ENDLESS, nu, weights_of_growing};
-use super::sampled_laws::SampledLaw;
+use super::server::Server;
 use super::span::StepSpan;
 use super::{Guarantee, ProofError, Proven};
 use crate::analysis::{on_this_topology, pairs};
@@ -41,8 +41,19 @@ enum Action {
     Mean,
     /// Equal peers, each of which follows the mean of its neighbours.
     Graph(EnclosedSpectrum),
-    /// By samples that carry more than a state.
-    Sampled(SampledLaw),
+    /// As a server and its clients.
+    Server(Server),
+}
+
+impl Action {
+    /// What the scene has that proofs follow for its own number of peers alone, and without a certificate; `None` if it has no such.
+    const fn special(&self) -> Option<&'static str> {
+        match self {
+            Self::Mean => None,
+            Self::Graph(_) => Some("a [topology]"),
+            Self::Server(_) => Some("client-server coordination"),
+        }
+    }
 }
 
 /// A part of a motion: the averages of all classes, or how the members of one differ.
@@ -152,6 +163,12 @@ impl<'a> Followed<'a> {
         Ok(found)
     }
 
+    /// Refuses scenes whose verdicts nothing is written for to check them by.
+    pub(super) fn refuse_certificate(&self) -> Result<(), ProofError> {
+        let what = self.stretches.iter().flat_map(|stretch| &stretch.motions).find_map(|motion| motion.action.special());
+        what.map_or(Ok(()), |what| Err(ProofError::NoCertificate { what }))
+    }
+
     /// A box with all numbers of peers for which none is decided.
     fn open(&self, mut ranges: Vec<[f64; 2]>) -> BoxCertificate {
         ranges.extend(self.numbers);
@@ -223,16 +240,18 @@ fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, O
     for (piece, first) in all[0].iter().enumerate() {
         let of_piece: Vec<&Scene> = all.iter().filter_map(|pieces| pieces.get(piece)).map(|piece| &*piece.scene).collect();
         for (_, combination) in pairs(std::slice::from_ref(first), &mut false)? {
-            let (structure, action) = match SampledLaw::structure(&of_piece, &network, &combination.contacts)? {
-                Some((structure, law)) => (structure, Action::Sampled(law)),
-                None => (Structure::of(&of_piece, &network, &combination.contacts)?, Action::Mean),
+            let (structure, action) = match Server::structure(&of_piece, &network, &combination.contacts)? {
+                Some((structure, server)) => (structure, Action::Server(server)),
+                None => {
+                    let structure = Structure::of(&of_piece, &network, &combination.contacts)?;
+                    let spectrum = graph.as_ref().map(|graph| on_graph(graph, &of_piece, &structure)).transpose()?;
+                    (structure, spectrum.map_or(Action::Mean, Action::Graph))
+                }
             };
-            let action = match &graph {
-                Some(graph) => Action::Graph(on_graph(graph, of_piece[0], &structure)?),
-                None => action,
-            };
-            if every.is_some() && !matches!(action, Action::Mean) {
-                return Err(ProofError::OneNumber { what: of_piece[0].coordination.strategy.name(), is_graph: graph.is_some() });
+            if every.is_some()
+                && let Some(what) = action.special()
+            {
+                return Err(ProofError::OneNumber { what });
             }
             let growing = every.map(|(from, _)| growing(&structure, &of_piece, from)).transpose()?;
             motions.push(Motion { piece, structure, growing, action });
@@ -246,13 +265,13 @@ fn mutual(scene: &Scene) -> Cow<'_, Scene> {
     if scene.topology.is_some() { Cow::Owned(scene.without_topology()) } else { Cow::Borrowed(scene) }
 }
 
-/// The spectrum of a graph of the peers of a scene, which have to be equal.
-fn on_graph(graph: &Graph, scene: &Scene, structure: &Structure) -> Result<EnclosedSpectrum, AnalysisError> {
+/// The spectrum of a graph of the peers of scenes, which have to be equal.
+fn on_graph(graph: &Graph, scenes: &[&Scene], structure: &Structure) -> Result<EnclosedSpectrum, AnalysisError> {
     if let Some(other) = structure.classes.get(1) {
-        return Err(on_this_topology(GraphError::Unequal { peer: scene.peers[other[0]].name.clone() }));
+        return Err(on_this_topology(GraphError::Unequal { peer: scenes[0].peers[other[0]].name.clone() }));
     }
-    let spectrum = graph.enclosed_spectrum(scene).map_err(on_this_topology)?;
-    node_on(scene, structure, spectrum.degree).map_err(on_this_topology)?;
+    let spectrum = graph.enclosed_spectrum(scenes[0]).map_err(on_this_topology)?;
+    node_on(scenes[0], structure, spectrum.degree).map_err(on_this_topology)?;
     Ok(spectrum)
 }
 
@@ -276,6 +295,7 @@ pub(super) fn certify(
     watch: &dyn Watch,
 ) -> Result<Vec<BoxCertificate>, ProofError> {
     let followed = Followed::new(family, every)?;
+    followed.refuse_certificate()?;
     watch.expects(real(boxes.len()));
     let certificates = boxes.into_par_iter().map(|ranges| {
         if watch.stops() {
@@ -294,7 +314,7 @@ impl Motion {
         match &self.action {
             Action::Mean => Ok(self.structure.nodes(scene)),
             Action::Graph(spectrum) => Ok(vec![node_on(scene, &self.structure, spectrum.degree).map_err(on_this_topology)?]),
-            Action::Sampled(law) => Ok(law.nodes(&self.structure, scene)),
+            Action::Server(server) => Ok(server.nodes(&self.structure, scene)),
         }
     }
 
@@ -306,20 +326,16 @@ impl Motion {
         let mut of = |part: &PartOf<'_>| {
             let classes = part.apart.map_or(0..structure.classes.len(), |class| class..class + 1);
             let ends: Vec<Vec<Node>> = nodes.iter().map(|nodes| nodes[classes.clone()].to_vec()).collect();
-            let (steps, states) = match &self.action {
-                Action::Sampled(law) => law.steps(scenes, structure, &ends, part.apart, time)?,
-                Action::Mean | Action::Graph(_) => {
-                    let points = self.points(&ends, numbers, part);
-                    let common = Common { timetable: part.timetable, tied: part.tied, time };
-                    (steps(&points, &ends, common)?, states(&points, common)?)
-                }
-            };
-            let Some(decision) = decide(&StepSpan::product(&steps)) else { return Ok(None) };
+            if let Action::Server(server) = &self.action {
+                return Ok(decide(&StepSpan::product(&server.steps(structure, &ends, part.apart, time)?)).map(|decision| decision.proven));
+            }
+            let points = self.points(&ends, numbers, part);
+            let common = Common { timetable: part.timetable, tied: part.tied, time };
+            let Some(decision) = decide(&StepSpan::product(&steps(&points, &ends, common)?)) else { return Ok(None) };
             if let Some(certified) = certified.as_deref_mut() {
                 let members = classes.map(|class| structure.classes[class].clone()).collect();
-                let mut certificate = PartCertificate::new(members, part.apart.is_some(), states, time, &decision.witness);
-                certificate.weight = part.weight;
-                certified.push((decision.proven, certificate));
+                certified
+                    .push((decision.proven, PartCertificate::new(members, part.apart.is_some(), states(&points, common)?, time, &decision.witness)));
             }
             Ok::<_, ProofError>(Some(decision.proven))
         };
@@ -363,8 +379,8 @@ impl Motion {
                     parts.push(PartOf { apart: Some(class), timetable, tied: true, weight: None });
                 }
             }
-            Action::Sampled(law) => {
-                for class in (0..structure.classes.len()).filter(|class| law.has_differences(structure, *class)) {
+            Action::Server(_) => {
+                for class in (0..structure.classes.len()).filter(|class| Server::has_differences(structure, *class)) {
                     parts.push(PartOf { apart: Some(class), timetable: &structure.timetable, tied: true, weight: None });
                 }
             }
@@ -377,17 +393,16 @@ impl Motion {
     fn points(&self, ends: &[Vec<Node>], numbers: Option<[f64; 2]>, part: &PartOf<'_>) -> Vec<Point> {
         let (structure, apart) = (&self.structure, part.apart);
         if let Some([low, high]) = part.weight {
-            let hears =
-                |nodes: &Vec<Node>, weight: f64| Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight), impedance: 0.0 };
+            let hears = |nodes: &Vec<Node>, weight: f64| Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight) };
             let points: Vec<Point> = ends.iter().map(|nodes| hears(nodes, low)).collect();
             return if low < high { doubled(&points, |point, upper| hears(&point.nodes, if upper { high } else { low })) } else { points };
         }
         let Some((growing, numbers)) = self.growing.zip(numbers) else {
             let weights = apart.map_or_else(|| structure.weights.clone(), |_| Matrix::from_fn(1, 1, |_, _| structure.difference_weight()));
-            return ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone(), impedance: 0.0 }).collect();
+            return ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone() }).collect();
         };
         let weights = numbers.map(|nu| weights_of_growing(structure, growing, nu, apart.is_some()));
-        let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights[0].clone(), impedance: 0.0 }).collect();
+        let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights[0].clone() }).collect();
         if weights[0] == weights[1] {
             return points;
         }

@@ -227,7 +227,7 @@ impl Motion {
             point.nodes.iter_mut().zip(end).for_each(|(node, end)| change(end, node));
             point
         };
-        let mut points = vec![Point { weights: self.weights(heard[0] / gain(&nodes[0]), apart), nodes, impedance: 0.0 }];
+        let mut points = vec![Point { weights: self.weights(heard[0] / gain(&nodes[0]), apart), nodes }];
         if varies && differ(&|near, end| near.law != end.law) {
             points = doubled(&points, |point, upper| if upper { with(point, &|end, node| node.law = end.law.clone()) } else { point.clone() });
         }

@@ -2,7 +2,7 @@
 
 use crate::timetable::{Event, Timetable};
 
-/// What is in force at each tick of a class of each other.
+/// The sample in force at each tick of a class, of each other.
 pub(super) struct Heard {
     /// By receiver, sender and tick in the frame: the number of the sample.
     of: Vec<Vec<Vec<Option<i64>>>>,
@@ -10,31 +10,22 @@ pub(super) struct Heard {
 }
 
 impl Heard {
-    /// `lasting`: for how many ticks of its receiver, by its class, a sample is in force if none comes; `None`: without end.
-    pub(super) fn new(timetable: &Timetable, lasting: Option<&[u64]>) -> Self {
+    pub(super) fn new(timetable: &Timetable) -> Self {
         let classes = timetable.sent.len();
         let number_of_ticks =
             |class: usize| timetable.events.iter().filter(|event| matches!(event, Event::Tick { node, .. } if *node == class)).count();
-        let ticks: Vec<usize> = (0..classes).map(number_of_ticks).collect();
-        let mut of: Vec<Vec<Vec<Option<i64>>>> = ticks.iter().map(|ticks| vec![vec![None; *ticks]; classes]).collect();
-        // The sample held and the tick at which it ends, both counted from the frame that is looked at.
+        let mut of: Vec<Vec<Vec<Option<i64>>>> = (0..classes).map(|class| vec![vec![None; number_of_ticks(class)]; classes]).collect();
+        // A sample is held until another comes, also across frames: those of the frame before are held when this one begins.
         let mut held = vec![vec![None; classes]; classes];
-        // What is held when a frame begins has come in one of the two before it, or in the one before those if nothing lasts as long.
-        for frame in -3_i64..=0 {
+        for frame in [-1, 0] {
             let mut tick = vec![0; classes];
             for event in &timetable.events {
-                let now = |class: usize, tick: &[usize]| frame * whole(ticks[class]) + whole(tick[class]);
                 match *event {
                     Event::Sample { .. } => {}
-                    Event::Deliver { from, to, sample } => {
-                        let end = lasting.map_or(i64::MAX, |lasting| now(to, &tick) + i64::try_from(lasting[to]).unwrap_or(i64::MAX));
-                        held[to][from] = Some((sample + frame * whole(timetable.sent[from]), end));
-                    }
+                    Event::Deliver { from, to, sample } => held[to][from] = Some(sample + frame * whole(timetable.sent[from])),
                     Event::Tick { node, .. } => {
-                        if frame == 0 {
-                            for (from, held) in held[node].iter().enumerate() {
-                                of[node][from][tick[node]] = held.filter(|(_, end)| now(node, &tick) < *end).map(|(sample, _)| sample);
-                            }
+                        for (from, held) in held[node].iter().enumerate() {
+                            of[node][from][tick[node]] = *held;
                         }
                         tick[node] += 1;
                     }
@@ -44,7 +35,7 @@ impl Heard {
         Self { of, sent: timetable.sent.clone() }
     }
 
-    /// The sample of one class that another has in force at a tick of its own, counted from the beginning of the frame, also before it.
+    /// The sample of one class that another has in force at a tick of its own, counted from the beginning of the frame, also before it; `None` if none ever comes.
     pub(super) fn at(&self, from: usize, to: usize, tick: i64) -> Option<i64> {
         let ticks = &self.of[to][from];
         let count = whole(ticks.len()).max(1);
@@ -54,6 +45,6 @@ impl Heard {
     }
 }
 
-pub(super) fn whole(number: usize) -> i64 {
+fn whole(number: usize) -> i64 {
     i64::try_from(number).unwrap_or(i64::MAX)
 }

@@ -23,7 +23,9 @@ mod number;
 mod points;
 mod program;
 mod region;
-mod sampled_laws;
+mod server;
+#[cfg(test)]
+mod servers_and_graphs;
 mod shared;
 mod span;
 mod steps;
@@ -122,25 +124,27 @@ pub enum ProofError {
         "gains or the mass of a copy depend on the number of peers, and a box of keys holds no such: expected average-position coordination without scaling and object.split-mass = false; or one number at a time, by `--curve scene.count=N`"
     )]
     Scaled,
-    /// A box of keys and numbers of peers, with a law of which it is not followed.
+    /// A box of keys and numbers of peers, of scenes that are followed for one number alone.
     #[error(
-        "{}: boxes of keys hold for one number of peers; expected no --every-number, or `stability point --every-number` for single scenes{}",
-        if *is_graph { "a scene with a [topology]" } else { what }, if *is_graph { " without a [topology]" } else { "" }
+        "{what}: a box of keys holds for the number of peers that the scene has; expected no --every-number, and one number at a time, by `--curve scene.count=N`"
     )]
     OneNumber {
-        /// The strategy.
+        /// The coordination, or the topology.
         what: &'static str,
-        /// Whether it is a topology that is not followed.
-        is_graph: bool,
     },
-    /// Waves between peers of several kinds.
+    /// A certificate of scenes whose frames the checker does not derive.
     #[error(
-        "waves between peers of {kinds} kinds: some bounce to and fro and move nothing, and a proof tells them apart among two kinds at most; expected equal peers and links, or `stability map` and `boundary` without --prove"
+        "{what} has no certificate, since the program that checks it does not follow that: expected no --certificate; the verdicts of --prove hold without"
     )]
-    KindsOfPeers {
-        /// How many kinds.
-        kinds: usize,
+    NoCertificate {
+        /// As above.
+        what: &'static str,
     },
+    /// Walls about the object of a server.
+    #[error(
+        "with client-server coordination walls are left out of every analysis: expected a scene without object.enclosure for --prove; `stability map` and `boundary` without it say what they leave out"
+    )]
+    WallOfServer,
     /// Numbers of peers that are none.
     #[error("expected numbers of peers from 2 on, the least first, such as 2.. or 2..100")]
     Numbers,
@@ -197,7 +201,7 @@ pub enum ProofError {
 /// The certificate of how the members of a class differ, if that is proven stable.
 pub(crate) fn stable_difference(members: &[usize], node: &Node, weight: f64, timetable: &Timetable, time: f64) -> Option<PartCertificate> {
     let nodes = vec![node.clone()];
-    let points = [Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight), impedance: 0.0 }];
+    let points = [Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight) }];
     let common = Common { timetable, tied: true, time };
     let decision = discs::decide(&StepSpan::product(&corners::steps(&points, &[nodes], common).ok()?))?;
     let part = PartCertificate::new(vec![members.to_vec()], true, corners::states(&points, common).ok()?, time, &decision.witness);

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::steps::{FrameState, StepMatrix};
+use super::steps::StepMatrix;
 use crate::Matrix;
 use crate::worst_case::rounding::real;
 
@@ -20,8 +20,8 @@ pub(super) enum Register {
     Force { class: usize, on_copy: bool },
     /// A sampled position or velocity; the samples of a class in this frame are numbered from 0, the last one before is −1.
     Sample { class: usize, number: i64, velocity: bool },
-    /// A number that a sample of one class has for another; of a difference within a class, whether the members that differ get it, or have sent it.
-    Line { from: usize, to: usize, received: bool, number: i64 },
+    /// The force that a sample of a server has for a class.
+    Returned { server: usize, class: usize, number: i64 },
 }
 
 /// Multiples of registers, which are added up.
@@ -30,40 +30,19 @@ pub(super) type Sum = Vec<(Register, f64)>;
 /// Registers that are set at once.
 pub(super) type Operation = Vec<(Register, Sum)>;
 
-/// A displacement that a frame leaves as it is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Displacement {
-    /// There is none.
-    Nothing,
-    /// Of everything together.
-    Everything,
-    /// Of each class by itself.
-    EachClass,
-}
-
 /// A frame.
 pub(super) struct Program {
     /// Operations of each step, in order.
     pub(super) steps: Vec<Vec<Operation>>,
     /// How many samples each class sends in a frame.
     pub(super) sent: Vec<usize>,
-    pub(super) displacement: Displacement,
-    /// The classes that something ties to ground, of which no copy is a reference.
-    pub(super) tied: Vec<bool>,
+    /// The position that all others are counted from, where nothing ties any of them to ground.
+    pub(super) reference: Option<Register>,
 }
 
 /// The states of a program between its steps.
 pub(super) struct Layout {
     order: Vec<Vec<Register>>,
-    /// The copies whose positions others are relative to, which are no states.
-    references: Vec<Register>,
-}
-
-impl Layout {
-    /// The states of the frame, in the order of rows and columns.
-    pub(super) fn states(&self) -> Vec<FrameState> {
-        self.order[0].iter().filter(|register| !self.references.contains(register)).map(|register| register.state()).collect()
-    }
 }
 
 /// What a coefficient and a sum round, in units of the last place, beside one for each term.
@@ -75,56 +54,17 @@ impl Register {
         let renamed = |class: usize, number: i64| number + i64::try_from(sent[class]).unwrap_or(i64::MAX);
         match self {
             Self::Sample { class, number, velocity } => Self::Sample { class, number: renamed(class, number), velocity },
-            Self::Line { from, to, received, number } => Self::Line { from, to, received, number: renamed(from, number) },
+            Self::Returned { server, class, number } => Self::Returned { server, class, number: renamed(server, number) },
             Self::Body { .. } | Self::Pending { .. } | Self::Force { .. } => self,
         }
     }
 
-    /// Whose place it is, if it is one.
-    const fn position(self) -> Option<usize> {
-        match self {
-            Self::Body { class, velocity: false, .. } | Self::Sample { class, velocity: false, .. } => Some(class),
-            _ => None,
-        }
-    }
-
-    fn state(self) -> FrameState {
-        match self {
-            Self::Body { class, of_copy: false, velocity } => FrameState::Device { class, velocity },
-            Self::Body { class, of_copy: true, velocity } => FrameState::Copy { class, velocity },
-            Self::Pending { class, on_copy } | Self::Force { class, on_copy } => FrameState::Other { class, row: usize::from(on_copy) },
-            Self::Sample { class, number, velocity } => FrameState::Sample { class, number, channel: usize::from(velocity) },
-            Self::Line { from, to, received, number } => FrameState::Line { from, to, received, number },
-        }
+    const fn is_position(self) -> bool {
+        matches!(self, Self::Body { velocity: false, .. } | Self::Sample { velocity: false, .. })
     }
 }
 
 impl Program {
-    /// The copies whose positions all others of a displacement are relative to.
-    fn references(&self) -> Vec<Register> {
-        let copies: BTreeSet<usize> = self
-            .set()
-            .filter_map(|register| if let Register::Body { class, of_copy: true, velocity: false } = register { Some(class) } else { None })
-            .collect();
-        let reference = |class: usize| Register::Body { class, of_copy: true, velocity: false };
-        match self.displacement {
-            Displacement::Nothing => Vec::new(),
-            Displacement::Everything if self.tied.contains(&true) => Vec::new(),
-            Displacement::Everything => copies.into_iter().take(1).map(reference).collect(),
-            Displacement::EachClass => copies.into_iter().filter(|class| !self.tied[*class]).map(reference).collect(),
-        }
-    }
-
-    /// The reference that a position is relative to.
-    fn reference_of(&self, register: Register, references: &[Register]) -> Option<Register> {
-        let class = register.position()?;
-        match self.displacement {
-            Displacement::Nothing => None,
-            Displacement::Everything => references.first().copied(),
-            Displacement::EachClass => references.iter().find(|reference| reference.position() == Some(class)).copied(),
-        }
-    }
-
     /// All registers that are set.
     fn set(&self) -> impl Iterator<Item = Register> {
         self.steps.iter().flatten().flatten().map(|(register, _)| *register)
@@ -161,23 +101,22 @@ impl Program {
 
     /// Which states the frame has between its steps: those of all programs that differ in multiples alone.
     pub(super) fn layout(&self) -> Layout {
-        let (mut live, references) = (self.live(), self.references());
+        let mut live = self.live();
         let end = live.pop().unwrap_or_default();
         let mut order: Vec<Vec<Register>> = live.into_iter().map(|live| live.into_iter().collect()).collect();
         // What lives on from a frame to the next is in one order at both ends.
         let last = order[0].iter().map(|register| register.before(&self.sent)).filter(|register| end.contains(register)).collect();
         order.push(last);
-        Layout { order, references }
+        Layout { order }
     }
 
     /// The matrices of all steps.
     pub(super) fn matrices(&self, layout: &Layout) -> Vec<StepMatrix> {
-        let Layout { order, references } = layout;
-        (0..self.steps.len()).map(|step| self.matrix(step, &order[step], &order[step + 1], references)).collect()
+        (0..self.steps.len()).map(|step| self.matrix(step, &layout.order[step], &layout.order[step + 1])).collect()
     }
 
-    fn matrix(&self, step: usize, before: &[Register], after: &[Register], references: &[Register]) -> StepMatrix {
-        let columns: Vec<Register> = before.iter().copied().filter(|register| !references.contains(register)).collect();
+    fn matrix(&self, step: usize, before: &[Register], after: &[Register]) -> StepMatrix {
+        let columns: Vec<Register> = before.iter().copied().filter(|register| self.reference != Some(*register)).collect();
         let unit = |place: Option<usize>| -> Vec<f64> { (0..columns.len()).map(|column| if Some(column) == place { 1.0 } else { 0.0 }).collect() };
         // Each with the sum of the sizes of all terms, which bounds what is rounded.
         let mut rows: BTreeMap<Register, (Vec<f64>, Vec<f64>)> = before
@@ -205,12 +144,12 @@ impl Program {
             roundings += ROUNDINGS + real(operation.iter().map(|(_, sum)| sum.len()).max().unwrap_or(0));
             rows.extend(set);
         }
-        let kept: Vec<Register> = after.iter().copied().filter(|register| !references.contains(register)).collect();
+        let kept: Vec<Register> = after.iter().copied().filter(|register| self.reference != Some(*register)).collect();
         let mut matrix = Matrix::zeros(kept.len(), columns.len());
         let mut largest = 1.0_f64;
         for (row, register) in kept.iter().enumerate() {
             let Some((values, sizes)) = rows.get(register) else { continue };
-            let moved = self.reference_of(*register, references).and_then(|reference| rows.get(&reference));
+            let moved = self.reference.filter(|_| register.is_position()).and_then(|reference| rows.get(&reference));
             for column in 0..columns.len() {
                 let (by, size) = moved.map_or((0.0, 0.0), |(values, sizes)| (values[column], sizes[column]));
                 matrix[(row, column)] = values[column] - by;

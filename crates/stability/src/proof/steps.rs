@@ -86,17 +86,6 @@ pub enum FrameState {
         /// Which of its numbers: position and velocity, or the one that is heard.
         channel: usize,
     },
-    /// A number that a sample of one class has for another: a wave, or a force.
-    Line {
-        /// The place of the class that sends.
-        from: usize,
-        /// The place of the other.
-        to: usize,
-        /// Of a difference within a class, whether the members that differ get it, or have sent it.
-        received: bool,
-        /// As that of a sample.
-        number: i64,
-    },
     /// A force that waits, or a number that a law remembers.
     Other {
         /// The place of the class.

@@ -135,11 +135,7 @@ fn steps_that_grow_without_end_are_enclosed() {
         let scene = scene(set);
         let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
         let at = |number: usize| {
-            vec![Point {
-                nodes: structure.nodes(&scene.scaled_for(number)),
-                weights: Matrix::from_fn(1, 1, |_, _| -1.0 / count(number - 1)),
-                impedance: 0.0,
-            }]
+            vec![Point { nodes: structure.nodes(&scene.scaled_for(number)), weights: Matrix::from_fn(1, 1, |_, _| -1.0 / count(number - 1)) }]
         };
         // Own samples are heard with gains times 1/(N − 1), which is a constant for PD; for AP it is taken to be one here.
         let heard = |number: usize| {
@@ -183,7 +179,7 @@ fn steps_of_a_law_that_looks_back_are_enclosed_over_both_gains() {
         let network = crate::network::NominalNetwork::of(&scene).unwrap();
         let contacts = crate::structure::Contacts { touching: vec![true; 2], at_wall: false, absent: vec![false; 2] };
         let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
-        (Point { nodes: structure.nodes(&scene), weights: Matrix::from_fn(1, 1, |_, _| -1.0), impedance: 0.0 }, structure)
+        (Point { nodes: structure.nodes(&scene), weights: Matrix::from_fn(1, 1, |_, _| -1.0) }, structure)
     };
     let (low, high) = ([100.0, 0.5], [3000.0, 40.0]);
     let corners: Vec<Point> = (0..4).map(|place| at([low[0], high[0]][place & 1], [low[1], high[1]][place >> 1]).0).collect();
@@ -388,7 +384,7 @@ fn the_product_of_the_steps_is_the_frame() {
         let node = structure.node(&scene, 0);
         let time = structure.time(&scene, std::slice::from_ref(&node));
         for (weight, tied, timetable) in [(1.0, structure.tied, &structure.timetable), (-1.0, true, structure.apart[0].as_ref().unwrap())] {
-            let point = Point { nodes: vec![node.clone()], weights: Matrix::from_fn(1, 1, |_, _| weight), impedance: 0.0 };
+            let point = Point { nodes: vec![node.clone()], weights: Matrix::from_fn(1, 1, |_, _| weight) };
             let product = StepSpan::product(
                 &corners::steps(std::slice::from_ref(&point), std::slice::from_ref(&point.nodes), Common { timetable, tied, time }).unwrap(),
             );
@@ -538,44 +534,4 @@ fn blocks_make_the_proof_of_one_process() {
     // Somebody who ends it is heard.
     let ended = crate::watch::Asks(|| true);
     shared.look_at(&line, &[0], &Kept::default(), |block| panic!("{block} is not whole"), &ended).unwrap();
-}
-
-/// Waves, servers and topologies: what is proven is what single scenes have by the general path, or by the modes of their graph, on a grid across the range and its boundaries; and most of it is decided.
-#[test]
-fn lines_of_other_linear_laws_are_judged_as_single_scenes_are() {
-    const SERVER: &str = "coordination.strategy=\"client-server\"";
-    const OBJECT: &str = "coordination.client-server.returns=\"object\"";
-    const LOSS: &str = "link.loss={ packets = [1], every = 3 }";
-    const ARM: &str = "peers=[{ name = \"peer2\", hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } } }]";
-    const LOOSE: &str = "peers=[{ name = \"peer1\", contact = \"none\" }]";
-    let mut crossings = 0;
-    for (set, key) in [
-        (&[SERVER, "scene.count=3"][..], "peer.coupling.stiffness=1..2000"),
-        (&[SERVER, "scene.count=4", OBJECT], "peer.coupling.stiffness=1..20000"),
-        (&[SERVER, "scene.count=3", LOOSE, "link.delay=13ms"], "peer.coupling.damping=0..60"),
-        (&[SERVER, "scene.count=3", ARM, "peer.compute-delay=1"], "peer.coupling.stiffness=50..2000"),
-        (&[SERVER, "scene.count=3", LOSS], "object.mass=0.1..4"),
-        (&["scene.count=5", "topology={ kind = \"ring\", neighbours = 2 }"], "coordination.stiffness=100..4000"),
-        (&["scene.count=6", "topology={ kind = \"ring\", neighbours = 4 }", PD], "coordination.stiffness=50..2000"),
-        (&["scene.count=5", "topology={ kind = \"star\" }"], "coordination.stiffness=100..4000"),
-    ] {
-        let family = Family::new(SCENE, "two.toml".as_ref(), &owned(set), vec![KeyRange::parse(key).unwrap()]).unwrap();
-        let range = &family.keys()[0];
-        let line = ProvenLine::prove(&family, (range.high - range.low) / 256.0, &Unwatched).unwrap_or_else(|error| panic!("{set:?}: {error}"));
-        let open: f64 = line.stretches.iter().filter(|one| one.guarantee == Guarantee::Undecided).map(|one| one.high - one.low).sum();
-        assert!(open < 0.1 * (range.high - range.low), "{set:?} {key}: {:?}", line.stretches);
-        crossings += line.stretches.iter().filter(|one| one.guarantee == Guarantee::Undecided).count();
-        for stretch in line.stretches.iter().filter(|one| one.guarantee != Guarantee::Undecided) {
-            for share in [0.0, 0.13, 0.5, 0.77, 1.0] {
-                let value = (stretch.low + share * (stretch.high - stretch.low)).min(stretch.high);
-                let verdict = analyse(&family.scene(&[value]).unwrap(), Method::Reduced).unwrap().verdict();
-                let agrees = match stretch.guarantee {
-                    Guarantee::Stable => matches!(verdict, Verdict::Stable | Verdict::Marginal),
-                    Guarantee::Unstable | Guarantee::Undecided => matches!(verdict, Verdict::Unstable | Verdict::Marginal),
-                };
-                assert!(agrees, "{set:?} {key}: {stretch:?}, and {verdict:?} at {value}");
-            }
-        }
-    }
-    assert!(crossings >= 4, "{crossings}");
 }
