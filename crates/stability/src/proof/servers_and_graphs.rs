@@ -4,7 +4,6 @@ use std::path::Path;
 
 use cohaptic_scene::Scene;
 
-use super::followed::Followed;
 use super::server::Server;
 use super::*;
 use crate::structure::{Contacts, Structure};
@@ -21,6 +20,7 @@ const SCENE: &str = r#"
 const SERVER: &str = "coordination.strategy=\"client-server\"";
 const OBJECT: &str = "coordination.client-server.returns=\"object\"";
 const LOSS: &str = "link.loss={ packets = [1], every = 3 }";
+const SOFT: &str = "peer.coupling.stiffness=150";
 const ARM: &str = "peers=[{ name = \"peer2\", hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } } }]";
 const ARMS: &str = "peer.hand={ arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } }";
 const LOOSE: &str = "peers=[{ name = \"peer1\", contact = \"none\" }]";
@@ -86,7 +86,8 @@ fn agrees(guarantee: Guarantee, verdict: Verdict) -> bool {
 fn frames_of_a_server_have_the_eigenvalues_of_real_peers() {
     let loose_both = "peers=[{ name = \"peer3\", contact = \"none\" }, { name = \"peer4\", contact = \"none\" }]";
     let kinds = "peers=[{ name = \"peer3\", device = { mass = 0.3 } }, { name = \"peer5\", device = { mass = 0.3 } }]";
-    let clocks = "peers=[{ name = \"peer2\", clock = { tick = \"2ms\" } }, { name = \"peer3\", clock = { offset = \"3.4ms\" } }]";
+    let clocks =
+        "peers=[{ name = \"peer2\", tick = \"2ms\" }, { name = \"peer3\", clock = { offset = \"3.4ms\" } }, { name = \"peer4\", phase = 3 }]";
     for set in [
         &[][..],
         &[OBJECT],
@@ -142,7 +143,7 @@ fn server_eigenvalues(scene: &Scene) -> Vec<(f64, f64)> {
     let time = structure.time(scene, &nodes);
     let frame = |nodes: &[Node], apart| {
         let product = StepSpan::product(&server.steps(&structure, &[nodes.to_vec()], apart, time).unwrap());
-        assert!(product.radius.largest() < 1e-9, "{}", product.radius.largest());
+        assert!(product.radius.largest() < 1e-7, "{}", product.radius.largest());
         product.mean
     };
     let mut parts = vec![(frame(&nodes, None), 1)];
@@ -165,26 +166,27 @@ fn lines_are_judged_as_single_scenes_are() {
     let mut crossings = 0;
     for (set, key) in [
         (&[SERVER][..], "peer.coupling.stiffness=1..2000"),
-        (&[SERVER, "scene.count=4", OBJECT], "peer.coupling.stiffness=1..20000"),
-        (&[SERVER, LOOSE, "link.delay=13ms"], "peer.coupling.damping=0..60"),
-        (&[SERVER, LOOSE_CLIENT, "scene.count=4"], "object.damping=0..40"),
+        (&[SERVER, OBJECT, "scene.count=4"], "peer.coupling.stiffness=1..20000"),
+        (&[SERVER, LOOSE, "link.delay=13ms", SOFT], "peer.coupling.damping=0..60"),
+        (&[SERVER, LOOSE_CLIENT, "scene.count=4", "object.damping=1"], "peer.coupling.stiffness=1..2000"),
         (&[SERVER, ARM, "peer.compute-delay=1"], "peer.coupling.stiffness=50..2000"),
-        (&[SERVER, LOSS], "object.mass=0.1..4"),
-        (&[SERVER, "peer.coupling.stiffness=900"], "link.delay=0ms..20ms"),
-        (&["scene.count=5", ring], "coordination.stiffness=100..4000"),
+        (&[SERVER, LOSS, SOFT], "peer.device.mass=0.02..1"),
+        (&[SERVER, "scene.count=2", "peer.coupling.stiffness=300"], "object.mass=0.02..4"),
+        (&[SERVER, SOFT], "link.delay=0ms..60ms"),
+        (&["scene.count=5", ring], "coordination.stiffness=100..6000"),
         (&["scene.count=6", dense_ring, PD], "coordination.stiffness=50..2000"),
         (&["scene.count=5", ring, "coordination.stiffness=1500"], "link.delay=0ms..40ms"),
         (&["scene.count=5", star], "coordination.stiffness=100..4000"),
         (&["scene.count=8", cube], "coordination.stiffness=100..4000"),
-        (&["scene.count=8", cube, PD], "coordination.stiffness=20..1500"),
+        (&["scene.count=8", cube, PD], "coordination.stiffness=20..4000"),
         (&["scene.count=5", uneven], "coordination.stiffness=100..4000"),
     ] {
         let family = family(set, &[key]);
         let range = &family.keys()[0];
         let length = range.high - range.low;
-        let line = ProvenLine::prove(&family, length / 256.0, &Unwatched).unwrap_or_else(|error| panic!("{set:?}: {error}"));
+        let line = ProvenLine::prove(&family, length / 512.0, &Unwatched).unwrap_or_else(|error| panic!("{set:?}: {error}"));
         let open: f64 = line.stretches.iter().filter(|one| one.guarantee == Guarantee::Undecided).map(|one| one.high - one.low).sum();
-        assert!(open < 0.1 * length, "{set:?} {key}: {:?}", line.stretches);
+        assert!(open < 0.15 * length, "{set:?} {key}: {:?}", line.stretches);
         crossings += line.stretches.windows(3).filter(|three| three[0].guarantee != three[2].guarantee).count();
         for stretch in &line.stretches {
             for share in [0.0, 0.13, 0.5, 0.77, 1.0] {
@@ -203,9 +205,10 @@ fn boxes_hold_no_scene_of_the_other_kind() {
     let (ring, star, uneven) = ("topology={ kind = \"ring\", neighbours = 2 }", "topology={ kind = \"star\" }", &*graph("uneven"));
     let gains = ["coordination.stiffness=100..5000", "coordination.damping=0..60"];
     for (set, keys) in [
-        (&[SERVER][..], ["peer.coupling.stiffness=10..3000", "peer.coupling.damping=0..40"]),
-        (&[SERVER, OBJECT, "link.delay=13ms", "scene.count=4"], ["peer.coupling.stiffness=10..20000", "object.mass=0.1..2"]),
-        (&[SERVER, LOOSE, LOSS], ["peer.coupling.stiffness=10..3000", "link.delay=0ms..20ms"]),
+        (&[SERVER][..], ["peer.coupling.stiffness=1..400", "peer.coupling.damping=0..8"]),
+        (&[SERVER, OBJECT, "link.delay=13ms", "scene.count=4"], ["peer.coupling.stiffness=1..3000", "object.mass=0.1..2"]),
+        (&[SERVER, ARM, LOSS], ["peer.coupling.stiffness=1..1000", "peer.coupling.damping=0..8"]),
+        (&[SERVER, LOOSE, LOSS], ["peer.coupling.stiffness=1..400", "link.delay=0ms..20ms"]),
         (&["scene.count=5", ring], gains),
         (&["scene.count=5", star], gains),
         (&["scene.count=5", uneven], gains),
@@ -226,6 +229,57 @@ fn boxes_hold_no_scene_of_the_other_kind() {
                 found[1] += usize::from(one.guarantee == Guarantee::Unstable);
             }
         }
-        assert!(found[0] + found[1] >= 70 && found[0] >= 8 && found[1] >= 8, "{set:?} {keys:?}: {found:?}");
+        assert!(found[0] + found[1] >= 60 && found[0] >= 8 && found[1] >= 8, "{set:?} {keys:?}: {found:?}");
     }
+}
+
+/// A graph with a repeated eigenvalue has as many parts as different ones, and a proof of it holds for all peers together.
+#[test]
+fn repeated_eigenvalues_of_a_graph_are_one_part() {
+    let scene = scene(&["scene.count=8", &graph("cube")]);
+    let spectrum = crate::Graph::from(&**scene.topology.as_ref().unwrap()).enclosed_spectrum(&scene.without_topology()).unwrap();
+    assert_eq!((spectrum.others.len(), spectrum.degree), (3, Some(3.0)), "-1, -1/3 three times, 1/3 three times: {spectrum:?}");
+    let nearly = Scene::parse(SCENE, &file(), &owned(&[&graph("nearly-regular"), PD])).unwrap();
+    assert_eq!(analyse(&nearly, Method::Reduced).unwrap().verdict(), Verdict::Stable, "row sums that differ by a rounding are analysed as if equal");
+}
+
+/// What has no proof, or no certificate of it, is refused before anything is looked for, with what could be asked instead.
+#[test]
+fn what_is_not_followed_is_refused_by_name() {
+    let ring = "topology={ kind = \"ring\", neighbours = 2 }";
+    let (gain, damping) = ("coordination.stiffness=100..200", "coordination.damping=1..2");
+    let (coupling, mass) = ("peer.coupling.stiffness=10..20", "object.mass=0.4..0.5");
+    let line = |set: &[&str], key: &str| {
+        let family = Family::new(SCENE, &file(), &owned(set), vec![KeyRange::parse(key).unwrap()]);
+        family.map_or_else(|error| error.to_string(), |family| ProvenLine::prove(&family, 1.0, &Unwatched).unwrap_err().to_string())
+    };
+    let wall = "object.enclosure={ min = -0.1, max = 0.1, stiffness = 500.0, damping = 1.0 }";
+    for (message, words) in [
+        (line(&["coordination.strategy=\"wave\""], mass), "--prove of `map` and `boundary` follows client-server, not wave"),
+        (line(&[SERVER, wall], coupling), "expected a scene without object.enclosure"),
+        (line(&[SERVER, "link.loss=5%"], coupling), "leave something to chance"),
+        (line(&[ring, "scene.count=5", LOOSE], gain), "peer2 or a link of it is not like the others"),
+        (line(&[ring, "scene.count=5", wall], gain), "expected contact"),
+        (line(&["topology={ kind = \"star\" }", "scene.count=5", PD], gain), "or a graph in which all hear as much"),
+        (line(&[&graph("nearly-regular"), PD], gain), "or a graph in which all hear as much"),
+    ] {
+        assert!(message.contains(words), "{words}: {message}");
+    }
+    for (set, keys, what) in
+        [(&[SERVER][..], [coupling, mass], "client-server coordination"), (&[ring, "scene.count=5"], [gain, damping], "a [topology]")]
+    {
+        let family = family(set, &keys);
+        let every = ProvenRegion::prove(&family, 2, Some((2, None)), &Unwatched).unwrap_err().to_string();
+        assert!(every.starts_with(what) && every.contains("expected no --every-number"), "{every}");
+        let shared = SharedProof::of_region(&family, 2, None).unwrap();
+        let region = ProvenRegion::prove(&family, 2, None, &Unwatched).unwrap();
+        for error in [shared.check_certificate(&family).unwrap_err(), region.certify(&family, &Unwatched).unwrap_err()] {
+            let message = error.to_string();
+            assert!(message.starts_with(what) && message.contains("expected no --certificate"), "{message}");
+        }
+    }
+    let certified = family(&[], &[gain, damping]);
+    SharedProof::of_region(&certified, 2, None).unwrap().check_certificate(&certified).unwrap();
+    let every = |set: &[&str]| prove_every_number(&scene(set), 2, None, &Unwatched).unwrap_err().to_string();
+    assert!(every(&[SERVER]).contains("without --graph, --every-number") && every(&[ring, "scene.count=5"]).contains("this scene has a [topology]"));
 }
