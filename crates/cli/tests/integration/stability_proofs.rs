@@ -206,10 +206,7 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
         (format!("point {turned} --every-number"), "the proof for every number of peers of an object that turns"),
         (format!("boundary {turned} {keys}"), "take all components together where nothing else is asked for"),
         (format!("point {turned} --losses-in-a-row 1"), "the worst case of an object that turns"),
-        (
-            format!("point equal.toml --every-number --set {ring}"),
-            "follow a topology where nothing but --prove is asked for",
-        ),
+        (format!("point equal.toml --every-number --set {ring}"), "follow a topology where nothing but --prove is asked for"),
         ("point equal.toml --every-number --set coordination.send-when={position=0.001}".to_owned(), "expected a scene without it"),
     ] {
         desk.cohaptic(&format!("stability {line}")).assert_refused(2, &[words]);

@@ -9,7 +9,7 @@ use super::steps::StepMatrix;
 use crate::Matrix;
 use crate::worst_case::rounding::real;
 
-/// What is set and read.
+/// A number that operations set and read.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Register {
     /// Position or velocity of the device of a class, or of its copy.
@@ -70,7 +70,7 @@ impl Program {
         self.steps.iter().flatten().flatten().map(|(register, _)| *register)
     }
 
-    /// What is alive before each step and after the last: what the bodies feel from there on.
+    /// The registers that are alive before each step and after the last: those that bodies feel from there on.
     fn live(&self) -> Vec<BTreeSet<Register>> {
         let bodies: BTreeSet<Register> = self.set().filter(|register| matches!(register, Register::Body { .. })).collect();
         let mut end = bodies.clone();
@@ -101,12 +101,9 @@ impl Program {
 
     /// Which states the frame has between its steps: those of all programs that differ in multiples alone.
     pub(super) fn layout(&self) -> Layout {
-        let mut live = self.live();
-        let end = live.pop().unwrap_or_default();
-        let mut order: Vec<Vec<Register>> = live.into_iter().map(|live| live.into_iter().collect()).collect();
-        // What lives on from a frame to the next is in one order at both ends.
-        let last = order[0].iter().map(|register| register.before(&self.sent)).filter(|register| end.contains(register)).collect();
-        order.push(last);
+        let mut order: Vec<Vec<Register>> = self.live().into_iter().map(|live| live.into_iter().collect()).collect();
+        // Those that live on from a frame to the next are in one order at both ends.
+        order[self.steps.len()] = order[0].iter().map(|register| register.before(&self.sent)).collect();
         Layout { order }
     }
 
@@ -118,7 +115,7 @@ impl Program {
     fn matrix(&self, step: usize, before: &[Register], after: &[Register]) -> StepMatrix {
         let columns: Vec<Register> = before.iter().copied().filter(|register| self.reference != Some(*register)).collect();
         let unit = |place: Option<usize>| -> Vec<f64> { (0..columns.len()).map(|column| if Some(column) == place { 1.0 } else { 0.0 }).collect() };
-        // Each with the sum of the sizes of all terms, which bounds what is rounded.
+        // Each with the sum of the sizes of all terms, for a bound of roundings.
         let mut rows: BTreeMap<Register, (Vec<f64>, Vec<f64>)> = before
             .iter()
             .map(|register| {
@@ -132,7 +129,7 @@ impl Program {
             for (register, sum) in operation {
                 let (mut row, mut sizes) = (unit(None), unit(None));
                 for (of, by) in sum {
-                    // What is read and is not alive was never set: nothing feels what comes of it.
+                    // A register that is not alive is read for others that are not: nothing feels them.
                     let Some((values, of_sizes)) = rows.get(of) else { continue };
                     for ((entry, size), (value, of_size)) in row.iter_mut().zip(&mut sizes).zip(values.iter().zip(of_sizes)) {
                         *entry += by * value;

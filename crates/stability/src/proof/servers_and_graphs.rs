@@ -33,7 +33,7 @@ fn owned(set: &[&str]) -> Vec<String> {
 
 /// The file that scenes are read as: weights are beside it.
 fn file() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/scene.toml")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scene.toml")
 }
 
 fn scene(set: &[&str]) -> Scene {
@@ -158,7 +158,7 @@ fn server_eigenvalues(scene: &Scene) -> Vec<(f64, f64)> {
     sorted(&parts)
 }
 
-/// On lines: what is proven is what single scenes have, at the ends of stretches and within, and most of each line is decided; crossings are among the rest.
+/// On lines: verdicts are those of single scenes, at the ends of stretches and within, and most of each line is decided; crossings are among the rest.
 #[test]
 fn lines_are_judged_as_single_scenes_are() {
     let (ring, dense_ring) = ("topology={ kind = \"ring\", neighbours = 2 }", "topology={ kind = \"ring\", neighbours = 4 }");
