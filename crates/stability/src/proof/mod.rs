@@ -3,6 +3,8 @@
 //! A frame of a lifted system is a product of steps ([`steps`]) whose entries are affine in each gain. Over a box of gains it is a mean, a slope along each of them and a small radius ([`span`]), and its
 //! eigenvalues lie in discs that move along ([`discs`]): all inside the unit circle, or one outside, for the whole box. Boxes of which neither can be shown are split.
 //!
+//! Equal peers on a graph are parts of one node each, for every eigenvalue of its averaging matrix between two numbers. A server and its clients have steps of their own ([`server`]).
+//!
 //! Nothing that is looked for has to be right: each finding is checked with bounds of all rounding errors.
 
 mod basis;
