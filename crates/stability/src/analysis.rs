@@ -136,18 +136,23 @@ pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Resu
     }
 }
 
+/// Why a scene with a topology is refused.
+pub(crate) fn on_this_topology(error: GraphError) -> AnalysisError {
+    match error {
+        GraphError::Analysis(error) => error,
+        GraphError::Unequal { .. }
+        | GraphError::Weight { .. }
+        | GraphError::Alone { .. }
+        | GraphError::Neighbours { .. }
+        | GraphError::Irregular
+        | GraphError::NotLinear => AnalysisError::OnTopology { why: error.to_string() },
+    }
+}
+
 /// The analysis of a scene with a topology: that of its peers on a graph.
 fn on_topology(scene: &Scene, topology: &Topology, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     match method {
-        Method::Reduced => analyse_on_watched(&scene.without_topology(), &Graph::from(topology), watch).map_err(|error| match error {
-            GraphError::Analysis(error) => error,
-            GraphError::Unequal { .. }
-            | GraphError::Weight { .. }
-            | GraphError::Alone { .. }
-            | GraphError::Neighbours { .. }
-            | GraphError::Irregular
-            | GraphError::NotLinear => AnalysisError::OnTopology { why: error.to_string() },
-        }),
+        Method::Reduced => analyse_on_watched(&scene.without_topology(), &Graph::from(topology), watch).map_err(on_this_topology),
         Method::Full => Err(AnalysisError::Topology { what: "the method full" }),
         Method::Determinant => Err(AnalysisError::Topology { what: "the method determinant" }),
     }

@@ -39,7 +39,7 @@ pub enum AnalysisError {
     /// The strategy has no linear form.
     #[error(
         "{strategy} coordination is followed as a whole alone, not in parts of equal peers: ask `cohaptic stability point`, `map` or `boundary` for its radius, \
-         without --graph, --every-number, --prove, --switching, --losses-in-a-row and --delay-within"
+         without --graph, --every-number, --switching, --losses-in-a-row and --delay-within; --prove of `map` and `boundary` follows client-server, not wave"
     )]
     OtherStrategy {
         /// Its name.
@@ -94,7 +94,7 @@ pub enum AnalysisError {
     /// The scene has a topology, and this analysis does not follow it.
     #[error(
         "{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"; \
-         `cohaptic stability point`, `map` and `boundary` follow a topology where nothing else is asked for"
+         `cohaptic stability point`, `map` and `boundary` follow a topology where nothing but --prove is asked for"
     )]
     Topology {
         /// The analysis.

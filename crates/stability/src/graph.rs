@@ -5,11 +5,14 @@
 //! scaled, and hears λ times its own samples: the scene is as many systems of one node. λ = 1 is there once for each connected part, which can be
 //! displaced as a whole.
 
+mod enclosed;
+
 use cohaptic_peer::coordination::Pull;
 use cohaptic_scene::{Scene, Topology, TopologyKind};
 
+pub(crate) use self::enclosed::EnclosedSpectrum;
 use crate::analysis::{Analysis, combinations, combine};
-use crate::lifted::Lifted;
+use crate::lifted::{Lifted, Node};
 use crate::network::NominalNetwork;
 use crate::parts::{alone, lifted_part};
 use crate::pieces::{Piece, pieces};
@@ -117,13 +120,7 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
     };
     let peers = scene.peers.len();
     let (spectrum, degree) = graph.spectrum(scene)?;
-    let mut node = [structure.node(scene, 0)];
-    let pulls = [scene.coordination.strategy.pull(), scene.coordination.pull];
-    for _ in pulls.into_iter().filter(|pull| *pull == Pull::Sum) {
-        // The sum over as many as are heard, in place of that over all others.
-        let degree = degree.ok_or(GraphError::Irregular)?;
-        node[0].law = node[0].law.scaled(degree / count(peers - 1));
-    }
+    let node = [node_on(scene, &structure, degree)?];
     let quotient = structure.quotient(scene, &node);
     let mut parts = Vec::new();
     let mut rigid_modes = 0;
@@ -147,6 +144,18 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
     let radius = crate::parts::radius_of(&parts);
     let (rigid_modes, dimension) = (rigid_modes * combination.axes, (dimension - rigid_modes) * combination.axes);
     Ok(ContactMode { motion: piece.motion.clone(), contacts: String::new(), radius, parts, rigid_modes, dimension, frame: timetable.frame })
+}
+
+/// The node that stands for equal peers of which each hears that number or weight of others, if all hear as much.
+pub(crate) fn node_on(scene: &Scene, structure: &Structure, degree: Option<f64>) -> Result<Node, GraphError> {
+    let mut node = structure.node(scene, 0);
+    let pulls = [scene.coordination.strategy.pull(), scene.coordination.pull];
+    for _ in pulls.into_iter().filter(|pull| *pull == Pull::Sum) {
+        // The sum over as many as are heard, in place of that over all others.
+        let degree = degree.ok_or(GraphError::Irregular)?;
+        node.law = node.law.scaled(degree / count(scene.peers.len() - 1));
+    }
+    Ok(node)
 }
 
 /// An eigenvalue of an averaging matrix; 1 is known exactly.

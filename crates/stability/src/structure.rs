@@ -69,11 +69,21 @@ impl Structure {
         contacts: &Contacts,
         apart: impl Fn(usize, usize) -> bool,
     ) -> Result<Self, AnalysisError> {
-        let scene = scenes[0];
-        let peers = scene.peers.len();
         for scene in scenes {
             check_laws(scene)?;
         }
+        Self::of_any_law(scenes, network, contacts, apart)
+    }
+
+    /// The same for laws of any kind, whose nodes are the caller's.
+    pub(crate) fn of_any_law(
+        scenes: &[&Scene],
+        network: &NominalNetwork,
+        contacts: &Contacts,
+        apart: impl Fn(usize, usize) -> bool,
+    ) -> Result<Self, AnalysisError> {
+        let scene = scenes[0];
+        let peers = scene.peers.len();
         let mut classes: Vec<Vec<usize>> = Vec::new();
         for place in 0..peers {
             let found = classes.iter().position(|class| {
@@ -148,13 +158,18 @@ impl Structure {
 
     /// The node that stands for a class.
     pub(crate) fn node(&self, scene: &Scene, class: usize) -> Node {
+        self.node_with(scene, class, self.law(scene, class))
+    }
+
+    /// The node that stands for a class, with a law in place of its own.
+    pub(crate) fn node_with(&self, scene: &Scene, class: usize, law: LinearLaw) -> Node {
         let place = self.classes[class][0];
         let spec = &scene.peers[place];
         Node {
             device: self.touching[class].then(|| Body::new(scene.device_plant(place), scene.integrator, &spec.clock)),
             object: Body::new(scene.copy_config(place).plant(), scene.integrator, &spec.clock),
             coupling: scene.coupling(place),
-            law: self.law(scene, class),
+            law,
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
             compute_delay: spec.compute_delay,
             keeps_whole_past: false,

@@ -127,6 +127,27 @@ fn delays_are_proven_tick_by_tick() {
     assert!(text.contains(&words), "{text}");
 }
 
+/// A server with its clients, and peers on a ring: single scenes at the ends of stretches say what their stretches say.
+#[test]
+fn servers_and_topologies_are_proven_as_single_scenes_are_judged() {
+    let desk = Desk::with("equal.toml", EQUAL);
+    for (set, key) in [
+        ("--set coordination.strategy=client-server", "peer.coupling.stiffness"),
+        ("--set scene.count=5 --set topology={kind=\"ring\",neighbours=2}", "coordination.stiffness"),
+    ] {
+        let proven = desk.json(&format!("stability boundary equal.toml {set} --along {key}=10..4000 --tolerance 10 --prove --json"));
+        let stretches = proven["stretches"].as_array().unwrap();
+        let decided: Vec<_> = stretches.iter().filter(|stretch| stretch["verdict"] != "undecided").collect();
+        assert!(decided.iter().any(|one| one["verdict"] == "stable") && decided.iter().any(|one| one["verdict"] == "unstable"), "{set}: {proven:#}");
+        for stretch in decided {
+            for end in ["low", "high"] {
+                let single = desk.json(&format!("stability point equal.toml --json {set} --set {key}={}", stretch[end]));
+                assert_eq!(single["verdict"], stretch["verdict"], "{set} {stretch}");
+            }
+        }
+    }
+}
+
 /// A box for every number of peers is one for each of them.
 #[test]
 fn a_region_of_every_number_holds_each_number() {
@@ -166,10 +187,15 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
     }
     let set = |law: &str| format!("equal.toml --set coordination.strategy={law}");
     let keys = "--along coordination.stiffness=100..6000 --prove";
+    let ring = "topology={kind=\"ring\",neighbours=2}";
     let turned = "equal.toml --set scene.axes=3 --set object.inertia=2.7e-4 --set peers.peer1.grasp=[0.03,0,0]";
     let loses = "equal.toml --set coordination.strategy=extrapolated --set link.loss=5%";
     for (line, words) in [
         (format!("point {} --every-number", set("wave")), "ask `cohaptic stability point`, `map` or `boundary` for its radius"),
+        (format!("boundary {} {keys} --certificate --out out", set("client-server")), "client-server coordination has no certificate"),
+        (format!("map {} {GAINS} --prove 2 --every-number", set("client-server")), "client-server coordination: a box of keys holds for"),
+        (format!("map equal.toml {GAINS} --prove 2 --certificate --out out --against {ring}"), "a [topology] has no certificate"),
+        (format!("map equal.toml {GAINS} --prove 2 --every-number --set {ring}"), "expected no --every-number, and one number at a time"),
         (format!("boundary {} {keys}", set("wave")), "wave coordination is followed as a whole alone"),
         (format!("point {} --losses-in-a-row 1", set("client-server")), "client-server coordination is followed as a whole alone"),
         (format!("point {} --switching", set("set-position")), "set-position coordination has no analysis: simulations tell"),
@@ -180,10 +206,7 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
         (format!("point {turned} --every-number"), "the proof for every number of peers of an object that turns"),
         (format!("boundary {turned} {keys}"), "take all components together where nothing else is asked for"),
         (format!("point {turned} --losses-in-a-row 1"), "the worst case of an object that turns"),
-        (
-            "point equal.toml --every-number --set topology={kind=\"ring\",neighbours=2}".to_owned(),
-            "follow a topology where nothing else is asked for",
-        ),
+        (format!("point equal.toml --every-number --set {ring}"), "follow a topology where nothing but --prove is asked for"),
         ("point equal.toml --every-number --set coordination.send-when={position=0.001}".to_owned(), "expected a scene without it"),
     ] {
         desk.cohaptic(&format!("stability {line}")).assert_refused(2, &[words]);

@@ -1,5 +1,6 @@
 //! What may be moved without a force: everything together, or with waves, which carry no position, each peer by itself.
 
+use cohaptic_peer::coordination::Role;
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{State, Strategy};
 use cohaptic_units::Instant;
@@ -52,7 +53,9 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 moved[first + axis] = 1.0;
             }
             moved[first + 2 * A + axis] = 1.0;
-            for age in 0..self.timetable.depth[place] {
+            // Samples of a client are of its device.
+            let is_sample_moved = self.layout.touching[place] || matches!(self.members[place].strategy().role(), Role::Copy);
+            for age in (0..self.timetable.depth[place]).filter(|_| is_sample_moved) {
                 moved[self.layout.samples[place] + age * self.layout.sample_len::<A>() + axis] = 1.0;
             }
         }

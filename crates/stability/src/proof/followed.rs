@@ -1,5 +1,7 @@
 //! A family of scenes with open keys, and the verdict on all of them in a box of values; and for every number of equal peers too, where that is asked for.
 
+use std::borrow::Cow;
+
 use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
@@ -8,9 +10,11 @@ use super::corners::{Common, Point, doubled, states, steps};
 use super::delays;
 use super::discs::decide;
 use super::growing::{ENDLESS, nu, weights_of_growing};
+use super::server::Server;
 use super::span::StepSpan;
 use super::{Guarantee, ProofError, Proven};
-use crate::analysis::pairs;
+use crate::analysis::{on_this_topology, pairs};
+use crate::graph::{EnclosedSpectrum, node_on};
 use crate::lifted::Node;
 use crate::network::NominalNetwork;
 use crate::parts::alone;
@@ -18,7 +22,7 @@ use crate::pieces::pieces;
 use crate::structure::Structure;
 use crate::timetable::Timetable;
 use crate::worst_case::rounding::real;
-use crate::{AnalysisError, Family, FamilyError, Matrix, Verdict, Watch};
+use crate::{AnalysisError, Family, FamilyError, Graph, GraphError, Matrix, Verdict, Watch};
 
 /// One motion in one combination of contacts: the classes of its peers, for all values of the keys.
 pub(super) struct Motion {
@@ -27,6 +31,38 @@ pub(super) struct Motion {
     pub(super) structure: Structure,
     /// The class that grows, where a verdict is asked for every number of peers.
     growing: Option<usize>,
+    /// How its peers act on each other.
+    action: Action,
+}
+
+/// How peers act on each other.
+enum Action {
+    /// Each follows the mean of all others.
+    Mean,
+    /// Equal peers, each of which follows the mean of its neighbours.
+    Graph(EnclosedSpectrum),
+    /// As a server and its clients.
+    Server(Server),
+}
+
+impl Action {
+    /// What the scene has that proofs follow for its own number of peers alone, and without a certificate; `None` if it has no such.
+    const fn special(&self) -> Option<&'static str> {
+        match self {
+            Self::Mean => None,
+            Self::Graph(_) => Some("a [topology]"),
+            Self::Server(_) => Some("client-server coordination"),
+        }
+    }
+}
+
+/// A part of a motion: the averages of all classes, or how the members of one differ.
+struct PartOf<'a> {
+    apart: Option<usize>,
+    timetable: &'a Timetable,
+    tied: bool,
+    /// On a graph, between which numbers the weight is with which a peer hears its own samples.
+    weight: Option<[f64; 2]>,
 }
 
 /// Values of a delay between which no frame differs, and its motions. Without a delay among the keys there is one stretch.
@@ -73,12 +109,13 @@ impl<'a> Followed<'a> {
                 return Err(ProofError::Key { key: keys[place].key.clone() });
             }
             let motions = motions(family, Some((place, value)), every)?;
+            let scene = mutual(&scene);
             let all = pieces(&scene, "a proof")?;
             let of = |motion: &Motion| {
-                let nodes = all.get(motion.piece).map(|piece| motion.structure.nodes(&piece.scene));
-                format!("{:?} {nodes:?}", motion.structure)
+                let nodes = all.get(motion.piece).map(|piece| motion.nodes(&piece.scene)).transpose()?;
+                Ok::<_, ProofError>(format!("{:?} {nodes:?}", motion.structure))
             };
-            Ok(motions.iter().map(of).collect::<String>())
+            motions.iter().map(of).collect::<Result<String, _>>()
         };
         let found = delays::stretches(&keys[place], frame)?;
         let stretch = |range: [f64; 2]| Ok::<_, ProofError>(Stretch { range: Some(range), motions: of(Some(range[0]))? });
@@ -126,6 +163,12 @@ impl<'a> Followed<'a> {
         Ok(found)
     }
 
+    /// Refuses scenes whose verdicts nothing is written for to check them by.
+    pub(super) fn refuse_certificate(&self) -> Result<(), ProofError> {
+        let what = self.stretches.iter().flat_map(|stretch| &stretch.motions).find_map(|motion| motion.action.special());
+        what.map_or(Ok(()), |what| Err(ProofError::NoCertificate { what }))
+    }
+
     /// A box with all numbers of peers for which none is decided.
     fn open(&self, mut ranges: Vec<[f64; 2]>) -> BoxCertificate {
         ranges.extend(self.numbers);
@@ -163,6 +206,7 @@ impl<'a> Followed<'a> {
             ranges.iter().enumerate().map(|(key, range)| range[usize::from(upper(key))]).collect::<Vec<f64>>()
         };
         let scenes = (0..1 << free.len()).map(|place| self.family.written(&corner(place))).collect::<Result<Vec<Scene>, FamilyError>>()?;
+        let scenes: Vec<Cow<'_, Scene>> = scenes.iter().map(mutual).collect();
         let all = scenes.iter().map(|scene| pieces(scene, "a proof")).collect::<Result<Vec<_>, _>>()?;
         let mut proven = Some(Proven::Stable);
         for motion in &self.stretches[stretch].motions {
@@ -188,18 +232,47 @@ fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, O
     // Values inside tell peers apart that are equal by chance at an end.
     let scenes = [at(&|key| keys[key].odd(key))?, at(&|key| keys[key].low)?, at(&|key| keys[key].high)?];
     scenes.iter().try_for_each(super::refuse)?;
+    let graph = scenes[0].topology.as_ref().map(|topology| Graph::from(&**topology));
+    let scenes: Vec<Cow<'_, Scene>> = scenes.iter().map(mutual).collect();
     let all = scenes.iter().map(|scene| pieces(scene, "a proof")).collect::<Result<Vec<_>, _>>()?;
     let network = NominalNetwork::of(&scenes[0])?;
     let mut motions = Vec::new();
     for (piece, first) in all[0].iter().enumerate() {
         let of_piece: Vec<&Scene> = all.iter().filter_map(|pieces| pieces.get(piece)).map(|piece| &*piece.scene).collect();
         for (_, combination) in pairs(std::slice::from_ref(first), &mut false)? {
-            let structure = Structure::of(&of_piece, &network, &combination.contacts)?;
+            let (structure, action) = match Server::structure(&of_piece, &network, &combination.contacts)? {
+                Some((structure, server)) => (structure, Action::Server(server)),
+                None => {
+                    let structure = Structure::of(&of_piece, &network, &combination.contacts)?;
+                    let spectrum = graph.as_ref().map(|graph| on_graph(graph, &of_piece, &structure)).transpose()?;
+                    (structure, spectrum.map_or(Action::Mean, Action::Graph))
+                }
+            };
+            if every.is_some()
+                && let Some(what) = action.special()
+            {
+                return Err(ProofError::OneNumber { what });
+            }
             let growing = every.map(|(from, _)| growing(&structure, &of_piece, from)).transpose()?;
-            motions.push(Motion { piece, structure, growing });
+            motions.push(Motion { piece, structure, growing, action });
         }
     }
     Ok(motions)
+}
+
+/// The scene as if every peer heard every other, whose peers an averaging matrix of the graph puts together.
+fn mutual(scene: &Scene) -> Cow<'_, Scene> {
+    if scene.topology.is_some() { Cow::Owned(scene.without_topology()) } else { Cow::Borrowed(scene) }
+}
+
+/// The spectrum of a graph of the peers of scenes, which have to be equal.
+fn on_graph(graph: &Graph, scenes: &[&Scene], structure: &Structure) -> Result<EnclosedSpectrum, AnalysisError> {
+    if let Some(other) = structure.classes.get(1) {
+        return Err(on_this_topology(GraphError::Unequal { peer: scenes[0].peers[other[0]].name.clone() }));
+    }
+    let spectrum = graph.enclosed_spectrum(scenes[0]).map_err(on_this_topology)?;
+    node_on(scenes[0], structure, spectrum.degree).map_err(on_this_topology)?;
+    Ok(spectrum)
 }
 
 /// The class that grows, if nothing but the weights depends on how many peers there are.
@@ -222,6 +295,7 @@ pub(super) fn certify(
     watch: &dyn Watch,
 ) -> Result<Vec<BoxCertificate>, ProofError> {
     let followed = Followed::new(family, every)?;
+    followed.refuse_certificate()?;
     watch.expects(real(boxes.len()));
     let certificates = boxes.into_par_iter().map(|ranges| {
         if watch.stops() {
@@ -235,21 +309,33 @@ pub(super) fn certify(
 }
 
 impl Motion {
+    /// The nodes of all classes.
+    fn nodes(&self, scene: &Scene) -> Result<Vec<Node>, ProofError> {
+        match &self.action {
+            Action::Mean => Ok(self.structure.nodes(scene)),
+            Action::Graph(spectrum) => Ok(vec![node_on(scene, &self.structure, spectrum.degree).map_err(on_this_topology)?]),
+            Action::Server(server) => Ok(server.nodes(&self.structure, scene)),
+        }
+    }
+
     /// The verdict on the motion between scenes, the corners of a box, and the certificates of its parts where they are asked for. `numbers`: between which ends 1/(N − 1) is.
     fn decide(&self, scenes: &[&Scene], numbers: Option<[f64; 2]>, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let structure = &self.structure;
-        let nodes: Vec<_> = scenes.iter().map(|scene| structure.nodes(scene)).collect();
+        let nodes = scenes.iter().map(|scene| self.nodes(scene)).collect::<Result<Vec<_>, _>>()?;
         let time = structure.time(scenes[0], &nodes[0]);
-        let mut of = |apart: Option<usize>, timetable: &Timetable, tied: bool| {
-            let classes = apart.map_or(0..structure.classes.len(), |class| class..class + 1);
+        let mut of = |part: &PartOf<'_>| {
+            let classes = part.apart.map_or(0..structure.classes.len(), |class| class..class + 1);
             let ends: Vec<Vec<Node>> = nodes.iter().map(|nodes| nodes[classes.clone()].to_vec()).collect();
-            let points = self.points(&ends, numbers, apart);
-            let common = Common { timetable, tied, time };
+            if let Action::Server(server) = &self.action {
+                return Ok(decide(&StepSpan::product(&server.steps(structure, &ends, part.apart, time)?)).map(|decision| decision.proven));
+            }
+            let points = self.points(&ends, numbers, part);
+            let common = Common { timetable: part.timetable, tied: part.tied, time };
             let Some(decision) = decide(&StepSpan::product(&steps(&points, &ends, common)?)) else { return Ok(None) };
             if let Some(certified) = certified.as_deref_mut() {
                 let members = classes.map(|class| structure.classes[class].clone()).collect();
-                let part = PartCertificate::new(members, apart.is_some(), states(&points, common)?, time, &decision.witness);
-                certified.push((decision.proven, part));
+                certified
+                    .push((decision.proven, PartCertificate::new(members, part.apart.is_some(), states(&points, common)?, time, &decision.witness)));
             }
             Ok::<_, ProofError>(Some(decision.proven))
         };
@@ -261,23 +347,56 @@ impl Motion {
                 _ => None,
             };
         };
+        for part in self.parts() {
+            add(of(&part)?);
+        }
         for class in 0..structure.classes.len() {
-            if let Some(timetable) = &structure.apart[class] {
-                add(of(Some(class), timetable, true)?);
-            }
             let radii: Vec<_> = scenes.iter().filter_map(|scene| alone(structure, scene, class, 1)).map(|(part, _)| part.radius).collect();
             if let Some(first) = radii.first() {
                 let is_one = radii.iter().all(|radius| radius == first);
                 add((is_one && first.verdict() == Verdict::Stable).then_some(Proven::Stable));
             }
         }
-        add(of(None, &structure.timetable, structure.tied)?);
         Ok(proven)
     }
 
-    /// The corners of a box, for the averages of classes or for differences within one. Weights are affine in 1/(N − 1), which is one number more unless they stay.
-    fn points(&self, ends: &[Vec<Node>], numbers: Option<[f64; 2]>, apart: Option<usize>) -> Vec<Point> {
+    /// The parts of the motion but for devices that touch nothing.
+    fn parts(&self) -> Vec<PartOf<'_>> {
         let structure = &self.structure;
+        let mut parts = Vec::new();
+        match &self.action {
+            Action::Graph(spectrum) => {
+                let timetable = structure.apart[0].as_ref().unwrap_or(&structure.timetable);
+                let of = |weight: &[f64; 2]| PartOf { apart: Some(0), timetable, tied: true, weight: Some(*weight) };
+                parts.extend(spectrum.others.iter().map(of));
+                parts.push(PartOf { apart: None, timetable, tied: structure.tied, weight: Some([1.0; 2]) });
+                return parts;
+            }
+            Action::Mean => {
+                let of = |(class, timetable): (usize, &'_ Option<Timetable>)| timetable.as_ref().map(|_| class);
+                for class in structure.apart.iter().enumerate().filter_map(of) {
+                    let timetable = structure.apart[class].as_ref().unwrap_or(&structure.timetable);
+                    parts.push(PartOf { apart: Some(class), timetable, tied: true, weight: None });
+                }
+            }
+            Action::Server(_) => {
+                for class in (0..structure.classes.len()).filter(|class| Server::has_differences(structure, *class)) {
+                    parts.push(PartOf { apart: Some(class), timetable: &structure.timetable, tied: true, weight: None });
+                }
+            }
+        }
+        parts.push(PartOf { apart: None, timetable: &structure.timetable, tied: structure.tied, weight: None });
+        parts
+    }
+
+    /// The corners of a box, for the averages of classes or for differences within one. Weights are affine in 1/(N − 1), which is one number more unless they stay.
+    fn points(&self, ends: &[Vec<Node>], numbers: Option<[f64; 2]>, part: &PartOf<'_>) -> Vec<Point> {
+        let (structure, apart) = (&self.structure, part.apart);
+        if let Some([low, high]) = part.weight {
+            let hears = |nodes: &Vec<Node>, weight: f64| Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight) };
+            let points: Vec<Point> = ends.iter().map(|nodes| hears(nodes, low)).collect();
+            return if low < high { doubled(&points, |point, upper| hears(&point.nodes, if upper { high } else { low })) } else { points };
+        }
         let Some((growing, numbers)) = self.growing.zip(numbers) else {
             let weights = apart.map_or_else(|| structure.weights.clone(), |_| Matrix::from_fn(1, 1, |_, _| structure.difference_weight()));
             return ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone() }).collect();

@@ -3,6 +3,8 @@
 //! A frame of a lifted system is a product of steps ([`steps`]) whose entries are affine in each gain. Over a box of gains it is a mean, a slope along each of them and a small radius ([`span`]), and its
 //! eigenvalues lie in discs that move along ([`discs`]): all inside the unit circle, or one outside, for the whole box. Boxes of which neither can be shown are split.
 //!
+//! Equal peers on a graph are parts of one node each, for every eigenvalue of its averaging matrix between two numbers. A server and its clients have steps of their own ([`server`]).
+//!
 //! Nothing that is looked for has to be right: each finding is checked with bounds of all rounding errors.
 
 mod basis;
@@ -13,6 +15,7 @@ mod discs;
 mod followed;
 mod growing;
 mod halving;
+mod heard;
 mod line;
 mod mean_square;
 #[cfg(test)]
@@ -20,7 +23,11 @@ mod mutation;
 mod number;
 #[cfg(test)]
 mod points;
+mod program;
 mod region;
+mod server;
+#[cfg(test)]
+mod servers_and_graphs;
 mod shared;
 mod span;
 mod steps;
@@ -119,6 +126,27 @@ pub enum ProofError {
         "gains or the mass of a copy depend on the number of peers, and a box of keys holds no such: expected average-position coordination without scaling and object.split-mass = false; or one number at a time, by `--curve scene.count=N`"
     )]
     Scaled,
+    /// A box of keys and numbers of peers, of scenes that are followed for one number alone.
+    #[error(
+        "{what}: a box of keys holds for the number of peers that the scene has; expected no --every-number, and one number at a time, by `--curve scene.count=N`"
+    )]
+    OneNumber {
+        /// The coordination, or the topology.
+        what: &'static str,
+    },
+    /// A certificate of scenes whose frames the checker does not derive.
+    #[error(
+        "{what} has no certificate, since the program that checks it does not follow that: expected no --certificate; the verdicts of --prove hold without"
+    )]
+    NoCertificate {
+        /// As above.
+        what: &'static str,
+    },
+    /// Walls about the object of a server.
+    #[error(
+        "with client-server coordination walls are left out of every analysis: expected a scene without object.enclosure for --prove; `stability map` and `boundary` without it say what they leave out"
+    )]
+    WallOfServer,
     /// Numbers of peers that are none.
     #[error("expected numbers of peers from 2 on, the least first, such as 2.. or 2..100")]
     Numbers,

@@ -213,7 +213,7 @@ fn scenes_without_a_proof_are_refused_by_name() {
         (&["coordination.strategy=\"extrapolated\"", "link.loss=10%"], "extrapolated coordination uses the ages of samples"),
         (&["coordination.strategy=\"passivity-control\""], "passivity-control"),
         (&["coordination.strategy=\"client-server\""], "client-server coordination is followed as a whole alone"),
-        (&["coordination.strategy=\"wave\""], "without --graph, --every-number, --prove"),
+        (&["coordination.strategy=\"wave\""], "follows client-server, not wave"),
         (&["scene.axes=3", "object.inertia=2.7e-4", "peers.peer1.grasp=[0.03, 0, 0]"], "`map` and `boundary` take all components together"),
     ] {
         let message = refused(set);

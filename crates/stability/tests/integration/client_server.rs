@@ -27,6 +27,22 @@ fn a_server_and_its_clients_have_the_radii_computed_elsewhere() {
     }
 }
 
+/// A client that lets go has a device that nothing depends on, and leaves the rest the eigenvalues that it has without it.
+#[test]
+fn a_client_that_lets_go_changes_nothing() {
+    for returns in ["force", "object"] {
+        let returns = format!("coordination.client-server.returns={returns}");
+        let radius = |changes: &[&str]| {
+            let analysis = analyse(&read("coordination/client-server.toml", &[&[returns.as_str()], changes].concat()), Method::Full).unwrap();
+            assert_eq!(analysis.verdict(), Verdict::Stable, "{changes:?}");
+            analysis.radius.value
+        };
+        let (with, without) =
+            (radius(&["peers.right.contact=none"]), radius(&["peers=[{ name = \"server\", contact = \"none\" }, { name = \"left\" }]"]));
+        assert!((with - without).abs() < 1e-12, "{with} {without}");
+    }
+}
+
 /// What the server does not bear, average-position does.
 #[test]
 fn average_position_bears_the_coupling_that_a_server_does_not() {

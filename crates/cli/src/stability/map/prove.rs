@@ -41,6 +41,11 @@ const ROWS: &str = "proof.rows";
 pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, sharing: Sharing<'_>) -> Result<ExitCode, Failure> {
     let start = Clock::now();
     let shared = SharedProof::of_region(&order.families[0], halvings, arguments.every_number).map_err(|error| failure(order, arguments, 0, error))?;
+    if arguments.certificate {
+        for (variant, family) in order.families.iter().enumerate() {
+            shared.check_certificate(family).map_err(|error| failure(order, arguments, variant, error))?;
+        }
+    }
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let numbers =
         arguments.every_number.map(|(from, to)| format!(", for every number from {from}{}", to.map_or_else(String::new, |to| format!(" to {to}"))));

@@ -1,0 +1,171 @@
+//! Eigenvalues of averaging matrices with bounds of all rounding, for proofs.
+
+use cohaptic_scene::Scene;
+
+use super::{Eigenvalue, Graph, GraphError};
+use crate::Matrix;
+use crate::structure::count;
+
+/// The eigenvalues of an averaging matrix but for 1, which each connected part has once.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct EnclosedSpectrum {
+    /// Intervals in rising order, each with one eigenvalue or several.
+    pub(crate) others: Vec<[f64; 2]>,
+    /// How many, or how much weight, each peer hears, if all hear exactly as much.
+    pub(crate) degree: Option<f64>,
+}
+
+impl Graph {
+    /// The eigenvalues of the averaging matrix of the peers of a scene.
+    pub(crate) fn enclosed_spectrum(&self, scene: &Scene) -> Result<EnclosedSpectrum, GraphError> {
+        let (spectrum, degree) = self.spectrum(scene)?;
+        let is_pair = scene.peers.len() == 2;
+        let error = match self {
+            Self::Weighted(weights) => {
+                let ones = spectrum.iter().map(|(eigenvalue, copies)| if *eigenvalue == Eigenvalue::One { *copies } else { 0 }).sum();
+                let degree = degree.filter(|_| has_equal_sums(weights));
+                return Ok(EnclosedSpectrum { others: merged(of_weights(weights, ones)), degree });
+            }
+            // 0 and −1.
+            Self::Star => 0.0,
+            Self::Ring { .. } if is_pair => 0.0,
+            // −1/(N − 1) is rounded once.
+            Self::Complete => f64::EPSILON,
+            // An angle below 2π is off by four roundings, a cosine by no more than its angle and one of its own, and a mean of them by one each and one more.
+            Self::Ring { neighbours } => (32.0 + count(*neighbours)) * f64::EPSILON,
+        };
+        let other = |(eigenvalue, _): &(Eigenvalue, usize)| if let Eigenvalue::Other(value) = eigenvalue { Some(*value) } else { None };
+        let others = spectrum.iter().filter_map(other).map(|value| within_unit(value, error)).collect();
+        Ok(EnclosedSpectrum { others: merged(others), degree })
+    }
+}
+
+/// That far around a value, and from −1 to 1, where the eigenvalues of all averaging matrices of mutual weights are.
+fn within_unit(value: f64, error: f64) -> [f64; 2] {
+    [(value - error).max(-1.0), (value + error).min(1.0)]
+}
+
+/// Intervals in rising order, of which no two overlap, with all points of those given.
+fn merged(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    intervals.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    let mut apart: Vec<[f64; 2]> = Vec::new();
+    for [low, high] in intervals {
+        match apart.last_mut() {
+            Some(last) if low <= last[1] => last[1] = last[1].max(high),
+            _ => apart.push([low, high]),
+        }
+    }
+    apart
+}
+
+/// All eigenvalues of D⁻¹W but for `ones` that are 1, the largest: those of A = D^−½·W·D^−½, which is symmetric with norm 1.
+///
+/// Let U and the diagonal Λ be what was computed for its eigenvectors and eigenvalues, ε = ‖UᵀU − 1‖ < 1 and U = Q·H with Q orthogonal. Then ‖U − Q‖ = ‖H − 1‖ ≤ ε, since each singular value σ has |σ − 1| ≤ |σ² − 1|. So
+/// ‖QᵀAQ − Λ‖ = ‖AQ − QΛ‖ ≤ ‖AU − UΛ‖ + ε·(1 + ‖Λ‖), and the eigenvalues of A, counted in order, are so near to those of Λ (Weyl 1912).
+fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
+    let size = weights.rows();
+    let unknown = || vec![[-1.0, 1.0]; usize::from(size > ones)];
+    let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
+    if degrees.iter().any(|degree| !degree.is_finite()) {
+        return unknown();
+    }
+    // Divided one by one, nothing leaves the range of numbers: no weight is above its degree.
+    let a = faer::Mat::from_fn(size, size, |row, column| weights[(row, column)] / degrees[row].sqrt() / degrees[column].sqrt());
+    let Ok(found) = a.self_adjoint_eigen(faer::Side::Lower) else { return unknown() };
+    let (u, values) = (found.U(), found.S().column_vector());
+    let residual = frobenius(&(&a * u - faer::Mat::from_fn(size, size, |row, column| u[(row, column)] * values[column])));
+    let skew = frobenius(&(u.transpose() * u - faer::Mat::<f64>::identity(size, size)));
+    let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    // Written so that NaN fails.
+    if !(skew < 0.1 && largest < 1.1 && residual < 1.0) {
+        return unknown();
+    }
+    // An entry of A is within (n + 4)·u of itself, for the sums D and five operations, which A takes over, since it has no negative ones and norm 1. Those of A·U − U·Λ and of UᵀU are sums of n terms: in the
+    // Frobenius norm within 4·(n + 2)·√n·u·(1 + ε) and n²·u·(1 + ε)². All together is less than half of this, which has room for the sums of squares.
+    let rounding = 8.0 * (count(size) + 8.0).powi(2) * f64::EPSILON;
+    let error = residual + skew * (1.0 + largest) + rounding;
+    let mut sorted: Vec<f64> = values.iter().copied().collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.truncate(size - ones);
+    sorted.into_iter().map(|value| within_unit(value, error)).collect()
+}
+
+fn frobenius(matrix: &faer::Mat<f64>) -> f64 {
+    matrix.col_iter().flat_map(|column| column.iter().copied()).map(|entry| entry * entry).sum::<f64>().sqrt()
+}
+
+/// Whether all rows add up to exactly the same number.
+fn has_equal_sums(weights: &Matrix) -> bool {
+    (1..weights.rows()).all(|row| is_zero(weights.row(0).iter().copied().chain(weights.row(row).iter().map(|weight| -weight))))
+}
+
+/// Whether the exact sum of numbers is zero: it is kept in parts that do not overlap (Shewchuk 1997, Grow-Expansion).
+fn is_zero(numbers: impl Iterator<Item = f64>) -> bool {
+    let mut parts: Vec<f64> = Vec::new();
+    for number in numbers {
+        let mut rest = number;
+        for part in &mut parts {
+            let (one, other) = (rest, *part);
+            rest = one + other;
+            let grown = rest - one;
+            *part = (one - (rest - grown)) + (other - grown);
+        }
+        parts.push(rest);
+    }
+    // Written so that NaN fails.
+    parts.iter().all(|part| part.abs() <= 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Weights of neighbours, and of the others none.
+    fn weights(peers: usize, weight: impl Fn(usize, usize) -> f64) -> Matrix {
+        Matrix::from_fn(peers, peers, |one, other| if one == other { 0.0 } else { weight(one.min(other), one.max(other)) })
+    }
+
+    /// Spectra in closed form, some of whose eigenvalues are repeated: each of them is enclosed, by an interval not much wider than rounding, and nothing else is.
+    #[test]
+    fn eigenvalues_in_closed_form_are_enclosed() {
+        let cos = |k: usize, of: usize| libm::cos(std::f64::consts::PI * count(k) / count(of));
+        let is = |truth: bool| f64::from(u8::from(truth));
+        let root = (0.0625_f64 + 1.0 / 6.0).sqrt();
+        let cases: Vec<(&str, Matrix, Vec<f64>)> = vec![
+            ("complete", weights(6, |_, _| 0.3), vec![-0.2]),
+            ("star of uneven weights", weights(7, |one, other| is(one == 0) * 0.7 * count(other)), vec![-1.0, 0.0]),
+            ("path", weights(9, |one, other| is(other == one + 1)), (1..=8).map(|k| cos(k, 8)).collect()),
+            ("ring", weights(8, |one, other| is(other == one + 1 || other == one + 7) * 2.5), (1..=4).map(|k| cos(k, 4)).collect()),
+            ("hypercube", weights(16, |one, other| is((one ^ other).is_power_of_two()) / 3.0), (1..=4).map(|k| 1.0 - count(k) / 2.0).collect()),
+            ("complete bipartite", weights(7, |one, other| is(one < 3 && other >= 3) * 1e-3), vec![-1.0, 0.0]),
+            // −1/2 of the two that are alike; of the others, with 1, 6·λ³ − 3·λ² − 4·λ + 1 = (λ − 1)·(6·λ² + 3·λ − 1).
+            ("triangle with a tail", weights(4, |one, other| is(other < 3 || one == 2)), vec![-0.5, -0.25 + root, -0.25 - root]),
+        ];
+        for (name, weights, mut expected) in cases {
+            expected.sort_by(f64::total_cmp);
+            let found = merged(of_weights(&weights, 1));
+            assert_eq!(found.len(), expected.len(), "{name}: {found:?}");
+            for (interval, value) in found.iter().zip(&expected) {
+                assert!(interval[0] <= *value && *value <= interval[1] && interval[1] - interval[0] < 1e-11, "{name}: {value} in {interval:?}");
+            }
+        }
+    }
+
+    /// Weights of any size, in parts of a graph that are not connected: as many ones as there are parts, and nothing out of range.
+    #[test]
+    fn weights_out_of_the_ordinary_leave_bounds_that_hold() {
+        let pairs = weights(6, |one, other| if one / 2 == other / 2 { [1e-300, 1.0, 1e300][one / 2] } else { 0.0 });
+        assert!(of_weights(&pairs, 3).iter().all(|interval| interval[0] <= -1.0 && interval[1] < -1.0 + 1e-11));
+        let beyond = weights(3, |_, _| 1.7e308);
+        assert_eq!(of_weights(&beyond, 1), [[-1.0, 1.0]], "degrees beyond all numbers");
+    }
+
+    #[test]
+    fn sums_are_compared_without_rounding() {
+        let rows = |rows: [[f64; 3]; 2]| Matrix::from_fn(2, 3, |row, column| rows[row][column]);
+        assert!(has_equal_sums(&rows([[0.1, 0.2, 0.3], [0.3, 0.1, 0.2]])));
+        assert!(!has_equal_sums(&rows([[0.1, 0.2, 0.0], [0.3, 0.0, 0.0]])), "0.1 + 0.2 is not 0.3, nor what its sum is rounded to");
+        assert!(!has_equal_sums(&rows([[1.0, 1e-20, 0.0], [1.0, 0.0, 0.0]])));
+        assert!(has_equal_sums(&rows([[1e20, 1.0, 0.0], [1.0, 1e20, 0.0]])));
+    }
+}
