@@ -11,7 +11,7 @@ use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 
 use crate::laws::delay::{Distribution, GammaLaw, Law, LawError};
-use crate::laws::normal::{in_the_core, outside_the_core, standard_normal};
+use crate::laws::normal::{in_the_core, in_the_core_or_nan, outside_the_core, standard_normal};
 use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
 use crate::random::{PacketDraws, Purpose};
 
@@ -340,6 +340,44 @@ impl CorrelatedDelays {
             Marginal::Other(checked) => checked.law.at_normal(*chain),
         })
     }
+
+    /// Whether [`CorrelatedDelays::quickly`] knows them.
+    pub(crate) const fn come_quickly(&self) -> bool {
+        matches!(self.marginal, Marginal::Gamma(_))
+    }
+
+    /// What [`CorrelatedDelays::draw_nanos`] gives for each of several links whose chains and words these are, but for those few that take longer.
+    #[inline(always)]
+    pub(crate) fn quickly<const N: usize>(&self, chains: &[f64; N], words: &[u64; N]) -> QuickDelays<N> {
+        // Loops, not `map`, which is a call that no wide registers reach.
+        let mut fresh = [0.0; N];
+        for (fresh, word) in fresh.iter_mut().zip(words) {
+            *fresh = in_the_core_or_nan(*word);
+        }
+        let mut chain = [0.0; N];
+        for (next, (before, fresh)) in chain.iter_mut().zip(chains.iter().zip(&fresh)) {
+            *next = if before.is_nan() { *fresh } else { self.phi * before + self.fresh_share * fresh };
+        }
+        let nanos = match &self.marginal {
+            Marginal::Gamma(law) => law.quickly(&chain),
+            Marginal::Other(_) => [f64::NAN; N],
+        };
+        QuickDelays { chain, nanos }
+    }
+}
+
+/// The chains of several links, and their delays \[ns\] before they are [rounded](whole).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct QuickDelays<const N: usize> {
+    pub(crate) chain: [f64; N],
+    /// NaN where a delay is not known quickly.
+    pub(crate) nanos: [f64; N],
+}
+
+/// A delay as a whole number of nanoseconds; `None` for a NaN and for some weeks or more.
+#[inline(always)]
+pub(crate) fn whole(nanos: f64) -> Option<u64> {
+    (nanos < SMALL).then(|| with_room(nanos).cast_unsigned())
 }
 
 /// What a fresh number adds to a chain of variance one.

@@ -4,10 +4,10 @@
 //! v = φ(z)/(x^a·e^(−x)/Γ(a)) (the idea is Steinbrecher & Shaw's, *Quantile mechanics*, 2008). A cell of width 1/8 has eleven derivatives. A cell whose
 //! next two terms could be seen (small shapes, where x(z) falls off like a power of Φ) has none, nor has |z| ≥ 8: there the exact inverse answers.
 
-use alloc::vec::Vec;
+use alloc::boxed::Box;
 
-use super::special::{gamma, gamma_inverse, normal};
 use super::LARGEST_NORMAL;
+use super::special::{gamma, gamma_inverse, normal};
 use super::tail::Tail;
 
 /// Cells lie in (−RANGE, RANGE).
@@ -25,7 +25,7 @@ const TOLERANCE: f64 = 1e-14;
 #[derive(Clone, Debug)]
 pub(super) struct GammaMap {
     shape: f64,
-    cells: Vec<Cell>,
+    cells: Box<[Cell; CELLS as usize]>,
 }
 
 /// Taylor coefficients in units of half a cell, NaN where they would not do: terms k, k + 4 and k + 8 lie together for k from 0 to 3, so that three sums are one
@@ -36,8 +36,14 @@ struct Cell([[f64; 4]; 4]);
 
 impl GammaMap {
     pub(super) fn new(shape: f64) -> Self {
-        let centre = |cell| (f64::from(cell) + 0.5) / DENSITY - RANGE;
-        Self { shape, cells: (0..CELLS).map(|cell| taylor(shape, centre(cell)).map_or(Cell::NONE, |terms| Cell::new(&terms))).collect() }
+        let centre = |cell: u32| (f64::from(cell) + 0.5) / DENSITY - RANGE;
+        let mut cells = Box::new([Cell::NONE; CELLS as usize]);
+        for (cell, number) in cells.iter_mut().zip(0..) {
+            if let Some(terms) = taylor(shape, centre(number)) {
+                *cell = Cell::new(&terms);
+            }
+        }
+        Self { shape, cells }
     }
 
     pub(super) const fn shape(&self) -> f64 {
@@ -58,6 +64,28 @@ impl GammaMap {
             }
         }
         self.exactly(z)
+    }
+
+    /// [`GammaMap::at_normal`] of each, but NaN where the exact inverse answers.
+    #[inline(always)]
+    pub(super) fn quickly<const N: usize>(&self, z: &[f64; N]) -> [f64; N] {
+        // From 2^52 on there is no room for a fraction, and the whole number lies in the lower bits: a conversion that saturates takes six instructions more.
+        const ROOM: f64 = 4_503_599_627_370_496.0;
+        let (mut places, mut t) = ([0; N], [0.0; N]);
+        for ((place, t), z) in places.iter_mut().zip(&mut t).zip(z) {
+            let position = (z + RANGE) * DENSITY;
+            let nearest = (position + ROOM) - ROOM;
+            let cell = if nearest > position { nearest - 1.0 } else { nearest };
+            let has_cell = position >= 0.0 && position < f64::from(CELLS);
+            *t = if has_cell { 2.0 * (position - cell) - 1.0 } else { f64::NAN };
+            *place = (cell + ROOM).to_bits();
+        }
+        for (place, t) in places.iter().zip(&mut t) {
+            #[expect(clippy::cast_possible_truncation, reason = "the lower bits are the number of the cell")]
+            let place = *place as usize % CELLS as usize;
+            *t = self.cells[place].sum(*t);
+        }
+        t
     }
 
     #[cold]
