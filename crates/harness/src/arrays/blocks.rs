@@ -164,10 +164,20 @@ impl<const A: usize> Blocks<A> {
         (position, velocity)
     }
 
-    /// Along each axis the least and the greatest position of the copies of a run.
-    pub(super) fn extremes(&self, run: usize) -> [(f64, f64); A] {
-        let places = |axis: usize| (0..self.places.peers).map(move |peer| self.object(axis, peer, run).0);
-        std::array::from_fn(|axis| places(axis).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (smaller(x, low), larger(x, high))))
+    /// Along each axis the least and the greatest position of the copies, if there is one run: what lies beyond the last peer repeats it.
+    #[inline]
+    pub(super) fn extremes(&self) -> [(f64, f64); A] {
+        let per_axis = self.places.blocks();
+        std::array::from_fn(|axis| {
+            let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
+            for block in &self.blocks[axis * per_axis..(axis + 1) * per_axis] {
+                (low, high) = (block.object.position.smaller(low), block.object.position.larger(high));
+            }
+            (
+                low.0.into_iter().fold(f64::INFINITY, |least, x| smaller(x, least)),
+                high.0.into_iter().fold(f64::NEG_INFINITY, |most, x| larger(x, most)),
+            )
+        })
     }
 
     /// Copies and devices in that place.
