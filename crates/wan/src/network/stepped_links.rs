@@ -194,7 +194,7 @@ mod tests {
     use crate::stages::queue::{Bottleneck, CoDel, Discipline, QueueLimit, Red};
 
     /// Packets of 64 bytes take 5.12 ms and come in bursts of 40 that are 3 ms apart, then 120 that are 8 ms apart: most find an idle line, some a queue, and some leave
-    /// just when the next one comes. Then the discipline is another one, and what it remembers of the idle line counts.
+    /// just when the next one comes. Then the discipline is another one.
     #[test]
     fn they_decide_what_whole_links_decide() {
         let (name, millis) = (LinkName::between("a", "b"), |n: u64| Instant::from_nanos(n * 1_000_000));

@@ -66,9 +66,11 @@ impl GammaMap {
         self.exactly(z)
     }
 
-    /// [`GammaMap::at_normal`] of each, but NaN where the exact inverse answers.
+    /// What `delay` makes of [`GammaMap::at_normal`] of each, but of NaN where the exact inverse answers.
+    ///
+    /// It is called number by number, as the series come: numbers that are written one by one are not read together at once.
     #[inline(always)]
-    pub(super) fn quickly<const N: usize>(&self, z: &[f64; N]) -> [f64; N] {
+    pub(super) fn quickly<const N: usize>(&self, z: &[f64; N], delay: impl Fn(f64) -> f64) -> [f64; N] {
         // From 2^52 on there is no room for a fraction, and the whole number lies in the lower bits: a conversion that saturates takes six instructions more.
         const ROOM: f64 = 4_503_599_627_370_496.0;
         let (mut places, mut t) = ([0; N], [0.0; N]);
@@ -83,7 +85,7 @@ impl GammaMap {
         for (place, t) in places.iter().zip(&mut t) {
             #[expect(clippy::cast_possible_truncation, reason = "the lower bits are the number of the cell")]
             let place = *place as usize % CELLS as usize;
-            *t = self.cells[place].sum(*t);
+            *t = delay(self.cells[place].sum(*t));
         }
         t
     }

@@ -158,12 +158,10 @@ impl GammaLaw {
     /// [`GammaLaw::at_normal`] of each, but NaN where that takes longer.
     #[inline(always)]
     pub(crate) fn quickly<const N: usize>(&self, z: &[f64; N]) -> [f64; N] {
-        let mut delays = self.map.quickly(z);
-        for x in &mut delays {
-            let delay = self.origin + self.scale * *x;
-            *x = if delay >= self.floor { delay } else { f64::NAN };
-        }
-        delays
+        self.map.quickly(z, |x| {
+            let delay = self.origin + self.scale * x;
+            if delay >= self.floor { delay } else { f64::NAN }
+        })
     }
 }
 
