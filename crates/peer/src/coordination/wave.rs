@@ -54,7 +54,7 @@ struct Ticks {
     end: u64,
 }
 
-/// What is counted of a line.
+/// A line, with the counts of one of its ends.
 struct Line<'w, const A: usize> {
     ticks: &'w mut Ticks,
     /// sⱼ.
