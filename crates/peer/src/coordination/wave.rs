@@ -133,7 +133,7 @@ impl<const A: usize> Wave<A> {
     }
 
     fn end_due(&mut self) {
-        // Mostly every wave that was to end is replaced: to look for the next end alone takes a fifth of the time.
+        // Mostly every wave that was to end is replaced, and the next end alone is looked for.
         let next = self.ticks.iter().fold(NEVER, |next, ticks| next.min(ticks.end));
         if next > self.tick {
             self.next_end = next;

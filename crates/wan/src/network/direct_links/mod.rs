@@ -164,8 +164,8 @@ impl DirectLinks {
         matches!(&self.kinds[..], [(_, Kind { chains: Some(_), .. })] if self.others.is_empty())
     }
 
-    /// [`DirectLinks::offer`], for a driver that asked before a loop [which links they are](DirectLinks::are_chains). Both in one loop take 3 % more instructions for a
-    /// packet of links with jitter and loss.
+    /// [`DirectLinks::offer`], for a driver that asked before a loop [which links they are](DirectLinks::are_chains). Both in one loop take
+    /// two instructions more for a packet of links with jitter and loss.
     ///
     /// # Panics
     ///
