@@ -236,12 +236,9 @@ fn threads(work: Work) {
     println!("| ---: | ---: | ---: | ---: |{} --- |", " ---: |".repeat(titles.len()));
     for peers in [50, 200, 1000] {
         let mesh = Mesh { peers, impaired: true };
-        // 1000 peers take some 0.2 s a window.
-        let (windows, rounds) = if peers < 1000 {
-            (work.seconds(mesh).clamp(4, 100) as u32, work.rounds)
-        } else {
-            (work.seconds(mesh).clamp(4, 30) as u32, work.rounds.min(2))
-        };
+        // So long that threads that begin, and counters that are gathered, take little of it; 1000 peers take some 0.06 s a window.
+        let windows = u32::try_from((work.most * 250 / (peers * peers) as u64).clamp(work.least.max(4), 2000)).unwrap_or(u32::MAX);
+        let rounds = if peers < 1000 { work.rounds } else { work.rounds.min(2) };
         let window = Window::measure(&mesh.scene(u64::from(windows) * 8, 1), windows, rounds);
         let pays = |threads: usize| threads == 2 || threads * 8 <= peers;
         let gains: Vec<String> =

@@ -215,6 +215,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
 
     /// The extra numbers of the sample that is sent now to another peer, which counts in order with this peer left out; `receiver` is 0 where they are the
     /// same for all.
+    #[inline]
     pub fn extra(&mut self, receiver: usize) -> [f64; A] {
         self.strategy.extra(receiver, self.object.state(), &self.held)
     }
@@ -274,7 +275,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// # Errors
     ///
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
-    #[inline]
+    #[inline(always)]
     pub fn handle_extended(&mut self, sample: &Sample<A>, extra: &Extra<A>) -> Result<Reception, ReceiveError> {
         let Some(place) = self.accept(sample)? else { return Ok(Reception::Stale) };
         if self.asked.kind != SampleKind::State {

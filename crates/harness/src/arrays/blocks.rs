@@ -157,10 +157,16 @@ impl Blocks {
         (position, velocity)
     }
 
-    /// Along each axis the least and the greatest position of the copies of a run.
-    pub(super) fn extremes(&self, run: usize) -> impl Iterator<Item = (f64, f64)> {
-        let positions = move |axis: usize| (0..self.places.peers).map(move |peer| self.object(axis, peer, run).0);
-        (0..self.axes).map(move |axis| positions(axis).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (smaller(x, low), larger(x, high))))
+    /// Along each axis the least and the greatest position of the copies, if there is one run: what lies beyond the last peer repeats it.
+    #[inline]
+    pub(super) fn extremes(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.blocks.chunks(self.places.blocks()).map(|blocks| {
+            let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
+            for block in blocks {
+                (low, high) = (block.object.position.smaller(low), block.object.position.larger(high));
+            }
+            (low.0.into_iter().fold(f64::INFINITY, |least, x| smaller(x, least)), high.0.into_iter().fold(f64::NEG_INFINITY, |most, x| larger(x, most)))
+        })
     }
 
     /// Copies and devices in that place.

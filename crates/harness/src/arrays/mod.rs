@@ -405,21 +405,22 @@ fn links<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
     if let Some(delay) = parts[0].shape.delay {
         return LinkSummaries::by_sender((0..peers).map(|from| parts[0].broadcast_stats(from, delay, ticks, until)).collect());
     }
-    let of_part = |from: usize, part: &'_ Arrays<'_, B, A, P, L>| -> Vec<LinkStats> {
-        let Samples::PerPacket(samples) = &part.samples else { return Vec::new() };
-        let receivers = match &part.shape.topology {
-            None => (0..part.members.len()).collect(),
+    // Room for all at once: to grow took as long as to count.
+    let mut stats = Vec::with_capacity(parts[0].shape.topology.as_ref().map_or(peers * (peers - 1), |topology| topology.links()));
+    for (from, part) in (0..peers).flat_map(|from| parts.iter().map(move |part| (from, part))) {
+        let Samples::PerPacket(samples) = &part.samples else { continue };
+        match &part.shape.topology {
+            None => stats.extend((0..part.members.len()).filter_map(|receiver| samples.stats(from, receiver, run))),
             Some(topology) => {
-                let near = topology.neighbours(from).iter().map(|to| *to as usize);
-                near.filter(|to| part.members.contains(to)).map(|to| to - part.members.start).collect::<Vec<_>>()
+                let near = topology.neighbours(from).iter().map(|to| *to as usize).filter(|to| part.members.contains(to));
+                stats.extend(near.filter_map(|to| samples.stats(from, to - part.members.start, run)));
             }
-        };
-        receivers.into_iter().filter_map(|receiver| samples.stats(from, receiver, run)).collect()
-    };
-    if let Some(topology) = &parts[0].shape.topology {
-        return LinkSummaries::on(Arc::clone(topology), (0..peers).flat_map(|from| parts.iter().flat_map(move |part| of_part(from, part))).collect());
+        }
     }
-    LinkSummaries::each(peers, (0..peers).flat_map(|from| parts.iter().flat_map(move |part| of_part(from, part))).collect())
+    match &parts[0].shape.topology {
+        Some(topology) => LinkSummaries::on(Arc::clone(topology), stats),
+        None => LinkSummaries::each(peers, stats),
+    }
 }
 
 /// What a run came to after that number of ticks, with the packets that arrived by an instant; the peers are here and there.

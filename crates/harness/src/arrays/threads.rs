@@ -16,6 +16,7 @@ use cohaptic_units::Instant;
 
 use self::barrier::Barrier;
 use super::bodies::Bodies;
+use super::lanes::{larger, smaller};
 use super::run_watch::Unwatched;
 use super::samples::Sample;
 use super::shape::Shape;
@@ -61,6 +62,8 @@ struct Thread<'e, const P: usize> {
     members: Range<usize>,
     turn: usize,
     extremes: Vec<(f64, f64)>,
+    /// Those of all threads at a meeting.
+    extremes_of_all: Vec<(f64, f64)>,
     is_finite: bool,
     /// As far as all have told.
     all_are_finite: bool,
@@ -82,24 +85,25 @@ impl<const P: usize> Others<P, 1> for Thread<'_, P> {
             let mut own = told[self.place].lock().unwrap_or_else(PoisonError::into_inner);
             own.samples.clear();
             own.samples.extend(senders.iter().filter(|sender| self.members.contains(sender)).map(|sender| (*sender, sent[*sender])));
+            // They change places, so that neither is allocated again.
             own.extremes.clear();
-            own.extremes.append(&mut self.extremes);
+            std::mem::swap(&mut own.extremes, &mut self.extremes);
             own.is_finite = self.is_finite;
         }
         self.exchange.barrier.wait();
-        let mut extremes: Vec<(f64, f64)> = Vec::new();
+        self.extremes_of_all.clear();
         for told in told {
             let told = told.lock().unwrap_or_else(PoisonError::into_inner);
             for (sender, sample) in &told.samples {
                 sent[*sender] = *sample;
             }
-            extremes.resize(told.extremes.len(), (f64::INFINITY, f64::NEG_INFINITY));
-            for ((low, high), told) in extremes.iter_mut().zip(&told.extremes) {
-                (*low, *high) = (low.min(told.0), high.max(told.1));
+            self.extremes_of_all.resize(told.extremes.len(), (f64::INFINITY, f64::NEG_INFINITY));
+            for ((low, high), told) in self.extremes_of_all.iter_mut().zip(&told.extremes) {
+                (*low, *high) = (smaller(told.0, *low), larger(told.1, *high));
             }
             self.all_are_finite &= told.is_finite;
         }
-        self.max_discrepancy = extremes.into_iter().fold(self.max_discrepancy, |largest, (low, high)| largest.max(high - low));
+        self.max_discrepancy = self.extremes_of_all.iter().fold(self.max_discrepancy, |largest, (low, high)| largest.max(high - low));
     }
 }
 
@@ -125,6 +129,7 @@ pub(super) fn run<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
             members: members.clone(),
             turn: 0,
             extremes: Vec::new(),
+            extremes_of_all: Vec::new(),
             is_finite: true,
             all_are_finite: true,
             max_discrepancy: 0.0,
@@ -209,7 +214,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> Part<'a, '_, '_, B, A,
                 return ControlFlow::Break(Early::Diverged);
             }
             let now = Instant::from_nanos(tick * tick_nanos);
-            self.thread.extremes.extend(self.arrays.bodies.blocks().extremes(0));
+            self.thread.extremes.extend(self.arrays.bodies.blocks().extremes());
             self.arrays.step(tick, now, (&mut self.thread, &mut Unwatched(&mut |_| true)));
             self.thread.is_finite &= self.arrays.finite[0];
             if is_asked_before(tick + 1) && !self.goes_on(now) {

@@ -166,6 +166,7 @@ macro_rules! registry {
                 }
             }
 
+            #[inline(always)]
             fn extra(&mut self, receiver: usize, own: &State<A>, held: &Held<A>) -> [f64; A] {
                 match self {
                     Self::Law(law) => law.extra(receiver, own, held),
@@ -180,6 +181,7 @@ macro_rules! registry {
                 }
             }
 
+            #[inline(always)]
             fn accept(&mut self, other: usize, numbers: &[f64; A]) {
                 match self {
                     Self::Law(law) => law.accept(other, numbers),

@@ -54,14 +54,26 @@ struct Ticks {
     end: u64,
 }
 
-/// Where sⱼ stands among the numbers.
-const fn wave_of(other: usize) -> usize {
-    1 + 2 * other
+/// A line, with the counts of one of its ends.
+struct Line<'w, const A: usize> {
+    ticks: &'w mut Ticks,
+    /// sⱼ.
+    wave: &'w mut [f64; A],
+    /// The sum of sⱼ over the ticks from the last sample to [`Ticks::since`].
+    received: &'w mut [f64; A],
 }
 
-/// Where the sum of sⱼ stands among the numbers.
-const fn received_of(other: usize) -> usize {
-    2 + 2 * other
+impl<const A: usize> Line<'_, A> {
+    /// Counts the ticks up to that one.
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
+    fn count_to(&mut self, tick: u64) {
+        // One instruction for a number with a sign, six without.
+        let ticks = (tick - core::mem::replace(&mut self.ticks.since, tick)).cast_signed() as f64;
+        for (received, wave) in self.received.iter_mut().zip(&*self.wave) {
+            *received += ticks * wave;
+        }
+    }
 }
 
 impl<const A: usize> ControllerKind<A> for Wave<A> {
@@ -121,6 +133,12 @@ impl<const A: usize> Wave<A> {
     }
 
     fn end_due(&mut self) {
+        // Mostly every wave that was to end is replaced, and the next end alone is looked for.
+        let next = self.ticks.iter().fold(NEVER, |next, ticks| next.min(ticks.end));
+        if next > self.tick {
+            self.next_end = next;
+            return;
+        }
         self.next_end = NEVER;
         for other in 0..self.ticks.len() {
             let end = self.ticks[other].end;
@@ -128,21 +146,21 @@ impl<const A: usize> Wave<A> {
                 self.next_end = self.next_end.min(end);
                 continue;
             }
-            self.count_to(other, end);
-            let wave = core::mem::replace(&mut self.numbers[wave_of(other)], [0.0; A]);
+            let mut line = self.line(other);
+            line.count_to(end);
+            line.ticks.end = NEVER;
+            let wave = core::mem::replace(line.wave, [0.0; A]);
             for (sum, wave) in self.sum.iter_mut().zip(wave) {
                 *sum -= wave;
             }
-            self.ticks[other].end = NEVER;
         }
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
-    fn count_to(&mut self, other: usize, tick: u64) {
-        let ticks = (tick - core::mem::replace(&mut self.ticks[other].since, tick)) as f64;
-        for axis in 0..A {
-            self.numbers[received_of(other)][axis] += ticks * self.numbers[wave_of(other)][axis];
-        }
+    /// The line to another peer: found once for all that a sample needs of it.
+    #[inline(always)]
+    fn line(&mut self, other: usize) -> Line<'_, A> {
+        let [wave, received] = &mut self.numbers[1..].as_chunks_mut().0[other];
+        Line { ticks: &mut self.ticks[other], wave, received }
     }
 
     fn sample(&mut self, position: &[f64; A]) {
@@ -154,7 +172,7 @@ impl<const A: usize> Wave<A> {
     fn add_up(&mut self) {
         self.sum = [0.0; A];
         for other in 0..self.ticks.len() {
-            for (sum, wave) in self.sum.iter_mut().zip(self.numbers[wave_of(other)]) {
+            for (sum, wave) in self.sum.iter_mut().zip(self.numbers[1 + 2 * other]) {
                 *sum += wave;
             }
         }
@@ -173,10 +191,13 @@ impl<const A: usize> Strategy<A> for Wave<A> {
         Self::KIND
     }
 
+    #[inline]
     fn extra(&mut self, receiver: usize, own: &State<A>, _held: &Held<A>) -> [f64; A] {
         self.end_waves();
-        self.count_to(receiver, self.tick);
-        let received = core::mem::replace(&mut self.numbers[received_of(receiver)], [0.0; A]);
+        let tick = self.tick;
+        let mut line = self.line(receiver);
+        line.count_to(tick);
+        let received = core::mem::replace(line.received, [0.0; A]);
         core::array::from_fn(|axis| self.rate * (own.position[axis] - self.sampled[axis]) - self.share * received[axis])
     }
 
@@ -186,17 +207,18 @@ impl<const A: usize> Strategy<A> for Wave<A> {
         self.add_up();
     }
 
+    #[inline]
     fn accept(&mut self, other: usize, numbers: &[f64; A]) {
-        self.count_to(other, self.tick);
-        let wave = &mut self.numbers[wave_of(other)];
-        for ((sum, new), old) in self.sum.iter_mut().zip(numbers).zip(&*wave) {
-            *sum += new - old;
+        let (tick, every, holds) = (self.tick, self.every, self.holds);
+        let mut line = self.line(other);
+        line.count_to(tick);
+        let old = core::mem::replace(line.wave, *numbers);
+        if !holds {
+            line.ticks.end = tick + every;
+            self.next_end = self.next_end.min(tick + every);
         }
-        *wave = *numbers;
-        if !self.holds {
-            let end = self.tick + self.every;
-            self.ticks[other].end = end;
-            self.next_end = self.next_end.min(end);
+        for ((sum, new), old) in self.sum.iter_mut().zip(numbers).zip(old) {
+            *sum += new - old;
         }
     }
 

@@ -5,10 +5,11 @@ use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
 
+use crate::fates::fate::DropCause;
 use crate::line::replay::ReplayStage;
 use crate::line::staged::Staged;
 use crate::netem::kernel_link::KernelStage;
-use crate::packet::{Carried, Outputs};
+use crate::packet::{Carried, Outputs, PacketInfo};
 
 /// An engine and, after a change to one of another kind, those before it, until the packets inside them have left.
 #[derive(Clone, Debug)]
@@ -55,6 +56,15 @@ impl<T: Clone> Engine<T> {
             Kind::Staged(staged) => staged.offer(now, packet, inside, outputs),
             Kind::Replay(replay) => replay.offer(now, packet, outputs),
             Kind::Kernel(kernel) => kernel.offer(now, packet, outputs),
+        }
+    }
+
+    /// Takes a packet if it is known at once what becomes of it: see [`Staged::offer_at_once`].
+    #[inline]
+    pub(crate) fn offer_at_once(&mut self, now: Instant, number: u64, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
+        match &mut self.kind {
+            Kind::Staged(staged) if self.retiring.is_empty() => staged.offer_at_once(now, number, info, until),
+            Kind::Staged(_) | Kind::Replay(_) | Kind::Kernel(_) => None,
         }
     }
 

@@ -121,6 +121,14 @@ impl<P, T: Clone> Line<P, T> {
         self.come_out(outputs, sink);
     }
 
+    /// In place of [`Line::enter`] for a packet that no line before this one has marked, where no other is offered before `until`: when it arrives or why it never does,
+    /// if that is known at once.
+    #[inline]
+    pub(crate) fn enter_at_once(&mut self, now: Instant, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
+        let number = self.flow.offered - 1;
+        self.pipeline.engine()?.offer_at_once(now, number, info, until)
+    }
+
     /// Wakes the engine.
     pub(crate) fn wake(&mut self, at: Instant, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         if let Some(engine) = self.pipeline.engine() {
@@ -149,6 +157,14 @@ impl<P, T: Clone> Line<P, T> {
     pub(crate) fn deliver(&mut self, entered: Instant, at: Instant) {
         self.flow.delivered += 1;
         self.flow.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
+    }
+
+    /// [`Line::deliver`], if it comes out by `until`.
+    #[inline(always)]
+    pub(crate) fn deliver_by(&mut self, until: Instant, entered: Instant, at: Instant) {
+        if at <= until {
+            self.deliver(entered, at);
+        }
     }
 
     /// Takes back that such a packet came out.

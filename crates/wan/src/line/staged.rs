@@ -18,7 +18,7 @@ use cohaptic_units::{Bytes, Instant};
 use crate::fates::fate::DropCause;
 use crate::laws::chance::ChanceStage;
 use crate::line::direct::Direct;
-use crate::packet::{Carried, Exit, Output, Outputs};
+use crate::packet::{Carried, Exit, Output, Outputs, PacketInfo};
 use crate::random::Purpose;
 use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::corruption::{Checksum, CorruptionStage};
@@ -83,6 +83,8 @@ pub(crate) struct Staged<T> {
     limit: Option<u64>,
     bucket: Option<Box<TokenBucketStage<T>>>,
     bottleneck: Option<BottleneckStage<T>>,
+    /// Whether there is no stage but a bottleneck, the physical way round, and those that decide at once.
+    is_plain: bool,
     slots: Option<Box<SlotStage<T>>>,
     reorder: ReorderStage<T>,
     trace: Option<PathTrace>,
@@ -175,6 +177,7 @@ impl<T: Clone> Staged<T> {
             limit: None,
             bucket: None,
             bottleneck: None,
+            is_plain: false,
             slots: None,
             reorder: ReorderStage::new(),
             trace: None,
@@ -209,6 +212,22 @@ impl<T: Clone> Staged<T> {
         self.walk(0, now, packet, inside, outputs);
         self.look_ahead();
         self.pass(now, outputs);
+    }
+
+    /// Takes packet number `number` if it is known at once what becomes of it, and says when it arrives, or why it never does: nothing is inside, and it leaves the
+    /// bottleneck by `until`, before which no other comes.
+    #[inline]
+    pub(crate) fn offer_at_once(&mut self, now: Instant, number: u64, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
+        if !self.is_plain || self.next.is_some() || self.modulation.is_some() {
+            return None;
+        }
+        let bottleneck = self.bottleneck.as_mut()?;
+        let departure = bottleneck.departure_if_idle(now, info.size).filter(|departure| *departure <= until)?;
+        let words = self.direct.words(number);
+        Some(self.direct.offer_through(now, number, words, |_| {
+            bottleneck.is_idle_from(departure);
+            Ok(departure)
+        }))
     }
 
     /// When [`Staged::pass`] must be called next; `None` if nothing waits.
@@ -316,6 +335,14 @@ impl<T: Clone> Staged<T> {
             }
         }
         self.reorder.configure(config.reorder);
+        let decides = |stage: &Stage| matches!(stage, Stage::Outage | Stage::Loss | Stage::Bottleneck | Stage::Propagation);
+        self.is_plain = self.bottleneck.is_some()
+            && self.layout() == Layout::Physical
+            && self.route.stages[..usize::from(self.route.count)].iter().all(decides)
+            && self.trace.is_none()
+            && self.listed.is_none()
+            && !self.marks_instead_of_loss
+            && self.reorder.is_idle();
         for (stage, packet) in given_up {
             self.walk_on(stage, now, packet, outputs);
         }

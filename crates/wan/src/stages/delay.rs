@@ -10,8 +10,8 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 
-use crate::laws::delay::{Distribution, Law, LawError};
-use crate::laws::normal::{in_the_core, outside_the_core, standard_normal};
+use crate::laws::delay::{Distribution, GammaLaw, Law, LawError};
+use crate::laws::normal::{in_the_core, in_the_core_or_nan, outside_the_core, standard_normal};
 use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
 use crate::random::{PacketDraws, Purpose};
 
@@ -306,9 +306,16 @@ impl DelayStage {
 /// Correlated delays of many links, each of which keeps its own chain.
 #[derive(Clone, Debug)]
 pub(crate) struct CorrelatedDelays {
-    checked: Arc<Checked>,
+    marginal: Marginal,
     phi: f64,
     fresh_share: f64,
+}
+
+/// The law of each of them alone.
+#[derive(Clone, Debug)]
+enum Marginal {
+    Gamma(GammaLaw),
+    Other(Arc<Checked>),
 }
 
 impl CorrelatedDelays {
@@ -316,7 +323,8 @@ impl CorrelatedDelays {
     pub(crate) fn new(delay: &Delay) -> Option<Self> {
         let checked = delay.jitter.as_ref()?;
         let Memory::PerPacket(phi) = checked.memory else { return None };
-        Some(Self { checked: Arc::clone(checked), phi, fresh_share: fresh_share(phi) })
+        let marginal = checked.law.as_gamma().map_or_else(|| Marginal::Other(Arc::clone(checked)), Marginal::Gamma);
+        Some(Self { marginal, phi, fresh_share: fresh_share(phi) })
     }
 
     /// The delay \[ns\] of a packet. `chain` is the latest value of its link's chain, NaN before the first packet.
@@ -327,8 +335,49 @@ impl CorrelatedDelays {
             outside_the_core(word, || more.next_word())
         });
         *chain = if chain.is_nan() { fresh } else { self.phi * *chain + self.fresh_share * fresh };
-        count(self.checked.law.at_normal(*chain))
+        count(match &self.marginal {
+            Marginal::Gamma(law) => law.at_normal(*chain),
+            Marginal::Other(checked) => checked.law.at_normal(*chain),
+        })
     }
+
+    /// Whether [`CorrelatedDelays::quickly`] knows them.
+    pub(crate) const fn come_quickly(&self) -> bool {
+        matches!(self.marginal, Marginal::Gamma(_))
+    }
+
+    /// What [`CorrelatedDelays::draw_nanos`] gives for each of several links whose chains and words these are, but for those few that take longer.
+    #[inline(always)]
+    pub(crate) fn quickly<const N: usize>(&self, chains: &[f64; N], words: &[u64; N]) -> QuickDelays<N> {
+        // Loops, not `map`, which is a call that no wide registers reach.
+        let mut fresh = [0.0; N];
+        for (fresh, word) in fresh.iter_mut().zip(words) {
+            *fresh = in_the_core_or_nan(*word);
+        }
+        let mut chain = [0.0; N];
+        for (next, (before, fresh)) in chain.iter_mut().zip(chains.iter().zip(&fresh)) {
+            *next = if before.is_nan() { *fresh } else { self.phi * before + self.fresh_share * fresh };
+        }
+        let nanos = match &self.marginal {
+            Marginal::Gamma(law) => law.quickly(&chain),
+            Marginal::Other(_) => [f64::NAN; N],
+        };
+        QuickDelays { chain, nanos }
+    }
+}
+
+/// The chains of several links, and their delays \[ns\] before they are [rounded](whole).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct QuickDelays<const N: usize> {
+    pub(crate) chain: [f64; N],
+    /// NaN where a delay is not known quickly.
+    pub(crate) nanos: [f64; N],
+}
+
+/// A delay as a whole number of nanoseconds; `None` for a NaN and for some weeks or more.
+#[inline(always)]
+pub(crate) fn whole(nanos: f64) -> Option<u64> {
+    (nanos < SMALL).then(|| with_room(nanos).cast_unsigned())
 }
 
 /// What a fresh number adds to a chain of variance one.
@@ -349,17 +398,24 @@ const SMALL: f64 = 2_251_799_813_685_248.0;
 /// Adding 1.5·2^52 leaves no room for a fraction, and the whole number in the lower bits: below 2^51 that is `rint` in an addition and a subtraction, where
 /// `libm`'s is a call, which added a quarter to a tick of ten peers over links with jitter.
 #[inline]
-#[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "saturates; a difference of bits that may be negative")]
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
 fn nearest(number: f64) -> i64 {
+    if number.abs() < SMALL { with_room(number) } else { libm::rint(number) as i64 }
+}
+
+/// [`nearest`] of a number smaller than [`SMALL`].
+#[inline(always)]
+#[expect(clippy::cast_possible_wrap, reason = "a difference of bits that may be negative")]
+fn with_room(number: f64) -> i64 {
     const ROOM: f64 = 6_755_399_441_055_744.0;
-    if number.abs() < SMALL { (number + ROOM).to_bits().wrapping_sub(ROOM.to_bits()) as i64 } else { libm::rint(number) as i64 }
+    (number + ROOM).to_bits().wrapping_sub(ROOM.to_bits()) as i64
 }
 
 /// A delay as a whole number of nanoseconds: laws are not below their floor.
 #[inline]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates beyond 584 years")]
 fn count(nanos: f64) -> u64 {
-    if nanos < SMALL { nearest(nanos).cast_unsigned() } else { libm::rint(nanos) as u64 }
+    if nanos < SMALL { with_room(nanos).cast_unsigned() } else { libm::rint(nanos) as u64 }
 }
 
 /// The parameters of the delay and of its jitter.

@@ -23,6 +23,13 @@ pub(crate) fn in_the_core(word: u64) -> Option<f64> {
     (size < X[layer + 1]).then(|| signed(word, size))
 }
 
+/// [`in_the_core`], NaN in the other cases.
+#[inline(always)]
+pub(crate) fn in_the_core_or_nan(word: u64) -> f64 {
+    let (layer, size) = point(word);
+    if size < X[layer + 1] { signed(word, size) } else { f64::NAN }
+}
+
 /// The layer, and how far to the right in it. They and the sign are different bits of the word.
 #[inline]
 fn point(word: u64) -> (usize, f64) {

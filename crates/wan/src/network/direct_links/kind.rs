@@ -2,6 +2,7 @@
 
 use cohaptic_units::{Bytes, Instant, Probability};
 
+use super::chains::Chains;
 use crate::line::direct::Words;
 use crate::random::{PacketDraws, Purpose, Stream};
 use crate::stages::config::{Layout, LinkConfig};
@@ -17,10 +18,12 @@ pub(super) struct Kind {
     loss: Losses,
     delay: Delays,
     queue: Option<EqualPackets>,
+    /// If they remember no more than that has.
+    pub(super) chains: Option<Chains>,
 }
 
 #[derive(Clone, Debug)]
-enum Losses {
+pub(super) enum Losses {
     None,
     Independent(Probability),
     GilbertElliott(GilbertElliott),
@@ -70,7 +73,12 @@ impl Kind {
         if !config.outages.is_empty() || config.order != Order::AllowReordering || remembers_more {
             return None;
         }
-        Some(Self { is_random: config.is_random(), loss, delay, queue: queue(config, size)? })
+        let queue = queue(config, size)?;
+        let chains = match &delay {
+            Delays::Correlated(delays) if queue.is_none() => Chains::new(&loss, delays),
+            Delays::Correlated(_) | Delays::Independent(_) => None,
+        };
+        Some(Self { is_random: config.is_random(), loss, delay, queue, chains })
     }
 
     /// Whether its links remember anything.
@@ -80,11 +88,15 @@ impl Kind {
 
     /// What a link remembers before its first packet.
     pub(super) fn beginning(&self, draws: Stream) -> Remembered {
-        let state = match &self.loss {
+        Remembered { state: self.initial_state(draws), ..Remembered::NOTHING }
+    }
+
+    /// The state in which losses begin.
+    pub(super) fn initial_state(&self, draws: Stream) -> GilbertElliottState {
+        match &self.loss {
             Losses::GilbertElliott(chain) => chain.stationary_state(draws.packet(0).first(Purpose::InitialState)),
             Losses::None | Losses::Independent(_) => GilbertElliottState::Good,
-        };
-        Remembered { state, ..Remembered::NOTHING }
+        }
     }
 
     /// What becomes of a packet of a link that remembers nothing.

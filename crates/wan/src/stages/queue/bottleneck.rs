@@ -88,6 +88,8 @@ pub(crate) struct BottleneckStage<T> {
     in_service: Option<InService<T>>,
     /// Since when the line has had nothing to send.
     idle_since: Instant,
+    /// The time on the line of a packet of that size: a division of 128 bits.
+    latest_service: Option<(Bytes, Duration)>,
     red: RedState,
     codel: CoDelState,
 }
@@ -115,9 +117,35 @@ impl<T> BottleneckStage<T> {
             waiting_bits: 0,
             in_service: None,
             idle_since: Instant::ZERO,
+            latest_service: None,
             red: RedState::default(),
             codel: CoDelState::default(),
         }
+    }
+
+    /// When a packet of that size leaves that is offered `now` and finds nothing before it: no discipline but RED, which draws, does anything to such a packet.
+    #[inline]
+    pub(crate) fn departure_if_idle(&mut self, now: Instant, size: Bytes) -> Option<Instant> {
+        let Service::Rate(rate) = &self.config.service else { return None };
+        if self.in_service.is_some() || matches!(self.config.discipline, Discipline::Red(_)) {
+            return None;
+        }
+        let service = match self.latest_service {
+            Some((same, service)) if same == size => service,
+            _ => {
+                let service = rate.transmission_time(giga_bits(self.config.framing.on_the_line(size)));
+                self.latest_service = Some((size, service));
+                service
+            }
+        };
+        Some(now.saturating_add(service))
+    }
+
+    /// A packet has left at that instant that was [told](BottleneckStage::departure_if_idle), and nothing came behind it. What CoDel remembers of an empty queue stays
+    /// as it is.
+    #[inline]
+    pub(crate) fn is_idle_from(&mut self, departure: Instant) {
+        self.idle_since = departure;
     }
 
     /// Takes a packet: it is sent, waits, or comes out dropped, perhaps others in its stead. `word` is its random word for queues.
@@ -188,7 +216,7 @@ impl<T> BottleneckStage<T> {
         if core::mem::discriminant(&self.config.discipline) != core::mem::discriminant(&config.discipline) {
             (self.red, self.codel) = (RedState::default(), CoDelState::default());
         }
-        self.config = config;
+        (self.config, self.latest_service) = (config, None);
         self.waiting_bits = self.waiting.iter().map(|(_, packet)| giga_bits(self.config.framing.on_the_line(packet.info.size))).sum();
         self.announce(now);
     }
