@@ -58,6 +58,8 @@ pub struct EventQueue<E> {
     /// Memory of emptied buckets, to be used again: so the queue touches memory in proportion to its events, not to the ring.
     spare: Vec<Vec<Packed>>,
     far: BinaryHeap<Reverse<Entry>>,
+    /// Nothing in the ring or beyond happens before this instant, so that the quiet ticks of a few peers search no bucket: it took 3 % of the instructions of three peers with jitter off.
+    quiet_until: Instant,
     len: usize,
     /// Buckets are 2 to this power ns wide.
     width: u32,
@@ -99,6 +101,7 @@ impl<E: Event> EventQueue<E> {
             occupied: [0; RING / 64],
             spare: Vec::new(),
             far: BinaryHeap::new(),
+            quiet_until: Instant::MAX,
             len: 0,
             width: FIRST_WIDTH,
             brought: (0, 0),
@@ -191,7 +194,7 @@ impl<E: Event> EventQueue<E> {
         if self.in_order {
             return self.ordered.front().is_some_and(|first| first.at() <= now);
         }
-        self.front.front().map_or(self.len > 0, |first| first.0 <= now)
+        self.front.front().map_or(self.quiet_until <= now && self.len > 0, |first| first.0 <= now)
     }
 
     /// The instant of the first event.
@@ -213,6 +216,7 @@ impl<E: Event> EventQueue<E> {
     #[cold]
     fn become_calendar(&mut self) {
         self.in_order = false;
+        self.quiet_until = Instant::MAX;
         self.ring.resize_with(RING, Vec::new);
         self.current = self.ordered.front().map_or(0, |first| self.bucket_of(first.at()));
         let mut ordered = core::mem::take(&mut self.ordered);
@@ -232,8 +236,10 @@ impl<E: Event> EventQueue<E> {
     fn push_entry(&mut self, entry: Entry) {
         let bucket = self.bucket_of(entry.0);
         if bucket <= self.current {
-            self.push_front(entry);
-        } else if bucket - self.current < RING as u64 {
+            return self.push_front(entry);
+        }
+        self.quiet_until = self.quiet_until.min(entry.0);
+        if bucket - self.current < RING as u64 {
             self.push_ring(bucket, entry);
         } else {
             self.far.push(Reverse(entry));
@@ -257,9 +263,11 @@ impl<E: Event> EventQueue<E> {
         let present = self.bucket_of(now);
         while self.front.is_empty() && self.len > 0 {
             let next = self.next_occupied().or_else(|| self.far.peek().map(|Reverse(first)| self.bucket_of(first.0)));
-            let Some(next) = next.filter(|&next| next <= present) else {
+            let Some(next) = next else { break };
+            if next > present {
+                self.quiet_until = Instant::from_nanos(next << self.width);
                 break;
-            };
+            }
             self.bring_to_front(next);
         }
         if self.front.is_empty() {
@@ -488,6 +496,36 @@ mod tests {
         assert_eq!(queue.pop_due(Instant::from_nanos(999_999)), None);
         let order: Vec<u32> = core::iter::from_fn(|| queue.pop_due(Instant::from_nanos(1_000_000))).map(|note| note.1).collect();
         assert_eq!(order, [0, 1, 2, 3]);
+    }
+
+    /// Over a ring, buckets and what lies beyond them: whatever is due may be due, and what was searched in vain is not searched again at the same instant.
+    #[test]
+    fn what_is_due_may_be_due() {
+        let (mut queue, mut pending, mut number) = (EventQueue::new(), alloc::collections::BTreeSet::new(), 2015_u64);
+        let mut draw = |below: u64| {
+            number = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (number >> 33) % below
+        };
+        let (mut now, mut quiet) = (0, 0);
+        for key in 0..20_000 {
+            let reach = [1, 200_000, 30_000_000, 3_000_000_000][usize::try_from(draw(4)).expect("small")];
+            if draw(3) > 0 {
+                let note = Note(now + draw(reach), key);
+                queue.push(note);
+                pending.insert(note);
+            }
+            now += draw(2) * draw(2_000_000);
+            let (at, first) = (Instant::from_nanos(now), pending.first().copied().filter(|first: &Note| first.0 <= now));
+            assert!(first.is_none() || queue.may_be_due(at), "{first:?} is due at {now}");
+            quiet += usize::from(first.is_none() && !pending.is_empty() && !queue.may_be_due(at));
+            assert_eq!(queue.pop_due(at), first);
+            if let Some(first) = first {
+                pending.remove(&first);
+            } else {
+                assert!(!queue.may_be_due(at), "what was searched in vain at {now} is searched again");
+            }
+        }
+        assert!(quiet > 1000, "only {quiet} instants were known to be quiet");
     }
 
     #[test]

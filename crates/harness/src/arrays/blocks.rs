@@ -165,7 +165,10 @@ impl Blocks {
             for block in blocks {
                 (low, high) = (block.object.position.smaller(low), block.object.position.larger(high));
             }
-            (low.0.into_iter().fold(f64::INFINITY, |least, x| smaller(x, least)), high.0.into_iter().fold(f64::NEG_INFINITY, |most, x| larger(x, most)))
+            (
+                low.0.into_iter().fold(f64::INFINITY, |least, x| smaller(x, least)),
+                high.0.into_iter().fold(f64::NEG_INFINITY, |most, x| larger(x, most)),
+            )
         })
     }
 

@@ -57,12 +57,14 @@ impl PeerEnergy {
     fn of_step(&self, row: &StepRow<'_>) -> f64 {
         let mut energy = 0.0;
         let share = if row.own_damping > 0.0 { row.own_damping / (self.damping + row.own_damping) } else { 0.0 };
-        for axis in 0..row.held_force.len() {
-            let moved = row.after.position[axis] - row.before.position[axis];
-            energy -= row.coordination_force[axis] * moved;
+        let positions = row.before.position.iter().zip(row.after.position);
+        let velocities = row.before.velocity.iter().zip(row.after.velocity);
+        let forces = row.coordination_force.iter().zip(row.held_force);
+        for ((positions, (before, after)), (coordination_force, held_force)) in positions.zip(velocities).zip(forces) {
+            let moved = positions.1 - positions.0;
+            energy -= coordination_force * moved;
             if share > 0.0 {
-                let (before, after) = (row.before.velocity[axis], row.after.velocity[axis]);
-                energy -= share * (row.held_force[axis] * moved - 0.5 * self.mass * (after * after - before * before));
+                energy -= share * (held_force * moved - 0.5 * self.mass * (after * after - before * before));
             }
         }
         match (&row.turn, &self.spin) {
@@ -113,6 +115,7 @@ impl Accumulator for Energy {
         Self { peers, injected: 0.0, peak: 0.0 }
     }
 
+    #[inline]
     fn on_step(&mut self, row: &StepRow<'_>) {
         let peer = &mut self.peers[row.peer];
         let energy = peer.of_step(row);

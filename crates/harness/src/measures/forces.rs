@@ -23,28 +23,22 @@ struct Force {
     squares: f64,
     count: u64,
     jump: f64,
-    /// At the latest tick of each peer; `None` before its first.
-    latest: Vec<Option<[f64; 3]>>,
+    /// At the latest tick of each peer; no number before its first, from which nothing jumps.
+    latest: Vec<[f64; 3]>,
 }
 
 impl Force {
     fn new(asked: &Asked<'_>) -> Self {
-        Self { peak: 0.0, squares: 0.0, count: 0, jump: 0.0, latest: vec![None; asked.scene.peers.len()] }
+        Self { peak: 0.0, squares: 0.0, count: 0, jump: 0.0, latest: vec![[f64::NAN; 3]; asked.scene.peers.len()] }
     }
 
     #[inline]
     fn add(&mut self, peer: usize, force: &[f64]) {
-        let latest = &mut self.latest[peer];
-        // The first tick of a peer is no jump.
-        let known = latest.is_some();
-        let latest = latest.get_or_insert_default();
         self.count += force.len() as u64;
-        for (component, latest) in force.iter().zip(latest) {
+        for (component, latest) in force.iter().zip(&mut self.latest[peer]) {
             self.peak = larger(component.abs(), self.peak);
             self.squares += component * component;
-            if known {
-                self.jump = larger((component - *latest).abs(), self.jump);
-            }
+            self.jump = larger((component - *latest).abs(), self.jump);
             *latest = *component;
         }
     }
@@ -76,6 +70,7 @@ impl Accumulator for CoordinationForce {
         Self(Force::new(asked))
     }
 
+    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         self.0.add(row.peer, row.coordination_force);
     }
@@ -96,6 +91,7 @@ impl Accumulator for FeltForce {
         Self(Force::new(asked))
     }
 
+    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         self.0.add(row.peer, row.coupling_force);
     }

@@ -66,21 +66,21 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         row: (usize, usize),
         observer: &mut AnyObserver<'_>,
     ) -> Result<(), Ended> {
-        if self.peer.rotation().is_some() {
-            self.advance_turning(now, span, commanded, row, observer)
-        } else {
-            self.advance_as(now, span, commanded, row, observer, None)
+        match self.peer.role() {
+            // The role is known where this is compiled, which took 2 % of the instructions of all measures.
+            Role::Copy if self.peer.rotation().is_none() => self.advance_as(now, span, commanded, (row, Role::Copy), observer, None),
+            role => self.advance_otherwise(now, span, commanded, (row, role), observer),
         }
     }
 
-    /// [`Member::advance_watched`] of a peer that turns: where no peer does, its copies were 3 % of the instructions of all measures.
+    /// [`Member::advance_watched`] of a client, or of a peer that turns: where no peer does, its copies were 3 % of the instructions of all measures.
     #[inline(never)]
-    fn advance_turning(
+    fn advance_otherwise(
         &mut self,
         now: Instant,
         span: Duration,
         commanded: [f64; A],
-        row: (usize, usize),
+        row: ((usize, usize), Role),
         observer: &mut AnyObserver<'_>,
     ) -> Result<(), Ended> {
         let turn = self.peer.rotation().map(|rotation| TurnStepRow {
@@ -102,18 +102,18 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         now: Instant,
         span: Duration,
         commanded: [f64; A],
-        (place, axes): (usize, usize),
+        ((place, axes), role): ((usize, usize), Role),
         observer: &mut AnyObserver<'_>,
         turn: Option<TurnStepRow>,
     ) -> Result<(), Ended> {
         let late = std::mem::replace(&mut self.commanded, commanded);
         let coordination = if self.peer.compute_delay() { late } else { commanded };
-        let before = self.moved_by_coordination();
+        let before = self.moved_by_coordination(role);
         let acting = *self.peer.applied();
         self.peer.advance(now, span);
         let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });
-        let after = self.moved_by_coordination();
-        let coordination = if self.peer.role() == Role::Copy { coordination } else { acting.coupling };
+        let after = self.moved_by_coordination(role);
+        let coordination = if role == Role::Copy { coordination } else { acting.coupling };
         observer.on_step(&StepRow {
             at: now,
             peer: place,
@@ -127,8 +127,9 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
     }
 
     /// The body on which the others act: the copy, or the device of a client.
-    fn moved_by_coordination(&self) -> State<A> {
-        if self.peer.role() == Role::Copy { *self.peer.object().state() } else { self.peer.device().state() }
+    #[inline(always)]
+    fn moved_by_coordination(&self, role: Role) -> State<A> {
+        if role == Role::Copy { *self.peer.object().state() } else { self.peer.device().state() }
     }
 }
 

@@ -45,8 +45,10 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
         let past = self.past.as_mut().map_or(*context.own, |past| past.exchange(context.own));
         for (axis, lead) in lead.into_iter().enumerate() {
             let seen = Observation { own: context.own.along(axis), past: past.along(axis), mean: context.held.mean().along(axis), lead };
-            command.force[axis] = self.law.force(&seen, &mut self.memory[axis * remembered..(axis + 1) * remembered]);
-            command.target.set_along(axis, self.law.target(&seen));
+            let memory = &mut self.memory[axis * remembered..(axis + 1) * remembered];
+            let (force, target) = self.law.command(&seen, memory);
+            command.force[axis] = force;
+            command.target.set_along(axis, target);
         }
         command
     }

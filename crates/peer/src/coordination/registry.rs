@@ -257,6 +257,16 @@ macro_rules! registry {
             }
         }
 
+        impl<N: Number> BuiltIn<N> {
+            /// [`Law::force`] and [`Law::target`]; the law is chosen once.
+            #[inline(always)]
+            pub(super) fn command(&self, seen: &Observation<N>, memory: &mut [N]) -> (N, Motion<N>) {
+                match self {
+                    $(Self::$law(law) => (law.force(seen, memory), law.target(seen)),)+
+                }
+            }
+        }
+
         impl<N: Number> Law<N> for BuiltIn<N> {
             fn memory(&self) -> usize {
                 match self {
