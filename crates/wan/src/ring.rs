@@ -107,6 +107,17 @@ impl<T> Ring<T> {
         }
     }
 
+    /// Passes the first value, which is to be taken out of the place where it lies.
+    #[inline(always)]
+    pub(crate) fn pass_front(&mut self) -> Option<&mut Option<T>> {
+        let first = self.first;
+        if self.len == 0 {
+            return None;
+        }
+        self.pass();
+        self.places.get_mut(first)
+    }
+
     /// Drops all values, and keeps the memory.
     pub fn clear(&mut self) {
         while self.len > 0 {
