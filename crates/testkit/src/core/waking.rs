@@ -54,8 +54,13 @@ impl Waiters {
             woken.wake_by_ref(first);
         }
         if !self.others.is_empty() {
-            self.others.drain(..).for_each(|waker| woken.wake(waker));
+            self.wake_others(woken);
         }
+    }
+
+    #[inline(never)]
+    fn wake_others(&mut self, woken: &mut Woken) {
+        self.others.drain(..).for_each(|waker| woken.wake(waker));
     }
 }
 
@@ -79,8 +84,13 @@ impl Woken {
         if self.own.is_some_and(|own| std::ptr::eq(own, waker.vtable())) {
             waker.wake_by_ref();
         } else {
-            self.later.push(waker.clone());
+            self.wake_later(waker);
         }
+    }
+
+    #[inline(never)]
+    fn wake_later(&mut self, waker: &Waker) {
+        self.later.push(waker.clone());
     }
 
     /// Wakes now if it may.
