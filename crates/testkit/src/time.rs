@@ -68,6 +68,19 @@ impl Sleep {
         Self { shared, deadline, timer: None }
     }
 
+    /// Sees to it that this waker is woken. It stands apart, since most often the timer has the waker already: to look took half the instructions then.
+    #[inline(never)]
+    fn register(&mut self, waker: &Waker) {
+        let registered = registered(waker);
+        match &mut self.timer {
+            Some((timer, known)) => {
+                self.shared.lock().timers.renew(*timer, waker);
+                *known = registered;
+            }
+            None => self.timer = Some((self.shared.lock().timers.set(self.deadline, waker.clone()), registered)),
+        }
+    }
+
     /// When it is over.
     #[must_use]
     pub const fn deadline(&self) -> Instant {
@@ -92,25 +105,20 @@ impl std::fmt::Debug for Sleep {
 impl Future for Sleep {
     type Output = ();
 
+    #[inline]
     fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<()> {
         let this = &mut *self;
-        if this.shared.now() >= this.deadline {
-            // The timer is gone: it goes off in the moment in which time passes to it. Without one it has not waited.
-            if this.timer.take().is_none() {
-                this.shared.note_call();
+        if this.shared.now() < this.deadline {
+            if this.timer.as_ref().is_none_or(|(_, known)| *known != registered(cx.waker())) {
+                this.register(cx.waker());
             }
-            return Poll::Ready(());
+            return Poll::Pending;
         }
-        let registered = registered(cx.waker());
-        match &mut this.timer {
-            Some((_, known)) if *known == registered => {}
-            Some((timer, known)) => {
-                this.shared.lock().timers.renew(*timer, cx.waker());
-                *known = registered;
-            }
-            None => this.timer = Some((this.shared.lock().timers.set(this.deadline, cx.waker().clone()), registered)),
+        // The timer is gone: it goes off in the moment in which time passes to it. Without one it has not waited.
+        if this.timer.take().is_none() {
+            this.shared.note_call();
         }
-        Poll::Pending
+        Poll::Ready(())
     }
 }
 

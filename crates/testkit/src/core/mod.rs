@@ -51,6 +51,8 @@ pub(crate) struct Core {
     face: Arc<Face>,
     /// Which run it is the state of.
     run: u64,
+    /// Whether it goes back to where other threads find it.
+    is_from_home: bool,
 }
 
 pub(crate) type Parcel = wire::Parcel<Ends>;
@@ -78,6 +80,7 @@ impl Core {
             tcp: tcp::Tcp::new(seed, names.len()),
             woken: Woken::default(),
             run: 0,
+            is_from_home: false,
         }
     }
 

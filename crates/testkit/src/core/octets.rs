@@ -84,7 +84,7 @@ impl Spare {
     const LONGEST: usize = 2048;
 
     /// A parcel with a copy of what a program sends.
-    #[inline]
+    #[inline(always)]
     pub(super) fn copied(&mut self, addresses: Ends, bytes: &[u8], ecn_capable: bool) -> Box<Parcel> {
         let Some(mut parcel) = self.0.pop() else { return boxed(addresses, Octets::Own(bytes.to_vec()), ecn_capable) };
         (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);

@@ -45,12 +45,8 @@ impl Core {
         let socket = self.sockets.get(id);
         let (SocketAddr::V4(local), SocketAddr::V4(to)) = (&socket.local, outgoing.to.or(socket.peer.as_ref())?) else { return None };
         let receiver = self.plan.owner_of_v4(*to.ip())?;
-        let is_plain = local.ip().is_unspecified()
-            && receiver != socket.host
-            && to.port() != 0
-            && outgoing.bytes.len() <= LONGEST[0]
-            && !socket.refused
-            && socket.died.is_none();
+        let is_plain =
+            local.ip().is_unspecified() && receiver != socket.host && to.port() != 0 && outgoing.bytes.len() <= LONGEST[0] && !socket.has_error();
         let from = SocketAddrV4::new(self.plan.of(socket.host).v4, local.port());
         is_plain.then(|| (Path { from: socket.host, to: receiver }, Ends::of_v4(from, *to, Kind::Datagram)))
     }
@@ -58,7 +54,7 @@ impl Core {
     #[inline(never)]
     fn send_any(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
         let socket = self.sockets.get(id);
-        if socket.died.is_some() || socket.refused {
+        if socket.has_error() {
             return Err(self.error_of(id));
         }
         let (host, local, may_broadcast) = (socket.host, socket.local, socket.may_broadcast);

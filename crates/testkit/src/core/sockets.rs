@@ -93,6 +93,13 @@ impl SocketState {
         Ok(())
     }
 
+    /// Whether the next call gives an error.
+    #[inline]
+    pub(super) const fn has_error(&self) -> bool {
+        // Both are looked at, where a branch for each would cost more.
+        self.died.is_some() | self.refused
+    }
+
     #[inline]
     pub(super) fn wake_readers(&mut self, woken: &mut Woken) {
         self.readers.wake(woken);
@@ -109,17 +116,18 @@ impl SocketState {
 /// All sockets that have not been closed.
 #[derive(Debug, Default)]
 pub(super) struct Sockets {
-    places: Vec<Option<SocketState>>,
+    /// In boxes, so that a place is found by a shift.
+    places: Vec<Option<Box<SocketState>>>,
     free: Vec<usize>,
 }
 
 impl Sockets {
     fn insert(&mut self, state: SocketState) -> SocketId {
         if let Some(place) = self.free.pop() {
-            self.places[place] = Some(state);
+            self.places[place] = Some(Box::new(state));
             return SocketId(place);
         }
-        self.places.push(Some(state));
+        self.places.push(Some(Box::new(state)));
         SocketId(self.places.len() - 1)
     }
 
@@ -134,7 +142,7 @@ impl Sockets {
     }
 
     pub(super) fn all_of(&mut self, host: NodeId) -> impl Iterator<Item = &mut SocketState> {
-        self.places.iter_mut().flatten().filter(move |socket| socket.host == host)
+        self.places.iter_mut().flatten().map(Box::as_mut).filter(move |socket| socket.host == host)
     }
 }
 
@@ -267,15 +275,16 @@ impl Core {
     #[inline]
     pub(crate) fn receive<T>(&mut self, id: SocketId, peek: bool, look: impl FnOnce(&Datagram) -> T) -> io::Result<Option<T>> {
         let socket = self.sockets.get_mut(id);
-        if socket.died.is_some() || socket.refused {
+        if socket.has_error() {
             return Err(self.error_of(id));
         }
-        let Some(datagram) = socket.inbox.front() else { return Ok(None) };
-        let seen = look(datagram);
-        if !peek && let Some(datagram) = socket.inbox.pop() {
-            socket.held -= datagram.bytes().len();
-            self.spare.put(datagram.parcel);
+        if peek {
+            return Ok(socket.inbox.front().map(look));
         }
+        let Some(datagram) = socket.inbox.pop() else { return Ok(None) };
+        socket.held -= datagram.bytes().len();
+        let seen = look(&datagram);
+        self.spare.put(datagram.parcel);
         Ok(Some(seen))
     }
 
@@ -292,7 +301,7 @@ impl Core {
     /// Whether [`Core::receive`] has something to say.
     pub(crate) fn is_readable(&self, id: SocketId) -> bool {
         let socket = self.sockets.get(id);
-        socket.died.is_some() || socket.refused || !socket.inbox.is_empty()
+        socket.has_error() || !socket.inbox.is_empty()
     }
 
     /// Takes an error out.

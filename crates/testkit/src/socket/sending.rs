@@ -65,10 +65,11 @@ impl UdpSocket {
         Poll::Ready(self.try_send_to(bytes, to))
     }
 
+    #[inline]
     pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
         let ecn_capable = ecn_capable || self.options.is_ecn_capable();
         let outgoing = Outgoing { to, bytes, ecn_capable };
-        self.shared.lock().send(self.id, outgoing)?;
+        self.shared.with(|core| core.send(self.id, outgoing))?;
         Ok(bytes.len())
     }
 
