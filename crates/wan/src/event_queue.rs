@@ -131,13 +131,20 @@ impl<E: Event> EventQueue<E> {
         self.push_calendar(event);
     }
 
-    /// Adds the event of that instant and that key that is made. It is made where it is stored: one that is handed on is written in parts and read as a whole, for which
-    /// a processor waits.
+    /// The event that was pushed last, while all come in order.
     #[inline(always)]
-    pub(crate) fn push_made(&mut self, at: Instant, key: &E::Key, make: impl FnOnce() -> E) {
+    pub(crate) fn last_in_order(&self) -> Option<&E> {
+        // In a calendar the ring is empty.
+        self.ordered.back()
+    }
+
+    /// Adds the event of that instant that is made. `follows` says whether its key is not below that of [`EventQueue::last_in_order`]. It is made where it is stored: one that
+    /// is handed on is written in parts and read as a whole, for which a processor waits.
+    #[inline(always)]
+    pub(crate) fn push_made(&mut self, at: Instant, follows: bool, make: impl FnOnce() -> E) {
         self.len += 1;
         if self.in_order {
-            if self.ordered.back().is_none_or(|last| last.key() <= *key) {
+            if follows {
                 return self.ordered.push(make);
             }
             self.become_calendar();

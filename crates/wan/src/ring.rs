@@ -91,6 +91,10 @@ impl<T> Ring<T> {
     /// Takes the first value out.
     #[inline(always)]
     pub fn pop(&mut self) -> Option<T> {
+        // An empty place need not be looked at.
+        if self.len == 0 {
+            return None;
+        }
         let value = self.places.get_mut(self.first)?.take();
         if value.is_some() {
             self.pass();
