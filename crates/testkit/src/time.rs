@@ -11,7 +11,7 @@ use std::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::context;
-use crate::core::{Shared, TimerId};
+use crate::core::{Shared, TimerId, asked_here};
 
 /// The time since the run began.
 ///
@@ -19,7 +19,14 @@ use crate::core::{Shared, TimerId};
 ///
 /// Outside a running test bed; and if it is asked millions of times without letting time pass, as a loop does that waits for it: `sleep` instead.
 #[must_use]
+#[inline]
 pub fn now() -> Instant {
+    asked_here().unwrap_or_else(asked_now)
+}
+
+/// The time where the state does not lie with this thread, or the clock must be asked.
+#[inline(never)]
+fn asked_now() -> Instant {
     context::ask("time is known", |shared| {
         shared.note_call();
         shared.now()

@@ -62,11 +62,17 @@ impl Face {
     /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass.
     #[inline]
     pub(crate) fn note_call(&self) {
-        let calls = self.calls.load(Ordering::Relaxed).wrapping_add(1);
-        self.calls.store(calls, Ordering::Relaxed);
-        if calls > self.most_calls {
+        if !self.count_call() {
             self.lose_patience();
         }
+    }
+
+    /// As [`Face::note_call`]; says whether there have not been too many calls.
+    #[inline]
+    pub(super) fn count_call(&self) -> bool {
+        let calls = self.calls.load(Ordering::Relaxed).wrapping_add(1);
+        self.calls.store(calls, Ordering::Relaxed);
+        calls <= self.most_calls
     }
 
     #[cold]

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
-use std::task::Waker;
+use std::task::{Poll, Waker};
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{NodeId, Ring};
@@ -22,6 +22,7 @@ pub(crate) struct Datagram {
     parcel: Box<Parcel>,
     /// When it arrived.
     pub(crate) at: Instant,
+    len: usize,
     /// Whether an active queue marked it.
     marked: bool,
 }
@@ -83,12 +84,13 @@ impl SocketState {
     /// Takes a datagram into the buffer, which holds this number of bytes.
     #[inline(always)]
     pub(super) fn keep(&mut self, at: Instant, parcel: Box<Parcel>, marked: bool, room: usize, woken: &mut Woken) -> Result<(), Lost> {
-        let held = self.held + parcel.bytes.len();
+        let len = parcel.bytes.len();
+        let held = self.held + len;
         if held > room {
             return Err(Lost::BufferFull);
         }
         self.held = held;
-        self.inbox.push(|| Datagram { parcel, at, marked });
+        self.inbox.push(|| Datagram { parcel, at, len, marked });
         self.wake_readers(woken);
         Ok(())
     }
@@ -271,21 +273,31 @@ impl Core {
         &mut self.sockets.get_mut(id).may_broadcast
     }
 
-    /// Looks at the next datagram, which is taken out unless it is only peeked at; `None` if there is none.
+    /// Looks at the next datagram, which is taken out unless it is only peeked at. If there is none, the waker is woken when there is one.
     #[inline]
-    pub(crate) fn receive<T>(&mut self, id: SocketId, peek: bool, look: impl FnOnce(&Datagram) -> T) -> io::Result<Option<T>> {
+    pub(crate) fn receive<const PEEK: bool, T>(
+        &mut self,
+        id: SocketId,
+        waker: Option<&Waker>,
+        look: impl FnOnce(&Datagram) -> T,
+    ) -> Poll<io::Result<T>> {
         let socket = self.sockets.get_mut(id);
         if socket.has_error() {
-            return Err(self.error_of(id));
+            return Poll::Ready(Err(self.error_of(id)));
         }
-        if peek {
-            return Ok(socket.inbox.front().map(look));
+        if PEEK && let Some(datagram) = socket.inbox.front() {
+            return Poll::Ready(Ok(look(datagram)));
         }
-        let Some(datagram) = socket.inbox.pop() else { return Ok(None) };
-        socket.held -= datagram.bytes().len();
+        let Some(datagram) = socket.inbox.pop() else {
+            if let Some(waker) = waker {
+                socket.readers.wait(waker);
+            }
+            return Poll::Pending;
+        };
+        socket.held -= datagram.len;
         let seen = look(&datagram);
         self.spare.put(datagram.parcel);
-        Ok(Some(seen))
+        Poll::Ready(Ok(seen))
     }
 
     /// The error that a socket has, which is taken out.

@@ -89,6 +89,7 @@ impl Wake for Place {
         Self::wake_by_ref(&self);
     }
 
+    #[inline]
     fn wake_by_ref(self: &Arc<Self>) {
         let is_here = HERE.try_with(|here| {
             let is_here = here.executor.get() == self.executor;
@@ -132,7 +133,9 @@ pub(crate) struct Inner {
     slots: RefCell<Vec<Option<Rc<Slot>>>>,
     free: RefCell<Vec<usize>>,
     last: Cell<usize>,
-    batch: RefCell<Batch>,
+    /// An empty one, for its memory.
+    #[cfg(feature = "tokio")]
+    batch: Cell<Batch>,
 }
 
 /// The tasks that are polled before those that are woken meanwhile. They are taken from the thread at once: to look there for each took a third of a poll's instructions.
@@ -149,6 +152,13 @@ impl Batch {
         let number = *self.numbers.get(self.next)?;
         self.next += 1;
         Some(number)
+    }
+
+    /// Gives back those that were not polled: they come first again, and [`is_any_ready`] sees them.
+    #[cfg(feature = "tokio")]
+    fn give_back(&mut self) {
+        let left = self.numbers.drain(..).skip(std::mem::take(&mut self.next));
+        HERE.with(|here| here.ready.borrow_mut().splice(..0, left).for_each(drop));
     }
 }
 
@@ -192,7 +202,8 @@ impl Executor {
             slots: RefCell::default(),
             free: RefCell::default(),
             last: Cell::default(),
-            batch: RefCell::default(),
+            #[cfg(feature = "tokio")]
+            batch: Cell::default(),
         }))
     }
 
@@ -212,12 +223,12 @@ impl Executor {
     /// If nothing will ever happen any more, or if time cannot pass because tasks are polled again and again.
     pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
         let patience = shared.lock().settings.patience;
-        let mut polls = 0;
+        let (mut polls, mut batch) = (0, Batch::default());
         self.begin(None);
         loop {
             shared.hand_out();
             // A task that is polled tells by itself that the executor does not stand.
-            if let Some(polled) = self.poll_one() {
+            if let Some(polled) = self.poll_one(&mut batch) {
                 polls += 1;
                 if polls > patience {
                     self.give_up(shared, polls);
@@ -257,14 +268,20 @@ impl Executor {
     /// Polls tasks until none can go on, or `goes_on` says no after one of them; says whether none can.
     #[cfg(feature = "tokio")]
     pub(crate) fn run_some(&self, mut goes_on: impl FnMut() -> bool) -> bool {
-        while self.poll_one().is_some() {
+        let mut batch = self.batch.take();
+        let mut all_wait = true;
+        while self.poll_one(&mut batch).is_some() {
             if !goes_on() {
-                self.return_batch();
-                return false;
+                batch.give_back();
+                all_wait = false;
+                break;
             }
         }
-        HERE.with(|here| here.waits.set(true));
-        true
+        self.batch.set(batch);
+        if all_wait {
+            HERE.with(|here| here.waits.set(true));
+        }
+        all_wait
     }
 
     /// The task that was polled last, unless it is over.
@@ -274,9 +291,8 @@ impl Executor {
 
     /// Polls the task that has waited longest, if there is one; says whether it is over.
     #[inline(always)]
-    fn poll_one(&self) -> Option<Poll<()>> {
-        let next = self.batch.borrow_mut().take();
-        let number = next.or_else(|| self.next_batch())?;
+    fn poll_one(&self, batch: &mut Batch) -> Option<Poll<()>> {
+        let number = batch.take().or_else(|| self.next_batch(batch))?;
         self.last.set(number);
         // The task may start others while it is polled, which get other places.
         let Some(slot) = self.slots.borrow().get(number).and_then(Clone::clone) else { return Some(Poll::Pending) };
@@ -299,8 +315,7 @@ impl Executor {
 
     /// Takes all tasks that were woken since this was last asked, and gives the first.
     #[inline(never)]
-    fn next_batch(&self) -> Option<usize> {
-        let batch = &mut *self.batch.borrow_mut();
+    fn next_batch(&self, batch: &mut Batch) -> Option<usize> {
         batch.numbers.clear();
         batch.next = 0;
         HERE.with(|here| std::mem::swap(&mut batch.numbers, &mut here.ready.borrow_mut()));
@@ -310,13 +325,6 @@ impl Executor {
             batch.numbers.append(&mut woken.numbers);
         }
         batch.take()
-    }
-
-    /// Gives back those that were not polled: they come first again, and [`is_any_ready`] sees them.
-    #[cfg(feature = "tokio")]
-    fn return_batch(&self) {
-        let Batch { numbers, next } = std::mem::take(&mut *self.batch.borrow_mut());
-        HERE.with(|here| here.ready.borrow_mut().splice(..0, numbers.into_iter().skip(next)).for_each(drop));
     }
 
     /// Gives up, because time does not pass.

@@ -18,7 +18,7 @@ impl UdpSocket {
     ///
     /// [`io::ErrorKind::ConnectionRefused`] if the peer has told that nobody is at its port.
     pub fn recv<'a>(&'a self, buffer: &'a mut [u8]) -> impl Future<Output = io::Result<usize>> + 'a {
-        self.look(false, move |datagram| datagram.copy_to(buffer))
+        self.look::<false, _>(move |datagram| datagram.copy_to(buffer))
     }
 
     /// Receives a datagram; gives its length and its sender.
@@ -27,7 +27,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn recv_from<'a>(&'a self, buffer: &'a mut [u8]) -> impl Future<Output = io::Result<(usize, SocketAddr)>> + 'a {
-        self.look(false, move |datagram| (datagram.copy_to(buffer), datagram.from()))
+        self.look::<false, _>(move |datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
     /// Receives a datagram into the free room of a buffer; gives its length.
@@ -36,7 +36,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn recv_buf<'a>(&'a self, buffer: &'a mut (impl BufMut + 'a)) -> impl Future<Output = io::Result<usize>> + 'a {
-        self.look(false, move |datagram| datagram.put_into(buffer))
+        self.look::<false, _>(move |datagram| datagram.put_into(buffer))
     }
 
     /// Receives a datagram into the free room of a buffer; gives its length and its sender.
@@ -45,7 +45,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn recv_buf_from<'a>(&'a self, buffer: &'a mut (impl BufMut + 'a)) -> impl Future<Output = io::Result<(usize, SocketAddr)>> + 'a {
-        self.look(false, move |datagram| (datagram.put_into(buffer), datagram.from()))
+        self.look::<false, _>(move |datagram| (datagram.put_into(buffer), datagram.from()))
     }
 
     /// Receives a datagram; gives its length, its sender, and when it arrived, to the nanosecond.
@@ -54,7 +54,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn recv_from_at<'a>(&'a self, buffer: &'a mut [u8]) -> impl Future<Output = io::Result<(usize, SocketAddr, Instant)>> + 'a {
-        self.look(false, move |datagram| (datagram.copy_to(buffer), datagram.from(), datagram.at))
+        self.look::<false, _>(move |datagram| (datagram.copy_to(buffer), datagram.from(), datagram.at))
     }
 
     /// Looks at the next datagram and leaves it; gives its length.
@@ -63,7 +63,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn peek<'a>(&'a self, buffer: &'a mut [u8]) -> impl Future<Output = io::Result<usize>> + 'a {
-        self.look(true, move |datagram| datagram.copy_to(buffer))
+        self.look::<true, _>(move |datagram| datagram.copy_to(buffer))
     }
 
     /// Looks at the next datagram and leaves it; gives its length and its sender.
@@ -72,7 +72,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn peek_from<'a>(&'a self, buffer: &'a mut [u8]) -> impl Future<Output = io::Result<(usize, SocketAddr)>> + 'a {
-        self.look(true, move |datagram| (datagram.copy_to(buffer), datagram.from()))
+        self.look::<true, _>(move |datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
     /// The sender of the next datagram, which is left.
@@ -81,7 +81,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn peek_sender(&self) -> impl Future<Output = io::Result<SocketAddr>> + '_ {
-        self.look(true, Datagram::from)
+        self.look::<true, _>(Datagram::from)
     }
 
     /// Receives a datagram if there is one.
@@ -90,7 +90,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`]; [`io::ErrorKind::WouldBlock`] if there is none.
     pub fn try_recv(&self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.try_look(false, |datagram| datagram.copy_to(buffer))
+        self.try_look::<false, _>(|datagram| datagram.copy_to(buffer))
     }
 
     /// Receives a datagram if there is one.
@@ -99,7 +99,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
-        self.try_look(false, |datagram| (datagram.copy_to(buffer), datagram.from()))
+        self.try_look::<false, _>(|datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
     /// Receives a datagram into the free room of a buffer if there is one.
@@ -108,7 +108,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_recv_buf(&self, buffer: &mut impl BufMut) -> io::Result<usize> {
-        self.try_look(false, |datagram| datagram.put_into(buffer))
+        self.try_look::<false, _>(|datagram| datagram.put_into(buffer))
     }
 
     /// Receives a datagram into the free room of a buffer if there is one.
@@ -117,7 +117,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_recv_buf_from(&self, buffer: &mut impl BufMut) -> io::Result<(usize, SocketAddr)> {
-        self.try_look(false, |datagram| (datagram.put_into(buffer), datagram.from()))
+        self.try_look::<false, _>(|datagram| (datagram.put_into(buffer), datagram.from()))
     }
 
     /// Looks at the next datagram if there is one.
@@ -126,7 +126,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_peek(&self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.try_look(true, |datagram| datagram.copy_to(buffer))
+        self.try_look::<true, _>(|datagram| datagram.copy_to(buffer))
     }
 
     /// Looks at the next datagram if there is one.
@@ -135,7 +135,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_peek_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
-        self.try_look(true, |datagram| (datagram.copy_to(buffer), datagram.from()))
+        self.try_look::<true, _>(|datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
     /// The sender of the next datagram if there is one.
@@ -144,7 +144,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_peek_sender(&self) -> io::Result<SocketAddr> {
-        self.try_look(true, Datagram::from)
+        self.try_look::<true, _>(Datagram::from)
     }
 
     /// Receives a datagram, or sees to it that the task is woken when there is one.
@@ -164,7 +164,7 @@ impl UdpSocket {
     /// As [`UdpSocket::recv`].
     #[cfg(feature = "tokio")]
     pub fn poll_recv_from(&self, cx: &mut Context<'_>, buffer: &mut tokio::io::ReadBuf<'_>) -> Poll<io::Result<SocketAddr>> {
-        self.poll_look(cx, false, |datagram| datagram.fill(buffer))
+        self.poll_look::<false, _>(cx, |datagram| datagram.fill(buffer))
     }
 
     /// Looks at the next datagram, or sees to it that the task is woken when there is one; gives its sender.
@@ -174,7 +174,7 @@ impl UdpSocket {
     /// As [`UdpSocket::recv`].
     #[cfg(feature = "tokio")]
     pub fn poll_peek_from(&self, cx: &mut Context<'_>, buffer: &mut tokio::io::ReadBuf<'_>) -> Poll<io::Result<SocketAddr>> {
-        self.poll_look(cx, true, |datagram| datagram.fill(buffer))
+        self.poll_look::<true, _>(cx, |datagram| datagram.fill(buffer))
     }
 
     /// Looks at the sender of the next datagram, or sees to it that the task is woken when there is one.
@@ -183,7 +183,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn poll_peek_sender(&self, cx: &mut Context<'_>) -> Poll<io::Result<SocketAddr>> {
-        self.poll_look(cx, true, Datagram::from)
+        self.poll_look::<true, _>(cx, Datagram::from)
     }
 
     /// Waits until something can be received.
@@ -210,28 +210,24 @@ impl UdpSocket {
     }
 
     /// A view of a datagram, if there is one.
-    pub(crate) fn try_look<T>(&self, peek: bool, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
+    pub(crate) fn try_look<const PEEK: bool, T>(&self, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
         let mut core = self.shared.lock();
         core.note_call();
-        core.receive(self.id, peek, look)?.ok_or_else(|| io::ErrorKind::WouldBlock.into())
+        match core.receive::<PEEK, _>(self.id, None, look) {
+            Poll::Ready(seen) => seen,
+            Poll::Pending => Err(io::ErrorKind::WouldBlock.into()),
+        }
     }
 
     /// A view of the next datagram. It gives the future that is polled, and no other around it: each that is there for a datagram takes 20 instructions.
     #[inline]
-    fn look<'a, T>(&'a self, peek: bool, mut look: impl FnMut(&Datagram) -> T + 'a) -> impl Future<Output = io::Result<T>> + 'a {
-        poll_fn(move |cx| self.poll_look(cx, peek, &mut look))
+    fn look<'a, const PEEK: bool, T>(&'a self, mut look: impl FnMut(&Datagram) -> T + 'a) -> impl Future<Output = io::Result<T>> + 'a {
+        poll_fn(move |cx| self.poll_look::<PEEK, _>(cx, &mut look))
     }
 
     #[inline]
-    pub(crate) fn poll_look<T>(&self, cx: &Context<'_>, peek: bool, look: impl FnOnce(&Datagram) -> T) -> Poll<io::Result<T>> {
-        self.shared.with(|core| match core.receive(self.id, peek, look) {
-            Ok(Some(seen)) => Poll::Ready(Ok(seen)),
-            Err(error) => Poll::Ready(Err(error)),
-            Ok(None) => {
-                core.wait_to_read(self.id, cx.waker());
-                Poll::Pending
-            }
-        })
+    pub(crate) fn poll_look<const PEEK: bool, T>(&self, cx: &Context<'_>, look: impl FnOnce(&Datagram) -> T) -> Poll<io::Result<T>> {
+        self.shared.with(|core| core.receive::<PEEK, _>(self.id, Some(cx.waker()), look))
     }
 }
 
