@@ -4,6 +4,7 @@ mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
 mod face;
+mod inlet;
 mod octets;
 mod passing;
 mod shared;
@@ -29,6 +30,7 @@ use face::Face;
 use sockets::Sockets;
 use waking::Woken;
 
+pub(crate) use inlet::Inlet;
 pub(crate) use octets::Octets;
 pub(crate) use passing::Outgoing;
 pub(crate) use shared::{Clock, Shared, asked_here};

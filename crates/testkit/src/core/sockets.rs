@@ -2,13 +2,14 @@
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 use std::task::{Poll, Waker};
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{NodeId, Ring};
 
 use super::waking::{Waiters, Woken};
-use super::{Core, Parcel};
+use super::{Core, Inlet, Parcel};
 use crate::trace::Lost;
 
 /// A socket, until it is closed.
@@ -74,6 +75,7 @@ pub(crate) struct SocketState {
     /// The bytes of the datagrams in `inbox`.
     pub(super) held: usize,
     readers: Waiters,
+    inlet: Arc<Inlet>,
     /// What IP told about something that was sent, until the program is told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
@@ -104,7 +106,22 @@ impl SocketState {
 
     #[inline]
     pub(super) fn wake_readers(&mut self, woken: &mut Woken) {
+        if self.inlet.set_busy() {
+            self.readers.first_waits();
+        }
         self.readers.wake(woken);
+    }
+
+    /// A task waits until there is something to read.
+    #[inline(never)]
+    fn wait(&mut self, waker: &Waker) {
+        if self.inlet.set_busy() {
+            self.readers.first_waits();
+        }
+        self.readers.wait(waker);
+        if let Some(first) = self.readers.first() {
+            self.inlet.keep(first);
+        }
     }
 
     pub(super) fn die(&mut self, at: Instant, woken: &mut Woken) {
@@ -165,8 +182,8 @@ impl Core {
             port => port,
         };
         let local = SocketAddr::new(ip, port);
-        let (readers, inbox) = (Waiters::default(), Ring::new());
-        let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
+        let (readers, inlet, inbox) = (Waiters::default(), Arc::default(), Ring::new());
+        let state = SocketState { host, local, peer: None, inbox, held: 0, readers, inlet, refused: false, may_broadcast: false, died: None };
         let id = self.sockets.insert(state);
         self.hosts[host.index()].ports.entry((six, port)).or_default().push(id);
         self.hosts[host.index()].plain = None;
@@ -236,6 +253,10 @@ impl Core {
         Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
     }
 
+    pub(crate) fn inlet_of(&self, id: SocketId) -> Arc<Inlet> {
+        Arc::clone(&self.sockets.get(id).inlet)
+    }
+
     pub(crate) fn local_of(&self, id: SocketId) -> SocketAddr {
         self.sockets.get(id).local
     }
@@ -262,7 +283,7 @@ impl Core {
 
     /// A line for each socket that a task waits for.
     pub(crate) fn waits(&self) -> Vec<String> {
-        let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty());
+        let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty() || socket.inlet.is_waited_for());
         let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local));
         #[cfg(feature = "tcp")]
         let lines = lines.chain(self.tcp_waits());
@@ -290,11 +311,14 @@ impl Core {
         }
         let Some(datagram) = socket.inbox.pop() else {
             if let Some(waker) = waker {
-                socket.readers.wait(waker);
+                socket.wait(waker);
             }
             return Poll::Pending;
         };
         socket.held -= datagram.len;
+        if socket.inbox.is_empty() && socket.readers.first().is_some() {
+            socket.inlet.set_quiet();
+        }
         let seen = look(&datagram);
         self.spare.put(datagram.parcel);
         Poll::Ready(Ok(seen))
@@ -323,6 +347,6 @@ impl Core {
 
     /// Somebody wants to be woken when the socket becomes readable.
     pub(crate) fn wait_to_read(&mut self, id: SocketId, waker: &Waker) {
-        self.sockets.get_mut(id).readers.wait(waker);
+        self.sockets.get_mut(id).wait(waker);
     }
 }

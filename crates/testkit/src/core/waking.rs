@@ -35,6 +35,18 @@ impl Waiters {
         }
     }
 
+    /// The first one, whether it waits or was woken.
+    #[inline]
+    pub(super) const fn first(&self) -> Option<&Waker> {
+        self.first.as_ref()
+    }
+
+    /// The first one waits again.
+    #[inline]
+    pub(super) const fn first_waits(&mut self) {
+        self.first_waits = true;
+    }
+
     pub(super) const fn is_empty(&self) -> bool {
         !self.first_waits && self.others.is_empty()
     }

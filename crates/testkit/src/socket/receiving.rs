@@ -227,6 +227,9 @@ impl UdpSocket {
 
     #[inline]
     pub(crate) fn poll_look<const PEEK: bool, T>(&self, cx: &Context<'_>, look: impl FnOnce(&Datagram) -> T) -> Poll<io::Result<T>> {
+        if !self.inlet.is_busy() && self.shared.is_at_hand() && self.inlet.waits_again(cx.waker()) {
+            return Poll::Pending;
+        }
         self.shared.with(|core| core.receive::<PEEK, _>(self.id, Some(cx.waker()), look))
     }
 }
