@@ -11,7 +11,7 @@ use std::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::context;
-use crate::core::{Shared, TimerId, asked_here};
+use crate::core::{Registered, Shared, TimerId, asked_here, registered};
 
 /// The time since the run began.
 ///
@@ -60,13 +60,6 @@ pub struct Sleep {
     shared: Arc<Shared>,
     deadline: Instant,
     timer: Option<(TimerId, Registered)>,
-}
-
-/// The waker that a timer has, by the addresses of its parts. They are those of no other waker as long as the timer keeps it.
-type Registered = [usize; 2];
-
-fn registered(waker: &Waker) -> Registered {
-    [waker.data().addr(), std::ptr::from_ref(waker.vtable()).addr()]
 }
 
 impl Sleep {

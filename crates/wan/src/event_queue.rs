@@ -173,7 +173,7 @@ impl<E: Event> EventQueue<E> {
     }
 
     /// Takes the first event if it is not later than `now`, and hands it on. That is asked for in one place for both kinds of queue, so that it is compiled into the loop of
-    /// its caller, and only what is asked for of an event is read: it took 60 instructions off an arrival.
+    /// its caller, and only the fields of an event that it asks for are read: it took 60 instructions off an arrival.
     #[inline(always)]
     pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(E) -> T) -> Option<T> {
         let place = if self.in_order {

@@ -3,6 +3,8 @@
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::task::Waker;
 
+use super::waking::registered;
+
 /// What a socket knows without the state of its run. A task that reads in a loop asks once more after each datagram, in vain; to take the state for that took
 /// 25 instructions more, and 3 % of the time of a datagram.
 ///
@@ -10,7 +12,7 @@ use std::task::Waker;
 #[derive(Debug, Default)]
 pub(crate) struct Inlet {
     state: AtomicU8,
-    /// The waker that the socket keeps, by the addresses of its parts: those of no other waker as long as it is kept.
+    /// The waker that the socket keeps, as [`Registered`](super::waking::Registered).
     known: [AtomicUsize; 2],
 }
 
@@ -25,7 +27,7 @@ impl Inlet {
     /// The task of that waker waits, if there is nothing to read and the socket keeps this waker. Says whether that is so.
     #[inline]
     pub(crate) fn waits_again(&self, waker: &Waker) -> bool {
-        let is_known = self.known.iter().zip(parts(waker)).all(|(known, part)| known.load(Ordering::Relaxed) == part);
+        let is_known = self.known.iter().zip(registered(waker)).all(|(known, part)| known.load(Ordering::Relaxed) == part);
         if is_known {
             self.state.store(WAITED_FOR, Ordering::Relaxed);
         }
@@ -40,7 +42,7 @@ impl Inlet {
 
     /// The socket keeps another waker.
     pub(super) fn keep(&self, waker: &Waker) {
-        for (known, part) in self.known.iter().zip(parts(waker)) {
+        for (known, part) in self.known.iter().zip(registered(waker)) {
             known.store(part, Ordering::Relaxed);
         }
     }
@@ -63,8 +65,4 @@ impl Inlet {
         self.state.store(BUSY, Ordering::Relaxed);
         is_waited_for
     }
-}
-
-fn parts(waker: &Waker) -> [usize; 2] {
-    [waker.data().addr(), std::ptr::from_ref(waker.vtable()).addr()]
 }

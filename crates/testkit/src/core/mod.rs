@@ -38,6 +38,7 @@ pub(crate) use sockets::{Datagram, SocketId};
 #[cfg(feature = "tcp")]
 pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
 pub(crate) use timers::{TimerId, Timers};
+pub(crate) use waking::{Registered, registered};
 
 pub(crate) struct Core {
     pub(crate) plan: AddressPlan,

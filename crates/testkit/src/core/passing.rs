@@ -206,6 +206,7 @@ impl Core {
     }
 
     #[inline(always)]
+    #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only a segment is taken out of its parcel"))]
     fn arrive(&mut self, host: NodeId, at: cohaptic_units::Instant, mut parcel: Box<Parcel>, marked: bool, from: NodeId) -> Result<(), Lost> {
         #[cfg(feature = "tcp")]
         if parcel.addresses.kind == Kind::Segment {

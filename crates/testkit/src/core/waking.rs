@@ -2,6 +2,13 @@
 
 use std::task::{RawWakerVTable, Waker};
 
+/// A waker, by the addresses of its parts. They are those of no other waker as long as it is kept.
+pub(crate) type Registered = [usize; 2];
+
+pub(crate) fn registered(waker: &Waker) -> Registered {
+    [waker.data().addr(), std::ptr::from_ref(waker.vtable()).addr()]
+}
+
 /// The wakers of tasks that wait for one thing.
 #[derive(Debug, Default)]
 pub(super) struct Waiters {
