@@ -13,7 +13,7 @@ use cohaptic_wan::NodeId;
 
 use crate::address::ToSocketAddrs;
 use crate::context;
-use crate::core::{Shared, SocketId};
+use crate::core::{Inlet, Shared, SocketId};
 
 /// A UDP socket of a host of the running test bed: the methods of tokio's, with the same meaning.
 ///
@@ -32,6 +32,7 @@ use crate::core::{Shared, SocketId};
 pub struct UdpSocket {
     shared: Arc<Shared>,
     id: SocketId,
+    inlet: Arc<Inlet>,
     options: options::Options,
 }
 
@@ -53,8 +54,9 @@ impl UdpSocket {
         let mut core = shared.lock();
         core.check_up(host)?;
         let id = core.bind(host, address)?;
+        let inlet = core.inlet_of(id);
         drop(core);
-        Ok(Self { shared, id, options: options::Options::default() })
+        Ok(Self { shared, id, inlet, options: options::Options::default() })
     }
 
     /// The address at which it is bound.

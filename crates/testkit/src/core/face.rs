@@ -13,8 +13,11 @@ pub(crate) struct Face {
     /// How often tasks were polled since it last passed, as far as they are counted here.
     #[cfg(feature = "tokio")]
     polled: AtomicU64,
-    /// How often tasks may be polled at one instant; calls may be ten times as many.
+    /// How often tasks may be polled at one instant.
+    #[cfg(feature = "tokio")]
     patience: u64,
+    /// How many calls there may be at one instant.
+    most_calls: u64,
 }
 
 impl Face {
@@ -24,7 +27,9 @@ impl Face {
             calls: AtomicU64::new(0),
             #[cfg(feature = "tokio")]
             polled: AtomicU64::new(0),
+            #[cfg(feature = "tokio")]
             patience,
+            most_calls: patience.saturating_mul(10),
         }
     }
 
@@ -57,11 +62,17 @@ impl Face {
     /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass.
     #[inline]
     pub(crate) fn note_call(&self) {
-        let calls = self.calls.load(Ordering::Relaxed) + 1;
-        self.calls.store(calls, Ordering::Relaxed);
-        if calls > self.patience.saturating_mul(10) {
+        if !self.count_call() {
             self.lose_patience();
         }
+    }
+
+    /// As [`Face::note_call`]; says whether there have not been too many calls.
+    #[inline]
+    pub(super) fn count_call(&self) -> bool {
+        let calls = self.calls.load(Ordering::Relaxed).wrapping_add(1);
+        self.calls.store(calls, Ordering::Relaxed);
+        calls <= self.most_calls
     }
 
     #[cold]

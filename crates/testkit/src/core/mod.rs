@@ -4,17 +4,19 @@ mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
 mod face;
+mod inlet;
 mod octets;
 mod passing;
 mod shared;
 mod sockets;
 #[cfg(feature = "tcp")]
 mod tcp;
+mod timers;
 mod waking;
 
 use std::collections::BTreeMap;
+use std::net::Ipv4Addr;
 use std::sync::Arc;
-use std::task::Waker;
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, NodeId, Path};
@@ -28,12 +30,15 @@ use face::Face;
 use sockets::Sockets;
 use waking::Woken;
 
+pub(crate) use inlet::Inlet;
 pub(crate) use octets::Octets;
 pub(crate) use passing::Outgoing;
-pub(crate) use shared::{Clock, Shared};
+pub(crate) use shared::{Clock, Shared, asked_here};
 pub(crate) use sockets::{Datagram, SocketId};
 #[cfg(feature = "tcp")]
 pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
+pub(crate) use timers::{TimerId, Timers};
+pub(crate) use waking::{Registered, registered};
 
 pub(crate) struct Core {
     pub(crate) plan: AddressPlan,
@@ -51,6 +56,10 @@ pub(crate) struct Core {
     face: Arc<Face>,
     /// Which run it is the state of.
     run: u64,
+    /// The same number as long as the time is that of the clock: then a task takes the state without another question. Else 0.
+    at_hand: u64,
+    /// Whether it goes back to where other threads find it.
+    is_from_home: bool,
 }
 
 pub(crate) type Parcel = wire::Parcel<Ends>;
@@ -78,6 +87,8 @@ impl Core {
             tcp: tcp::Tcp::new(seed, names.len()),
             woken: Woken::default(),
             run: 0,
+            at_hand: 0,
+            is_from_home: false,
         }
     }
 
@@ -137,47 +148,6 @@ impl Core {
     }
 }
 
-/// A timer: its deadline, and a number that makes it different from others with the same one.
-pub(crate) type TimerId = (Instant, u64);
-
-/// Timers, in the order in which they go off: by deadline, then by when they were set.
-#[derive(Debug, Default)]
-pub(crate) struct Timers {
-    wakers: BTreeMap<TimerId, Waker>,
-    set: u64,
-}
-
-impl Timers {
-    pub(crate) fn set(&mut self, deadline: Instant, waker: Waker) -> TimerId {
-        let id = (deadline, self.set);
-        self.set += 1;
-        self.wakers.insert(id, waker);
-        id
-    }
-
-    /// Sees to it that another one is woken.
-    pub(crate) fn renew(&mut self, id: TimerId, waker: &Waker) {
-        if let Some(known) = self.wakers.get_mut(&id) {
-            known.clone_from(waker);
-        }
-    }
-
-    pub(crate) fn cancel(&mut self, id: TimerId) {
-        self.wakers.remove(&id);
-    }
-
-    pub(crate) fn next(&self) -> Option<Instant> {
-        self.wakers.first_key_value().map(|((deadline, _), _)| *deadline)
-    }
-
-    /// Takes out those that are due.
-    pub(crate) fn fire(&mut self, now: Instant, woken: &mut Woken) {
-        while let Some(first) = self.wakers.first_entry().filter(|first| first.key().0 <= now) {
-            woken.wake(first.remove());
-        }
-    }
-}
-
 /// A host.
 #[derive(Debug, Default)]
 struct HostState {
@@ -186,8 +156,9 @@ struct HostState {
     is_idle: bool,
     /// The sockets of a port, by version (6 or not) and port.
     ports: BTreeMap<(bool, u16), Vec<SocketId>>,
-    /// The port and the socket of the last plain datagram, until a socket of the host is bound, connected or closed: see [`Core::arrive`].
-    plain: Option<(u16, SocketId)>,
+    /// The address and port to which the last plain datagram went, and its socket, until a socket of the host is bound, connected or closed, or the host is down or has other
+    /// addresses: see [`Core::arrive`].
+    plain: Option<(Ipv4Addr, u16, SocketId)>,
     /// The port that is given next to a socket that asks for none.
     next_port: u16,
 }
@@ -252,6 +223,7 @@ impl Core {
     /// The host has other addresses from now on.
     pub(crate) fn change_addresses(&mut self, host: NodeId) -> address::Addresses {
         self.wire.note(Happening::Readdressed(host));
+        self.hosts[host.index()].plain = None;
         self.plan.change(host)
     }
 }

@@ -1,11 +1,12 @@
 //! What packets carry, in memory that is used again.
 
+use std::net::{Ipv4Addr, SocketAddrV4};
 use std::ops::Deref;
 
 use bytes::Bytes;
 
 use super::Parcel;
-use super::ends::Ends;
+use super::ends::{Ends, Kind};
 
 /// What a packet carries.
 #[derive(Clone, Debug)]
@@ -63,6 +64,7 @@ impl Octets {
     #[inline]
     fn refill(&mut self, bytes: &[u8]) {
         match self {
+            Self::Own(octets) if octets.len() == bytes.len() => octets.copy_from_slice(bytes),
             Self::Own(octets) => {
                 octets.clear();
                 octets.extend_from_slice(bytes);
@@ -84,9 +86,10 @@ impl Spare {
     const LONGEST: usize = 2048;
 
     /// A parcel with a copy of what a program sends.
-    #[inline]
+    #[inline(always)]
     pub(super) fn copied(&mut self, addresses: Ends, bytes: &[u8], ecn_capable: bool) -> Box<Parcel> {
-        let Some(mut parcel) = self.0.pop() else { return boxed(addresses, Octets::Own(bytes.to_vec()), ecn_capable) };
+        // The addresses are given to no call, so that they are written once.
+        let mut parcel = self.0.pop().unwrap_or_else(empty);
         (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);
         parcel.bytes.refill(bytes);
         parcel
@@ -95,7 +98,7 @@ impl Spare {
     /// A parcel of anything else.
     #[cfg(feature = "tcp")]
     pub(super) fn wrapped(&mut self, addresses: Ends, bytes: Bytes, ecn_capable: bool) -> Box<Parcel> {
-        let Some(mut parcel) = self.0.pop() else { return boxed(addresses, bytes.into(), ecn_capable) };
+        let mut parcel = self.0.pop().unwrap_or_else(empty);
         *parcel = Parcel { addresses, bytes: bytes.into(), ecn_capable };
         parcel
     }
@@ -113,14 +116,16 @@ impl Spare {
     }
 }
 
+/// A new parcel, of which all is to be written.
 #[cold]
-fn boxed(addresses: Ends, bytes: Octets, ecn_capable: bool) -> Box<Parcel> {
-    Box::new(Parcel { addresses, bytes, ecn_capable })
+#[inline(never)]
+fn empty() -> Box<Parcel> {
+    let nowhere = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);
+    Box::new(Parcel { addresses: Ends::of_v4(nowhere, nowhere, Kind::Datagram), bytes: Octets::default(), ecn_capable: false })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::ends::Kind;
     use super::*;
 
     fn ends() -> Ends {
@@ -128,7 +133,7 @@ mod tests {
     }
 
     fn parcel_of(bytes: Octets) -> Box<Parcel> {
-        boxed(ends(), bytes, false)
+        Box::new(Parcel { addresses: ends(), bytes, ecn_capable: false })
     }
 
     #[test]

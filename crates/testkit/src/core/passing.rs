@@ -32,8 +32,10 @@ impl Core {
     #[inline]
     pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
         self.note_call();
-        let Some((path, addresses)) = self.plainly(id, &outgoing) else { return self.send_any(id, outgoing) };
-        let parcel = self.spare.copied(addresses, outgoing.bytes, outgoing.ecn_capable);
+        let Outgoing { to, bytes, ecn_capable } = outgoing;
+        // By its parts, so that nothing is written to memory for it.
+        let Some((path, addresses)) = self.plainly(id, to, bytes.len()) else { return self.send_any(id, to, bytes, ecn_capable) };
+        let parcel = self.spare.copied(addresses, bytes, ecn_capable);
         self.offer(path, parcel);
         Ok(())
     }
@@ -41,31 +43,29 @@ impl Core {
     /// The way and the ends of a datagram with which nothing is special: over IPv4, from a socket without an error that is bound to all addresses, to another host.
     /// What else may be said of a datagram need not be asked then: it took more time than all the rest of sending.
     #[inline(always)]
-    fn plainly(&self, id: SocketId, outgoing: &Outgoing<'_>) -> Option<(Path, Ends)> {
+    fn plainly(&self, id: SocketId, to: Option<&SocketAddr>, len: usize) -> Option<(Path, Ends)> {
         let socket = self.sockets.get(id);
-        let (SocketAddr::V4(local), SocketAddr::V4(to)) = (&socket.local, outgoing.to.or(socket.peer.as_ref())?) else { return None };
+        let (SocketAddr::V4(local), SocketAddr::V4(to)) = (&socket.local, to.or(socket.peer.as_ref())?) else { return None };
         let receiver = self.plan.owner_of_v4(*to.ip())?;
-        let is_plain = local.ip().is_unspecified()
-            && receiver != socket.host
-            && to.port() != 0
-            && outgoing.bytes.len() <= LONGEST[0]
-            && !socket.refused
-            && socket.died.is_none();
+        let is_special = !local.ip().is_unspecified() || receiver == socket.host || to.port() == 0 || len > LONGEST[0] || socket.has_error();
+        if is_special {
+            return None;
+        }
         let from = SocketAddrV4::new(self.plan.of(socket.host).v4, local.port());
-        is_plain.then(|| (Path { from: socket.host, to: receiver }, Ends::of_v4(from, *to, Kind::Datagram)))
+        Some((Path { from: socket.host, to: receiver }, Ends::of_v4(from, *to, Kind::Datagram)))
     }
 
     #[inline(never)]
-    fn send_any(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
+    fn send_any(&mut self, id: SocketId, to: Option<&SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<()> {
         let socket = self.sockets.get(id);
-        if socket.died.is_some() || socket.refused {
+        if socket.has_error() {
             return Err(self.error_of(id));
         }
         let (host, local, may_broadcast) = (socket.host, socket.local, socket.may_broadcast);
-        let Some(mut to) = outgoing.to.copied().or(socket.peer) else {
+        let Some(mut to) = to.copied().or(socket.peer) else {
             return refuse(io::ErrorKind::NotConnected, "the socket is not connected; use `send_to`, or `connect` before".into());
         };
-        let len = outgoing.bytes.len();
+        let len = bytes.len();
         if to.is_ipv6() != local.is_ipv6() {
             return refuse(io::ErrorKind::InvalidInput, format!("a socket at {local} cannot reach {to}, which is of the other version of IP"));
         }
@@ -85,7 +85,7 @@ impl Core {
         }
         let from = SocketAddr::new(self.source(host, local.ip(), to.ip())?, local.port());
         let addresses = Ends::new(from, to, Kind::Datagram);
-        let parcel = self.spare.copied(addresses, outgoing.bytes, outgoing.ecn_capable);
+        let parcel = self.spare.copied(addresses, bytes, ecn_capable);
         if to.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
             if !may_broadcast {
                 return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
@@ -136,10 +136,9 @@ impl Core {
 impl HostState {
     /// The socket for which a datagram is with which nothing is special: over IPv4, to the only socket of its port, which hears all addresses and everybody.
     #[inline]
-    fn plain_socket_for(&self, own: Ipv4Addr, ends: &Ends) -> Option<SocketId> {
-        let (address, port) = ends.receiver_v4()?;
-        let id = self.plain.filter(|(plain, _)| *plain == port)?.1;
-        (own == address).then_some(id)
+    fn plain_socket_for(&self, ends: &Ends) -> Option<SocketId> {
+        let (address, port, id) = self.plain?;
+        (ends.receiver_v4() == Some((address, port))).then_some(id)
     }
 }
 
@@ -169,14 +168,12 @@ impl Core {
     /// is special, and else into `other`. One that is lost in a cut is gone. Says whether there was one.
     #[inline(always)]
     fn take_plain(&mut self, other: &mut Option<(Path, cohaptic_units::Instant, Box<Parcel>)>) -> bool {
-        let Self { wire, hosts, plan, sockets, settings, woken, .. } = self;
+        let Self { wire, hosts, sockets, settings, woken, .. } = self;
         let taken = wire.take_plain(|path, at, is_cut, parcel| {
             if is_cut {
                 return;
             }
-            let host = &hosts[path.to.index()];
-            let id = if host.is_down { None } else { host.plain_socket_for(plan.of(path.to).v4, &parcel.addresses) };
-            let Some(id) = id.filter(|_| parcel.addresses.kind == Kind::Datagram) else {
+            let Some(id) = hosts[path.to.index()].plain_socket_for(&parcel.addresses).filter(|_| parcel.addresses.kind == Kind::Datagram) else {
                 *other = Some((path, at, parcel));
                 return;
             };
@@ -209,6 +206,7 @@ impl Core {
     }
 
     #[inline(always)]
+    #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only a segment is taken out of its parcel"))]
     fn arrive(&mut self, host: NodeId, at: cohaptic_units::Instant, mut parcel: Box<Parcel>, marked: bool, from: NodeId) -> Result<(), Lost> {
         #[cfg(feature = "tcp")]
         if parcel.addresses.kind == Kind::Segment {
@@ -219,7 +217,7 @@ impl Core {
         if self.hosts[host.index()].is_down {
             return Err(Lost::HostDown);
         }
-        let Some(id) = self.hosts[host.index()].plain_socket_for(self.plan.of(host).v4, &parcel.addresses) else {
+        let Some(id) = self.hosts[host.index()].plain_socket_for(&parcel.addresses) else {
             return self.arrive_anywhere(host, at, parcel, marked, from);
         };
         self.arrive_at(id, at, parcel, marked)
@@ -265,10 +263,10 @@ impl Core {
     /// Remembers the socket for which a packet was, if all plain datagrams to its port are for it.
     fn note_plain(&mut self, host: NodeId, id: SocketId) {
         let SocketState { local: SocketAddr::V4(local), peer: None, .. } = self.sockets.get(id) else { return };
-        let state = &mut self.hosts[host.index()];
+        let (state, own) = (&mut self.hosts[host.index()], self.plan.of(host).v4);
         let is_only = state.ports.get(&(false, local.port())).is_some_and(|bound| bound.len() == 1);
         if is_only && local.ip().is_unspecified() {
-            state.plain = Some((local.port(), id));
+            state.plain = Some((own, local.port(), id));
         }
     }
 

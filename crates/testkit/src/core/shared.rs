@@ -22,6 +22,8 @@ thread_local! {
     /// The state of the run whose tasks this thread polls, unless it is in use. Nothing is to be dropped with the thread, so that no access asks whether that was
     /// done: [`Stay`] has taken the state away before.
     static HERE: Cell<ManuallyDrop<Option<Box<Core>>>> = const { Cell::new(ManuallyDrop::new(None)) };
+    /// The run whose state this thread has for itself, at the time of its clock; 0 if there is none. In use or not, no other thread has the state then.
+    static AT_HAND: Cell<u64> = const { Cell::new(0) };
 }
 
 #[inline]
@@ -32,6 +34,15 @@ fn take_here() -> Option<Box<Core>> {
 #[inline]
 fn put_here(core: Box<Core>) {
     HERE.with(|here| here.set(ManuallyDrop::new(Some(core))));
+}
+
+/// The time, if the state of a run lies here at the time of its clock: for a program that asks. `None` too if it has asked too often; see [`Face::note_call`].
+#[inline]
+pub(crate) fn asked_here() -> Option<Instant> {
+    let core = take_here()?;
+    let now = (core.at_hand != 0 && core.face.count_call()).then(|| core.now());
+    put_here(core);
+    now
 }
 
 /// The state machine, and how what belongs to tasks gets at it.
@@ -46,9 +57,11 @@ pub(crate) struct Shared {
     run: u64,
     /// Whether the state stays in `home`, where other threads see it.
     stays: bool,
-    /// Whether the time is that of tokio's clock, so that it need not be asked: while the executor of this crate polls, only a task of its own could move it.
+    /// Whether the time is that of the clock, so that it need not be asked. Tokio's clock is asked unless the executor of this crate polls: then only a task of its own could
+    /// move it.
     #[cfg(feature = "tokio")]
     is_synced: AtomicBool,
+    #[cfg_attr(not(feature = "tokio"), expect(dead_code, reason = "there is one clock"))]
     clock: Clock,
     face: Arc<Face>,
 }
@@ -70,7 +83,8 @@ impl Shared {
         static RUNS: AtomicU64 = AtomicU64::new(1);
         let run = RUNS.fetch_add(1, Ordering::Relaxed);
         let (face, stays) = (Arc::clone(&core.face), core.is_looked_at());
-        let home = Mutex::new(Some(Box::new(Core { run, ..core })));
+        let at_hand = if matches!(clock, Clock::Own) { run } else { 0 };
+        let home = Mutex::new(Some(Box::new(Core { run, at_hand, ..core })));
         Self {
             home,
             returned: Condvar::new(),
@@ -78,22 +92,36 @@ impl Shared {
             run,
             stays,
             #[cfg(feature = "tokio")]
-            is_synced: AtomicBool::new(false),
+            is_synced: AtomicBool::new(matches!(clock, Clock::Own)),
             clock,
             face,
         }
     }
 
+    /// Whether this thread has the state for itself, at the time of its clock: until the executor goes on, nothing happens but by this thread.
+    #[inline]
+    pub(crate) fn is_at_hand(&self) -> bool {
+        AT_HAND.get() == self.run
+    }
+
+    #[inline]
+    fn is_synced(&self) -> bool {
+        #[cfg(feature = "tokio")]
+        return self.is_synced.load(Ordering::Relaxed);
+        #[cfg(not(feature = "tokio"))]
+        true
+    }
+
     /// The time.
     #[inline]
     pub(crate) fn now(&self) -> Instant {
-        match self.clock {
-            Clock::Own => self.face.now(),
-            #[cfg(feature = "tokio")]
-            Clock::Tokio { .. } if self.is_synced.load(Ordering::Relaxed) => self.face.now(),
-            #[cfg(feature = "tokio")]
-            Clock::Tokio { .. } => self.lock().now(),
-        }
+        if self.is_synced() { self.face.now() } else { self.asked_now() }
+    }
+
+    /// The time of a clock that must be asked.
+    #[inline(never)]
+    fn asked_now(&self) -> Instant {
+        self.lock().now()
     }
 
     /// Follows tokio's clock, and then not until the guard is dropped. `moved` is where the clock stands, if that is known: to ask it takes four atomic operations.
@@ -104,6 +132,10 @@ impl Shared {
         }
         self.is_synced.store(true, Ordering::Relaxed);
         let mut core = self.lock();
+        core.at_hand = self.run;
+        if !core.is_from_home {
+            AT_HAND.set(self.run);
+        }
         if let Some(moved) = moved.filter(|moved| *moved > core.now()) {
             core.pass_until(moved);
         }
@@ -146,28 +178,56 @@ impl Shared {
     /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.
     #[inline]
     pub(crate) fn lock(&self) -> Guard<'_> {
-        // The guard is made at the end: one that is handed on is written in parts and read as a whole, for which a processor waits.
-        #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
-        let (mut core, is_from_home) = match take_here() {
-            Some(core) if core.run == self.run => (core, false),
-            other => (self.take_leaving(other), true),
-        };
-        #[cfg(feature = "tokio")]
-        if let Clock::Tokio { origin } = self.clock
-            && !self.is_synced.load(Ordering::Relaxed)
-        {
-            follow(&mut core, origin, is_from_home);
-        }
-        Guard { core: Some(core), shared: self, is_from_home }
+        Guard { core: Some(self.take()), shared: self }
     }
 
-    /// Takes the state from where others find it. That of another run, which may lie here, stays here.
-    #[cold]
-    fn take_leaving(&self, other: Option<Box<Core>>) -> Box<Core> {
-        if let Some(other) = other {
-            put_here(other);
+    #[inline(always)]
+    fn take(&self) -> Box<Core> {
+        match take_here() {
+            Some(core) if core.at_hand == self.run => core,
+            other => self.fetch(other),
         }
-        self.take_home()
+    }
+
+    #[inline(always)]
+    fn put(&self, core: Box<Core>) {
+        if core.is_from_home || core.woken.is_any() {
+            self.give_back(core);
+        } else {
+            put_here(core);
+        }
+    }
+
+    /// Asks the state, as [`Shared::lock`] gives it, and gives it back without a call. Nothing has the address of the guard, so that it lies in registers: together this
+    /// took more than half off the instructions of a guard.
+    #[inline(always)]
+    pub(crate) fn with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> T {
+        let mut lent = Lent { core: Some(self.take()), shared: self };
+        ask(lent.core.as_mut().expect("it is there until it is given back"))
+    }
+
+    /// Takes the state from where others find it, unless it lay here, and lets time pass to that of the clock. The state of another run, which may lie here, stays here.
+    #[inline(never)]
+    fn fetch(&self, here: Option<Box<Core>>) -> Box<Core> {
+        #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
+        let mut core = match here {
+            Some(core) if core.run == self.run => core,
+            other => {
+                if let Some(other) = other {
+                    put_here(other);
+                }
+                let mut core = self.take_home();
+                core.is_from_home = true;
+                core
+            }
+        };
+        #[cfg(feature = "tokio")]
+        if !self.is_synced()
+            && let Clock::Tokio { origin } = self.clock
+        {
+            follow(&mut core, origin);
+        }
+        core
     }
 
     /// Waits until nobody else has the state.
@@ -213,15 +273,30 @@ impl Shared {
     /// The state lies with this thread, unless others look at it.
     pub(crate) fn bring_here(&self) {
         if !self.stays {
-            put_here(self.take_home());
+            let core = self.take_home();
+            AT_HAND.set(core.at_hand);
+            put_here(core);
         }
     }
 
     /// Others may have the state.
     pub(crate) fn bring_home(&self) {
         if let Some(core) = take_here() {
+            AT_HAND.set(0);
             self.return_home(core);
         }
+    }
+
+    /// Gives the state back, and then wakes the tasks that could not be woken while it was held.
+    #[inline(never)]
+    fn give_back(&self, mut core: Box<Core>) {
+        let woken = core.woken.take();
+        if std::mem::take(&mut core.is_from_home) {
+            self.return_home(core);
+        } else {
+            put_here(core);
+        }
+        woken.into_iter().for_each(Waker::wake);
     }
 
     fn return_home(&self, core: Box<Core>) {
@@ -247,6 +322,8 @@ pub(crate) struct Synced<'a>(&'a Shared);
 impl Drop for Synced<'_> {
     fn drop(&mut self) {
         self.0.is_synced.store(false, Ordering::Relaxed);
+        self.0.lock().at_hand = 0;
+        AT_HAND.set(0);
     }
 }
 
@@ -254,16 +331,14 @@ impl Drop for Synced<'_> {
 pub(crate) struct Guard<'a> {
     core: Option<Box<Core>>,
     shared: &'a Shared,
-    /// Whether it goes back where others find it.
-    is_from_home: bool,
 }
 
 /// Lets time pass up to that of tokio's clock.
 #[cfg(feature = "tokio")]
 #[inline(never)]
-fn follow(core: &mut Core, origin: tokio::time::Instant, is_from_home: bool) {
+fn follow(core: &mut Core, origin: tokio::time::Instant) {
     // Once the run is over, tokio's clock is that of the machine; and other threads have that one always.
-    if !is_from_home || tokio::runtime::Handle::try_current().is_ok() {
+    if !core.is_from_home || tokio::runtime::Handle::try_current().is_ok() {
         let now = Instant::ZERO + origin.elapsed();
         if now > core.now() {
             core.pass_until(now);
@@ -288,22 +363,24 @@ impl std::ops::DerefMut for Guard<'_> {
 }
 
 impl Drop for Guard<'_> {
-    #[inline(always)]
     fn drop(&mut self) {
-        let Some(mut core) = self.core.take() else { return };
-        let woken = if core.woken.is_any() { core.woken.take() } else { Vec::new() };
-        if self.is_from_home {
-            self.shared.return_home(core);
-        } else {
-            put_here(core);
-        }
-        if !woken.is_empty() {
-            wake_all(woken);
+        if let Some(core) = self.core.take() {
+            self.shared.put(core);
         }
     }
 }
 
-#[cold]
-fn wake_all(woken: Vec<Waker>) {
-    woken.into_iter().for_each(Waker::wake);
+/// The state for one question: a [`Guard`] that is compiled into the function that asks.
+struct Lent<'a> {
+    core: Option<Box<Core>>,
+    shared: &'a Shared,
+}
+
+impl Drop for Lent<'_> {
+    #[inline(always)]
+    fn drop(&mut self) {
+        if let Some(core) = self.core.take() {
+            self.shared.put(core);
+        }
+    }
 }

@@ -2,13 +2,14 @@
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
-use std::task::Waker;
+use std::sync::Arc;
+use std::task::{Poll, Waker};
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{NodeId, Ring};
 
 use super::waking::{Waiters, Woken};
-use super::{Core, Parcel};
+use super::{Core, Inlet, Parcel};
 use crate::trace::Lost;
 
 /// A socket, until it is closed.
@@ -22,6 +23,7 @@ pub(crate) struct Datagram {
     parcel: Box<Parcel>,
     /// When it arrived.
     pub(crate) at: Instant,
+    len: usize,
     /// Whether an active queue marked it.
     marked: bool,
 }
@@ -73,6 +75,7 @@ pub(crate) struct SocketState {
     /// The bytes of the datagrams in `inbox`.
     pub(super) held: usize,
     readers: Waiters,
+    inlet: Arc<Inlet>,
     /// What IP told about something that was sent, until the program is told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
@@ -83,19 +86,42 @@ impl SocketState {
     /// Takes a datagram into the buffer, which holds this number of bytes.
     #[inline(always)]
     pub(super) fn keep(&mut self, at: Instant, parcel: Box<Parcel>, marked: bool, room: usize, woken: &mut Woken) -> Result<(), Lost> {
-        let held = self.held + parcel.bytes.len();
+        let len = parcel.bytes.len();
+        let held = self.held + len;
         if held > room {
             return Err(Lost::BufferFull);
         }
         self.held = held;
-        self.inbox.push(|| Datagram { parcel, at, marked });
+        self.inbox.push(|| Datagram { parcel, at, len, marked });
         self.wake_readers(woken);
         Ok(())
     }
 
+    /// Whether the next call gives an error.
+    #[inline]
+    pub(super) const fn has_error(&self) -> bool {
+        // Both are looked at, where a branch for each would cost more.
+        self.died.is_some() | self.refused
+    }
+
     #[inline]
     pub(super) fn wake_readers(&mut self, woken: &mut Woken) {
+        if self.inlet.set_busy() {
+            self.readers.first_waits();
+        }
         self.readers.wake(woken);
+    }
+
+    /// A task waits until there is something to read.
+    #[inline(never)]
+    fn wait(&mut self, waker: &Waker) {
+        if self.inlet.set_busy() {
+            self.readers.first_waits();
+        }
+        self.readers.wait(waker);
+        if let Some(first) = self.readers.first() {
+            self.inlet.keep(first);
+        }
     }
 
     pub(super) fn die(&mut self, at: Instant, woken: &mut Woken) {
@@ -109,17 +135,18 @@ impl SocketState {
 /// All sockets that have not been closed.
 #[derive(Debug, Default)]
 pub(super) struct Sockets {
-    places: Vec<Option<SocketState>>,
+    /// In boxes, so that a place is found by a shift.
+    places: Vec<Option<Box<SocketState>>>,
     free: Vec<usize>,
 }
 
 impl Sockets {
     fn insert(&mut self, state: SocketState) -> SocketId {
         if let Some(place) = self.free.pop() {
-            self.places[place] = Some(state);
+            self.places[place] = Some(Box::new(state));
             return SocketId(place);
         }
-        self.places.push(Some(state));
+        self.places.push(Some(Box::new(state)));
         SocketId(self.places.len() - 1)
     }
 
@@ -134,7 +161,7 @@ impl Sockets {
     }
 
     pub(super) fn all_of(&mut self, host: NodeId) -> impl Iterator<Item = &mut SocketState> {
-        self.places.iter_mut().flatten().filter(move |socket| socket.host == host)
+        self.places.iter_mut().flatten().map(Box::as_mut).filter(move |socket| socket.host == host)
     }
 }
 
@@ -155,8 +182,8 @@ impl Core {
             port => port,
         };
         let local = SocketAddr::new(ip, port);
-        let (readers, inbox) = (Waiters::default(), Ring::new());
-        let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
+        let (readers, inlet, inbox) = (Waiters::default(), Arc::default(), Ring::new());
+        let state = SocketState { host, local, peer: None, inbox, held: 0, readers, inlet, refused: false, may_broadcast: false, died: None };
         let id = self.sockets.insert(state);
         self.hosts[host.index()].ports.entry((six, port)).or_default().push(id);
         self.hosts[host.index()].plain = None;
@@ -226,6 +253,10 @@ impl Core {
         Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
     }
 
+    pub(crate) fn inlet_of(&self, id: SocketId) -> Arc<Inlet> {
+        Arc::clone(&self.sockets.get(id).inlet)
+    }
+
     pub(crate) fn local_of(&self, id: SocketId) -> SocketAddr {
         self.sockets.get(id).local
     }
@@ -252,7 +283,7 @@ impl Core {
 
     /// A line for each socket that a task waits for.
     pub(crate) fn waits(&self) -> Vec<String> {
-        let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty());
+        let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty() || socket.inlet.is_waited_for());
         let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local));
         #[cfg(feature = "tcp")]
         let lines = lines.chain(self.tcp_waits());
@@ -263,20 +294,34 @@ impl Core {
         &mut self.sockets.get_mut(id).may_broadcast
     }
 
-    /// Looks at the next datagram, which is taken out unless it is only peeked at; `None` if there is none.
+    /// Looks at the next datagram, which is taken out unless it is only peeked at. If there is none, the waker is woken when there is one.
     #[inline]
-    pub(crate) fn receive<T>(&mut self, id: SocketId, peek: bool, look: impl FnOnce(&Datagram) -> T) -> io::Result<Option<T>> {
+    pub(crate) fn receive<const PEEK: bool, T>(
+        &mut self,
+        id: SocketId,
+        waker: Option<&Waker>,
+        look: impl FnOnce(&Datagram) -> T,
+    ) -> Poll<io::Result<T>> {
         let socket = self.sockets.get_mut(id);
-        if socket.died.is_some() || socket.refused {
-            return Err(self.error_of(id));
+        if socket.has_error() {
+            return Poll::Ready(Err(self.error_of(id)));
         }
-        let Some(datagram) = socket.inbox.front() else { return Ok(None) };
-        let seen = look(datagram);
-        if !peek && let Some(datagram) = socket.inbox.pop() {
-            socket.held -= datagram.bytes().len();
-            self.spare.put(datagram.parcel);
+        if PEEK && let Some(datagram) = socket.inbox.front() {
+            return Poll::Ready(Ok(look(datagram)));
         }
-        Ok(Some(seen))
+        let Some(datagram) = socket.inbox.pop() else {
+            if let Some(waker) = waker {
+                socket.wait(waker);
+            }
+            return Poll::Pending;
+        };
+        socket.held -= datagram.len;
+        if socket.inbox.is_empty() && socket.readers.first().is_some() {
+            socket.inlet.set_quiet();
+        }
+        let seen = look(&datagram);
+        self.spare.put(datagram.parcel);
+        Poll::Ready(Ok(seen))
     }
 
     /// The error that a socket has, which is taken out.
@@ -292,7 +337,7 @@ impl Core {
     /// Whether [`Core::receive`] has something to say.
     pub(crate) fn is_readable(&self, id: SocketId) -> bool {
         let socket = self.sockets.get(id);
-        socket.died.is_some() || socket.refused || !socket.inbox.is_empty()
+        socket.has_error() || !socket.inbox.is_empty()
     }
 
     /// Takes an error out.
@@ -302,6 +347,6 @@ impl Core {
 
     /// Somebody wants to be woken when the socket becomes readable.
     pub(crate) fn wait_to_read(&mut self, id: SocketId, waker: &Waker) {
-        self.sockets.get_mut(id).readers.wait(waker);
+        self.sockets.get_mut(id).wait(waker);
     }
 }

@@ -2,6 +2,13 @@
 
 use std::task::{RawWakerVTable, Waker};
 
+/// A waker, by the addresses of its parts. They are those of no other waker as long as it is kept.
+pub(crate) type Registered = [usize; 2];
+
+pub(crate) fn registered(waker: &Waker) -> Registered {
+    [waker.data().addr(), std::ptr::from_ref(waker.vtable()).addr()]
+}
+
 /// The wakers of tasks that wait for one thing.
 #[derive(Debug, Default)]
 pub(super) struct Waiters {
@@ -35,6 +42,18 @@ impl Waiters {
         }
     }
 
+    /// The first one, whether it waits or was woken.
+    #[inline]
+    pub(super) const fn first(&self) -> Option<&Waker> {
+        self.first.as_ref()
+    }
+
+    /// The first one waits again.
+    #[inline]
+    pub(super) const fn first_waits(&mut self) {
+        self.first_waits = true;
+    }
+
     pub(super) const fn is_empty(&self) -> bool {
         !self.first_waits && self.others.is_empty()
     }
@@ -54,8 +73,13 @@ impl Waiters {
             woken.wake_by_ref(first);
         }
         if !self.others.is_empty() {
-            self.others.drain(..).for_each(|waker| woken.wake(waker));
+            self.wake_others(woken);
         }
+    }
+
+    #[inline(never)]
+    fn wake_others(&mut self, woken: &mut Woken) {
+        self.others.drain(..).for_each(|waker| woken.wake(waker));
     }
 }
 
@@ -79,8 +103,13 @@ impl Woken {
         if self.own.is_some_and(|own| std::ptr::eq(own, waker.vtable())) {
             waker.wake_by_ref();
         } else {
-            self.later.push(waker.clone());
+            self.wake_later(waker);
         }
+    }
+
+    #[inline(never)]
+    fn wake_later(&mut self, waker: &Waker) {
+        self.later.push(waker.clone());
     }
 
     /// Wakes now if it may.

@@ -53,13 +53,13 @@ impl AsyncUdpSocket for VirtualSocket {
         let mut count = 0;
         for (buffer, meta) in buffers.iter_mut().zip(metas) {
             let filled = if count == 0 {
-                match self.socket.poll_look(cx, false, |datagram| fill(buffer, datagram)) {
+                match self.socket.poll_look::<false, _>(cx, |datagram| fill(buffer, datagram)) {
                     Poll::Ready(filled) => filled?,
                     Poll::Pending => return Poll::Pending,
                 }
             } else {
                 // An error comes again with the next call.
-                let Ok(filled) = self.socket.try_look(false, |datagram| fill(buffer, datagram)) else { break };
+                let Ok(filled) = self.socket.try_look::<false, _>(|datagram| fill(buffer, datagram)) else { break };
                 filled
             };
             *meta = filled;

@@ -1,5 +1,6 @@
 //! What a socket sends.
 
+use std::future::{Future, poll_fn};
 use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
@@ -33,9 +34,9 @@ impl UdpSocket {
     /// # Errors
     ///
     /// As [`UdpSocket::send`]; [`io::ErrorKind::HostUnreachable`] if no host ever had that address.
-    #[expect(clippy::unused_async, reason = "as tokio's")]
-    pub async fn send_to(&self, bytes: &[u8], to: impl ToSocketAddrs) -> io::Result<usize> {
-        self.send_now(Some(&to.to_socket_addr()?), bytes, false)
+    #[inline]
+    pub fn send_to<'a>(&'a self, bytes: &'a [u8], to: impl ToSocketAddrs + 'a) -> impl Future<Output = io::Result<usize>> + 'a {
+        poll_fn(move |_| Poll::Ready(self.send_now(Some(&to.to_socket_addr()?), bytes, false)))
     }
 
     /// Sends to an address; gives the length.
@@ -65,10 +66,11 @@ impl UdpSocket {
         Poll::Ready(self.try_send_to(bytes, to))
     }
 
+    #[inline]
     pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
         let ecn_capable = ecn_capable || self.options.is_ecn_capable();
         let outgoing = Outgoing { to, bytes, ecn_capable };
-        self.shared.lock().send(self.id, outgoing)?;
+        self.shared.with(|core| core.send(self.id, outgoing))?;
         Ok(bytes.len())
     }
 

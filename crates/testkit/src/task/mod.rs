@@ -32,7 +32,7 @@ pub(crate) struct Task {
     program: RefCell<Option<Program>>,
     /// It was stopped while it was polled.
     is_doomed: Cell<bool>,
-    /// The waker of its last poll.
+    /// Its waker, the same in each poll.
     waker: RefCell<Option<Waker>>,
 }
 
@@ -50,26 +50,32 @@ impl Task {
         })
     }
 
+    /// Gives it its waker.
+    pub(crate) fn is_woken_by(&self, waker: Waker) {
+        *self.waker.borrow_mut() = Some(waker);
+    }
+
     /// Polls the program; ready when it is over, or was stopped.
+    #[inline]
     pub(crate) fn poll(&self, cx: &mut Context<'_>) -> Poll<()> {
-        {
-            let mut waker = self.waker.borrow_mut();
-            if !waker.as_ref().is_some_and(|known| known.will_wake(cx.waker())) {
-                *waker = Some(cx.waker().clone());
-            }
-        }
         let mut program = self.program.borrow_mut();
         let Some(future) = program.as_mut() else { return Poll::Ready(()) };
         self.pulse.begins(self.number);
         let polled = context::on_host(self.host, || future.as_mut().poll(cx));
         self.pulse.returns();
-        if polled.is_ready() || self.is_doomed.get() {
-            let over = program.take();
-            drop(program);
-            context::on_host(self.host, || drop(over));
-            return Poll::Ready(());
+        if polled.is_pending() && !self.is_doomed.get() {
+            return Poll::Pending;
         }
-        Poll::Pending
+        let over = program.take();
+        drop(program);
+        self.drop_there(over);
+        Poll::Ready(())
+    }
+
+    /// Drops the program as one of its host.
+    #[inline(never)]
+    fn drop_there(&self, program: Option<Program>) {
+        context::on_host(self.host, || drop(program));
     }
 
     /// Drops the program; a task that stops itself is dropped when it next waits.
@@ -79,7 +85,7 @@ impl Task {
         let Ok(mut program) = self.program.try_borrow_mut() else { return };
         let over = program.take();
         drop(program);
-        context::on_host(self.host, || drop(over));
+        self.drop_there(over);
         let waker = self.waker.borrow_mut().take();
         if let Some(waker) = waker {
             waker.wake();

@@ -27,7 +27,7 @@ pub(crate) const LIMIT: Duration = Duration::from_secs(60);
 /// What runs, for the thread that watches. The thread that runs writes, and the other one only reads.
 #[derive(Debug, Default)]
 pub(crate) struct Pulse {
-    /// How often something has begun or returned.
+    /// How often something has begun, or time has passed.
     turns: AtomicU64,
     /// The number of what runs now, from 1; 0 if nothing does.
     running: AtomicUsize,
@@ -70,7 +70,6 @@ impl Pulse {
     #[inline]
     pub(crate) fn returns(&self) {
         self.running.store(0, Ordering::Relaxed);
-        self.turns();
     }
 
     /// Time passes, or the executor does something else.

@@ -185,6 +185,9 @@ fn a_host_that_moves_is_reached_at_its_new_address_alone() {
             let (any, fixed) = (b.bind("0.0.0.0:5").unwrap(), b.bind((b.ip(), 6)).unwrap());
             let from_a = a.bind("0.0.0.0:1").unwrap();
             let before = b.addresses();
+            // From now on it is known where datagrams to that port go.
+            from_a.send_to(b"first", (before.v4, 5)).await.unwrap();
+            assert_eq!(any.recv(&mut [0; 20]).await.unwrap(), 5);
             from_a.send_to(b"on its way", (before.v4, 5)).await.unwrap();
             let after = b.change_addresses();
             assert_eq!((after.v4.to_string(), after.v6.to_string()), ("10.0.0.4".into(), "fd00::4".into()));

@@ -18,3 +18,4 @@ mod sockets;
 mod stall;
 #[cfg(feature = "strategies")]
 mod strategies;
+mod waiting;

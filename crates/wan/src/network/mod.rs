@@ -415,8 +415,8 @@ impl<P: Clone> Network<P> {
         let Self { now, traffic, lines, .. } = self;
         // Without inner events nobody is woken, and no packet has another line before it.
         let taken = traffic.pending.take_due(*now, |Pending { at, offered, entered, turn, path, payload, .. }| {
-            lines.links[turn.link().index()].deliver(*entered, *at);
-            payload.take().map(|payload| take(MereArrival { path: *path, offered: *offered, at: *at, payload }))
+            lines.links[turn.link().index()].deliver(entered, at);
+            payload.map(|payload| take(MereArrival { path, offered, at, payload }))
         });
         taken.flatten()
     }

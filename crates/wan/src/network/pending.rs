@@ -45,7 +45,7 @@ impl SizeAndMarks {
     pub(super) const DISCARDED_ON_ARRIVAL: u32 = 1 << 6;
 
     pub(super) fn new(info: PacketInfo) -> Self {
-        let size = u32::try_from(info.size.get()).unwrap_or(u32::MAX).min((1 << 24) - 1);
+        let size = u32::try_from(info.size.get().min((1 << 24) - 1)).unwrap_or(u32::MAX);
         Self(Self::NOTHING.0 | size << 8).with(Self::ECN_CAPABLE, info.ecn_capable)
     }
 
@@ -149,12 +149,12 @@ impl Turn {
 impl<P> Event for Pending<P> {
     type Key = (Instant, Turn, u64, Path, u8);
 
-    #[inline]
+    #[inline(always)]
     fn at(&self) -> Instant {
         self.at
     }
 
-    #[inline]
+    #[inline(always)]
     fn key(&self) -> Self::Key {
         (self.at, self.turn, self.sequence, self.path, self.size.copy())
     }
