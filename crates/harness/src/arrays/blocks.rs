@@ -293,7 +293,7 @@ impl Blocks {
 
     /// Everybody computes forces by the law and moves to the next tick. `grasped` says what devices hold.
     ///
-    /// The law is chosen at each tick, so that all loops over ticks, which are compiled for each kind of bodies and of observers, share what is compiled for each law.
+    /// The law is chosen at each tick: all loops over ticks, one for each kind of bodies and of observers, then call one piece of code for each law.
     #[inline(always)]
     pub(super) fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>, grasped: &impl Grasped) -> Moved<L> {
         law.visit(Advance::<_, L> { blocks: self, processor, grasped })
