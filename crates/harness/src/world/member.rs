@@ -69,7 +69,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         match self.peer.role() {
             // The role is known where this is compiled, which took 2 % of the instructions of all measures.
             Role::Copy if self.peer.rotation().is_none() => self.advance_as(now, span, commanded, (row, Role::Copy), observer, None),
-            role => self.advance_otherwise(now, span, commanded, (row, role), observer),
+            role @ (Role::Copy | Role::Client { .. }) => self.advance_otherwise(now, span, commanded, (row, role), observer),
         }
     }
 
