@@ -43,6 +43,8 @@ mod matrix;
 mod mean_square;
 mod monodromy;
 mod network;
+#[cfg(test)]
+mod paper_scene;
 mod parts;
 mod pieces;
 mod proof;

@@ -26,7 +26,7 @@ pub(super) trait Bodies<const A: usize, const P: usize> {
     /// How they go.
     fn blocks(&self) -> &Blocks;
 
-    /// How they go, to change what moves them.
+    /// [`Bodies::blocks`], to change what moves them.
     fn blocks_mut(&mut self) -> &mut Blocks;
 
     /// What a peer sends now.

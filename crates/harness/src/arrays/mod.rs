@@ -53,8 +53,6 @@ use translations::Translations;
 use turning::{PAIRS, TurningBlocks};
 
 /// A run of a scene of that shape with that law, to its end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
-///
-/// Compiled here for all observers: most of the code of this crate is in the loops of the laws.
 pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dyn FnMut(Instant) -> bool) -> Summary {
     let [summary] = run_lanes([scene], shape, [law], keep_going);
     summary
@@ -146,7 +144,7 @@ enum Samples<const P: usize, const L: usize> {
 }
 
 impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'a, B, A, P, L> {
-    /// The scenes at their beginning, all of that shape; `devices` as for [`Blocks::new`].
+    /// The scenes at their beginning, all of that shape; `devices` as for [`Bodies::new`].
     fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L], devices: Option<&[DeviceChoice]>) -> Self {
         let members = 0..shape.peers;
         let bodies = bodies_of::<B, A, P, L>(&scenes, &members, &laws, devices);

@@ -13,6 +13,7 @@ use super::blocks::{Blocks, Grasped, Moved};
 use super::bodies::{Bodies, SeenPlace};
 use super::lanes::{Lanes, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
+use super::processor::on_widest;
 use super::samples::Sample;
 use super::translations::Translations;
 use super::turn::{Computed, Handles, Shared, Steps, Turn};
@@ -279,7 +280,7 @@ impl Bodies<3, PAIRS> for TurningBlocks {
 
     #[inline(always)]
     fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>) -> Moved<L> {
-        let size = processor.dispatch(Turned(self));
+        let size = on_widest(processor, Turned(self));
         let mut moved = self.translations.advance_grasped::<L>(processor, law, &Points(&self.coupling));
         let size = size & self.blocks().goes_on;
         if !size.0.iter().sum::<f64>().is_finite() {

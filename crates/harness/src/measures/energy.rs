@@ -60,8 +60,8 @@ impl PeerEnergy {
         let positions = row.before.position.iter().zip(row.after.position);
         let velocities = row.before.velocity.iter().zip(row.after.velocity);
         let forces = row.coordination_force.iter().zip(row.held_force);
-        for ((positions, (before, after)), (coordination_force, held_force)) in positions.zip(velocities).zip(forces) {
-            let moved = positions.1 - positions.0;
+        for (((from, to), (before, after)), (coordination_force, held_force)) in positions.zip(velocities).zip(forces) {
+            let moved = to - from;
             energy -= coordination_force * moved;
             if share > 0.0 {
                 energy -= share * (held_force * moved - 0.5 * self.mass * (after * after - before * before));

@@ -3,15 +3,8 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::paper_scene::PAPER;
 use crate::{Method, analyse, mean_square};
-
-const SCENE: &str = r#"
-    scene        = { duration = "1s", count = 3 }
-    object       = { mass = 0.45 }
-    coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
-    peer         = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
-    link         = { delay = "8ms" }
-"#;
 
 fn texts(overrides: &[&str]) -> Vec<String> {
     overrides.iter().map(|text| (*text).to_owned()).collect()
@@ -19,7 +12,7 @@ fn texts(overrides: &[&str]) -> Vec<String> {
 
 fn try_family(overrides: &[&str], keys: &[&str]) -> Result<Family, FamilyError> {
     let keys = keys.iter().map(|key| KeyRange::parse(key).unwrap()).collect();
-    Family::new(SCENE, "family.toml".as_ref(), &texts(overrides), keys)
+    Family::new(PAPER, "family.toml".as_ref(), &texts(overrides), keys)
 }
 
 #[track_caller]

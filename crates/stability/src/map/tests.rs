@@ -1,18 +1,11 @@
 //! Maps of scenes, and lines in maps made up.
 
 use super::*;
-
-const SCENE: &str = r#"
-    scene        = { duration = "1s", count = 3 }
-    object       = { mass = 0.45 }
-    coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
-    peer         = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
-    link         = { delay = "8ms" }
-"#;
+use crate::paper_scene::PAPER;
 
 fn family(keys: &[&str]) -> Family {
     let keys = keys.iter().map(|key| KeyRange::parse(key).unwrap()).collect();
-    Family::new(SCENE, "map.toml".as_ref(), &[], keys).unwrap()
+    Family::new(PAPER, "map.toml".as_ref(), &[], keys).unwrap()
 }
 
 const KEYS: [&str; 2] = ["coordination.stiffness=0..6000", "peer.coupling.stiffness=500..20000"];

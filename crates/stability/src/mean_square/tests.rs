@@ -7,16 +7,9 @@ use cohaptic_scene::Scene;
 use faer::Mat;
 
 use super::*;
+use crate::paper_scene::PAPER;
 
 use crate::{Method, analyse};
-
-const PAPER: &str = r#"
-    scene        = { duration = "1s", count = 3 }
-    object       = { mass = 0.45 }
-    coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
-    peer         = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
-    link         = { delay = "8ms" }
-"#;
 
 /// The widest bounds, relative to the radius, of up to five peers whose samples may arrive at many ticks; two or three of one delay have 10⁻⁹ to 10⁻⁸.
 const BOUND: f64 = 1e-7;

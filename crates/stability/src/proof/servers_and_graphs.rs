@@ -6,16 +6,9 @@ use cohaptic_scene::Scene;
 
 use super::server::Server;
 use super::*;
+use crate::paper_scene::PAPER;
 use crate::structure::{Contacts, Structure};
 use crate::{Family, KeyRange, Method, Unwatched, Verdict, analyse, bounded_radius, monodromy};
-
-const SCENE: &str = r#"
-    scene = { duration = "1s", count = 3 }
-    object = { mass = 0.45 }
-    coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
-    peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
-    link = { delay = "8ms" }
-"#;
 
 const SERVER: &str = "coordination.strategy=\"client-server\"";
 const OBJECT: &str = "coordination.client-server.returns=\"object\"";
@@ -37,7 +30,7 @@ fn file() -> std::path::PathBuf {
 }
 
 fn scene(set: &[&str]) -> Scene {
-    Scene::parse(SCENE, &file(), &owned(set)).unwrap_or_else(|error| panic!("{set:?}: {error}"))
+    Scene::parse(PAPER, &file(), &owned(set)).unwrap_or_else(|error| panic!("{set:?}: {error}"))
 }
 
 fn graph(weights: &str) -> String {
@@ -46,7 +39,7 @@ fn graph(weights: &str) -> String {
 
 fn family(set: &[&str], keys: &[&str]) -> Family {
     let keys = keys.iter().map(|key| KeyRange::parse(key).unwrap()).collect();
-    Family::new(SCENE, &file(), &owned(set), keys).unwrap_or_else(|error| panic!("{set:?}: {error}"))
+    Family::new(PAPER, &file(), &owned(set), keys).unwrap_or_else(|error| panic!("{set:?}: {error}"))
 }
 
 /// The verdict on one scene, by other means than a proof's.
@@ -239,7 +232,7 @@ fn repeated_eigenvalues_of_a_graph_are_one_part() {
     let scene = scene(&["scene.count=8", &graph("cube")]);
     let spectrum = crate::Graph::from(&**scene.topology.as_ref().unwrap()).enclosed_spectrum(&scene.without_topology()).unwrap();
     assert_eq!((spectrum.others.len(), spectrum.degree), (3, Some(3.0)), "-1, -1/3 three times, 1/3 three times: {spectrum:?}");
-    let nearly = Scene::parse(SCENE, &file(), &owned(&[&graph("nearly-regular"), PD])).unwrap();
+    let nearly = Scene::parse(PAPER, &file(), &owned(&[&graph("nearly-regular"), PD])).unwrap();
     assert_eq!(analyse(&nearly, Method::Reduced).unwrap().verdict(), Verdict::Stable, "row sums that differ by a rounding are analysed as if equal");
 }
 
@@ -250,7 +243,7 @@ fn what_is_not_followed_is_refused_by_name() {
     let (gain, damping) = ("coordination.stiffness=100..200", "coordination.damping=1..2");
     let (coupling, mass) = ("peer.coupling.stiffness=10..20", "object.mass=0.4..0.5");
     let line = |set: &[&str], key: &str| {
-        let family = Family::new(SCENE, &file(), &owned(set), vec![KeyRange::parse(key).unwrap()]);
+        let family = Family::new(PAPER, &file(), &owned(set), vec![KeyRange::parse(key).unwrap()]);
         family.map_or_else(|error| error.to_string(), |family| ProvenLine::prove(&family, 1.0, &Unwatched).unwrap_err().to_string())
     };
     let wall = "object.enclosure={ min = -0.1, max = 0.1, stiffness = 500.0, damping = 1.0 }";

@@ -19,6 +19,7 @@ use super::quads::{self, Quad};
 use super::rows::Rows;
 use super::{Sample, count};
 use crate::arrays::bodies::Bodies;
+use crate::arrays::processor::on_widest;
 use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
 use crate::summary::AccessSummary;
@@ -140,7 +141,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 sends.fill(false);
                 senders.iter().for_each(|sender| sends[*sender] = true);
                 let (receivers, sends) = (receivers.clone(), &**sends);
-                processor.dispatch(DirectSending { peers, receivers, links, senders, sends, sent, in_flight, at: (tick, now) });
+                on_widest(processor, DirectSending { peers, receivers, links, senders, sends, sent, in_flight, at: (tick, now) });
             }
             Links::Carried(carrier) => carrier.send(now, senders, sent),
             Links::Stepped(links, info) => {
