@@ -100,3 +100,29 @@ impl Accumulator for FeltForce {
         self.0.value(figure)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_scene::{MeasureSettings, Scene};
+
+    use super::*;
+
+    #[test]
+    fn the_first_force_of_a_peer_is_no_jump() {
+        let text = r#"
+            scene = { duration = "1s", count = 2 }
+            object = { mass = 1.0 }
+            coordination = { strategy = "average-position", stiffness = 1.0, damping = 1.0, update = "8ms" }
+            peer = { device = { mass = 1.0, damping = 1.0 }, coupling = { stiffness = 1.0, damping = 1.0 } }
+            link = { delay = "8ms" }
+        "#;
+        let scene = Scene::parse(text, "scene.toml".as_ref(), &[]).unwrap();
+        let mut force = Force::new(&Asked { scene: &scene, names: &[], settings: &MeasureSettings::default() });
+        for (peer, components) in [(0, [5.0, 1.0]), (1, [-9.0, 0.0]), (0, [4.0, 3.0])] {
+            force.add(peer, &components);
+        }
+        assert_eq!(force.value(Figure::Jump), Some(2.0));
+        assert_eq!(force.value(Figure::Peak), Some(9.0));
+        assert_eq!(force.value(Figure::Rms), Some((132.0_f64 / 6.0).sqrt()));
+    }
+}
