@@ -222,7 +222,7 @@ const ASKED_OF_MEASURES: f64 = 2.0;
 fn threads(work: Work) {
     println!("## One scene on many threads\n");
     println!(
-        "The mesh with jitter and loss on one thread and on two, by the wall clock, the least of {} rounds, or of five with 1000 peers; beyond two by a model (`benches/src/scaling.rs`): work",
+        "The mesh with jitter and loss on one thread and on two, by the wall clock, the least of {} rounds, or of five with 1000 peers. Beyond two by a model (`benches/src/scaling.rs`): work",
         work.rounds
     );
     println!(
