@@ -321,6 +321,7 @@ macro_rules! observe_by_field {
             self.$field.wants_holds()
         }
 
+        #[inline(always)]
         fn on_tick(&mut self, row: &$crate::TickRow<'_>) -> Result<(), Self::Error> {
             let result = self.$field.on_tick(row);
             ($map)(self, result)
@@ -331,11 +332,13 @@ macro_rules! observe_by_field {
             ($map)(self, result)
         }
 
+        #[inline(always)]
         fn on_step(&mut self, row: &$crate::StepRow<'_>) -> Result<(), Self::Error> {
             let result = self.$field.on_step(row);
             ($map)(self, result)
         }
 
+        #[inline(always)]
         fn on_instant(&mut self, row: &$crate::InstantRow) -> Result<(), Self::Error> {
             let result = self.$field.on_instant(row);
             ($map)(self, result)
@@ -372,7 +375,8 @@ pub(crate) use observe_by_field;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Ended;
 
-/// Any observer. The loops of a run are compiled for this one alone: a call through a table for each row costs less than the row.
+/// Any observer. The loops of a run are compiled for this one, and once more for measures: a call through a table for each row costs less than the row, but a
+/// tenth of the instructions of all measures of three peers.
 pub(crate) type AnyObserver<'o> = dyn Observer<Error = Ended> + 'o;
 
 /// An observer without its error, which is kept.
@@ -384,6 +388,11 @@ pub(crate) struct Erased<'o, O: Observer> {
 impl<'o, O: Observer> Erased<'o, O> {
     /// What `run` gives, or the error with which the observer has ended it.
     pub(crate) fn run<T>(observer: &'o mut O, run: impl FnOnce(&mut AnyObserver<'_>) -> Result<T, Ended>) -> Result<T, O::Error> {
+        Self::run_as_itself(observer, |observer| run(observer))
+    }
+
+    /// [`Erased::run`], where `run` is compiled for this observer.
+    pub(crate) fn run_as_itself<T>(observer: &'o mut O, run: impl FnOnce(&mut Self) -> Result<T, Ended>) -> Result<T, O::Error> {
         let mut erased = Self { observer, error: None };
         let result = run(&mut erased);
         match (result, erased.error) {

@@ -7,6 +7,7 @@ use cohaptic_units::Instant;
 
 use crate::arrays::{self, Onlooker, Shape, Ticks};
 use crate::disturbance::Disturbance;
+use crate::measures::Measures;
 use crate::observer::{AnyObserver, Ended, Erased, INSTANTS_BETWEEN_QUESTIONS, InstantRow, Observer};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
@@ -34,6 +35,17 @@ impl<'a> Simulation<'a> {
 
     pub(crate) const fn disturbed(scene: &'a Scene, model: Model, disturbance: Disturbance) -> Self {
         Self { scene, model, disturbance: Some(disturbance), threads: 1, strategies: FromScene }
+    }
+
+    /// [`Simulation::run`] with loops that are compiled for measures, where it needs events.
+    pub(crate) fn run_measured(&self, measures: &mut Measures) -> Summary {
+        let plan = Plan::new(self.scene, self.model, measures.wants_ticks());
+        if self.arrays(&plan, Watch::of(measures)).is_some() {
+            let Ok(summary) = self.run(measures);
+            return summary;
+        }
+        let Ok(summary) = Erased::run_as_itself(measures, |observer| self.run_with_events(&plan, observer));
+        summary
     }
 }
 
@@ -94,12 +106,13 @@ impl<'a, S: Strategies> Simulation<'a, S> {
             };
             // The counters of queues that have looked ahead are those of a later instant. Rows have none, and are not given twice.
             let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
-            return if has_looked_too_far { self.run_with_events(&plan, &mut Asked(observer)) } else { Ok(summary) };
+            let asked: &mut AnyObserver<'_> = &mut Asked(observer);
+            return if has_looked_too_far { self.run_with_events(&plan, asked) } else { Ok(summary) };
         }
         self.run_with_events(&plan, observer)
     }
 
-    fn run_with_events(&self, plan: &Plan, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
+    fn run_with_events(&self, plan: &Plan, observer: &mut (impl Observer<Error = Ended> + ?Sized)) -> Result<Summary, Ended> {
         match plan.axes {
             Axes::One => run_to_end(self.world::<1, _>(plan, NoRemote), observer),
             Axes::Two => run_to_end(self.world::<2, _>(plan, NoRemote), observer),
@@ -160,7 +173,10 @@ impl Observer for Asked<'_, '_> {
     }
 }
 
-fn run_to_end<const A: usize, S: Strategy<A>>(mut world: World<A, S>, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
+fn run_to_end<const A: usize, S: Strategy<A>>(
+    mut world: World<A, S>,
+    observer: &mut (impl Observer<Error = Ended> + ?Sized),
+) -> Result<Summary, Ended> {
     let watch = Watch::of(observer);
     loop {
         for _ in 0..INSTANTS_BETWEEN_QUESTIONS {

@@ -106,6 +106,7 @@ impl Accumulator for Ages {
         }
     }
 
+    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         let Receiver { sampled, nanos, instants } = &self.receivers[row.peer];
         let held = sampled.len() as u64;

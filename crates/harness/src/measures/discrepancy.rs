@@ -41,6 +41,7 @@ impl Accumulator for Discrepancy {
         Self { squares: 0.0, count: 0, sketch }
     }
 
+    #[inline]
     fn on_instant(&mut self, row: &InstantRow) {
         self.squares += row.discrepancy * row.discrepancy;
         self.count += 1;

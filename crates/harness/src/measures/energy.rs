@@ -53,7 +53,7 @@ impl PeerEnergy {
     }
 
     /// What the coordination injects into the copy in a step \[J\].
-    #[inline]
+    #[inline(always)]
     fn of_step(&self, row: &StepRow<'_>) -> f64 {
         let mut energy = 0.0;
         let share = if row.own_damping > 0.0 { row.own_damping / (self.damping + row.own_damping) } else { 0.0 };
@@ -75,6 +75,7 @@ impl PeerEnergy {
 }
 
 /// What the coordination injects into the turn of a copy in a step \[J\].
+#[inline(never)]
 fn of_turn(turn: &TurnStepRow, spin: &Spin) -> f64 {
     let TurnStepRow { before, after, travel, held_torque, coordination_torque, own_damping, .. } = turn;
     let mut energy = 0.0;
@@ -115,7 +116,7 @@ impl Accumulator for Energy {
         Self { peers, injected: 0.0, peak: 0.0 }
     }
 
-    #[inline]
+    #[inline(always)]
     fn on_step(&mut self, row: &StepRow<'_>) {
         let peer = &mut self.peers[row.peer];
         let energy = peer.of_step(row);

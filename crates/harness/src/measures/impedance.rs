@@ -56,6 +56,7 @@ impl Accumulator for Impedance {
         Self(Probe::new(asked))
     }
 
+    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         let Some(probe) = self.0.as_mut().filter(|probe| probe.peer == row.peer && probe.from <= row.at) else { return };
         let angle = probe.omega * row.at.as_secs_f64();

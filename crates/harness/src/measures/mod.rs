@@ -39,7 +39,7 @@ use std::time::Duration;
 
 use cohaptic_scene::{Measure, MeasureName, MeasureSettings, Scene};
 
-use crate::{HoldRow, InstantRow, Model, Observer, SendRow, Simulation, StepRow, Summary, TickRow};
+use crate::{HoldRow, InstantRow, Model, NoObserver, Observer, SendRow, Simulation, StepRow, Summary, TickRow};
 
 pub use quantiles::QuantileSketch;
 
@@ -193,6 +193,7 @@ macro_rules! accumulators {
         }
     };
     (forwarded $($field:ident: $kind:ty;)+ => $on:ident $row:ty, $rows:ident) => {
+        #[inline(always)]
         fn $on(&mut self, row: &$row) -> Result<(), Infallible> {
             $(
                 if <$kind>::ROWS.$rows && let Some(accumulator) = &mut self.$field {
@@ -230,9 +231,13 @@ impl Measures {
     /// If the scene needs events and has more than 23,170 peers; see [`crate::too_large`].
     #[must_use]
     pub fn run(scene: &Scene, model: Model) -> (Summary, Vec<MeasuredValue>) {
-        let mut measures = Self::of(scene);
-        let Ok(summary) = Simulation::new(scene, model).run(&mut measures);
-        let values = measures.map(|measures| measures.values(summary.duration)).unwrap_or_default();
+        let simulation = Simulation::new(scene, model);
+        let Some(mut measures) = Self::of(scene) else {
+            let Ok(summary) = simulation.run(&mut NoObserver);
+            return (summary, Vec::new());
+        };
+        let summary = simulation.run_measured(&mut measures);
+        let values = measures.values(summary.duration);
         (summary, values)
     }
 

@@ -25,6 +25,7 @@ impl Accumulator for Settling {
         Self { band: asked.settings.band, since: Some(Instant::ZERO) }
     }
 
+    #[inline]
     fn on_instant(&mut self, row: &InstantRow) {
         if row.discrepancy > self.band {
             self.since = None;

@@ -27,6 +27,7 @@ impl Accumulator for Travel {
         Self { travel, start: asked.scene.peers[travel.peer].position[travel.axis], reached: None }
     }
 
+    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         let MeasureTravel { peer, axis, distance } = self.travel;
         if row.peer == peer && self.reached.is_none() && (row.object.position[axis] - self.start).abs() >= distance {

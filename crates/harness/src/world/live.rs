@@ -12,7 +12,7 @@ use crate::live::{
     Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, PulledDevice, RemotePeers, SampleError, Seat, SeatStats, Transmit, TurnState,
     UnsimulatedDevice,
 };
-use crate::observer::{AnyObserver, Ended};
+use crate::observer::{Ended, Observer};
 use crate::plan::ticking;
 use crate::schedule::Schedule;
 
@@ -79,7 +79,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
     }
 
     /// Everything that happens at [`World::next_instant`], which is `at`.
-    pub(crate) fn happen(&mut self, at: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<Step, Ended> {
+    pub(crate) fn happen(&mut self, at: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Step, Ended> {
         self.remote.undrained = None;
         self.notice_silence(at);
         if at >= self.end {
@@ -264,7 +264,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
         place: usize,
         peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
         axes: usize,
-        observer: &mut AnyObserver<'_>,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended> {
         if let (Some(device), Some(seat)) = (peer.device_mut().hand_mut(), self.seat_mut(place)) {
             let read = device.read(now);

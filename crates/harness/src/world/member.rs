@@ -10,7 +10,7 @@ use cohaptic_units::Instant;
 
 use super::row;
 use crate::disturbance::Disturbance;
-use crate::observer::{AnyObserver, Ended, StepRow, TurnStepRow};
+use crate::observer::{Ended, Observer, StepRow, TurnStepRow};
 use crate::plan::{DeviceChoice, Plan};
 
 /// A peer with its clock.
@@ -64,7 +64,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         span: Duration,
         commanded: [f64; A],
         row: (usize, usize),
-        observer: &mut AnyObserver<'_>,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended> {
         match self.peer.role() {
             // The role is known where this is compiled, which took 2 % of the instructions of all measures.
@@ -81,7 +81,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         span: Duration,
         commanded: [f64; A],
         row: ((usize, usize), Role),
-        observer: &mut AnyObserver<'_>,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended> {
         let turn = self.peer.rotation().map(|rotation| TurnStepRow {
             span,
@@ -103,7 +103,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         span: Duration,
         commanded: [f64; A],
         ((place, axes), role): ((usize, usize), Role),
-        observer: &mut AnyObserver<'_>,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
         turn: Option<TurnStepRow>,
     ) -> Result<(), Ended> {
         let late = std::mem::replace(&mut self.commanded, commanded);

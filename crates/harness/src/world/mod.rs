@@ -20,7 +20,7 @@ use cohaptic_wan::{AccessLine, Fate, LinkModel, MereArrival, Network, NetworkCon
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::observer::{AnyObserver, Ended, HoldRow, InstantRow, SendRow, StateRow, TickRow};
+use crate::observer::{Ended, HoldRow, InstantRow, Observer, SendRow, StateRow, TickRow};
 use crate::plan::Plan;
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
@@ -140,7 +140,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// Everything that happens at the next instant at which a peer ticks, or the end of the scene.
-    pub(crate) fn step(&mut self, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<Step, Ended> {
+    pub(crate) fn step(&mut self, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Step, Ended> {
         let Some(now) = self.schedule.next_instant().filter(|now| *now < self.end) else {
             return self.finish(observer, watch).map(Step::Ended);
         };
@@ -210,7 +210,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// Step 1: those whose time it is send their sample to everybody else, or to their neighbours.
-    fn send(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
+    fn send(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.remote.lead()].tick < self.earliest_send {
             return Ok(());
         }
@@ -288,7 +288,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// Step 2: whatever has arrived is handed to its receiver.
-    fn deliver(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
+    fn deliver(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         self.network.handle_timeout(now).expect("instants come in order");
         let has_mere_arrivals = E::IS_EMPTY && !watch.packets;
         loop {
@@ -334,7 +334,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
 
     /// What has arrived undamaged, with nothing else to happen before it, where nobody looks at packets. It took a tenth of the instructions of ten peers off.
     #[inline(always)]
-    fn deliver_mere_arrivals(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
+    fn deliver_mere_arrivals(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         let arrived = |MereArrival { path, offered, payload, .. }: MereArrival<Handle>| (path, offered, payload);
         while let Some((path, offered, payload)) = self.network.take_mere_arrival(arrived) {
             let to = path.to.index();
@@ -358,7 +358,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// Steps 3 and 4: each peer that ticks computes forces and moves to the next tick.
-    fn compute_and_move(&mut self, now: Instant, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<(), Ended> {
+    fn compute_and_move(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         let lockstep = match &mut self.schedule {
             Schedule::Lockstep { tick, next } => {
                 *next = now.saturating_add(*tick);
@@ -457,7 +457,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// The end of the scene: what has arrived by then is delivered.
-    fn finish(&mut self, observer: &mut AnyObserver<'_>, watch: Watch) -> Result<Ending, Ended> {
+    fn finish(&mut self, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Ending, Ended> {
         self.change(self.end);
         self.deliver(self.end, observer, watch)?;
         Ok(if self.finite { Ending::Complete } else { Ending::Diverged(self.end) })

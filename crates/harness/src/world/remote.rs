@@ -7,7 +7,7 @@ use cohaptic_wan::{Damage, PacketEvent, Path};
 
 use super::DeviceModel;
 use crate::datagrams::Handle;
-use crate::observer::{AnyObserver, Ended};
+use crate::observer::{Ended, Observer};
 
 /// The peers of a running scene that are remote: in other processes, or with their device in somebody's hand.
 ///
@@ -42,7 +42,7 @@ pub(crate) trait Remote<const A: usize> {
         place: usize,
         peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
         axes: usize,
-        observer: &mut AnyObserver<'_>,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended>;
 }
 
@@ -86,7 +86,7 @@ impl<const A: usize> Remote<A> for NoRemote {
         _place: usize,
         _peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
         _axes: usize,
-        _observer: &mut AnyObserver<'_>,
+        _observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended> {
         Ok(())
     }

@@ -4,7 +4,7 @@ use cohaptic_peer::Gains;
 use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
 use cohaptic_scene::Scene;
 
-use crate::observer::{AnyObserver, Ended, TickRow, TurnRow};
+use crate::observer::{Ended, Observer, TickRow, TurnRow};
 use crate::spread::Spread;
 
 /// The attitudes of all copies, and changes of the gains on them.
@@ -49,7 +49,7 @@ impl Turning {
 
 /// Shows a tick of a peer that turns. Apart from the loop over peers, where the larger row would be written for those that do not turn as well.
 #[inline(never)]
-pub(super) fn on_tick(observer: &mut AnyObserver<'_>, tick: TickRow<'_>, rotation: &Rotation) -> Result<(), Ended> {
+pub(super) fn on_tick(observer: &mut (impl Observer<Error = Ended> + ?Sized), tick: TickRow<'_>, rotation: &Rotation) -> Result<(), Ended> {
     observer.on_tick(&TickRow {
         turn: Some(TurnRow {
             object: rotation.copy(),
