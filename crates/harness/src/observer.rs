@@ -90,7 +90,7 @@ pub trait Observer {
 
     /// All peers have computed their forces at an instant at which all of them tick: [`Observer::on_tick`] of each, in one call.
     ///
-    /// A run of which only ticks and instants are wanted calls this where it needs no events; all others call
+    /// A run of which only ticks and instants are wanted calls this where it needs no events and all peers tick together; all others call
     /// [`Observer::on_tick`]. An observer with an `on_ticks` of its own, which may look at less than whole rows, must come to the same with either.
     ///
     /// # Errors

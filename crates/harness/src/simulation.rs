@@ -8,7 +8,7 @@ use cohaptic_units::Instant;
 use crate::arrays::{self, Onlooker, Shape, Ticks};
 use crate::disturbance::Disturbance;
 use crate::measures::Measures;
-use crate::observer::{AnyObserver, Ended, Erased, INSTANTS_BETWEEN_QUESTIONS, InstantRow, Observer};
+use crate::observer::{AnyObserver, Ended, Erased, INSTANTS_BETWEEN_QUESTIONS, InstantRow, Observer, TickRow};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{NoRemote, Remote, Step, Watch, World};
@@ -89,6 +89,18 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         let watch = Watch::of(observer);
         if let Some((shape, law)) = self.arrays(&plan, watch) {
+            if shape.has_windows() {
+                let summary = if watch == Watch::NOTHING {
+                    arrays::run_in_windows(self.scene, (shape, law), &mut |now| observer.keep_going(now))
+                } else {
+                    let mut watching = Watching { observer, watch, result: Ok(()) };
+                    let summary = arrays::run_in_watched_windows(self.scene, (shape, law), &plan, &mut watching);
+                    watching.result?;
+                    summary
+                };
+                // Which tick comes after the one that diverged is known with events. Rows are not given twice.
+                return summary.map_or_else(|| self.run_again(&plan, observer), Ok);
+            }
             let looks_ahead = shape.looks_ahead();
             let summary = if watch == Watch::NOTHING {
                 let threads = self.threads.min(shape.threads().0);
@@ -106,10 +118,15 @@ impl<'a, S: Strategies> Simulation<'a, S> {
             };
             // The counters of queues that have looked ahead are those of a later instant. Rows have none, and are not given twice.
             let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
-            let asked: &mut AnyObserver<'_> = &mut Asked(observer);
-            return if has_looked_too_far { self.run_with_events(&plan, asked) } else { Ok(summary) };
+            return if has_looked_too_far { self.run_again(&plan, observer) } else { Ok(summary) };
         }
         self.run_with_events(&plan, observer)
+    }
+
+    /// Runs with events what the observer has seen in arrays.
+    fn run_again(&self, plan: &Plan, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
+        let asked: &mut AnyObserver<'_> = &mut Asked(observer);
+        self.run_with_events(plan, asked)
     }
 
     fn run_with_events(&self, plan: &Plan, observer: &mut (impl Observer<Error = Ended> + ?Sized)) -> Result<Summary, Ended> {
@@ -144,10 +161,21 @@ struct Watching<'o, 'a> {
 }
 
 impl Onlooker for Watching<'_, '_> {
+    fn wants_ticks(&self) -> bool {
+        self.watch.ticks
+    }
+
     fn on_ticks(&mut self, ticks: &Ticks<'_>) {
         if self.watch.ticks {
             self.result = self.observer.on_ticks(ticks);
         }
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> bool {
+        if self.result.is_ok() {
+            self.result = self.observer.on_tick(row);
+        }
+        self.result.is_ok()
     }
 
     fn on_instant(&mut self, row: &InstantRow) -> bool {

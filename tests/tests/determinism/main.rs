@@ -4,6 +4,7 @@
 mod arrays;
 mod bystander;
 mod changes;
+mod clocks;
 mod models;
 mod threads;
 mod topologies;

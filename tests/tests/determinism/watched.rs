@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_harness::{Ending, InstantRow, Model, Observer, Simulation, Summary, TickRow, Ticks};
+use cohaptic_harness::{Ending, InstantRow, Model, Observer, Simulation, Summary, TickRow, Ticks, same_shape};
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 use cohaptic_tests::{cases, drafts};
@@ -17,8 +17,8 @@ pub(super) struct Keeper {
     /// Wants rows of samples held as well, for which a run has events.
     has_events: bool,
     /// Until when it wants the run to go on, and how many rows it takes before it fails.
-    until: Instant,
-    most_rows: usize,
+    pub(super) until: Instant,
+    pub(super) most_rows: usize,
     rows: Vec<Vec<u64>>,
     called_together: bool,
 }
@@ -99,7 +99,9 @@ pub(super) fn found(scene: &Scene, change: impl Fn(&mut Keeper)) -> Option<Strin
         let mut keeper = Keeper::new(has_events);
         change(&mut keeper);
         let summary: Result<Summary, Full> = Simulation::new(scene, Model::Least).run(&mut keeper);
-        assert_eq!(keeper.called_together, !has_events, "it is run in arrays if it needs no events");
+        let tick_together = scene.peers.iter().all(|peer| peer.clock.offset.is_zero() && peer.clock.drift.parts_per_billion() == 0);
+        assert_eq!(keeper.called_together, tick_together && !has_events, "it is run in arrays if it needs no events");
+        assert!(same_shape(scene, scene), "it is run in arrays");
         (summary, keeper.rows)
     };
     let ((one, rows), (other, expected)) = (run(false), run(true));

@@ -5,9 +5,11 @@
 
 mod block;
 mod law;
+mod rests;
+mod spans;
 
 use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
-use cohaptic_peer::{Contact, Enclosure, HandForce, Motion, Plant, State, StepMap};
+use cohaptic_peer::{Contact, Enclosure, HandForce, Motion, State, StepMap};
 use cohaptic_scene::Scene;
 use pulp::NullaryFnOnce;
 
@@ -20,6 +22,8 @@ pub(super) use block::Block;
 use block::{Forces, Late, RESTING, ZERO_MAP, set_map};
 use law::memory_of_lane;
 pub(super) use law::{LawOfLanes, law_of_lanes};
+pub(super) use rests::Rests;
+use spans::Spans;
 
 /// All bodies on all axes.
 #[derive(Clone, Debug)]
@@ -35,7 +39,10 @@ pub(super) struct Blocks {
     past: Vec<Motions>,
     /// The oldest of those ticks.
     oldest: usize,
-    object_map: StepMap<Lanes>,
+    /// How copies move in a tick, a block of peers after another; one for all if all clocks are equal.
+    object_maps: Vec<StepMap<Lanes>>,
+    /// The maps of each span between two ticks of a peer, if clocks drift.
+    spans: Option<Box<Spans>>,
     /// The forces computed at the latest tick, where anybody applies them a tick late.
     late: Option<Vec<Late>>,
     /// The walls of each run, where any has some.
@@ -101,8 +108,7 @@ impl Blocks {
     /// The bodies of runs of these scenes, all of which have that law, with numbers of their own. `devices` says what stands for the device of each peer, if anybody
     /// looks; otherwise only those move that ever touch their copies.
     pub(super) fn new<const A: usize>(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
-        let tick = scenes[0].peers[0].clock.tick;
-        let step = |plant: Plant, run: usize| plant.step(tick, scenes[run].integrator);
+        let mut spans = Spans::of(places, scenes, A).map(Box::new);
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
         for axis in 0..A {
@@ -122,8 +128,14 @@ impl Blocks {
                     set_map(&mut block.device_map, spot.lane, &RESTING);
                     continue;
                 }
-                let map = step(spec.device.plant(spec.hand.as_ref()), run);
+                let (plant, (short, long)) = (spec.device.plant(spec.hand.as_ref()), spec.clock.spans());
+                let map = plant.step(short, scenes[run].integrator);
                 block.is_tied |= !map.is_free();
+                if let Some(spans) = &mut spans {
+                    let longer = plant.step(long, scenes[run].integrator);
+                    block.is_tied |= !longer.is_free();
+                    spans.set_device(spot, (&map, &longer));
+                }
                 set_map(&mut block.device_map, spot.lane, &map);
                 block.device.velocity.0[spot.lane] = device.velocity[axis];
                 block.coupling.stiffness.0[spot.lane] = config.coupling.stiffness;
@@ -142,7 +154,8 @@ impl Blocks {
             places,
             axes: A,
             blocks,
-            object_map: object_map(scenes),
+            object_maps: object_maps(places, scenes, spans.as_deref()),
+            spans,
             late: any_late.then_some(late),
             walls: walls.iter().any(Option::is_some).then_some(walls),
             goes_on: Mask::ALL,
@@ -254,7 +267,10 @@ impl Blocks {
 
     /// The damping of copies from now on is that of these scenes, in each run.
     pub(super) fn set_damping(&mut self, scenes: &[&Scene]) {
-        self.object_map = object_map(scenes);
+        if let Some(spans) = &mut self.spans {
+            spans.set_objects(self.places, scenes);
+        }
+        self.object_maps = object_maps(self.places, scenes, self.spans.as_deref());
     }
 
     /// A device touches its copy in that way from now on, in all runs.
@@ -305,6 +321,7 @@ impl Blocks {
         let per_axis = self.places.blocks();
         let (remembered, lag) = (law.remembered() * WIDTH, law.looks_back());
         let oldest = self.oldest * self.axes * per_axis;
+        let all_alike = self.object_maps.len() == 1;
         for axis in 0..self.axes {
             let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
             for place in axis * per_axis..(axis + 1) * per_axis {
@@ -313,11 +330,12 @@ impl Blocks {
                 let past = if lag > 0 { std::mem::replace(&mut self.past[oldest + place], block.object) } else { block.object };
                 let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
                 let memory = if remembered > 0 { &mut self.memory[place * remembered..(place + 1) * remembered] } else { &mut [] };
+                let object_map = &self.object_maps[if all_alike { 0 } else { place - axis * per_axis }];
                 low = block.object.position.smaller(low);
                 high = block.object.position.larger(high);
                 let coupling = grasped.coupling(place);
                 if coupling.is_none() && self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
-                    block.tick(law, &past, lead, memory, &self.object_map);
+                    block.tick(law, &past, lead, memory, object_map);
                 } else {
                     let coupling = coupling.copied().unwrap_or_else(|| block.coupling(&block.object));
                     let mut forces = block.forces(coupling, law, &past, lead, memory);
@@ -327,7 +345,7 @@ impl Blocks {
                     if let Some(late) = &mut self.late {
                         forces = late[place].exchange(forces);
                     }
-                    block.advance(&self.object_map, &forces);
+                    block.advance(object_map, &forces);
                 }
                 size = size + block.size();
             }
@@ -348,6 +366,23 @@ impl Blocks {
         // A sum of sizes is finite only if they all are. Were it not for overflow it would also be so the other way round.
         let [a, b, c, d, e, f, g, h] = (size & self.goes_on).0;
         if ((a + e) + (b + f)) + ((c + g) + (d + h)) < f64::INFINITY { [true; L] } else { self.look_at_each() }
+    }
+
+    /// Whether everything in the first run is finite.
+    pub(super) fn are_finite(&self) -> bool {
+        self.look_at_each::<1>()[0]
+    }
+
+    /// Whether everything of a peer is finite in the first run.
+    pub(super) fn is_finite(&self, peer: usize) -> bool {
+        (0..self.axes).all(|axis| {
+            let Spot { block, lane } = self.places.spot(axis, peer, 0);
+            let block = &self.blocks[block];
+            [&block.device, &block.object]
+                .map(|motions| lane_of(motions, lane))
+                .iter()
+                .all(|motion| motion.position.is_finite() && motion.velocity.is_finite())
+        })
     }
 
     #[cold]
@@ -419,14 +454,17 @@ impl LawVisitor<Lanes> for Look<'_> {
     }
 }
 
-/// How copies of runs of these scenes move in a tick.
-fn object_map(scenes: &[&Scene]) -> StepMap<Lanes> {
+/// How copies of runs of these scenes move in a tick: [`Blocks::object_maps`].
+fn object_maps(places: Places, scenes: &[&Scene], spans: Option<&Spans>) -> Vec<StepMap<Lanes>> {
+    if let Some(spans) = spans {
+        return (0..places.blocks()).map(|block| spans.object_map(block)).collect();
+    }
     let mut map = ZERO_MAP;
     for lane in 0..WIDTH {
         let scene = scenes[lane % scenes.len()];
         set_map(&mut map, lane, &scene.copy_config(0).plant().step(scene.peers[0].clock.tick, scene.integrator));
     }
-    map
+    vec![map]
 }
 
 /// The distance from the least to the greatest of each run.

@@ -11,7 +11,7 @@ pub(crate) const WIDTH: usize = 8;
 pub(super) struct Lanes(pub(super) [f64; WIDTH]);
 
 /// For each of eight numbers all bits or none.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(align(64))]
 pub(super) struct Mask([u64; WIDTH]);
 

@@ -41,8 +41,14 @@ impl<B, const A: usize, const P: usize> RunWatch<B, A, P> for Unwatched<'_> {
 
 /// An observer of ticks and instants, of any type.
 pub(crate) trait Onlooker {
+    /// Whether ticks are looked at.
+    fn wants_ticks(&self) -> bool;
+
     /// See [`crate::Observer::on_ticks`].
     fn on_ticks(&mut self, ticks: &Ticks<'_>);
+
+    /// See [`crate::Observer::on_tick`]. Gives whether the run goes on.
+    fn on_tick(&mut self, row: &TickRow<'_>) -> bool;
 
     /// See [`crate::Observer::on_instant`]. Gives whether the run goes on: nothing has failed.
     fn on_instant(&mut self, row: &InstantRow) -> bool;
@@ -90,6 +96,106 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize> RunWatch<B, A, P> for Watc
     }
 }
 
+/// The observer of a run in windows, which is not compiled for each kind.
+pub(super) enum WindowWatch<'a> {
+    Unwatched(Unwatched<'a>),
+    Watched(WatchedTicks<'a>),
+}
+
+impl WindowWatch<'_> {
+    /// Whether ticks are looked at.
+    pub(super) fn wants_ticks(&self) -> bool {
+        matches!(self, Self::Watched(watch) if watch.onlooker.wants_ticks())
+    }
+
+    /// Whether instants are looked at.
+    pub(super) const fn wants_instants(&self) -> bool {
+        matches!(self, Self::Watched(_))
+    }
+
+    /// A peer ticks that was so before it moved, in that lane; gives whether the run goes on.
+    pub(super) fn on_tick<const A: usize>(&mut self, (at, peer): (Instant, usize), seen: &SeenPlace<A>) -> bool {
+        match self {
+            Self::Unwatched(_) => true,
+            Self::Watched(WatchedTicks { onlooker, damping }) => {
+                let place = Place { at, peer, damping: &damping[peer], attitude: None, device: None };
+                place.hand_on(seen, &mut |row| onlooker.on_tick(row))
+            }
+        }
+    }
+
+    /// That is how far copies are apart at an instant \[m\]; gives whether the run goes on.
+    pub(super) fn on_instant(&mut self, at: Instant, discrepancy: f64) -> bool {
+        match self {
+            Self::Unwatched(_) => true,
+            Self::Watched(watch) => watch.onlooker.on_instant(&InstantRow { at, discrepancy }),
+        }
+    }
+
+    /// Asked as [`crate::Observer::keep_going`] is.
+    pub(super) fn goes_on(&mut self, now: Instant) -> bool {
+        match self {
+            Self::Unwatched(watch) => (watch.0)(now),
+            Self::Watched(watch) => watch.onlooker.keep_going(now),
+        }
+    }
+}
+
+impl<B, const A: usize, const P: usize> RunWatch<B, A, P> for WindowWatch<'_> {
+    fn keep_going(&mut self, now: Instant) -> bool {
+        self.goes_on(now)
+    }
+
+    fn change_damping(&mut self, scene: &Scene) {
+        if let Self::Watched(watch) = self {
+            watch.damping = damping(scene);
+        }
+    }
+}
+
+/// A peer at one of its ticks.
+struct Place<'a> {
+    at: Instant,
+    peer: usize,
+    /// By how much the law damps it, and its turn.
+    damping: &'a (f64, Triple),
+    /// How its copy and its device are turned, if they are.
+    attitude: Option<Attitude>,
+    device: Option<Attitude>,
+}
+
+impl Place<'_> {
+    /// Hands on its row, from what is seen of the eight peers among which it is.
+    fn hand_on<const A: usize>(&self, SeenPlace { axes, turn }: &SeenPlace<A>, on: &mut dyn FnMut(&TickRow<'_>) -> bool) -> bool {
+        let (lane, (own, turns)) = (self.peer % WIDTH, self.damping);
+        let object = StateOfLane::of(axes.each_ref().map(|seen| &seen.object), lane);
+        let recorded = |axis: usize| {
+            let held = axes[axis].coordination.0[lane];
+            if *own > 0.0 { held + own * object.velocity[axis] } else { held }
+        };
+        let turned = turn.as_ref().and_then(|(coupling, aligning)| Some((self.attitude?, coupling, aligning)));
+        let turned = turned.map(|(attitude, coupling, aligning)| {
+            let coordination: Triple = std::array::from_fn(|axis| aligning[axis].0[lane] + turns[axis] * attitude.rate[axis]);
+            (attitude, coupling.map(|torque| torque.0[lane]), coordination)
+        });
+        on(&TickRow {
+            at: self.at,
+            peer: self.peer,
+            device: StateOfLane::of(axes.each_ref().map(|seen| &seen.device), lane).row(),
+            object: object.row(),
+            target: StateOfLane::of(axes.each_ref().map(|seen| &seen.target), lane).row(),
+            coupling_force: &axes.each_ref().map(|seen| seen.coupling.0[lane]),
+            coordination_force: &std::array::from_fn::<f64, A, _>(recorded),
+            turn: turned.as_ref().map(|(object, coupling_torque, coordination_torque)| TurnRow {
+                object,
+                device: self.device.as_ref(),
+                coupling_torque,
+                coordination_torque,
+            }),
+        })
+    }
+}
+
 /// All peers before they move.
 struct Peers<'a, B, const A: usize, const P: usize> {
     at: Instant,
@@ -125,36 +231,10 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize> Source for Peers<'_, B, A,
     #[inline(never)]
     fn each(&self, on: &mut dyn FnMut(&TickRow<'_>) -> bool) {
         for (place, damping) in self.damping.chunks(WIDTH).enumerate() {
-            let SeenPlace { axes, turn } = self.bodies.seen(place, self.law);
-            for (lane, (own, turns)) in damping.iter().enumerate() {
-                let peer = place * WIDTH + lane;
-                let object = StateOfLane::of(axes.each_ref().map(|seen| &seen.object), lane);
-                let recorded = |axis: usize| {
-                    let held = axes[axis].coordination.0[lane];
-                    if *own > 0.0 { held + own * object.velocity[axis] } else { held }
-                };
-                let turned = turn.as_ref().and_then(|(coupling, aligning)| Some((self.bodies.attitude(peer, 0)?, coupling, aligning)));
-                let device = self.bodies.device_attitude(peer, 0);
-                let turned = turned.map(|(attitude, coupling, aligning)| {
-                    let coordination: Triple = std::array::from_fn(|axis| aligning[axis].0[lane] + turns[axis] * attitude.rate[axis]);
-                    (attitude, coupling.map(|torque| torque.0[lane]), coordination)
-                });
-                let goes_on = on(&TickRow {
-                    at: self.at,
-                    peer,
-                    device: StateOfLane::of(axes.each_ref().map(|seen| &seen.device), lane).row(),
-                    object: object.row(),
-                    target: StateOfLane::of(axes.each_ref().map(|seen| &seen.target), lane).row(),
-                    coupling_force: &axes.each_ref().map(|seen| seen.coupling.0[lane]),
-                    coordination_force: &std::array::from_fn::<f64, A, _>(recorded),
-                    turn: turned.as_ref().map(|(object, coupling_torque, coordination_torque)| TurnRow {
-                        object,
-                        device: device.as_ref(),
-                        coupling_torque,
-                        coordination_torque,
-                    }),
-                });
-                if !goes_on {
+            let seen = self.bodies.seen(place, self.law);
+            for (peer, damping) in (place * WIDTH..).zip(damping) {
+                let (attitude, device) = (self.bodies.attitude(peer, 0), self.bodies.device_attitude(peer, 0));
+                if !(Place { at: self.at, peer, damping, attitude, device }).hand_on(&seen, on) {
                     return;
                 }
             }

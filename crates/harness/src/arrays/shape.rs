@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{Coordination, EXACT_FROM, Integrator};
+use cohaptic_peer::{Clock, Coordination, EXACT_FROM, Integrator};
 use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DirectLinks, LinkModel, MOST_NODES, SteppedLinks};
@@ -39,6 +39,8 @@ pub(crate) struct Shape {
     pub(super) delay: Option<Duration>,
     /// The neighbours of each peer, if they are not all others.
     pub(super) topology: Option<Arc<Topology>>,
+    /// The clocks of the peers, if not all tick together: then a run goes window by window.
+    pub(super) clocks: Option<Vec<Clock>>,
 }
 
 /// How the fates of packets become known, if links do more than to delay all by the same span.
@@ -72,6 +74,16 @@ impl Shape {
         self.delay.is_some()
     }
 
+    /// The longest span between two ticks of a peer.
+    pub(super) fn longest_span(&self) -> Duration {
+        self.clocks.iter().flatten().map(|clock| clock.spans().1).max().unwrap_or(self.tick)
+    }
+
+    /// Whether peers tick at instants of their own.
+    pub(crate) const fn has_windows(&self) -> bool {
+        self.clocks.is_some()
+    }
+
     /// How many threads pay for a run at most, and why no more.
     pub(crate) fn threads(&self) -> (usize, &'static str) {
         threads::that_pay(self)
@@ -102,6 +114,7 @@ impl Shape {
         // All tick together, so that all have one law.
         let law = strategies.law(scene, 0).ok_or("the strategy is not a law of the registry")?;
         let clock = scene.peers[0].clock;
+        let tick_together = plan.ticking == Ticking::Lockstep;
         let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
         let size = Bytes::new(kind.datagram_len(scene.axes.count()) as u64);
         let links = scene.used_links();
@@ -113,16 +126,20 @@ impl Shape {
         let is_stepped = links.iter().all(|(link, _)| SteppedLinks::takes(link)) && models_to_come(scene).all(SteppedLinks::takes);
         let way = match (are_direct, is_stepped && !has_lines) {
             (true, true) => Way::Direct,
-            (false, true) => Way::Stepped,
-            (_, false) => Way::Carried,
+            (false, true) if tick_together => Way::Stepped,
+            (false, true) | (_, false) => Way::Carried,
         };
         let has_past = |law: BuiltIn| Law::<f64>::lag(&law) > 0 || Law::<f64>::memory(&law) > 0;
         let may_have_past = || has_past(law) || !scene.timeline.is_empty() && scene.laws_in_time(0).any(has_past);
         let sends_by_difference = |change: &Change| matches!(change.what, ChangeKind::SendWhen(_));
         // Of strategies that are not the scene's own nobody knows the law after a change.
         let changes_law = |change: &Change| matches!(change.what, ChangeKind::Coordination(_) | ChangeKind::Parameters(_));
+        let clocks = || scene.peers.iter().map(|peer| &peer.clock);
         let fits = [
-            (plan.ticking == Ticking::Lockstep && !plan.general_links, "peers tick at instants of their own"),
+            (!plan.general_links, "everything is modelled"),
+            (clocks().all(|other| other.tick == clock.tick), "the ticks of peers differ in length"),
+            (clocks().all(|clock| !clock.spans().0.is_zero()), "two ticks of a peer fall on one instant"),
+            (tick_together || scene.rotation.is_none(), "peers tick at instants of their own, and the object turns"),
             (links.iter().all(|(link, _)| !link.may_damage()), "a link damages packets"),
             (lines().all(|line| !line.may_damage()), "an access line damages packets"),
             (models_to_come(scene).all(|link| !link.may_damage()), "the timeline makes a link damage packets"),
@@ -157,6 +174,7 @@ impl Shape {
             way,
             delay,
             topology: scene.topology.clone(),
+            clocks: (!tick_together).then(|| clocks().copied().collect()),
         };
         Ok((shape, law))
     }
@@ -220,12 +238,13 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             change("coordination = { stiffness = 2 }"),
             "peer.uplink={ rate = \"1Mbit\" }".to_owned(),
             "link.limit=\"9 packets\"".to_owned(),
+            "peer.clock.drift=\"10ppm\"\nlink.loss=0.1".to_owned(),
             change("link = \"all\", set = { limit = \"9 packets\" }"),
         ] {
             assert_eq!(refusal(&fits), None, "{fits}");
         }
         for (keys, expected) in [
-            ("peer.clock.drift=\"10ppm\"".to_owned(), "instants of their own"),
+            ("peers=[{ name = \"peer1\", clock.tick = \"2ms\" }]".to_owned(), "differ in length"),
             ("peer.downlink={ corrupt = 0.1 }".to_owned(), "an access line damages"),
             ("link.corrupt=0.1".to_owned(), "a link damages"),
             (change("link = \"all\", set = { corrupt = 0.1 }"), "the timeline makes a link damage"),

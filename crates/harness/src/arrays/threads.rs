@@ -30,6 +30,8 @@ const PEERS_A_THREAD: usize = 8;
 pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
     if shape.delay.is_some() {
         (1, "all samples travel together: a tick takes less time than threads take to meet")
+    } else if shape.has_windows() {
+        (1, "peers tick at instants of their own: threads would meet in each window")
     } else if shape.is_carried() {
         (1, "packets of several peers pass one access line, or links know their fates only as time goes")
     } else if shape.turns.is_some() {

@@ -115,10 +115,15 @@ pub fn explain(scene: &Scene) -> Explanation {
         Some(_) => Nanos { a_packet: IN_ARRAYS.an_impaired_packet, ..IN_ARRAYS },
     };
     if let Some(shape) = arrays {
+        let (peers, ticks) = if shape.has_windows() {
+            ("eight peers of one run, in windows in which each peer ticks at most once", "ticks are equally long by peers' own clocks")
+        } else {
+            ("eight peers of one run or one peer of eight runs", "all tick together")
+        };
         rows.model(
             "runs of which nobody watches more than ticks",
-            "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
-            "all tick together, and no line damages packets; a run that is recorded has events, since packets are recorded",
+            format!("in arrays: binary64 in eight lanes, {peers}"),
+            format!("{ticks}, and no line damages packets; a run that is recorded has events, since packets are recorded"),
         );
         let (threads, why) = shape.threads();
         rows.model("threads of such a run, if nobody watches", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);

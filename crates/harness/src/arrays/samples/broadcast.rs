@@ -2,6 +2,8 @@
 //!
 //! Then all hold the same of a sender, and a sample is one thing for all its receivers, on the way and when it is held.
 
+mod heard;
+
 use std::collections::VecDeque;
 
 use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
@@ -10,11 +12,13 @@ use cohaptic_units::Instant;
 use super::quads::{self, Quad};
 use super::{Sample, count};
 use crate::arrays::bodies::Bodies;
+use heard::Heard;
+pub(in crate::arrays) use heard::TOGETHER;
 
-/// The samples in flight, and those held from each sender.
+/// The samples in flight, and those held from each sender. Time counts ticks, or nanoseconds where peers tick at instants of their own.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct Broadcast<const P: usize, const L: usize> {
-    delay_ticks: u64,
+    delay: u64,
     on_the_way: VecDeque<Sent<P, L>>,
     peers: usize,
     /// The samples held from each sender but the first, by pair of numbers, as the first peer holds it; and from the first.
@@ -25,6 +29,8 @@ pub(in crate::arrays) struct Broadcast<const P: usize, const L: usize> {
     /// How many samples of each sender have arrived.
     arrived: Vec<u64>,
     changed: Changed,
+    /// Where peers tick at instants of their own.
+    heard: Option<Box<Heard<P, L>>>,
 }
 
 /// The senders whose samples have arrived since the means were computed.
@@ -38,7 +44,7 @@ enum Changed {
 
 #[derive(Clone, Copy, Debug)]
 struct Sent<const P: usize, const L: usize> {
-    /// The tick at which it is in force.
+    /// When it is in force.
     due: u64,
     sender: usize,
     sample: Sample<P, L>,
@@ -46,10 +52,10 @@ struct Sent<const P: usize, const L: usize> {
 
 impl<const P: usize, const L: usize> Broadcast<P, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new(initial: &[Sample<P, L>], delay_ticks: u64) -> Self {
+    pub(in crate::arrays) fn new(initial: &[Sample<P, L>], delay: u64) -> Self {
         let peers = initial.len();
         let mut broadcast = Self {
-            delay_ticks,
+            delay,
             on_the_way: VecDeque::new(),
             peers,
             held: std::array::from_fn(|_| quads::empty(peers - 1)),
@@ -57,6 +63,7 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
             sums: None,
             arrived: vec![0; peers],
             changed: Changed::More,
+            heard: None,
         };
         for (sender, sample) in initial.iter().enumerate() {
             broadcast.hold(sender, sample);
@@ -68,14 +75,15 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
 
     /// A peer sends to all others.
     #[inline(always)]
-    pub(in crate::arrays) fn send<const A: usize>(&mut self, tick: u64, sender: usize, bodies: &impl Bodies<A, P>) {
-        let due = tick.saturating_add(self.delay_ticks);
+    pub(in crate::arrays) fn send<const A: usize>(&mut self, now: u64, sender: usize, bodies: &impl Bodies<A, P>) {
+        let due = now.saturating_add(self.delay);
         self.on_the_way.push_back(Sent { due, sender, sample: bodies.sample(sender) });
     }
 
     /// What has arrived is held from now on.
-    pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
-        while let Some(&Sent { sender, sample, .. }) = self.on_the_way.front().filter(|sent| sent.due <= tick) {
+    #[inline]
+    pub(in crate::arrays) fn deliver(&mut self, now: u64) {
+        while let Some(&Sent { sender, sample, .. }) = self.on_the_way.front().filter(|sent| sent.due <= now) {
             self.on_the_way.pop_front();
             self.hold(sender, &sample);
             self.arrived[sender] += 1;
@@ -96,6 +104,9 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
         if self.sums.is_some() {
             let before = self.held_from(sender);
             self.sums.iter_mut().for_each(|sums| sums.replace(&before, &sample.state(0)));
+        }
+        if let Some(heard) = &mut self.heard {
+            heard.hold(sender, sample);
         }
         let Some(place) = sender.checked_sub(1) else {
             self.first = *sample;
@@ -121,6 +132,11 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
                 None => self.first.velocity[axis][run],
             }),
         })
+    }
+
+    /// How many samples of a sender have arrived.
+    pub(in crate::arrays) fn arrived(&self, sender: usize) -> u64 {
+        self.arrived[sender]
     }
 
     /// Whether nothing that anybody holds has changed since the means were computed.

@@ -4,6 +4,7 @@
 //! nothing is sorted but the samples that are due together on a link on which one overtook another.
 
 mod carried;
+mod in_turn;
 mod neighbours;
 
 use std::ops::Range;
@@ -24,6 +25,7 @@ use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
 use crate::summary::AccessSummary;
 use carried::Carrier;
+pub(in crate::arrays) use in_turn::NextTick;
 
 /// Set in the sequence number of a link on which one of the samples that are due overtakes another.
 const IS_OVERTAKEN: u64 = 1 << 63;
@@ -95,7 +97,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             end: shape.end,
             links,
             sends: vec![false; peers],
-            in_flight: InFlight::new(nanos(shape.tick)),
+            in_flight: InFlight::new(nanos(shape.longest_span())),
             held: std::array::from_fn(|_| quads::empty(places)),
             sums: Vec::new(),
             next: vec![0; places * L],

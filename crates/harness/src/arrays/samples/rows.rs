@@ -4,6 +4,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use cohaptic_scene::Topology;
+use cohaptic_units::Instant;
+
+use super::Sample;
+use super::in_flight::Packet;
 
 /// The rows of some receivers, which are counted from 0: a link from each sender, in order, and a place for the sample held from each.
 #[derive(Clone, Debug)]
@@ -123,6 +127,28 @@ impl Rows {
         match self {
             Self::All { peers, .. } => receiver * whole(peers - 1)..receiver * whole(peers - 1) + peers - 1,
             Self::Some(rows) => rows.places[receiver]..rows.places[receiver] + rows.of(receiver).len(),
+        }
+    }
+
+    /// The packet to a receiver over the link in a column, in the only run.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
+    pub(super) fn packet<const P: usize>(
+        &self,
+        (receiver, column): (usize, usize),
+        sample: &Sample<P, 1>,
+        arrival: Instant,
+        sequence: u64,
+    ) -> Packet<P> {
+        let weight = self.weight(receiver, column);
+        let weighed = |[number]: [f64; 1]| weight.map_or(number, |weight| number * weight);
+        Packet {
+            arrival,
+            sequence,
+            place: self.place(receiver, column) as u32,
+            receiver: receiver as u16,
+            position: sample.position.map(weighed),
+            velocity: sample.velocity.map(weighed),
         }
     }
 

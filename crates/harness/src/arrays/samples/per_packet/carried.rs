@@ -19,6 +19,8 @@ pub(super) struct Carrier<const P: usize> {
     /// By sender of the scene, how many samples it has sent.
     sent: Vec<u64>,
     info: PacketInfo,
+    /// What has arrived while its receiver did not tick, in the order of arrivals.
+    waiting: Vec<Packet<P>>,
 }
 
 /// A sample on its way, and which one of its sender it is.
@@ -32,7 +34,7 @@ impl<const P: usize> Carrier<P> {
     /// The networks of these scenes, with nothing on the way.
     pub(super) fn new(scenes: &[&Scene], info: PacketInfo) -> Self {
         let networks = scenes.iter().map(|scene| network(scene, &Plan::new(scene, crate::Model::Least, false))).collect();
-        Self { networks, sent: vec![0; scenes[0].peers.len()], info }
+        Self { networks, sent: vec![0; scenes[0].peers.len()], info, waiting: Vec::new() }
     }
 
     /// Some peers send, one after the other.
@@ -113,6 +115,29 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             receiver: receiver as u16,
             position: carried.state.position.map(weighed),
             velocity: carried.state.velocity.map(weighed),
+        }
+    }
+}
+
+impl<const P: usize> PerPacket<P, 1> {
+    /// What has arrived by an instant is taken in by the receivers for which it arrived before an instant of their own; what others have not taken in, they do later.
+    #[inline(never)]
+    pub(super) fn deliver_carried_until(&mut self, latest: Instant, until: impl Fn(usize) -> u64) {
+        let Links::Carried(carrier) = &mut self.links else { return };
+        carrier.networks[0].handle_timeout(latest).expect("instants come in order");
+        let mut waiting = std::mem::take(&mut carrier.waiting);
+        while let Some((path, arrival, carried)) = self.next_arrival(0) {
+            waiting.push(self.packet(path, 0, arrival, carried));
+        }
+        waiting.retain(|packet| {
+            let arrives = packet.arrival.as_nanos() < until(usize::from(packet.receiver));
+            if arrives {
+                self.take_in_one(packet);
+            }
+            !arrives
+        });
+        if let Links::Carried(carrier) = &mut self.links {
+            carrier.waiting = waiting;
         }
     }
 }
