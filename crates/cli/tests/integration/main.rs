@@ -56,6 +56,7 @@ mod stability_map;
 mod stability_point;
 mod stability_proofs;
 mod stability_switching;
+mod stability_topology_certificates;
 mod stability_wall_certificates;
 mod standard_input;
 #[cfg(target_os = "linux")]

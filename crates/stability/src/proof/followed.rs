@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
-use super::certificate::{BoxCertificate, Certified, PartCertificate};
+use super::certificate::{BoxCertificate, Certified, PartCertificate, TopologyCertificate};
 use super::corners::{Common, Point, doubled, states, steps};
 use super::delays;
 use super::discs::decide;
@@ -46,7 +46,7 @@ enum Action {
 }
 
 impl Action {
-    /// What the scene has that proofs follow for its own number of peers alone, and without a certificate; `None` if it has no such.
+    /// What the scene has that proofs follow for its own number of peers alone; `None` if it has no such.
     const fn special(&self) -> Option<&'static str> {
         match self {
             Self::Mean => None,
@@ -165,8 +165,11 @@ impl<'a> Followed<'a> {
 
     /// Refuses scenes whose verdicts nothing is written for to check them by.
     pub(super) fn refuse_certificate(&self) -> Result<(), ProofError> {
-        let what = self.stretches.iter().flat_map(|stretch| &stretch.motions).find_map(|motion| motion.action.special());
-        what.map_or(Ok(()), |what| Err(ProofError::NoCertificate { what }))
+        let mut motions = self.stretches.iter().flat_map(|stretch| &stretch.motions);
+        if motions.any(|motion| matches!(motion.action, Action::Server(_))) {
+            return Err(ProofError::NoCertificate { what: "client-server coordination" });
+        }
+        TopologyCertificate::of(self.family).map(drop)
     }
 
     /// A box with all numbers of peers for which none is decided.
@@ -334,8 +337,8 @@ impl Motion {
             let Some(decision) = decide(&StepSpan::product(&steps(&points, &ends, common)?)) else { return Ok(None) };
             if let Some(certified) = certified.as_deref_mut() {
                 let members = classes.map(|class| structure.classes[class].clone()).collect();
-                certified
-                    .push((decision.proven, PartCertificate::new(members, part.apart.is_some(), states(&points, common)?, time, &decision.witness)));
+                let certificate = PartCertificate::new(members, part.apart.is_some(), states(&points, common)?, time, &decision.witness);
+                certified.push((decision.proven, PartCertificate { eigenvalues: part.weight.filter(|_| part.apart.is_some()), ..certificate }));
             }
             Ok::<_, ProofError>(Some(decision.proven))
         };

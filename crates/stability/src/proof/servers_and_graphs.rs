@@ -264,6 +264,9 @@ fn what_is_not_followed_is_refused_by_name() {
         let family = family(set, &keys);
         let every = ProvenRegion::prove(&family, 2, Some((2, None)), &Unwatched).unwrap_err().to_string();
         assert!(every.starts_with(what) && every.contains("expected no --every-number"), "{every}");
+        if set[0] == ring {
+            continue;
+        }
         let shared = SharedProof::of_region(&family, 2, None).unwrap();
         let region = ProvenRegion::prove(&family, 2, None, &Unwatched).unwrap();
         for error in [shared.check_certificate(&family).unwrap_err(), region.certify(&family, &Unwatched).unwrap_err()] {
