@@ -123,6 +123,8 @@ pub struct PartCertificate {
     pub heard: Option<Gains>,
     /// What velocities are multiplied by \[s\].
     pub time: f64,
+    /// With a server, what forces are multiplied by \[m/N\].
+    pub compliance: Option<f64>,
     /// V, column by column, real and imaginary part of each entry, each as sixteen hexadecimal digits of its IEEE 754 representation.
     pub coordinates: String,
     /// d, in such digits too.
@@ -138,7 +140,7 @@ impl PartCertificate {
         let coordinates = digits(entries.flat_map(|entry| [entry.re, entry.im]));
         let weights = digits(witness.weights.iter().copied());
         let (states, heard, circle) = (states.names, states.heard, witness.circle);
-        Self { members, is_difference, eigenvalues: None, states, heard, time, coordinates, weights, circle }
+        Self { members, is_difference, eigenvalues: None, states, heard, time, compliance: None, coordinates, weights, circle }
     }
 }
 
