@@ -58,8 +58,8 @@ pub struct MomentCertificate {
     pub heard: Option<Gains>,
     /// How many samples of frames before take part.
     pub depth: usize,
-    /// Y of the mean over the peers, of the differences from it, and of samples of which all sums are zero: row by row, in digits as those of [`PartCertificate`].
-    pub blocks: [String; 3],
+    /// Y of the mean over the peers, of the differences from it, and, but for two peers, of samples of which all sums are zero: row by row, in digits as those of [`PartCertificate`].
+    pub blocks: Vec<String>,
 }
 
 /// The averaging matrix of a topology, and by what its eigenvalues can be enclosed.
@@ -102,9 +102,9 @@ pub(super) fn needed(verdict: Option<Proven>, mut parts: Vec<(Proven, PartCertif
 }
 
 impl MomentCertificate {
-    pub(super) fn new(factor: f64, time: f64, heard: Option<Gains>, depth: usize, blocks: [&Matrix; 3]) -> Self {
+    pub(super) fn new(factor: f64, time: f64, heard: Option<Gains>, depth: usize, blocks: &[&Matrix]) -> Self {
         let rows = |block: &Matrix| digits((0..block.rows()).flat_map(|row| block.row(row).to_vec()));
-        Self { factor, time, heard, depth, blocks: blocks.map(rows) }
+        Self { factor, time, heard, depth, blocks: blocks.iter().map(|block| rows(block)).collect() }
     }
 }
 
