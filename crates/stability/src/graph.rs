@@ -10,7 +10,7 @@ mod enclosed;
 use cohaptic_peer::coordination::Pull;
 use cohaptic_scene::{Scene, Topology, TopologyKind};
 
-pub(crate) use self::enclosed::EnclosedSpectrum;
+pub(crate) use self::enclosed::{EnclosedSpectrum, eigenvectors};
 use crate::analysis::{Analysis, combinations, combine};
 use crate::lifted::{Lifted, Node};
 use crate::network::NominalNetwork;
@@ -179,15 +179,18 @@ impl From<&Topology> for Graph {
         match topology.kind() {
             TopologyKind::Ring { neighbours } => Self::Ring { neighbours },
             TopologyKind::Star { .. } => Self::Star,
-            TopologyKind::Graph => {
-                let mut weights = Matrix::zeros(topology.peers(), topology.peers());
-                for (from, to) in topology.pairs() {
-                    weights[(from, to)] = topology.weight(from, to);
-                }
-                Self::Weighted(weights)
-            }
+            TopologyKind::Graph => Self::Weighted(weights_of(topology)),
         }
     }
+}
+
+/// The weights between peers, a row a peer.
+pub(crate) fn weights_of(topology: &Topology) -> Matrix {
+    let mut weights = Matrix::zeros(topology.peers(), topology.peers());
+    for (from, to) in topology.pairs() {
+        weights[(from, to)] = topology.weight(from, to);
+    }
+    weights
 }
 
 impl Graph {

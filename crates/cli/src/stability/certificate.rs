@@ -2,7 +2,7 @@
 
 use cohaptic_stability::{
     BoxCertificate, FrameState, FreeCircle, Guarantee, KeyRange, MomentCertificate, NumberCertificate, PartCertificate, Switching,
-    SwitchingCertificate,
+    SwitchingCertificate, TopologyCertificate,
 };
 use serde::Serialize;
 
@@ -21,6 +21,7 @@ pub(super) fn of_boxes(
     given: &Given<'_>,
     keys: &[&KeyRange],
     every: Option<(u64, Option<u64>)>,
+    topology: Option<&TopologyCertificate>,
     boxes: &[BoxCertificate],
 ) -> Result<String, Failure> {
     written(
@@ -34,6 +35,8 @@ pub(super) fn of_boxes(
             units: keys.iter().map(|range| range.unit.as_str()).collect::<Vec<_>>(),
             // For which numbers N of equal peers; a box then ends with the range of 1/(N - 1). `null`: for those of the scene.
             every_number: every.map(|(from, to)| document! { from: from, to: to }),
+            #[serde(flatten)]
+            topology: topology.map(|topology| document! { topology: of_topology(topology) }),
             boxes: boxes.iter().map(of_box).collect::<Vec<_>>(),
         },
     )
@@ -122,6 +125,15 @@ fn of_box(one: &BoxCertificate) -> impl Serialize {
     }
 }
 
+fn of_topology(topology: &TopologyCertificate) -> impl Serialize + use<'_> {
+    document! {
+        // Of the file that the scene names; null: the scene says them.
+        weights: topology.weights.as_deref(),
+        // Of the averaging matrix, nearly, but for that of the eigenvalue 1.
+        eigenvectors: topology.eigenvectors.as_str(),
+    }
+}
+
 fn of_part(part: &PartCertificate) -> impl Serialize {
     let circle = match part.circle {
         FreeCircle::AroundZero(radius) => serde_json::json!(["around-zero", radius]),
@@ -131,11 +143,17 @@ fn of_part(part: &PartCertificate) -> impl Serialize {
         // The members of its classes of equal peers, counted from 0, and whether it is how the members of one differ.
         members: part.members.as_slice(),
         difference: part.is_difference,
+        // Of the averaging matrix of a topology, but for 1: between which ends those are that the part stands for.
+        #[serde(flatten)]
+        eigenvalues: part.eigenvalues.map(|ends| document! { eigenvalues: ends }),
         states: part.states.iter().map(of_state).collect::<Vec<_>>(),
         // The gains K and B by which a sample is the number (K·x + B·v)/(K + B/time); null: its position and its velocity.
         heard: part.heard.map(|gains| [gains.stiffness, gains.damping]),
         // What velocities are multiplied by, in seconds.
         time: part.time,
+        // With a server, by what forces are multiplied, in m/N.
+        #[serde(flatten)]
+        compliance: part.compliance.map(|compliance| document! { compliance: compliance }),
         coordinates: part.coordinates.as_str(),
         weights: part.weights.as_str(),
         circle: circle,
@@ -161,6 +179,7 @@ fn of_state(state: &FrameState) -> serde_json::Value {
         FrameState::Device { class, velocity } => serde_json::json!(["device", class, which(velocity)]),
         FrameState::Copy { class, velocity } => serde_json::json!(["copy", class, which(velocity)]),
         FrameState::Sample { class, number, channel } => serde_json::json!(["sample", class, number, channel]),
+        FrameState::Returned { class, number } => serde_json::json!(["returned", class, number]),
         FrameState::Other { class, row } => serde_json::json!(["other", class, row]),
     }
 }

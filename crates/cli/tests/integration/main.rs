@@ -55,7 +55,10 @@ mod stability_claims;
 mod stability_map;
 mod stability_point;
 mod stability_proofs;
+mod stability_server_certificates;
 mod stability_switching;
+mod stability_topology_certificates;
+mod stability_wall_certificates;
 mod standard_input;
 #[cfg(target_os = "linux")]
 mod stop;

@@ -65,12 +65,7 @@ fn merged(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     let size = weights.rows();
     let unknown = || vec![[-1.0, 1.0]; usize::from(size > ones)];
-    let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
-    if degrees.iter().any(|degree| !degree.is_finite()) {
-        return unknown();
-    }
-    // Divided one by one, nothing leaves the range of numbers: no weight is above its degree.
-    let a = faer::Mat::from_fn(size, size, |row, column| weights[(row, column)] / degrees[row].sqrt() / degrees[column].sqrt());
+    let Some((a, _)) = symmetric(weights) else { return unknown() };
     let Ok(found) = a.self_adjoint_eigen(faer::Side::Lower) else { return unknown() };
     let (u, values) = (found.U(), found.S().column_vector());
     let residual = frobenius(&(&a * u - faer::Mat::from_fn(size, size, |row, column| u[(row, column)] * values[column])));
@@ -88,6 +83,32 @@ fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     sorted.sort_by(f64::total_cmp);
     sorted.truncate(size - ones);
     sorted.into_iter().map(|value| within_unit(value, error)).collect()
+}
+
+/// D^−½·W·D^−½ and the row sums D; `None` if a sum is beyond all numbers.
+fn symmetric(weights: &Matrix) -> Option<(faer::Mat<f64>, Vec<f64>)> {
+    let size = weights.rows();
+    let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
+    if degrees.iter().any(|degree| !degree.is_finite()) {
+        return None;
+    }
+    // Divided one by one, nothing leaves the range of numbers: no weight is above its degree.
+    let entry = |row: usize, column: usize| weights[(row, column)] / degrees[row].sqrt() / degrees[column].sqrt();
+    let a = faer::Mat::from_fn(size, size, entry);
+    Some((a, degrees))
+}
+
+/// The eigenvectors of D⁻¹W, nearly: columns x with xᵀDx = 1 for a connected graph, but for that of the eigenvalue 1. `None` if they were not found.
+pub(crate) fn eigenvectors(weights: &Matrix) -> Option<Matrix> {
+    let (a, degrees) = symmetric(weights)?;
+    let found = a.self_adjoint_eigen(faer::Side::Lower).ok()?;
+    let (u, values) = (found.U(), found.S().column_vector());
+    let mut order: Vec<usize> = (0..values.nrows()).collect();
+    order.sort_by(|one, other| values[*one].total_cmp(&values[*other]));
+    // The largest is 1.
+    order.pop();
+    let vectors = Matrix::from_fn(degrees.len(), order.len(), |row, column| u[(row, order[column])] / degrees[row].sqrt());
+    vectors.is_finite().then_some(vectors)
 }
 
 fn frobenius(matrix: &faer::Mat<f64>) -> f64 {

@@ -93,6 +93,19 @@ pub(crate) fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> 
     }
 }
 
+/// Whether γY − L(Y) is positive definite whatever was rounded.
+pub(crate) fn leaves_less(operator: &impl Positive, factor: f64, solution: &[f64]) -> bool {
+    let image = operator.apply(solution);
+    let left: Vec<f64> = solution.iter().zip(&image).map(|(solution, image)| factor * solution - image).collect();
+    let absolute: Vec<f64> = solution.iter().map(|entry| entry.abs()).collect();
+    // The product with γ and the difference round too; the sizes were computed with as many roundings.
+    let share = gamma(operator.roundings() + 2);
+    let sizes = operator.sizes(&absolute);
+    let error: Vec<f64> = absolute.iter().zip(&sizes).map(|(entry, size)| outward(share * (1.0 + share) * (factor * entry + size))).collect();
+    let (left, error) = (operator.matrices(&left), operator.matrices(&error));
+    left.iter().zip(&error).all(|(left, error)| is_positive(left, error))
+}
+
 /// As near as this to the base, relative to it, is near enough for a solution that is checked over a box.
 const NEARLY: f64 = 1e-6;
 
@@ -287,18 +300,7 @@ impl Krylov {
         let Some((solution, _)) = self.solve(candidate) else {
             return false;
         };
-        if !kind(&operator.matrices(&solution)) {
-            return false;
-        }
-        let image = operator.apply(&solution);
-        let left: Vec<f64> = solution.iter().zip(&image).map(|(solution, image)| candidate * solution - image).collect();
-        let absolute: Vec<f64> = solution.iter().map(|entry| entry.abs()).collect();
-        // The product with γ and the difference round too; the sizes were computed with as many roundings.
-        let share = gamma(operator.roundings() + 2);
-        let sizes = operator.sizes(&absolute);
-        let error: Vec<f64> = absolute.iter().zip(&sizes).map(|(entry, size)| outward(share * (1.0 + share) * (candidate * entry + size))).collect();
-        let (left, error) = (operator.matrices(&left), operator.matrices(&error));
-        left.iter().zip(&error).all(|(left, error)| is_positive(left, error))
+        kind(&operator.matrices(&solution)) && leaves_less(operator, candidate, &solution)
     }
 
     /// The combination of the basis for which γY − L(Y) − E is least, and how large that is: a least-squares problem with a Hessenberg matrix, by rotations.
@@ -346,12 +348,12 @@ fn dot(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
-fn is_definite(matrices: &[Matrix]) -> bool {
+pub(crate) fn is_definite(matrices: &[Matrix]) -> bool {
     matrices.iter().all(|matrix| is_positive(matrix, &Matrix::zeros(matrix.rows(), matrix.columns())))
 }
 
 /// Whether a diagonal has an entry below zero: eᵀYe < 0.
-fn is_indefinite(matrices: &[Matrix]) -> bool {
+pub(crate) fn is_indefinite(matrices: &[Matrix]) -> bool {
     matrices.iter().any(|matrix| (0..matrix.rows()).any(|place| matrix[(place, place)] < 0.0))
 }
 

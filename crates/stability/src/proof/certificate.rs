@@ -6,12 +6,14 @@
 use std::fmt::Write as _;
 
 use cohaptic_peer::Gains;
+use cohaptic_scene::TopologyKind;
 
 use super::corners::States;
 use super::discs::{FreeCircle, Witness};
 use super::steps::FrameState;
-use super::{Guarantee, Proven};
-use crate::Matrix;
+use super::{Guarantee, ProofError, Proven};
+use crate::graph::{eigenvectors, weights_of};
+use crate::{Family, Matrix};
 
 /// A box of keys, and the numbers by which its verdict can be checked.
 #[derive(Clone, Debug)]
@@ -56,8 +58,35 @@ pub struct MomentCertificate {
     pub heard: Option<Gains>,
     /// How many samples of frames before take part.
     pub depth: usize,
-    /// Y of the mean over the peers, of the differences from it, and of samples of which all sums are zero: row by row, in digits as those of [`PartCertificate`].
-    pub blocks: [String; 3],
+    /// Y of the mean over the peers, of the differences from it, and, but for two peers, of samples of which all sums are zero: row by row, in digits as those of [`PartCertificate`].
+    pub blocks: Vec<String>,
+}
+
+/// The averaging matrix of a topology, and by what its eigenvalues can be enclosed.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TopologyCertificate {
+    /// The weights between peers, a row a peer, where the scene reads them from a file.
+    pub weights: Option<Vec<Vec<f64>>>,
+    /// Nearly its eigenvectors, column by column, but for that of equal entries; in digits as those of [`PartCertificate`].
+    pub eigenvectors: String,
+}
+
+impl TopologyCertificate {
+    /// That of the topology of a family; `None` if everybody sends to everybody.
+    ///
+    /// # Errors
+    ///
+    /// [`ProofError::NoCertificate`] for weights whose eigenvectors are not found, and if a scene of the family is refused.
+    pub fn of(family: &Family) -> Result<Option<Self>, ProofError> {
+        let lows: Vec<f64> = family.keys().iter().map(|key| key.low).collect();
+        let scene = family.scene(&lows)?;
+        let Some(topology) = &scene.topology else { return Ok(None) };
+        let weights = weights_of(topology);
+        let vectors = eigenvectors(&weights).ok_or(ProofError::NoCertificate { what: "a [topology] of such weights" })?;
+        let rows = || (0..weights.rows()).map(|row| weights.row(row).to_vec()).collect();
+        let columns = (0..vectors.columns()).flat_map(|column| (0..vectors.rows()).map(move |row| (row, column)));
+        Ok(Some(Self { weights: (topology.kind() == TopologyKind::Graph).then(rows), eigenvectors: digits(columns.map(|place| vectors[place])) }))
+    }
 }
 
 /// Parts of a scene with their verdicts, where they are asked for.
@@ -73,9 +102,9 @@ pub(super) fn needed(verdict: Option<Proven>, mut parts: Vec<(Proven, PartCertif
 }
 
 impl MomentCertificate {
-    pub(super) fn new(factor: f64, time: f64, heard: Option<Gains>, depth: usize, blocks: [&Matrix; 3]) -> Self {
+    pub(super) fn new(factor: f64, time: f64, heard: Option<Gains>, depth: usize, blocks: &[&Matrix]) -> Self {
         let rows = |block: &Matrix| digits((0..block.rows()).flat_map(|row| block.row(row).to_vec()));
-        Self { factor, time, heard, depth, blocks: blocks.map(rows) }
+        Self { factor, time, heard, depth, blocks: blocks.iter().map(|block| rows(block)).collect() }
     }
 }
 
@@ -86,12 +115,16 @@ pub struct PartCertificate {
     pub members: Vec<Vec<usize>>,
     /// Whether it is how the members of a class differ.
     pub is_difference: bool,
+    /// Of a part of a topology but that of 1, between which ends the eigenvalues of the averaging matrix are that it stands for.
+    pub eigenvalues: Option<[f64; 2]>,
     /// The states, in the order of rows of the coordinates. Positions are counted from the first copy where nothing ties the scene to ground, and velocities multiplied by `time`.
     pub states: Vec<FrameState>,
     /// The gains K and B by which a sample is the one number (K·x + B·v)/(K + B/time); `None`: its position and its velocity.
     pub heard: Option<Gains>,
     /// What velocities are multiplied by \[s\].
     pub time: f64,
+    /// With a server, what forces are multiplied by \[m/N\].
+    pub compliance: Option<f64>,
     /// V, column by column, real and imaginary part of each entry, each as sixteen hexadecimal digits of its IEEE 754 representation.
     pub coordinates: String,
     /// d, in such digits too.
@@ -106,7 +139,8 @@ impl PartCertificate {
         let entries = (0..v.ncols()).flat_map(|column| (0..v.nrows()).map(move |row| v[(row, column)]));
         let coordinates = digits(entries.flat_map(|entry| [entry.re, entry.im]));
         let weights = digits(witness.weights.iter().copied());
-        Self { members, is_difference, states: states.names, heard: states.heard, time, coordinates, weights, circle: witness.circle }
+        let (states, heard, circle) = (states.names, states.heard, witness.circle);
+        Self { members, is_difference, eigenvalues: None, states, heard, time, compliance: None, coordinates, weights, circle }
     }
 }
 

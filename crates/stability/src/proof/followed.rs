@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
-use super::certificate::{BoxCertificate, Certified, PartCertificate};
-use super::corners::{Common, Point, doubled, states, steps};
+use super::certificate::{BoxCertificate, Certified, PartCertificate, TopologyCertificate};
+use super::corners::{Common, Point, States, doubled, states, steps};
 use super::delays;
 use super::discs::decide;
 use super::growing::{ENDLESS, nu, weights_of_growing};
@@ -46,7 +46,7 @@ enum Action {
 }
 
 impl Action {
-    /// What the scene has that proofs follow for its own number of peers alone, and without a certificate; `None` if it has no such.
+    /// What the scene has that proofs follow for its own number of peers alone; `None` if it has no such.
     const fn special(&self) -> Option<&'static str> {
         match self {
             Self::Mean => None,
@@ -63,6 +63,14 @@ struct PartOf<'a> {
     tied: bool,
     /// On a graph, between which numbers the weight is with which a peer hears its own samples.
     weight: Option<[f64; 2]>,
+}
+
+/// By what the states of a frame get their names.
+enum Named {
+    /// The points that it was computed from.
+    AtPoints(Vec<Point>),
+    /// The frame of a server, with what forces are multiplied by.
+    OfServer(States, f64),
 }
 
 /// Values of a delay between which no frame differs, and its motions. Without a delay among the keys there is one stretch.
@@ -165,8 +173,7 @@ impl<'a> Followed<'a> {
 
     /// Refuses scenes whose verdicts nothing is written for to check them by.
     pub(super) fn refuse_certificate(&self) -> Result<(), ProofError> {
-        let what = self.stretches.iter().flat_map(|stretch| &stretch.motions).find_map(|motion| motion.action.special());
-        what.map_or(Ok(()), |what| Err(ProofError::NoCertificate { what }))
+        TopologyCertificate::of(self.family).map(drop)
     }
 
     /// A box with all numbers of peers for which none is decided.
@@ -326,16 +333,24 @@ impl Motion {
         let mut of = |part: &PartOf<'_>| {
             let classes = part.apart.map_or(0..structure.classes.len(), |class| class..class + 1);
             let ends: Vec<Vec<Node>> = nodes.iter().map(|nodes| nodes[classes.clone()].to_vec()).collect();
-            if let Action::Server(server) = &self.action {
-                return Ok(decide(&StepSpan::product(&server.steps(structure, &ends, part.apart, time)?)).map(|decision| decision.proven));
-            }
-            let points = self.points(&ends, numbers, part);
             let common = Common { timetable: part.timetable, tied: part.tied, time };
-            let Some(decision) = decide(&StepSpan::product(&steps(&points, &ends, common)?)) else { return Ok(None) };
+            let (steps, named) = if let Action::Server(server) = &self.action {
+                let frame = server.frame(structure, &ends, part.apart, time)?;
+                (frame.steps, Named::OfServer(frame.states, frame.compliance))
+            } else {
+                let points = self.points(&ends, numbers, part);
+                (steps(&points, &ends, common)?, Named::AtPoints(points))
+            };
+            let Some(decision) = decide(&StepSpan::product(&steps)) else { return Ok(None) };
             if let Some(certified) = certified.as_deref_mut() {
                 let members = classes.map(|class| structure.classes[class].clone()).collect();
-                certified
-                    .push((decision.proven, PartCertificate::new(members, part.apart.is_some(), states(&points, common)?, time, &decision.witness)));
+                let (states, compliance) = match named {
+                    Named::AtPoints(points) => (states(&points, common)?, None),
+                    Named::OfServer(states, compliance) => (states, Some(compliance)),
+                };
+                let certificate = PartCertificate::new(members, part.apart.is_some(), states, time, &decision.witness);
+                let eigenvalues = part.weight.filter(|_| part.apart.is_some());
+                certified.push((decision.proven, PartCertificate { eigenvalues, compliance, ..certificate }));
             }
             Ok::<_, ProofError>(Some(decision.proven))
         };

@@ -15,6 +15,8 @@
 //! Y − L(Y) is positive definite on all of the span if it is at all ends of the slopes, radius included. Y is looked for at a number in the middle, and need not be exact. If it is positive definite too, every number is *stable*; if an
 //! entry of its diagonal is below zero, every one is *unstable* ([`positive`](crate::mean_square::positive)).
 
+use cohaptic_peer::Gains;
+
 use super::certificate::MomentCertificate;
 use super::corners::{check_units, enclosed, takes_one_past};
 use super::growing::{ENDLESS, Growing, Motion, WIDER, nu};
@@ -24,7 +26,7 @@ use super::{ProofError, Proven};
 use crate::lifted::node::{External, Scale, Scratch};
 use crate::lifted::{Lifted, Node, Sampling};
 use crate::mean_square::Independent;
-use crate::mean_square::positive::{Positive, radius_watched, solution};
+use crate::mean_square::positive::{Positive, is_definite, is_indefinite, leaves_less, radius_watched, solution};
 use crate::mean_square::symmetric::Symmetric;
 use crate::network::NominalNetwork;
 use crate::timetable::Event;
@@ -68,13 +70,14 @@ impl<'a> GrowingMoments<'a> {
         Ok(all)
     }
 
-    /// The verdict on those numbers with all by which it can be checked; `None` if there is none, and of two peers, of which a radius decides.
+    /// The verdict on those numbers with all by which it can be checked; `None` if there is none.
     pub(super) fn certify(&self, low: u64, high: u64) -> Result<Option<(Proven, Vec<MomentCertificate>)>, ProofError> {
         let mut all = Vec::new();
-        let mut is_decided = high > 2;
+        let mut is_decided = true;
         let wider = if low < high { WIDER } else { 1.0 };
-        for (motion, independent) in self.motions.iter().filter(|_| high > 2) {
-            match (Frame { motion, independent, wider }).decide(low, high)? {
+        for (motion, independent) in &self.motions {
+            let found = if high == 2 { moment_of_two(motion, independent) } else { Frame { motion, independent, wider }.decide(low, high)? };
+            match found {
                 Some((Proven::Unstable, moment)) => return Ok(Some((Proven::Unstable, vec![moment]))),
                 Some((Proven::Stable, moment)) => all.push(moment),
                 None => is_decided = false,
@@ -109,6 +112,42 @@ fn of_two(motion: &Motion, independent: &Independent) -> Option<Proven> {
         Verdict::Stable => Some(Proven::Stable),
         Verdict::Unstable => Some(Proven::Unstable),
         Verdict::Marginal | Verdict::Overflow => None,
+    }
+}
+
+/// The verdict on two peers by a Y, whose kinds of motion are the mean and the difference of both.
+fn moment_of_two(motion: &Motion, independent: &Independent) -> Option<(Proven, MomentCertificate)> {
+    let node = motion.part(2, Some(0)).swap_remove(0);
+    let time = motion.time(2);
+    let operator = operator(motion, independent, 2, &node, time);
+    let (gamma, found) = solution(&operator, factor)?;
+    let blocks = operator.matrices(&found);
+    let proven = proven(gamma, &blocks)?;
+    let holds = leaves_less(&operator, gamma, &found) && (proven == Proven::Unstable || independent.held.verdict() == Verdict::Stable);
+    let heard = heard_by(Sampling::of(std::slice::from_ref(&node)));
+    let blocks: Vec<Matrix> = blocks.iter().map(symmetric).collect();
+    holds.then(|| (proven, MomentCertificate::new(gamma, time, heard, independent.hazards.depth(), &blocks.iter().collect::<Vec<_>>())))
+}
+
+/// γ for a spectral radius: above 1 and well below a radius that is far above, where Y is then far from positive.
+fn factor(radius: f64) -> f64 {
+    if radius < 1.0 { 1.0 } else { (0.5 * radius).max(ABOVE) }
+}
+
+/// What Y shows if γY − L(Y) is positive definite.
+fn proven(gamma: f64, y: &[Matrix]) -> Option<Proven> {
+    match (is_definite(y), is_indefinite(y)) {
+        (true, _) if gamma <= 1.0 => Some(Proven::Stable),
+        (false, true) if gamma > 1.0 => Some(Proven::Unstable),
+        _ => None,
+    }
+}
+
+/// The gains by which a sample is one number.
+const fn heard_by(sampling: Sampling) -> Option<Gains> {
+    match sampling {
+        Sampling::Combined(gains) => Some(gains),
+        Sampling::Whole => None,
     }
 }
 
@@ -236,17 +275,9 @@ impl Frame<'_> {
         let (common, apart) = (wider(common), wider(apart));
 
         let operator = operator(self.motion, self.independent, number, &node, time);
-        // Above 1 and well below a radius that is far above: Y is then far from positive.
-        let Some((gamma, found)) = solution(&operator, |radius| if radius < 1.0 { 1.0 } else { (0.5 * radius).max(ABOVE) }) else { return Ok(None) };
+        let Some((gamma, found)) = solution(&operator, factor) else { return Ok(None) };
         let Some(y) = of_blocks(&operator.matrices(&found), &numbers, nu(number)) else { return Ok(None) };
-        let is_definite =
-            [&y.common, &y.apart, &y.rest].iter().all(|one| is_positive(&one.mean, &Matrix::zeros(one.mean.rows(), one.mean.columns())));
-        let is_indefinite = [&y.common, &y.apart, &y.rest].iter().any(|one| (0..one.mean.rows()).any(|place| one.mean[(place, place)] < 0.0));
-        let proven = match (is_definite, is_indefinite) {
-            (true, _) if gamma <= 1.0 => Proven::Stable,
-            (false, true) if gamma > 1.0 => Proven::Unstable,
-            _ => return Ok(None),
-        };
+        let Some(proven) = proven(gamma, &[&y.common, &y.apart, &y.rest].map(|one| one.mean.clone())) else { return Ok(None) };
         let tied = self.motion.structure.tied;
         let translation: Option<Vec<f64>> = (!tied).then(|| {
             let of_states = (0..rows.states).map(|row| node.displacement(own, row, time));
@@ -259,11 +290,7 @@ impl Frame<'_> {
             && is_everywhere_positive(&left(&y.rest, &image.rest));
         // A sample that never arrives is held for ever.
         let is_proven = holds && (proven == Proven::Unstable || self.independent.held.verdict() == Verdict::Stable);
-        let heard = match sampling {
-            Sampling::Combined(gains) => Some(gains),
-            Sampling::Whole => None,
-        };
-        let moment = || MomentCertificate::new(gamma, time, heard, depth, [&y.common, &y.apart, &y.rest].map(|one| &one.mean));
+        let moment = || MomentCertificate::new(gamma, time, heard_by(sampling), depth, &[&y.common, &y.apart, &y.rest].map(|one| &one.mean));
         Ok(is_proven.then(|| (proven, moment())))
     }
 

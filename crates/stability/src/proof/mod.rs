@@ -35,7 +35,7 @@ mod steps;
 mod tests;
 
 pub(crate) use certificate::digits;
-pub use certificate::{BoxCertificate, MomentCertificate, NumberCertificate, PartCertificate};
+pub use certificate::{BoxCertificate, MomentCertificate, NumberCertificate, PartCertificate, TopologyCertificate};
 pub use discs::FreeCircle;
 pub use line::{ProvenLine, ProvenStretch};
 pub use number::{EveryNumber, MOST_FOLLOWED, NumberSpan, prove_every_number};

@@ -126,7 +126,7 @@ fn search(
 }
 
 impl EveryNumber {
-    /// The spans that are decided with all by which they can be checked, halved as often as that takes, and the others. Of a span beyond all limits, and in the mean square of two peers, nothing can be checked, so that it counts as undecided there. Each is decided once more.
+    /// The spans that are decided with all by which they can be checked, halved as often as that takes, and the others. Of a span beyond all limits nothing can be checked, so that it counts as undecided there. Each is decided once more.
     ///
     /// # Errors
     ///

@@ -64,6 +64,13 @@ impl Register {
     }
 }
 
+impl Layout {
+    /// The states at the beginning of a frame, in the order of its rows and columns.
+    pub(super) fn states(&self, program: &Program) -> impl Iterator<Item = Register> {
+        self.order[0].iter().copied().filter(move |register| program.reference != Some(*register))
+    }
+}
+
 impl Program {
     /// All registers that are set.
     fn set(&self) -> impl Iterator<Item = Register> {

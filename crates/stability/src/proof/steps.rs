@@ -86,6 +86,13 @@ pub enum FrameState {
         /// Which of its numbers: position and velocity, or the one that is heard.
         channel: usize,
     },
+    /// The force that a sample of a server has for a class.
+    Returned {
+        /// The place of the class that gets it.
+        class: usize,
+        /// Which sample, as above.
+        number: i64,
+    },
     /// A force that waits, or a number that a law remembers.
     Other {
         /// The place of the class.

@@ -19,24 +19,23 @@ It needs Python 3.11 or later and nothing else. A scene that is not covered is r
 
 import json
 import math
-import struct
 import sys
 import tomllib
 from decimal import Decimal
 from fractions import Fraction
 from itertools import product as tuples
-from operator import mul
 
 import scene as scenes
-from frame_over_box import KeyBox, NumberBox, Part, TooLight, classes_of
+from averaging import TopologyBox, enclosures, weights_of
+from boxes import KeyBox, NumberBox, classes_of
+from circles import Refused, check_part, doubles
+from frame_over_box import Part
 from moments_over_box import Moments, Span, is_everywhere_positive
-from pushes import PRODUCTS, PushBox, PushFrame, axes_of, is_shape, without_pushes
+from numbers_over_box import EPS, TooLight
+from pushes import Multipliers, PushBox, PushFrame, axes_of, is_shape, walls_of, without_pushes
+from server_frame import ServerBox, without_server
 from scene import Scene
 from timing import Timing
-
-# The relative error of one operation, and of some in a row.
-EPS = 2.0**-52
-UP = 1 + 2.0**-40
 
 KEYS = {
     *("coordination.stiffness", "coordination.damping", "peer.coupling.stiffness", "peer.coupling.damping"),
@@ -44,17 +43,8 @@ KEYS = {
 }
 
 
-class Refused(Exception):
-    """The certificate does not show what it says, or cannot be checked."""
-
-
-def scene_with(text: str, overrides: list) -> Scene:
-    """The scene with keys set to values, as the program's --set does."""
-    return scenes.read(tables_with(text, overrides), text)
-
-
 def tables_with(text: str, overrides) -> dict:
-    """The tables of a scene with keys set to values."""
+    """The tables of a scene with keys set to values, as the program's --set does."""
     root = tomllib.loads(text)
     for key, value in overrides:
         *path, last = key.split(".")
@@ -75,98 +65,6 @@ def override(text: str) -> tuple:
         return key, value
 
 
-def doubles(digits: str) -> list:
-    return [number for (number,) in struct.iter_unpack(">d", bytes.fromhex(digits))]
-
-
-def product(one, other):
-    columns = list(zip(*other))
-    return [[sum(map(mul, row, column)) for column in columns] for row in one]
-
-
-def sizes(matrix):
-    return [[abs(entry) * UP for entry in row] for row in matrix]
-
-
-def inverse(matrix):
-    """The inverse, nearly, by Gauss and Jordan."""
-    size = len(matrix)
-    rows = [list(row) + [1.0 if i == j else 0.0 for j in range(size)] for i, row in enumerate(matrix)]
-    for place in range(size):
-        pivot = max(range(place, size), key=lambda row: abs(rows[row][place]))
-        rows[place], rows[pivot] = rows[pivot], rows[place]
-        if rows[place][place] == 0:
-            raise Refused("coordinates that are none: V has no inverse")
-        by = 1 / rows[place][place]
-        head = rows[place] = [entry * by for entry in rows[place]]
-        for row in range(size):
-            if row != place and rows[row][place] != 0:
-                factor = rows[row][place]
-                rows[row] = [entry - factor * of_head for entry, of_head in zip(rows[row], head)]
-    return [row[size:] for row in rows]
-
-
-def check_part(frame, certificate) -> tuple:
-    """How many eigenvalues of every matrix of the box lie within the circle of the certificate, of how many; and a bound from below of how far the others
-    are from zero."""
-    size, numbers = len(frame.mean), len(frame.slopes)
-    flat = doubles(certificate["coordinates"])
-    weights = doubles(certificate["weights"])
-    if len(flat) != 2 * size * size or len(weights) != size or not all(weight > 0 for weight in weights):
-        raise Refused(f"expected {size} coordinates and as many weights above zero")
-    column = lambda j: [complex(*flat[2 * (j * size + i) : 2 * (j * size + i) + 2]) for i in range(size)]
-    v = [list(row) for row in zip(*[column(j) for j in range(size)])]
-    w = inverse(v)
-    through = lambda matrix: product(w, product(matrix, v))
-    unit, mean, slopes = product(w, v), through(frame.mean), [through(slope) for slope in frame.slopes]
-    w_sizes, v_sizes = sizes(w), sizes(v)
-    rounding = (8 * size + 32) * (2 + numbers) * EPS
-    largest = [
-        [(abs(m) + sum(abs(s[i][j]) for s in frame.slopes) + frame.radius[i][j]) * UP for j, m in enumerate(row)] for i, row in enumerate(frame.mean)
-    ]
-    by_radius, by_largest = (product(w_sizes, product(matrix, v_sizes)) for matrix in (frame.radius, largest))
-    unit_sizes = product(w_sizes, v_sizes)
-    wide = [[(one + rounding * other) * UP for one, other in zip(*rows)] for rows in zip(by_radius, by_largest)]
-    off_unit = [[(abs(u - (i == j)) + rounding * unit_sizes[i][j]) * UP for j, u in enumerate(row)] for i, row in enumerate(unit)]
-
-    def reach(centre, moves, radius):
-        """Between which sizes centre + Σ sᵢ·movesᵢ ± radius stays."""
-        length = abs(centre)
-        turn = centre.conjugate() / length if length > 0 else 1.0
-        along = sum(abs((move * turn).real) for move in moves)
-        across = sum(abs((move * turn).imag) for move in moves)
-        radius = radius + 16 * EPS * (length + along + across)
-        return length - along - radius, (math.hypot(length + along, across) + radius) * UP
-
-    moves = lambda i, j: [slope[i][j] for slope in slopes]
-    reaches = [reach(mean[i][i], moves(i, i), wide[i][i]) for i in range(size)]
-    kind, *of_circle = certificate["circle"]
-    if kind == "around-zero":
-        (radius,) = of_circle
-        inside = [high < radius for _, high in reaches]
-        apart = [radius - high if within else low - radius for (low, high), within in zip(reaches, inside)]
-        farthest = radius
-        least = radius
-    elif kind == "around-entry":
-        place, radius = of_circle
-        inside = [i == place for i in range(size)]
-        far = lambda i: reach(mean[i][i] - mean[place][place], [a - b for a, b in zip(moves(i, i), moves(place, place))], wide[i][i])[0]
-        apart = [radius - wide[i][i] if i == place else far(i) - radius for i in range(size)]
-        low, high = reach(mean[place][place], moves(place, place), 0.0)
-        farthest = (high + radius) * UP
-        least = low - radius
-    else:
-        raise Refused(f"a circle that is not covered: {kind}")
-    if not radius > 0:
-        raise Refused("a circle without a radius")
-    for i in range(size):
-        own = (apart[i] - off_unit[i][i] * farthest * UP) * weights[i]
-        beside = [(abs(mean[i][j]) + sum(map(abs, moves(i, j))) + wide[i][j] + off_unit[i][j] * farthest) * weights[j] for j in range(size) if j != i]
-        if not own > sum(beside) * (1 + 4 * size * EPS) * UP:
-            raise Refused(f"row {i + 1} of {size} is not dominant on the circle")
-    return sum(inside), size, kind, least
-
-
 DELAY = "link.delay"
 
 
@@ -183,14 +81,38 @@ def check_box(document, box) -> str:
         if events(corners[0]) != events(last):
             raise Refused("samples come into force at other ticks with the longest delay than with the shortest")
     numbers = numbers_of_box(document, ranges[len(keys) :])
-    return check_verdict(lambda: KeyBox(corners, classes_of(corners), numbers), box, corners)
+    return check_verdict(lambda: box_of(document, corners, numbers), box, corners)
+
+
+def box_of(document, corners, numbers):
+    """The box of scenes with those corners, by how their peers act on each other."""
+    _, server, returns_force = without_server(tables_of(document))
+    classes = classes_of(corners, lambda name: name == server)
+    if server is not None:
+        if numbers is not None:
+            raise Refused("a server for every number of peers")
+        return ServerBox(corners, classes, server, returns_force)
+    if document.get("topology") is None:
+        return KeyBox(corners, classes, numbers)
+    if numbers is not None:
+        raise Refused("a topology for every number of peers")
+    return TopologyBox(corners, classes, *topology_of(document, tuple(peer.name for peer in corners[0].peers)))
+
+
+def topology_of(document, names):
+    """The weights of a topology and its eigenvalues, which are those of all boxes."""
+    if "averaging" not in document:
+        table, given = tables_of(document)["topology"], document["topology"]
+        weights, flat = weights_of(table, names, given["weights"]), doubles(given["eigenvectors"])
+        document["averaging"] = weights, enclosures(weights, [flat[start : start + len(names)] for start in range(0, len(flat), len(names))])
+    return document["averaging"]
 
 
 def events(scene):
     """When the samples of each peer come into force at each other, which is later for none if a delay is shorter."""
     timing = Timing(scene)
     of = lambda *link: (timing.held(*link) - timing.t0, [(tick - timing.t0, sent - timing.t0) for tick, sent in timing.in_force(*link)])
-    return [of(*link) for link in scene.links]
+    return [of(*link) for link in ([(0, 1)] if None in scene.links else scene.links)]
 
 
 def ends_of_numbers(document):
@@ -218,9 +140,11 @@ def check_moments(scene, growing, span):
     (moment,) = span["moments"]
     gamma = moment["factor"]
     frame = Moments(box, span["from"], span["to"], moment["heard"], moment["time"], moment["depth"])
-    size = frame.bodies + frame.depth
+    sizes = frame.sizes()
+    if len(moment["blocks"]) != len(sizes):
+        raise Refused(f"expected {len(sizes)} kinds of motion")
     blocks = []
-    for digits, rows in zip(moment["blocks"], (size + 1 - (frame.part.reference is not None), size + 2, 1)):
+    for digits, rows in zip(moment["blocks"], sizes):
         flat = doubles(digits)
         if len(flat) != rows * rows:
             raise Refused(f"expected a moment of {rows} rows")
@@ -258,7 +182,10 @@ def check_span(document, span) -> str:
 
 
 def scene_of(document, values=()) -> Scene:
-    return scene_with(document["scene"], [*map(override, document["overrides"]), *values])
+    root = tables_with(document["scene"], [*map(override, document["overrides"]), *values])
+    if document.get("topology") is not None or root.get("topology", {}).get("kind") == "full":
+        root.pop("topology", None)
+    return scenes.read(without_server(root)[0], document["scene"])
 
 
 def check_verdict(make, certified, scenes) -> str:
@@ -268,15 +195,14 @@ def check_verdict(make, certified, scenes) -> str:
     over = make()
     found = set()
     for part in certified["parts"]:
-        name = (part["difference"], tuple(map(tuple, part["members"])))
-        frame = Part(over, *name, part["states"], part["heard"], part["time"]).frame()
+        frame = over.part(part).frame()
         within, size, kind, least = check_part(frame, part)
         if verdict == "unstable" and (least < 1 or kind == "around-zero" and within == size):
             raise Refused("no eigenvalue is shown to be outside of the unit circle")
         if verdict == "stable" and (kind != "around-zero" or part["circle"][1] > 1 or within < size):
             raise Refused("not all eigenvalues are shown to be within the unit circle")
-        found.add(name)
-    known = {(True, (members,)) for members in over.classes if over.has_differences(members)} | {(False, tuple(over.classes))}
+        found |= over.names(part)
+    known = over.known()
     if not found <= known:
         raise Refused("a part of the certificate is none of the scene")
     if verdict == "unstable" and not found:
@@ -305,32 +231,27 @@ def check_motion(document, motion) -> str:
     if motion["verdict"] != "stable" or not 0 < motion["factor"] <= 1:
         raise Refused("a verdict that is not covered")
     root, pushes = without_pushes(tables_of(document), motion["axis"])
+    walls = walls_of(tables_of(document))
     scene = scenes.read(root, document["scene"])
     box = PushBox(scene, pushes)
-    multipliers = doubles(motion["multipliers"])
-    numbers = {members[0]: place for place, members in enumerate(m for m in box.classes if scene.peers[m[0]].name in pushes)}
+    multipliers = Multipliers(box, motion, pushes, walls)
     found = set()
     for part in motion["parts"]:
         members = list(map(tuple, part["members"]))
-        frame = PushFrame(box, part["difference"], members, part["states"], motion["heard"], motion["time"], pushes)
-        firsts = [members[c][0] for c in frame.contacts]
+        frame = PushFrame(box, part["difference"], members, part["states"], motion["heard"], motion["time"], pushes, walls)
         rows = len(frame.states) + len(frame.contacts)
         flat = doubles(part["shape"])
-        if len(flat) != rows * rows or len(multipliers) != len(numbers) * frame.ticks * PRODUCTS:
-            raise Refused("a form, or multipliers, of another size")
+        if len(flat) != rows * rows:
+            raise Refused("a form of another size")
         shape = [flat[row * rows : (row + 1) * rows] for row in range(rows)]
-        at = lambda contact, tick: PRODUCTS * (numbers[contact] * frame.ticks + tick)
-        of_contacts = [[multipliers[at(first, tick) : at(first, tick) + PRODUCTS] for tick in range(frame.ticks)] for first in firsts]
-        if any(by < 0 for ticks in of_contacts for tick in ticks for by in tick[1:]):
-            raise Refused("a multiplier below zero")
-        weights = [1.0 if part["difference"] else float(len(members[c])) for c in frame.contacts]
-        if not is_shape(shape) or not frame.falls(shape, of_contacts, weights, motion["factor"]):
+        of_contacts = [multipliers.of[members[c][0], kind] for c, kind in frame.contacts]
+        if not is_shape(shape) or not frame.falls(shape, of_contacts, multipliers.shared, list(map(len, members)), motion["factor"]):
             raise Refused("a form that is not shown to fall")
         found.add((part["difference"], tuple(members)))
     for part in motion["rest"]:
         members = tuple(map(tuple, part["members"]))
         within, size, kind, _ = check_part(Part(box, part["difference"], members, part["states"], part["heard"], part["time"]).frame(), part)
-        if kind != "around-zero" or part["circle"][1] > 1 or within < size or any(scene.peers[first].name in pushes for first, *_ in members):
+        if kind != "around-zero" or part["circle"][1] > 1 or within < size or walls or any(scene.peers[first].name in pushes for first, *_ in members):
             raise Refused("not all eigenvalues are shown to be within the unit circle")
         found.add((part["difference"], members))
     if found != {(True, (members,)) for members in box.classes if len(members) > 1} | {(False, tuple(box.classes))}:

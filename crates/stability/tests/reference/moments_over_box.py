@@ -9,14 +9,17 @@ of a peer and its samples on the way, in the mean of the samples that it holds, 
     x    ← q²·x + p·q·σ²
     σ² = µ·C[u − h] + (1 − µ)·A[u − out] + (1 − µ)/(1 − ν²)·A[in + ν·out] + ((1 − 2ν)/2 + (1 − ν)/(2 + 2ν))·x
 
-`mean_square.py` computes the moments of few peers without any of this. Only links of constant delay are covered, and N ≥ 3.
+Of two peers out is −in and there is no x, so that A has (a, in) alone, each delivery makes the noise p·q·σ² of both, and σ² = C[u − h]/2 + A[u + in]/2.
+
+`mean_square.py` computes the moments of few peers without any of this. Only links of constant delay are covered.
 """
 
 import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-from frame_over_box import EPS, UP, Affine, NotCovered, Part, between, scalar
+from frame_over_box import Part
+from numbers_over_box import EPS, UP, Affine, NotCovered, between, scalar
 from timing import Timing
 
 TINY = 1e-290
@@ -142,8 +145,11 @@ class Moments:
     """What a frame makes of second moments over a span of numbers of peers."""
 
     def __init__(self, box, low, high, heard, time, depth):
-        if len(box.classes) != 1 or low < 3:
-            raise NotCovered("second moments of peers that differ, or of two")
+        self.is_pair = (low, high) == (2, 2)
+        if len(box.classes) != 1 or low < 3 and not self.is_pair:
+            raise NotCovered("second moments of peers that differ, or of two together with more")
+        # Samples held of how peers differ: in, and out where it is another number.
+        self.held_apart = 1 if self.is_pair else 2
         self.box, self.depth = box, depth
         self.part = Part(box, False, [list(box.classes[0])], [], heard, time)
         self.shares, self.heard_by = self.part.heard()
@@ -187,14 +193,20 @@ class Moments:
         zeros = [[0.0] * len(rows[0].mean) for _ in rows]
         return Span([row.mean for row in rows], [[row.slopes[k] for row in rows] for k in range(self.box.count)] + [zeros], [row.radius for row in rows])
 
-    def image(self, common, apart, rest):
+    def sizes(self):
+        """How many rows each kind of motion has."""
+        size = self.bodies + self.depth
+        return size + 1 - (self.part.reference is not None), size + self.held_apart, *([] if self.is_pair else [1])
+
+    def image(self, common, apart, rest=None):
         """L(Y) of Y = (common, apart, rest), spans."""
         tied = self.part.reference is None
         kept = self.bodies + self.depth
         start = kept + self.sent
-        placed = lambda held: [row for row in range(kept) if held == 2 or tied or row != self.position] + [start + h for h in range(held)]
-        begins = lambda held: self.constant([[float(place == row) for place in placed(held)] for row in range(start + held)])
-        common, apart = common.through(begins(1)), apart.through(begins(2))
+        placed = lambda held, free: [row for row in range(kept) if free or row != self.position] + [start + h for h in range(held)]
+        begins = lambda held, free: self.constant([[float(place == row) for place in placed(held, free)] for row in range(start + held)])
+        both = ((1, tied), (self.held_apart, True))
+        common, apart = (span.through(begins(*of)) for span, of in zip((common, apart), both))
         peer = self.part.first[0]
         t0, t1, step = self.timing.t0, self.timing.t1, self.box.scene.peers[peer].tick
         due = {}
@@ -203,12 +215,15 @@ class Moments:
         for instant in range(self.timing.first_tick(peer, t0), t1, step):
             if instant in self.sends:
                 sample = kept + self.sends.index(instant)
-                common, apart = (span.through(self.sampled(sample, start + held)) for span, held in ((common, 1), (apart, 2)))
+                common, apart = (span.through(self.sampled(sample, start + held)) for span, (held, _) in zip((common, apart), both))
             for sample in sorted(due.get(instant, [])):
-                common, apart, rest = self.delivered(common, apart, rest, start, sample)
-            common, apart = (span.through(self.tick(start, held)) for span, held in ((common, 1), (apart, 2)))
-        ends = lambda held: self.ended(start, held, tied or held == 2)
-        return common.through(ends(1)), apart.through(ends(2)), rest
+                if self.is_pair:
+                    common, apart = self.delivered_to_pair(common, apart, start, sample)
+                else:
+                    common, apart, rest = self.delivered(common, apart, rest, start, sample)
+            common, apart = (span.through(self.tick(start, held)) for span, (held, _) in zip((common, apart), both))
+        common, apart = (span.through(self.ended(start, *of)) for span, of in zip((common, apart), both))
+        return (common, apart) if self.is_pair else (common, apart, rest)
 
     def rows(self, size):
         return [self.part.unit(size, place) for place in range(size)]
@@ -245,6 +260,21 @@ class Moments:
         if not tied:
             del final[self.position]
         return self.moved(final)
+
+    def delivered_to_pair(self, common, apart, held, sample):
+        q = Fraction(self.loss)
+        exact = lambda number: self.single(Affine(number, (Fraction(0),) * self.count))
+        row = lambda sign: self.constant([[1.0 if column == sample else sign * (column == held) for column in range(held + 1)]])
+        unit = self.constant([[float(column == held)] for column in range(held + 1)])
+        missed = exact(Fraction(1, 2)).times(common.through(row(-1.0)).plus(apart.through(row(1.0))))
+        noise = exact(q * (1 - q)).times(missed).through(unit)
+
+        def taken(sign):
+            entries = [[Fraction(i == j) for j in range(held + 1)] for i in range(held + 1)]
+            entries[held][held], entries[held][sample] = q, sign * (1 - q)
+            return self.of_nu(entries, [[0] * (held + 1) for _ in entries])
+
+        return common.through(taken(1)).plus(noise), apart.through(taken(-1)).plus(noise)
 
     def delivered(self, common, apart, rest, held, sample):
         q = Fraction(self.loss)

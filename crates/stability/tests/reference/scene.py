@@ -44,6 +44,13 @@ class Link:
     uniform_sd: int = 0  # [ns]
 
 
+class EqualLinks(dict):
+    """Thousands of equal peers have millions of equal links: the one of `None` stands for all."""
+
+    def __missing__(self, ends):
+        return self[None]
+
+
 @dataclass
 class Scene:
     text: str
@@ -154,8 +161,7 @@ def read(root, text):
     names = [p.name for p in peers]
     links = {}
     if len(names) > 64 and "peers" not in root and "links" not in root:
-        # Thousands of equal peers have millions of equal links: one stands for all.
-        links = {None: link(root.get("link", {}))}
+        links = EqualLinks({None: link(root.get("link", {}))})
     pairs = ((i, j) for i in range(len(names)) for j in range(len(names)) if i != j) if len(names) <= 64 else ()
     for i, j in pairs:
         links[i, j] = link({**root.get("link", {}), **own.get((names[i], names[j]), {})})

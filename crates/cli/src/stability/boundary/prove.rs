@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use cohaptic_stability::{BoundaryError, Guarantee, ProofError, ProvenLine, ProvenStretch, SharedProof};
+use cohaptic_stability::{BoundaryError, Guarantee, ProofError, ProvenLine, ProvenStretch, SharedProof, TopologyCertificate};
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 
@@ -50,8 +50,9 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
         files.push(write_into(folder, "proof.csv", table(order, &line))?);
         if arguments.certificate && line.is_whole {
             let pieces = line.certify(&order.family, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
+            let topology = TopologyCertificate::of(&order.family).map_err(|error| failure(order, arguments, error))?;
             let given = Given { title: &order.title, text: &order.text, overrides: &arguments.scene.overrides.set };
-            files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], None, &pieces)?)?);
+            files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], None, topology.as_ref(), &pieces)?)?);
         }
         if line.is_whole {
             proof_blocks::remove(folder, ROWS)?;

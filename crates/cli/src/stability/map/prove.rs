@@ -7,7 +7,7 @@ use std::time::Instant as Clock;
 
 use cohaptic_answers::axis_of;
 use cohaptic_picture::{Fill, Panel, Picture, Region};
-use cohaptic_stability::{Guarantee, ProofError, ProvenBox, ProvenRegion, SharedProof};
+use cohaptic_stability::{Guarantee, ProofError, ProvenBox, ProvenRegion, SharedProof, TopologyCertificate};
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 
@@ -110,9 +110,11 @@ fn certificates(order: &Order, arguments: &MapArguments, proofs: &[Proof], folde
     for (number, (proof, family)) in proofs.iter().zip(&order.families).enumerate() {
         let boxes = proof.region.certify(family, &watch).map_err(|error| failure(order, arguments, number, error))?;
         let overrides = order.variants[number].on_top_of(&arguments.scene.overrides.set);
+        let topology = TopologyCertificate::of(family).map_err(|error| failure(order, arguments, number, error))?;
         let given = Given { title: &order.title, text: &order.text, overrides: &overrides };
         let name = if number == 0 { "certificate.json".to_owned() } else { format!("certificate-{}.json", number + 1) };
-        files.push(write_into(folder, &name, certificate::of_boxes(&given, &[order.x(), order.y()], arguments.every_number, &boxes)?)?);
+        let keys = [order.x(), order.y()];
+        files.push(write_into(folder, &name, certificate::of_boxes(&given, &keys, arguments.every_number, topology.as_ref(), &boxes)?)?);
     }
     Ok(files)
 }
