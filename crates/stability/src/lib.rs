@@ -78,7 +78,7 @@ pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use proof::{
     BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, KnownPieces, MOST_FOLLOWED, MOST_HALVINGS, MomentCertificate, NumberCertificate,
-    NumberSpan, PartCertificate, ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch, SharedProof, TopologyCertificate,
+    NumberProof, NumberSpan, PartCertificate, ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch, SharedProof, TopologyCertificate,
     prove_every_number,
 };
 pub use radius::{Radius, Verdict};

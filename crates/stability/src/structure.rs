@@ -82,28 +82,7 @@ impl Structure {
         contacts: &Contacts,
         apart: impl Fn(usize, usize) -> bool,
     ) -> Result<Self, AnalysisError> {
-        let scene = scenes[0];
-        let peers = scene.peers.len();
-        let mut classes: Vec<Vec<usize>> = Vec::new();
-        for place in 0..peers {
-            let found = classes.iter().position(|class| {
-                !apart(class[0], place)
-                    && contacts.touching[class[0]] == contacts.touching[place]
-                    && contacts.absent[class[0]] == contacts.absent[place]
-                    && scenes.iter().all(|scene| {
-                        let touching = contacts.touching[place];
-                        alike(&scene.peers[class[0]], &scene.peers[place], touching) && turn_alike(scene, class[0], place, touching)
-                    })
-            });
-            match found {
-                Some(class) => classes[class].push(place),
-                None => classes.push(vec![place]),
-            }
-        }
-        if !network.is_uniform() {
-            classes = split_by_links(classes, network);
-        }
-        Self::of_classes(scene, classes, network, contacts)
+        Self::of_classes(scenes[0], classes(scenes, network, contacts, apart), network, contacts)
     }
 
     /// Every peer by itself, whether or not it is like another.
@@ -254,6 +233,30 @@ pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, p
         tick = tick.min(scene.peers[place].clock.tick);
     }
     (1.0 / fastest.sqrt()).clamp(tick.as_secs_f64(), frame.as_secs_f64())
+}
+
+/// The classes of peers that are equal in every one of the scenes, but for pairs that are in one class in no case.
+pub(crate) fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, apart: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
+    let mut classes: Vec<Vec<usize>> = Vec::new();
+    for place in 0..scenes[0].peers.len() {
+        let found = classes.iter().position(|class| {
+            !apart(class[0], place)
+                && contacts.touching[class[0]] == contacts.touching[place]
+                && contacts.absent[class[0]] == contacts.absent[place]
+                && scenes.iter().all(|scene| {
+                    let touching = contacts.touching[place];
+                    alike(&scene.peers[class[0]], &scene.peers[place], touching) && turn_alike(scene, class[0], place, touching)
+                })
+        });
+        match found {
+            Some(class) => classes[class].push(place),
+            None => classes.push(vec![place]),
+        }
+    }
+    if !network.is_uniform() {
+        classes = split_by_links(classes, network);
+    }
+    classes
 }
 
 /// The clock of each class.

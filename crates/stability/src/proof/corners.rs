@@ -8,8 +8,8 @@ use std::borrow::Cow;
 use cohaptic_peer::{Gains, StepMap};
 
 use super::ProofError;
-use super::span::StepSpan;
-use super::steps::{FrameState, Numbers, Plan, StepMatrix};
+use super::span::{FrameSpan, StepSpan};
+use super::steps::{FrameState, Numbers, Plan, Plans, StepMatrix};
 use crate::Matrix;
 use crate::lifted::node::{Body, Scale};
 use crate::lifted::{Node, Sampling};
@@ -26,6 +26,8 @@ pub(super) struct Point {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Common<'a> {
     pub(super) timetable: &'a Timetable,
+    /// The plans of that timetable.
+    pub(super) plans: &'a Plans,
     pub(super) tied: bool,
     /// What velocities are multiplied by \[s\].
     pub(super) time: f64,
@@ -35,8 +37,8 @@ pub(super) struct Common<'a> {
 const MOST_NUMBERS: u32 = 6;
 
 /// Parts of the computation that all points share.
-struct Frame {
-    plan: Plan,
+struct Frame<'a> {
+    plan: &'a Plan,
     sampling: Sampling,
     scale: Scale,
     tied: bool,
@@ -44,15 +46,15 @@ struct Frame {
     whole_past: bool,
 }
 
-impl Frame {
-    fn of(points: &[Point], common: Common<'_>) -> Result<Self, ProofError> {
+impl<'a> Frame<'a> {
+    fn of(points: &[Point], common: Common<'a>) -> Result<Self, ProofError> {
         let all: Vec<Node> = points.iter().flat_map(|point| point.nodes.iter().cloned()).collect();
         let sampling = Sampling::of(&all);
         let scale = Scale { time: common.time, compliance: points[0].nodes[0].compliance(common.time) };
         check_units(points, scale)?;
         let whole_past = !takes_one_past(points, scale);
         let ages = all.iter().any(|node| node.law.horizon.is_some());
-        Ok(Self { plan: Plan::of(common.timetable, !sampling.is_silent(scale.time), ages), sampling, scale, tied: common.tied, whole_past })
+        Ok(Self { plan: common.plans.of(common.timetable, !sampling.is_silent(scale.time), ages), sampling, scale, tied: common.tied, whole_past })
     }
 
     fn matrices(&self, point: &Point) -> Vec<StepMatrix> {
@@ -70,12 +72,12 @@ impl Frame {
 
 /// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set. Bodies are between those of `ends`, whatever those of
 /// the points are.
-pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
+pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<FrameSpan, ProofError> {
     let frame = Frame::of(points, common)?;
-    let steps = enclosed(points, ends, |point| frame.matrices(point))?;
+    let kinds = enclosed(points, ends, |point| frame.matrices(point))?;
     #[cfg(test)]
-    let steps = super::mutation::of_steps(steps);
-    Ok(steps)
+    let kinds = super::mutation::of_steps(kinds);
+    Ok(FrameSpan { kinds, order: frame.plan.kinds().to_vec() })
 }
 
 /// Matrices over the box that points enclose, from those at each corner. Bodies are between those of `ends`, whatever those of the points are.
@@ -107,7 +109,7 @@ pub(super) struct States {
 ///
 /// With one, steps are affine in N, T = A + N·B, so that N₀/N·T = u·A + N₀·B, u = N₀/N from 0 to 1, lies between T(N₀) and N₀·B = T(2·N₀) − T(N₀).
 /// With two, T = A + N·B + N²·C, and (N₀/N)²·T = u²·A + u·L + Q with L = N₀·B and Q = N₀²·C lies between the four where u² and u are 0 or 1.
-pub(super) fn steps_beyond(at: [&[Point]; 3], growing: Growth, common: Common<'_>) -> Result<Vec<StepSpan>, ProofError> {
+pub(super) fn steps_beyond(at: [&[Point]; 3], growing: Growth, common: Common<'_>) -> Result<FrameSpan, ProofError> {
     let all: Vec<Point> = at.iter().flat_map(|points| points.iter().cloned()).collect();
     let frame = Frame::of(&all, common)?;
     let [near, far, third] = at.map(|points| points.iter().map(|point| frame.matrices(point)).collect::<Vec<_>>());
@@ -130,7 +132,7 @@ pub(super) fn steps_beyond(at: [&[Point]; 3], growing: Growth, common: Common<'_
         let limits: Vec<StepMatrix> = corners.iter().flat_map(of).collect();
         StepSpan::of(limits.iter().chain(near.iter().map(|steps| &steps[step])))
     };
-    Ok((0..near[0].len()).map(span).collect())
+    Ok(FrameSpan { kinds: (0..near[0].len()).map(span).collect(), order: frame.plan.kinds().to_vec() })
 }
 
 /// How the steps of a frame grow with the number of peers.
@@ -142,7 +144,7 @@ pub(super) enum Growth {
     Quadratic,
 }
 
-/// The steps of a frame at each point, in the units of the first.
+/// The kinds of steps of a frame at each point, in the units of the first.
 #[cfg(test)]
 pub(super) fn steps_of_each(points: &[Point], common: Common<'_>) -> Result<Vec<Vec<StepMatrix>>, ProofError> {
     let frame = Frame::of(points, common)?;

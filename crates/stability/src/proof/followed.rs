@@ -9,9 +9,10 @@ use super::certificate::{BoxCertificate, Certified, PartCertificate, TopologyCer
 use super::corners::{Common, Point, States, doubled, states, steps};
 use super::delays;
 use super::discs::decide;
-use super::growing::{ENDLESS, nu, weights_of_growing};
+use super::growing::{ENDLESS, nu, plans_of, weights_of_growing};
 use super::server::Server;
-use super::span::StepSpan;
+use super::steps::Plans;
+use super::waves::{self, Waves};
 use super::{Guarantee, ProofError, Proven};
 use crate::analysis::{on_this_topology, pairs};
 use crate::graph::{EnclosedSpectrum, node_on};
@@ -33,6 +34,8 @@ pub(super) struct Motion {
     growing: Option<usize>,
     /// How its peers act on each other.
     action: Action,
+    /// Those of the averages of classes, and of the differences within each.
+    plans: (Plans, Vec<Plans>),
 }
 
 /// How peers act on each other.
@@ -43,6 +46,8 @@ enum Action {
     Graph(EnclosedSpectrum),
     /// As a server and its clients.
     Server(Server),
+    /// By waves over equal links.
+    Waves(Waves),
 }
 
 impl Action {
@@ -52,6 +57,7 @@ impl Action {
             Self::Mean => None,
             Self::Graph(_) => Some("a [topology]"),
             Self::Server(_) => Some("client-server coordination"),
+            Self::Waves(_) => Some("wave coordination"),
         }
     }
 }
@@ -60,6 +66,7 @@ impl Action {
 struct PartOf<'a> {
     apart: Option<usize>,
     timetable: &'a Timetable,
+    plans: &'a Plans,
     tied: bool,
     /// On a graph, between which numbers the weight is with which a peer hears its own samples.
     weight: Option<[f64; 2]>,
@@ -71,6 +78,8 @@ enum Named {
     AtPoints(Vec<Point>),
     /// The frame of a server, with what forces are multiplied by.
     OfServer(States, f64),
+    /// The checker does not derive the frame.
+    Never,
 }
 
 /// Values of a delay between which no frame differs, and its motions. Without a delay among the keys there is one stretch.
@@ -173,6 +182,10 @@ impl<'a> Followed<'a> {
 
     /// Refuses scenes whose verdicts nothing is written for to check them by.
     pub(super) fn refuse_certificate(&self) -> Result<(), ProofError> {
+        let mut motions = self.stretches.iter().flat_map(|stretch| &stretch.motions);
+        if motions.any(|motion| matches!(motion.action, Action::Waves(_))) {
+            return Err(ProofError::NoCertificate { what: "wave coordination" });
+        }
         TopologyCertificate::of(self.family).map(drop)
     }
 
@@ -247,13 +260,15 @@ fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, O
     for (piece, first) in all[0].iter().enumerate() {
         let of_piece: Vec<&Scene> = all.iter().filter_map(|pieces| pieces.get(piece)).map(|piece| &*piece.scene).collect();
         for (_, combination) in pairs(std::slice::from_ref(first), &mut false)? {
-            let (structure, action) = match Server::structure(&of_piece, &network, &combination.contacts)? {
-                Some((structure, server)) => (structure, Action::Server(server)),
-                None => {
-                    let structure = Structure::of(&of_piece, &network, &combination.contacts)?;
-                    let spectrum = graph.as_ref().map(|graph| on_graph(graph, &of_piece, &structure)).transpose()?;
-                    (structure, spectrum.map_or(Action::Mean, Action::Graph))
-                }
+            let contacts = &combination.contacts;
+            let (structure, action) = if let Some((structure, server)) = Server::structure(&of_piece, &network, contacts)? {
+                (structure, Action::Server(server))
+            } else if let Some((structure, waves)) = Waves::structure(&of_piece, &network, contacts)? {
+                (structure, Action::Waves(waves))
+            } else {
+                let structure = Structure::of(&of_piece, &network, contacts)?;
+                let spectrum = graph.as_ref().map(|graph| on_graph(graph, &of_piece, &structure)).transpose()?;
+                (structure, spectrum.map_or(Action::Mean, Action::Graph))
             };
             if every.is_some()
                 && let Some(what) = action.special()
@@ -261,7 +276,8 @@ fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, O
                 return Err(ProofError::OneNumber { what });
             }
             let growing = every.map(|(from, _)| growing(&structure, &of_piece, from)).transpose()?;
-            motions.push(Motion { piece, structure, growing, action });
+            let plans = plans_of(&structure);
+            motions.push(Motion { piece, structure, growing, action, plans });
         }
     }
     Ok(motions)
@@ -322,6 +338,7 @@ impl Motion {
             Action::Mean => Ok(self.structure.nodes(scene)),
             Action::Graph(spectrum) => Ok(vec![node_on(scene, &self.structure, spectrum.degree).map_err(on_this_topology)?]),
             Action::Server(server) => Ok(server.nodes(&self.structure, scene)),
+            Action::Waves(_) => Ok(Waves::nodes(&self.structure, scene)),
         }
     }
 
@@ -333,20 +350,28 @@ impl Motion {
         let mut of = |part: &PartOf<'_>| {
             let classes = part.apart.map_or(0..structure.classes.len(), |class| class..class + 1);
             let ends: Vec<Vec<Node>> = nodes.iter().map(|nodes| nodes[classes.clone()].to_vec()).collect();
-            let common = Common { timetable: part.timetable, tied: part.tied, time };
-            let (steps, named) = if let Action::Server(server) = &self.action {
-                let frame = server.frame(structure, &ends, part.apart, time)?;
-                (frame.steps, Named::OfServer(frame.states, frame.compliance))
-            } else {
-                let points = self.points(&ends, numbers, part);
-                (steps(&points, &ends, common)?, Named::AtPoints(points))
+            let common = Common { timetable: part.timetable, plans: part.plans, tied: part.tied, time };
+            let (frame, named) = match &self.action {
+                Action::Server(server) => {
+                    let frame = server.frame(structure, &ends, part.apart, time)?;
+                    (frame.steps, Named::OfServer(frame.states, frame.compliance))
+                }
+                Action::Waves(waves) => {
+                    let points = self.points(&ends, numbers, part);
+                    (waves.steps(&waves::Part::of(structure, part.apart), &points, &ends, time)?, Named::Never)
+                }
+                Action::Mean | Action::Graph(_) => {
+                    let points = self.points(&ends, numbers, part);
+                    (steps(&points, &ends, common)?, Named::AtPoints(points))
+                }
             };
-            let Some(decision) = decide(&StepSpan::product(&steps)) else { return Ok(None) };
+            let Some(decision) = decide(&frame.product()) else { return Ok(None) };
             if let Some(certified) = certified.as_deref_mut() {
                 let members = classes.map(|class| structure.classes[class].clone()).collect();
                 let (states, compliance) = match named {
                     Named::AtPoints(points) => (states(&points, common)?, None),
                     Named::OfServer(states, compliance) => (states, Some(compliance)),
+                    Named::Never => unreachable!("a certificate of it is refused"),
                 };
                 let certificate = PartCertificate::new(members, part.apart.is_some(), states, time, &decision.witness);
                 let eigenvalues = part.weight.filter(|_| part.apart.is_some());
@@ -382,25 +407,29 @@ impl Motion {
         match &self.action {
             Action::Graph(spectrum) => {
                 let timetable = structure.apart[0].as_ref().unwrap_or(&structure.timetable);
-                let of = |weight: &[f64; 2]| PartOf { apart: Some(0), timetable, tied: true, weight: Some(*weight) };
+                let of = |weight: &[f64; 2]| PartOf { apart: Some(0), timetable, plans: &self.plans.0, tied: true, weight: Some(*weight) };
                 parts.extend(spectrum.others.iter().map(of));
-                parts.push(PartOf { apart: None, timetable, tied: structure.tied, weight: Some([1.0; 2]) });
+                parts.push(PartOf { apart: None, timetable, plans: &self.plans.0, tied: structure.tied, weight: Some([1.0; 2]) });
                 return parts;
             }
             Action::Mean => {
                 let of = |(class, timetable): (usize, &'_ Option<Timetable>)| timetable.as_ref().map(|_| class);
                 for class in structure.apart.iter().enumerate().filter_map(of) {
                     let timetable = structure.apart[class].as_ref().unwrap_or(&structure.timetable);
-                    parts.push(PartOf { apart: Some(class), timetable, tied: true, weight: None });
+                    parts.push(PartOf { apart: Some(class), timetable, plans: &self.plans.1[class], tied: true, weight: None });
                 }
             }
-            Action::Server(_) => {
-                for class in (0..structure.classes.len()).filter(|class| Server::has_differences(structure, *class)) {
-                    parts.push(PartOf { apart: Some(class), timetable: &structure.timetable, tied: true, weight: None });
+            Action::Server(_) | Action::Waves(_) => {
+                let has_differences = |class: &usize| match self.action {
+                    Action::Server(_) => Server::has_differences(structure, *class),
+                    _ => structure.classes[*class].len() > 1,
+                };
+                for class in (0..structure.classes.len()).filter(has_differences) {
+                    parts.push(PartOf { apart: Some(class), timetable: &structure.timetable, plans: &self.plans.0, tied: true, weight: None });
                 }
             }
         }
-        parts.push(PartOf { apart: None, timetable: &structure.timetable, tied: structure.tied, weight: None });
+        parts.push(PartOf { apart: None, timetable: &structure.timetable, plans: &self.plans.0, tied: structure.tied, weight: None });
         parts
     }
 
@@ -413,7 +442,11 @@ impl Motion {
             return if low < high { doubled(&points, |point, upper| hears(&point.nodes, if upper { high } else { low })) } else { points };
         }
         let Some((growing, numbers)) = self.growing.zip(numbers) else {
-            let weights = apart.map_or_else(|| structure.weights.clone(), |_| Matrix::from_fn(1, 1, |_, _| structure.difference_weight()));
+            let whole = || match &self.action {
+                Action::Waves(_) => waves::with_shares(&structure.weights, &waves::Part::of(structure, apart).shares()),
+                _ => structure.weights.clone(),
+            };
+            let weights = apart.map_or_else(whole, |_| Matrix::from_fn(1, 1, |_, _| structure.difference_weight()));
             return ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone() }).collect();
         };
         let weights = numbers.map(|nu| weights_of_growing(structure, growing, nu, apart.is_some()));

@@ -14,7 +14,8 @@ use cohaptic_scene::Scene;
 use super::certificate::{Certified, PartCertificate};
 use super::corners::{Common, Growth, Point, doubled, states, steps, steps_beyond};
 use super::discs::decide;
-use super::span::StepSpan;
+use super::steps::Plans;
+use super::waves::{self, Part, Waves};
 use super::{ProofError, Proven};
 use crate::analysis::pairs;
 use crate::lifted::Node;
@@ -22,7 +23,7 @@ use crate::lifted::node::Body;
 use crate::network::NominalNetwork;
 use crate::parts::alone;
 use crate::pieces::pieces;
-use crate::structure::{Structure, count};
+use crate::structure::{Structure, check_laws, classes, count};
 use crate::{Matrix, Verdict};
 
 /// As good as without end: a weight of 1/(N − 1) is below a rounding.
@@ -32,6 +33,7 @@ pub(super) const ENDLESS: u64 = 1 << 53;
 pub(super) const WIDER: f64 = 8.0;
 
 /// A motion of the scene, in one combination of contacts: its classes, of which one grows.
+#[derive(Debug)]
 pub(super) struct Motion {
     pub(super) scene: Scene,
     pub(super) structure: Structure,
@@ -39,9 +41,14 @@ pub(super) struct Motion {
     growing: usize,
     /// Whether forces are counted in newtons over N.
     divides_forces: bool,
+    /// Those of the averages of classes, and of the differences within each.
+    plans: (Plans, Vec<Plans>),
+    /// If waves tie its copies.
+    waves: Option<Waves>,
 }
 
 /// A scene of which the largest class of equal peers grows.
+#[derive(Debug)]
 pub(super) struct Growing {
     pub(super) motions: Vec<Motion>,
     /// The first peer of the class that grows.
@@ -54,8 +61,21 @@ impl Growing {
     pub(super) fn new(scene: &Scene, network: &NominalNetwork) -> Result<Self, ProofError> {
         let all = pieces(scene, "the proof for every number of peers")?;
         let (mut motions, mut least, mut first) = (Vec::new(), 2, 0);
-        for (piece, combination) in pairs(&all, &mut false)? {
-            let structure = Structure::of(&[&*piece.scene], network, &combination.contacts)?;
+        let pairs = pairs(&all, &mut false)?;
+        // A frame of clocks that drift has very many events: it is not made for a refusal.
+        for (piece, combination) in &pairs {
+            if !Waves::tie(&piece.scene) {
+                check_laws(&piece.scene)?;
+            }
+            if classes(&[&*piece.scene], network, &combination.contacts, |_, _| false).iter().all(|class| class.len() == 1) {
+                return Err(ProofError::Unequal);
+            }
+        }
+        for (piece, combination) in pairs {
+            let (structure, waves) = match Waves::structure(&[&*piece.scene], network, &combination.contacts)? {
+                Some((structure, waves)) => (structure, Some(waves)),
+                None => (Structure::of(&[&*piece.scene], network, &combination.contacts)?, None),
+            };
             let growing = structure.largest_equal().ok_or(ProofError::Unequal)?;
             for class in 0..structure.classes.len() {
                 // It does not depend on N.
@@ -65,11 +85,17 @@ impl Growing {
             }
             least = least.max(structure.peers - structure.classes[growing].len() + 1);
             first = structure.classes[growing][0];
-            let mut motion = Motion { scene: piece.scene.clone().into_owned(), structure, growing, divides_forces: false };
+            let plans = plans_of(&structure);
+            let mut motion = Motion { scene: piece.scene.clone().into_owned(), structure, growing, divides_forces: false, plans, waves };
             motion.divides_forces = motion.has_limits_of_divided_forces();
             motions.push(motion);
         }
         Ok(Self { motions, first, least: least as u64 })
+    }
+
+    /// What a verdict has no certificate of; `None` if it has one.
+    pub(super) fn special(&self) -> Option<&'static str> {
+        self.motions.iter().any(|motion| motion.waves.is_some()).then_some("wave coordination")
     }
 
     /// What every number of peers from `low` to `high` has in common, if that is proven, and the certificates of its parts where they are asked for.
@@ -158,7 +184,8 @@ fn differs(far: f64, near: f64) -> bool {
 impl Motion {
     /// The nodes of all classes, with forces in newtons.
     fn scaled(&self, number: u64) -> Vec<Node> {
-        self.structure.nodes(&self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX)))
+        let scene = self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX));
+        if self.waves.is_some() { Waves::nodes(&self.structure, &scene) } else { self.structure.nodes(&scene) }
     }
 
     /// The nodes of all classes.
@@ -211,12 +238,43 @@ impl Motion {
     }
 
     fn weights(&self, nu: f64, apart: Option<usize>) -> Matrix {
-        weights_of_growing(&self.structure, self.growing, nu, apart.is_some())
+        let weights = weights_of_growing(&self.structure, self.growing, nu, apart.is_some());
+        if self.waves.is_some() && apart.is_none() { waves::with_shares(&weights, &self.shares(nu)) } else { weights }
+    }
+
+    /// How large each class is beside the one that grows; of itself it does not matter.
+    fn shares(&self, nu: f64) -> Vec<f64> {
+        let classes = &self.structure.classes;
+        let others = count(self.structure.peers - classes[self.growing].len());
+        (0..classes.len())
+            .map(|class| if class == self.growing { 1.0 } else { count(classes[class].len()) * nu / (1.0 - (others - 1.0) * nu) })
+            .collect()
+    }
+
+    /// The verdict on the waves of the averages of all classes, or of how the members of one differ, whose nodes are those at both ends.
+    fn decide_waves(
+        &self,
+        waves: &Waves,
+        [low, high]: [u64; 2],
+        points: Vec<Point>,
+        ends: &[Vec<Node>; 2],
+        apart: Option<usize>,
+    ) -> Result<Option<Proven>, ProofError> {
+        let mut points = points;
+        // Of one other peer they are as affine in ν as the weights are.
+        if apart.is_none() && self.structure.peers - self.structure.classes[self.growing].len() > 1 {
+            let shares = [low, high].map(|number| self.shares(nu(number)));
+            points =
+                doubled(&points, |point, upper| Point { weights: waves::with_shares(&point.weights, &shares[usize::from(upper)]), ..point.clone() });
+        }
+        let part = Part { structure: &self.structure, apart, rest: self.growing, is_pair: high == 2 };
+        Ok(decide(&waves.steps(&part, &points, ends, self.time(low))?.product()).map(|decision| decision.proven))
     }
 
     fn common(&self, apart: Option<usize>, time: f64) -> Common<'_> {
         let timetable = apart.and_then(|class| self.structure.apart[class].as_ref()).unwrap_or(&self.structure.timetable);
-        Common { timetable, tied: apart.is_some() || self.structure.tied, time }
+        let plans = apart.map_or(&self.plans.0, |class| &self.plans.1[class]);
+        Common { timetable, plans, tied: apart.is_some() || self.structure.tied, time }
     }
 
     /// The corners of a box: from nodes on, with ν times the gains at each end, and laws and couplings that go from those of `near` to those of `end`. A law that is none of the box's numbers stays as it is.
@@ -249,6 +307,9 @@ impl Motion {
     /// Whether all numbers of peers from one on are proven unstable in a part of which the gains of the law or the effects of a force on the copies grow with N, or both, and nothing else changes but
     /// towards a limit. A frame divided by N/N₀ a step, or by its square, is one of a box then, and an unstable one is so without the division.
     fn is_unstable_beyond(&self, from: u64, apart: Option<usize>) -> Result<bool, ProofError> {
+        if self.waves.is_some() {
+            return Ok(false);
+        }
         let [near, far, end] = [from, 2 * from, ENDLESS].map(|number| self.part(number, apart));
         let grows = |of: &dyn Fn(&Node) -> f64| of(&end[0]) > 2.0 * of(&far[0]);
         let force = |node: &Node| force(node).unwrap_or(0.0);
@@ -275,7 +336,7 @@ impl Motion {
         let time = self.structure.time(&self.scene, &self.nodes(from));
         let growth = if law_grows && mass_vanishes { Growth::Quadratic } else { Growth::Linear };
         let [near, far, third] = [points(&near), points(&far), points(&third)];
-        let span = StepSpan::product(&steps_beyond([&near, &far, &third], growth, self.common(apart, time))?);
+        let span = steps_beyond([&near, &far, &third], growth, self.common(apart, time))?.product();
         Ok(decide(&span).is_some_and(|decision| decision.proven == Proven::Unstable))
     }
 
@@ -286,8 +347,11 @@ impl Motion {
         let time = self.time(low);
         let heard = [gain(&first[0]) * nu(low), gain(&last[0]) * nu(high)];
         let points = self.corners(first.to_vec(), [first, last], heard, true, apart);
+        if let Some(waves) = &self.waves {
+            return self.decide_waves(waves, [low, high], points, &ends, apart);
+        }
         let common = self.common(apart, time);
-        let span = StepSpan::product(&steps(&points, &ends, common)?);
+        let span = steps(&points, &ends, common)?.product();
         let span = if certified.is_some() && low < high { span.widened(WIDER) } else { span };
         let Some(decision) = decide(&span) else { return Ok(None) };
         if let Some(certified) = certified {
@@ -298,6 +362,11 @@ impl Motion {
         }
         Ok(Some(decision.proven))
     }
+}
+
+/// Plans, not yet made, of the averages of classes, and of the differences within each.
+pub(super) fn plans_of(structure: &Structure) -> (Plans, Vec<Plans>) {
+    (Plans::default(), structure.classes.iter().map(|_| Plans::default()).collect())
 }
 
 /// The weights of the averages of classes (columns) in the targets of classes (rows), of which one grows, or the weight of a difference in itself: constants, and multiples of ν.

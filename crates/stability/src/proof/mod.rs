@@ -3,7 +3,7 @@
 //! A frame of a lifted system is a product of steps ([`steps`]) whose entries are affine in each gain. Over a box of gains it is a mean, a slope along each of them and a small radius ([`span`]), and its
 //! eigenvalues lie in discs that move along ([`discs`]): all inside the unit circle, or one outside, for the whole box. Boxes of which neither can be shown are split.
 //!
-//! Equal peers on a graph are parts of one node each, for every eigenvalue of its averaging matrix between two numbers. A server and its clients have steps of their own ([`server`]).
+//! Equal peers on a graph are parts of one node each, for every eigenvalue of its averaging matrix between two numbers. A server and its clients ([`server`]), and copies that are tied by waves ([`waves`]), have steps of their own.
 //!
 //! Nothing that is looked for has to be right: each finding is checked with bounds of all rounding errors.
 
@@ -24,6 +24,7 @@ mod number;
 #[cfg(test)]
 mod points;
 mod program;
+mod pushed;
 mod region;
 mod server;
 #[cfg(test)]
@@ -33,12 +34,15 @@ mod span;
 mod steps;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_of_waves;
+mod waves;
 
 pub(crate) use certificate::digits;
 pub use certificate::{BoxCertificate, MomentCertificate, NumberCertificate, PartCertificate, TopologyCertificate};
 pub use discs::FreeCircle;
 pub use line::{ProvenLine, ProvenStretch};
-pub use number::{EveryNumber, MOST_FOLLOWED, NumberSpan, prove_every_number};
+pub use number::{EveryNumber, MOST_FOLLOWED, NumberProof, NumberSpan, prove_every_number};
 pub use region::{MOST_HALVINGS, ProvenBox, ProvenRegion};
 pub use shared::{KnownPieces, SharedProof};
 pub use steps::FrameState;
@@ -46,7 +50,7 @@ pub use steps::FrameState;
 use cohaptic_scene::Scene;
 
 use self::corners::{Common, Point};
-use self::span::StepSpan;
+use self::steps::Plans;
 use crate::lifted::Node;
 use crate::timetable::Timetable;
 use crate::{AnalysisError, FamilyError, Matrix};
@@ -142,11 +146,19 @@ pub enum ProofError {
         /// As above.
         what: &'static str,
     },
-    /// Walls about the object of a server.
+    /// Walls with a law whose analyses leave them out.
     #[error(
-        "with client-server coordination walls are left out of every analysis: expected a scene without object.enclosure for --prove; `stability map` and `boundary` without it say what they leave out"
+        "with {strategy} coordination walls are left out of every analysis: expected a scene without object.enclosure for --prove; `stability map` and `boundary` without it say what they leave out"
     )]
-    WallOfServer,
+    WallLeftOut {
+        /// The name of the law.
+        strategy: &'static str,
+    },
+    /// Waves over links or between clocks that differ.
+    #[error(
+        "waves are followed over equal links between peers whose clocks and phases are equal: expected such a scene; `stability point`, `map` and `boundary` follow the others, without --every-number and --prove"
+    )]
+    UnequalWaves,
     /// Numbers of peers that are none.
     #[error("expected numbers of peers from 2 on, the least first, such as 2.. or 2..100")]
     Numbers,
@@ -204,8 +216,8 @@ pub enum ProofError {
 pub(crate) fn stable_difference(members: &[usize], node: &Node, weight: f64, timetable: &Timetable, time: f64) -> Option<PartCertificate> {
     let nodes = vec![node.clone()];
     let points = [Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight) }];
-    let common = Common { timetable, tied: true, time };
-    let decision = discs::decide(&StepSpan::product(&corners::steps(&points, &[nodes], common).ok()?))?;
+    let common = Common { timetable, plans: &Plans::default(), tied: true, time };
+    let decision = discs::decide(&corners::steps(&points, &[nodes], common).ok()?.product())?;
     let part = PartCertificate::new(vec![members.to_vec()], true, corners::states(&points, common).ok()?, time, &decision.witness);
     (decision.proven == Proven::Stable).then_some(part)
 }

@@ -35,6 +35,8 @@ pub struct EveryNumber {
     pub attempts: u64,
     /// Whether they are verdicts in the mean square, since links lose.
     pub is_mean_square: bool,
+    /// Whether all numbers were looked at, and the proof was not ended before.
+    pub is_whole: bool,
     /// The spans as they were decided, of which neighbours may agree.
     pieces: Vec<NumberSpan>,
 }
@@ -46,60 +48,128 @@ const MOST_ATTEMPTS: u64 = 200_000;
 /// Where this number of numbers in a row are undecided, each by itself, all others beyond are left so.
 const MOST_OPEN: u64 = 64;
 
-/// Decides a scene for every number of peers from `from` to `to`, or without end, where the largest class of equal peers over equal links grows and all others stay as they are. How many of that class the scene
-/// itself has does not matter, but that there are two. Numbers for which none is left are passed over. Over links that lose independently it is decided in the mean square.
+/// A scene that can be decided for every number of peers.
+#[derive(Debug)]
+pub struct NumberProof {
+    network: NominalNetwork,
+    growing: Growing,
+    is_mean_square: bool,
+    from: u64,
+    to: Option<u64>,
+    without_limit: Option<String>,
+}
+
+/// Decides a scene for every number of peers from `from` to `to`, or without end, as [`NumberProof`] does.
 ///
 /// # Errors
 ///
-/// [`ProofError`] if no two peers are equal, if something is not linear, if links do something else at random than to lose independently, or if the watch ends it.
+/// Those of [`NumberProof::new`].
 pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn Watch) -> Result<EveryNumber, ProofError> {
-    if from < 2 || to.is_some_and(|to| to < from) {
-        return Err(ProofError::Numbers);
-    }
-    refuse_topology(scene, "the proof for every number of peers")?;
-    let network = NominalNetwork::of(scene)?;
-    let growing = Growing::new(scene, &network)?;
-    let moments = has_chance(scene).then(|| GrowingMoments::new(&growing, &network)).transpose()?;
-    if to.is_some_and(|to| to < growing.least) {
-        return Err(ProofError::Fewer { least: growing.least });
-    }
-    let from = from.max(growing.least);
-    let without_limit = if to.is_some() { None } else { growing.without_limit()? };
-    let end = match to {
-        Some(to) => to,
-        None if without_limit.is_some() => MOST_FOLLOWED.max(from),
-        None => ENDLESS,
-    };
-    let decide = |low, high| moments.as_ref().map_or_else(|| growing.decide(low, high, None), |moments| moments.decide(low, high));
-    let (mut pieces, attempts) = search(from, end, growing.least, watch, decide)?;
-    if without_limit.is_some() {
-        let guarantee = if moments.is_none() && growing.is_unstable_beyond(end)? { Guarantee::Unstable } else { Guarantee::Undecided };
-        pieces.push(NumberSpan { from: end + 1, to: None, guarantee });
-    }
-    let mut spans: Vec<NumberSpan> = Vec::new();
-    for piece in &pieces {
-        match spans.last_mut() {
-            Some(last) if last.guarantee == piece.guarantee => last.to = piece.to,
-            _ => spans.push(*piece),
-        }
-    }
-    Ok(EveryNumber { growing: growing.first, spans, without_limit, attempts, is_mean_square: moments.is_some(), pieces })
+    NumberProof::new(scene, from, to)?.prove(watch)
 }
 
-/// Halves spans of numbers until each is decided, or has one number alone; also says how often it was tried. `least` has not all parts of the motion that others have.
+impl NumberProof {
+    /// Of all numbers of peers from `from` to `to`, or without end, where the largest class of equal peers over equal links grows and all others stay as they are. How many of that class the scene
+    /// itself has does not matter, but that there are two. Numbers for which none is left are passed over.
+    ///
+    /// # Errors
+    ///
+    /// [`ProofError`] if no two peers are equal, if something is not linear, or if links do something else at random than to lose independently.
+    pub fn new(scene: &Scene, from: u64, to: Option<u64>) -> Result<Self, ProofError> {
+        if from < 2 || to.is_some_and(|to| to < from) {
+            return Err(ProofError::Numbers);
+        }
+        refuse_topology(scene, "the proof for every number of peers")?;
+        let network = NominalNetwork::of(scene)?;
+        let growing = Growing::new(scene, &network)?;
+        if growing.special().is_some() && has_chance(scene) {
+            return Err(AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() }.into());
+        }
+        if to.is_some_and(|to| to < growing.least) {
+            return Err(ProofError::Fewer { least: growing.least });
+        }
+        let from = from.max(growing.least);
+        let without_limit = if to.is_some() { None } else { growing.without_limit()? };
+        let proof = Self { network, growing, is_mean_square: has_chance(scene), from, to, without_limit };
+        proof.moments()?;
+        Ok(proof)
+    }
+
+    /// Refuses a scene whose verdicts have no certificate, before they are found.
+    ///
+    /// # Errors
+    ///
+    /// [`ProofError::NoCertificate`].
+    pub fn check_certificate(&self) -> Result<(), ProofError> {
+        refuse_certificate(&self.growing)
+    }
+
+    /// In the mean square, over links that lose independently.
+    fn moments(&self) -> Result<Option<GrowingMoments<'_>>, ProofError> {
+        self.is_mean_square.then(|| GrowingMoments::new(&self.growing, &self.network)).transpose()
+    }
+
+    /// Decides all numbers, or what the watch leaves it time for. A span that is looked at is an operation of the watch.
+    ///
+    /// # Errors
+    ///
+    /// [`ProofError::Remembered`], [`ProofError::Drift`] or [`ProofError::Numerous`] of numbers that are no box.
+    pub fn prove(&self, watch: &dyn Watch) -> Result<EveryNumber, ProofError> {
+        let Self { growing, from, to, without_limit, .. } = self;
+        let moments = self.moments()?;
+        let end = match to {
+            Some(to) => *to,
+            None if without_limit.is_some() => MOST_FOLLOWED.max(*from),
+            None => ENDLESS,
+        };
+        let decide = |low, high| moments.as_ref().map_or_else(|| growing.decide(low, high, None), |moments| moments.decide(low, high));
+        let Search { mut pieces, attempts, is_whole } = search(*from, end, growing.least, watch, decide)?;
+        if without_limit.is_some() {
+            let is_unstable = is_whole && moments.is_none() && growing.is_unstable_beyond(end)?;
+            let guarantee = if is_unstable { Guarantee::Unstable } else { Guarantee::Undecided };
+            pieces.push(NumberSpan { from: end + 1, to: None, guarantee });
+        }
+        let mut spans: Vec<NumberSpan> = Vec::new();
+        for piece in &pieces {
+            match spans.last_mut() {
+                Some(last) if last.guarantee == piece.guarantee => last.to = piece.to,
+                _ => spans.push(*piece),
+            }
+        }
+        let without_limit = without_limit.clone();
+        Ok(EveryNumber { growing: growing.first, spans, without_limit, attempts, is_mean_square: self.is_mean_square, is_whole, pieces })
+    }
+}
+
+fn refuse_certificate(growing: &Growing) -> Result<(), ProofError> {
+    growing.special().map_or(Ok(()), |what| Err(ProofError::NoCertificate { what }))
+}
+
+/// What comes out of a search.
+struct Search {
+    pieces: Vec<NumberSpan>,
+    /// How many spans were looked at.
+    attempts: u64,
+    is_whole: bool,
+}
+
+/// Halves spans of numbers until each is decided, or has one number alone. `least` has not all parts of the motion that others have.
 fn search(
     from: u64,
     end: u64,
     least: u64,
     watch: &dyn Watch,
     decide: impl Fn(u64, u64) -> Result<Option<Proven>, ProofError>,
-) -> Result<(Vec<NumberSpan>, u64), ProofError> {
-    let (mut pieces, mut attempts, mut open) = (Vec::new(), 0, 0);
+) -> Result<Search, ProofError> {
+    let (mut pieces, mut attempts, mut open, mut is_whole) = (Vec::new(), 0, 0, true);
     // From the least number on: an undecided span is halved, and the far half waits.
     let mut waiting = vec![(from, end)];
+    watch.expects(1.0);
     while let Some((low, high)) = waiting.pop() {
-        if watch.stops() {
-            return Err(ProofError::Analysis(AnalysisError::Stopped));
+        is_whole = is_whole && !watch.stops();
+        if !is_whole {
+            pieces.push(piece(low, high, None));
+            continue;
         }
         attempts += 1;
         // The least number has no second member of the class that grows, and no differences within it.
@@ -116,13 +186,19 @@ fn search(
             };
             waiting.push((middle + 1, high));
             waiting.push((low, middle));
+            watch.expects(2.0);
+            watch.done(1.0);
             continue;
         }
         open = if found.is_some() { 0 } else { open + 1 };
-        let guarantee = found.map_or(Guarantee::Undecided, Guarantee::from);
-        pieces.push(NumberSpan { from: low, to: if high == ENDLESS { None } else { Some(high) }, guarantee });
+        pieces.push(piece(low, high, found));
+        watch.done(1.0);
     }
-    Ok((pieces, attempts))
+    Ok(Search { pieces, attempts, is_whole })
+}
+
+fn piece(low: u64, high: u64, found: Option<Proven>) -> NumberSpan {
+    NumberSpan { from: low, to: if high == ENDLESS { None } else { Some(high) }, guarantee: found.map_or(Guarantee::Undecided, Guarantee::from) }
 }
 
 impl EveryNumber {
@@ -134,6 +210,7 @@ impl EveryNumber {
     pub fn certify(&self, scene: &Scene, watch: &dyn Watch) -> Result<Vec<NumberCertificate>, ProofError> {
         let network = NominalNetwork::of(scene)?;
         let growing = Growing::new(scene, &network)?;
+        refuse_certificate(&growing)?;
         let moments = self.is_mean_square.then(|| GrowingMoments::new(&growing, &network)).transpose()?;
         let mut found = Vec::new();
         // An undecided span is halved, and the far half waits: with a certificate there is less room than without.

@@ -22,6 +22,8 @@ pub(super) enum Register {
     Sample { class: usize, number: i64, velocity: bool },
     /// The force that a sample of a server has for a class.
     Returned { server: usize, class: usize, number: i64 },
+    /// The waves of a sampling that a class gets from all others, or others from it.
+    Waves { class: usize, number: i64, of_others: bool },
 }
 
 /// Multiples of registers, which are added up.
@@ -36,8 +38,8 @@ pub(super) struct Program {
     pub(super) steps: Vec<Vec<Operation>>,
     /// How many samples each class sends in a frame.
     pub(super) sent: Vec<usize>,
-    /// The position that all others are counted from, where nothing ties any of them to ground.
-    pub(super) reference: Option<Register>,
+    /// For each class, the position that all of its positions are counted from, where nothing ties them to ground.
+    pub(super) references: Vec<Option<Register>>,
 }
 
 /// The states of a program between its steps.
@@ -55,19 +57,24 @@ impl Register {
         match self {
             Self::Sample { class, number, velocity } => Self::Sample { class, number: renamed(class, number), velocity },
             Self::Returned { server, class, number } => Self::Returned { server, class, number: renamed(server, number) },
+            Self::Waves { class, number, of_others } => Self::Waves { class, number: renamed(class, number), of_others },
             Self::Body { .. } | Self::Pending { .. } | Self::Force { .. } => self,
         }
     }
 
-    const fn is_position(self) -> bool {
-        matches!(self, Self::Body { velocity: false, .. } | Self::Sample { velocity: false, .. })
+    /// The class of which it is a position.
+    const fn position_of(self) -> Option<usize> {
+        match self {
+            Self::Body { class, velocity: false, .. } | Self::Sample { class, velocity: false, .. } => Some(class),
+            _ => None,
+        }
     }
 }
 
 impl Layout {
     /// The states at the beginning of a frame, in the order of its rows and columns.
     pub(super) fn states(&self, program: &Program) -> impl Iterator<Item = Register> {
-        self.order[0].iter().copied().filter(move |register| program.reference != Some(*register))
+        self.order[0].iter().copied().filter(move |register| program.reference(*register) != Some(*register))
     }
 }
 
@@ -119,8 +126,13 @@ impl Program {
         (0..self.steps.len()).map(|step| self.matrix(step, &layout.order[step], &layout.order[step + 1])).collect()
     }
 
+    /// The position that a register is counted from.
+    fn reference(&self, register: Register) -> Option<Register> {
+        register.position_of().and_then(|class| self.references[class])
+    }
+
     fn matrix(&self, step: usize, before: &[Register], after: &[Register]) -> StepMatrix {
-        let columns: Vec<Register> = before.iter().copied().filter(|register| self.reference != Some(*register)).collect();
+        let columns: Vec<Register> = before.iter().copied().filter(|register| self.reference(*register) != Some(*register)).collect();
         let unit = |place: Option<usize>| -> Vec<f64> { (0..columns.len()).map(|column| if Some(column) == place { 1.0 } else { 0.0 }).collect() };
         // Each with the sum of the sizes of all terms, for a bound of roundings.
         let mut rows: BTreeMap<Register, (Vec<f64>, Vec<f64>)> = before
@@ -148,12 +160,12 @@ impl Program {
             roundings += ROUNDINGS + real(operation.iter().map(|(_, sum)| sum.len()).max().unwrap_or(0));
             rows.extend(set);
         }
-        let kept: Vec<Register> = after.iter().copied().filter(|register| self.reference != Some(*register)).collect();
+        let kept: Vec<Register> = after.iter().copied().filter(|register| self.reference(*register) != Some(*register)).collect();
         let mut matrix = Matrix::zeros(kept.len(), columns.len());
         let mut largest = 1.0_f64;
         for (row, register) in kept.iter().enumerate() {
             let Some((values, sizes)) = rows.get(register) else { continue };
-            let moved = self.reference.filter(|_| register.is_position()).and_then(|reference| rows.get(&reference));
+            let moved = self.reference(*register).and_then(|reference| rows.get(&reference));
             for column in 0..columns.len() {
                 let (by, size) = moved.map_or((0.0, 0.0), |(values, sizes)| (values[column], sizes[column]));
                 matrix[(row, column)] = values[column] - by;

@@ -14,11 +14,12 @@ use super::ProofError;
 use super::corners::{Point, States, enclosed};
 use super::heard::Heard;
 use super::program::{Operation, Program, Register, Sum};
-use super::span::StepSpan;
+use super::pushed::{Pushed, StateRegisters, coupling, device, moved, negative, state};
+use super::span::FrameSpan;
 use super::steps::FrameState;
 use crate::Matrix;
 use crate::lifted::Node;
-use crate::lifted::node::{Body, Scale};
+use crate::lifted::node::Scale;
 use crate::linear_form::LinearLaw;
 use crate::network::NominalNetwork;
 use crate::structure::{Contacts, Structure, count};
@@ -45,7 +46,7 @@ impl Server {
             return Ok(None);
         }
         if scenes[0].object.enclosure.is_some() {
-            return Err(ProofError::WallOfServer);
+            return Err(ProofError::WallLeftOut { strategy: coordination.strategy.name() });
         }
         let server = scenes[0].server().unwrap_or(0);
         let structure = Structure::of_any_law(scenes, network, contacts, |one, other| one == server || other == server)?;
@@ -87,13 +88,13 @@ impl Server {
         let steps = super::mutation::of_steps(steps);
         // The classes of a part are counted by themselves.
         let states = layout.states(&first).map(|register| state_of(register, |class| class - apart.unwrap_or(0)));
-        Ok(ServerFrame { steps, states: States { names: states.collect(), heard: None }, compliance: scale.compliance })
+        Ok(ServerFrame { steps: FrameSpan::of(steps), states: States { names: states.collect(), heard: None }, compliance: scale.compliance })
     }
 }
 
 /// A frame of a server and its clients over a box.
 pub(super) struct ServerFrame {
-    pub(super) steps: Vec<StepSpan>,
+    pub(super) steps: FrameSpan,
     pub(super) states: States,
     /// What forces are multiplied by to be lengths \[m/N\].
     pub(super) compliance: f64,
@@ -109,6 +110,7 @@ fn state_of(register: Register, placed: impl Fn(usize) -> usize) -> FrameState {
         Register::Pending { class, on_copy } | Register::Force { class, on_copy } => {
             FrameState::Other { class: placed(class), row: usize::from(on_copy) }
         }
+        Register::Waves { .. } => unreachable!("a server sends no waves"),
     }
 }
 
@@ -119,13 +121,6 @@ struct Frame<'a> {
     point: &'a Point,
     scale: Scale,
     heard: &'a Heard,
-}
-
-/// The registers of position and velocity.
-type StateRegisters = [Register; 2];
-
-fn state(of: impl Fn(bool) -> Register) -> StateRegisters {
-    [false, true].map(of)
 }
 
 impl Frame<'_> {
@@ -155,7 +150,7 @@ impl Frame<'_> {
         }
         let steps = steps.into_iter().map(|(_, step)| step).filter(|step| step.iter().any(|operation| !operation.is_empty())).collect();
         let object = Register::Body { class: self.server.class, of_copy: true, velocity: false };
-        Program { steps, sent: timetable.sent.clone(), reference: (!tied).then_some(object) }
+        Program { steps, sent: timetable.sent.clone(), references: vec![(!tied).then_some(object); classes] }
     }
 
     /// The node of a class; `None` if it has no part in a difference.
@@ -169,10 +164,6 @@ impl Frame<'_> {
     /// The node of a class whose device is held to the object.
     fn touching(&self, class: usize) -> Option<&Node> {
         self.node(class).filter(|node| node.device.is_some())
-    }
-
-    fn device(class: usize) -> StateRegisters {
-        state(|velocity| Register::Body { class, of_copy: false, velocity })
     }
 
     /// The object, if it has a part here.
@@ -194,7 +185,7 @@ impl Frame<'_> {
             registers.into_iter().zip(bodies).map(|(register, body)| (register, vec![(body, 1.0)])).collect()
         };
         if class != server {
-            return self.touching(class).map(|_| of(Self::device(class))).unwrap_or_default();
+            return self.touching(class).map(|_| of(device(class))).unwrap_or_default();
         }
         if !returns_forces {
             return self.object().map(of).unwrap_or_default();
@@ -208,14 +199,8 @@ impl Frame<'_> {
         (0..self.point.weights.columns()).filter_map(returned).collect()
     }
 
-    /// The force of a coupling on the object, as a length; what has no part here is at rest.
     fn coupling(&self, gains: Gains, device: Option<StateRegisters>, object: Option<StateRegisters>) -> Sum {
-        let gains = self.scale.gains(gains);
-        let of = |bodies: Option<StateRegisters>, sign: f64| {
-            let by = [gains.stiffness, gains.damping].map(|gain| sign * (gain * self.scale.compliance));
-            bodies.into_iter().flatten().zip(by)
-        };
-        of(device, 1.0).chain(of(object, -1.0)).collect()
+        coupling(gains, device, object, self.scale)
     }
 
     fn tick(&self, class: usize, tick: i64, span: Duration) -> Vec<Operation> {
@@ -224,14 +209,14 @@ impl Frame<'_> {
         // The force of its coupling on the object.
         let coupling = self.touching(class).map(|_| {
             if class == server {
-                self.coupling(node.coupling, Some(Self::device(class)), self.object())
+                self.coupling(node.coupling, Some(device(class)), self.object())
             } else if returns_forces {
                 self.heard.at(server, class, tick).map(|number| (Register::Returned { server, class, number }, 1.0)).into_iter().collect()
             } else {
-                self.coupling(node.coupling, Some(Self::device(class)), self.object().and_then(|_| self.held(server, class, tick)))
+                self.coupling(node.coupling, Some(device(class)), self.object().and_then(|_| self.held(server, class, tick)))
             }
         });
-        let mut bodies: Vec<(Body, bool, Sum)> = Vec::new();
+        let mut bodies: Vec<Pushed> = Vec::new();
         if class == server {
             let mut force = coupling.clone().unwrap_or_default();
             for client in (0..self.point.weights.columns()).filter(|client| *client != server) {
@@ -239,28 +224,11 @@ impl Frame<'_> {
                 let of_one = self.coupling(other.coupling, self.held(client, server, tick), self.object());
                 force.extend(of_one.into_iter().map(|(register, by)| (register, by * self.point.weights[(0, client)])));
             }
-            bodies.push((node.object, true, force));
+            bodies.push(Pushed { body: node.object, is_copy: true, force });
         }
         if let Some((device, force)) = node.device.zip(coupling) {
-            bodies.push((device, false, force.into_iter().map(|(register, by)| (register, -by)).collect()));
+            bodies.push(Pushed { body: device, is_copy: false, force: negative(force) });
         }
-        // All forces follow from where bodies are before any of them moves.
-        let forces = bodies.iter().map(|(_, on_copy, force)| force_of(class, *on_copy, force, node.compute_delay)).collect::<Vec<_>>();
-        forces.into_iter().chain(bodies.iter().map(|(body, on_copy, _)| self.moved(body, class, *on_copy, span))).collect()
+        moved(class, &bodies, node.compute_delay, span, self.scale)
     }
-
-    /// The step of a body under its force.
-    fn moved(&self, body: &Body, class: usize, of_copy: bool, span: Duration) -> Operation {
-        let (e, g) = body.scaled_map(span, self.scale.time).coefficients();
-        let [x, v] = state(|velocity| Register::Body { class, of_copy, velocity });
-        let force = Register::Force { class, on_copy: of_copy };
-        let by = |row: usize| g[row] / self.scale.compliance;
-        vec![(x, vec![(x, 1.0 + e[0][0]), (v, e[0][1]), (force, by(0))]), (v, vec![(x, e[1][0]), (v, 1.0 + e[1][1]), (force, by(1))])]
-    }
-}
-
-/// The force on a body, which acts a tick later where the node computes for so long.
-fn force_of(class: usize, on_copy: bool, force: &Sum, is_late: bool) -> Operation {
-    let (acting, pending) = (Register::Force { class, on_copy }, Register::Pending { class, on_copy });
-    if is_late { vec![(acting, vec![(pending, 1.0)]), (pending, force.clone())] } else { vec![(acting, force.clone())] }
 }

@@ -135,7 +135,7 @@ fn server_eigenvalues(scene: &Scene) -> Vec<(f64, f64)> {
     let nodes = server.nodes(&structure, scene);
     let time = structure.time(scene, &nodes);
     let frame = |nodes: &[Node], apart| {
-        let product = StepSpan::product(&server.frame(&structure, &[nodes.to_vec()], apart, time).unwrap().steps);
+        let product = server.frame(&structure, &[nodes.to_vec()], apart, time).unwrap().steps.product();
         assert!(product.radius.largest() < 1e-7, "{}", product.radius.largest());
         product.mean
     };
@@ -248,7 +248,6 @@ fn what_is_not_followed_is_refused_by_name() {
     };
     let wall = "object.enclosure={ min = -0.1, max = 0.1, stiffness = 500.0, damping = 1.0 }";
     for (message, words) in [
-        (line(&["coordination.strategy=\"wave\""], mass), "--prove of `map` and `boundary` follows client-server, not wave"),
         (line(&[SERVER, wall], coupling), "expected a scene without object.enclosure"),
         (line(&[SERVER, "link.loss=5%"], coupling), "leave something to chance"),
         (line(&[ring, "scene.count=5", LOOSE], gain), "peer2 or a link of it is not like the others"),

@@ -92,7 +92,7 @@ impl StepSpan {
 
     /// T·M·Tᵀ.
     pub(super) fn through(&self, by: &Self) -> Self {
-        by.times(self).times(&by.transposed())
+        by.times(&by.times(self).transposed()).transposed()
     }
 
     /// The largest size that each entry can have.
@@ -105,35 +105,82 @@ impl StepSpan {
         Matrix::from_fn(self.mean.rows(), self.mean.columns(), |i, j| outward(mean(&self.mean, i, j) + slopes(i, j) + self.radius[(i, j)]))
     }
 
-    /// This matrix times another over the same box.
+    /// This matrix times another over the same box. Entries of this one that are zero all over the box, but for the least radius of all, are passed over: a step leaves most of the state as it is.
+    ///
+    /// Where an entry of `other` is not finite, so is no radius of the product: no zero hides that.
     pub(super) fn times(&self, other: &Self) -> Self {
-        let mut slopes = Vec::with_capacity(self.slopes.len());
-        for (own, others) in self.slopes.iter().zip(&other.slopes) {
-            slopes.push(plus(&own.times(&other.mean), &self.mean.times(others)));
-        }
+        let (rows, columns, inner) = (self.mean.rows(), other.mean.columns(), self.mean.columns());
         // The effects of any two numbers, and whatever has an error: what of one is no mean with what of the other is none.
         let uneven = |span: &Self| span.reach(|_, _, _| 0.0);
         let (own, others) = (uneven(self), uneven(other));
-        let sizes = absolute(&self.mean).times(&absolute(&other.mean));
-        let by_mean = plus(&absolute(&self.mean).times(&other.radius), &self.radius.times(&absolute(&other.mean)));
-        let by_both = own.times(&others);
-        let inner = self.mean.columns();
-        // Each product of sums of `inner` terms, and the sum of two, of mean and slopes.
+        let sizes = absolute(&other.mean);
+        // Each product of sums of `inner` terms, and the sum of two, of mean and slopes: a share of |M|·|M'| and of the product of the largest sizes.
         let share = gamma(2 * inner + 4) * real(1 + self.slopes.len());
-        let whole = self.largest().times(&other.largest());
-        let entry = |i: usize, j: usize| {
-            outward(outward(by_mean[(i, j)] + by_both[(i, j)] + share * (sizes[(i, j)] + whole[(i, j)]))) + real(inner) * UNDERFLOW
+        let weighted = |one: &Matrix, by: f64| Matrix::from_fn(inner, columns, |i, j| one[(i, j)] + share * (by * sizes[(i, j)] + others[(i, j)]));
+        let (beside_mean, beside_uneven) = (weighted(&other.radius, 2.0), weighted(&others, 1.0));
+        let least = |of: &Matrix| of.entries().iter().copied().reduce(f64::min).unwrap_or(0.0);
+        let (least_radius, least_uneven) = (least(&self.radius), least(&own));
+        let sum = |of: &Matrix, column: usize| (0..inner).map(|row| of[(row, column)]).sum::<f64>();
+        let of_least: Vec<f64> = (0..columns).map(|column| least_radius * sum(&sizes, column) + least_uneven * sum(&beside_uneven, column)).collect();
+        let mut product = Self {
+            mean: Matrix::zeros(rows, columns),
+            slopes: vec![Matrix::zeros(rows, columns); self.slopes.len()],
+            radius: Matrix::from_fn(rows, columns, |_, column| of_least[column]),
         };
-        Self { mean: self.mean.times(&other.mean), slopes, radius: Matrix::from_fn(self.mean.rows(), other.mean.columns(), entry) }
+        for row in 0..rows {
+            for place in 0..inner {
+                let (mean, radius, uneven) = (self.mean[(row, place)], self.radius[(row, place)] - least_radius, own[(row, place)] - least_uneven);
+                add(product.mean.row_mut(row), mean, other.mean.row(place));
+                for (slope, (own, others)) in product.slopes.iter_mut().zip(self.slopes.iter().zip(&other.slopes)) {
+                    add(slope.row_mut(row), own[(row, place)], other.mean.row(place));
+                    add(slope.row_mut(row), mean, others.row(place));
+                }
+                let target = product.radius.row_mut(row);
+                add(target, mean.abs(), beside_mean.row(place));
+                add(target, radius, sizes.row(place));
+                add(target, uneven, beside_uneven.row(place));
+            }
+        }
+        // Three sums of `inner` terms of numbers that are not negative, of a few roundings each.
+        let rounded = if other.is_finite() { 1.0 + gamma(4 * inner + 32) } else { f64::INFINITY };
+        for entry in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            product.radius[entry] = outward(product.radius[entry] * rounded) + real(inner) * UNDERFLOW;
+        }
+        product
     }
 
-    /// The product of all steps of a frame, the first at the right.
-    pub(super) fn product(steps: &[Self]) -> Self {
-        let mut frame = steps[0].clone();
-        for step in &steps[1..] {
-            frame = step.times(&frame);
-        }
-        frame
+    fn is_finite(&self) -> bool {
+        self.mean.is_finite() && self.radius.is_finite() && self.slopes.iter().all(Matrix::is_finite)
+    }
+}
+
+/// The steps of a frame over a box.
+#[derive(Clone, Debug)]
+pub(super) struct FrameSpan {
+    /// Each that there is, once.
+    pub(super) kinds: Vec<StepSpan>,
+    /// The places of the steps among these, in the order of the frame.
+    pub(super) order: Vec<usize>,
+}
+
+impl FrameSpan {
+    /// Of steps of which none is known to be like another.
+    pub(super) fn of(steps: Vec<StepSpan>) -> Self {
+        Self { order: (0..steps.len()).collect(), kinds: steps }
+    }
+
+    /// The product of all steps, the first at the right.
+    pub(super) fn product(&self) -> StepSpan {
+        let mut steps = self.order.iter().map(|kind| &self.kinds[*kind]);
+        let first = steps.next().expect("a frame has a step").clone();
+        steps.fold(first, |frame, step| step.times(&frame))
+    }
+}
+
+/// Adds a row times a factor, unless that is zero.
+fn add(sum: &mut [f64], factor: f64, row: &[f64]) {
+    if factor != 0.0 {
+        sum.iter_mut().zip(row).for_each(|(sum, entry)| *sum += factor * entry);
     }
 }
 
@@ -143,4 +190,57 @@ fn plus(one: &Matrix, other: &Matrix) -> Matrix {
 
 pub(super) fn absolute(of: &Matrix) -> Matrix {
     Matrix::from_fn(of.rows(), of.columns(), |i, j| of[(i, j)].abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn span(mean: &[[f64; 2]; 2], slope: &[[f64; 2]; 2], radius: f64) -> StepSpan {
+        let of = |entries: &[[f64; 2]; 2]| Matrix::from_fn(2, 2, |i, j| entries[i][j]);
+        StepSpan { mean: of(mean), slopes: vec![of(slope)], radius: Matrix::from_fn(2, 2, |_, _| radius) }
+    }
+
+    /// A zero times a number that has overflowed is not taken for zero.
+    #[test]
+    fn no_zero_hides_an_overflow() {
+        let none = [[0.0; 2]; 2];
+        for radius in [0.0, 1e-15] {
+            let left = span(&[[1.0, 0.0], [0.5, 0.0]], &none, radius);
+            for bad in [f64::INFINITY, f64::NAN] {
+                let of = [span(&[[1.0, 0.0], [0.0, bad]], &none, 1e-15), span(&[[1.0, 0.0], [0.0, 1.0]], &[[0.0, 0.0], [bad, 0.0]], 1e-15)];
+                for right in of {
+                    let product = left.times(&right);
+                    assert!(product.radius.entries().iter().all(|entry| !entry.is_finite()), "{product:?}");
+                    assert!(super::super::discs::decide(&product).is_none() && super::super::discs::decide(&left.times(&product)).is_none());
+                }
+                // On the left nothing is passed over but zeros.
+                let product = span(&[[bad, 0.0], [0.0, 1.0]], &none, radius).times(&left);
+                assert!(!product.mean.is_finite() && !product.radius.is_finite(), "{product:?}");
+            }
+        }
+    }
+
+    /// An entry of a step that is zero but for the least radius of all counts with that radius, and each kind of entry that is not is counted.
+    #[test]
+    fn entries_that_are_passed_over_count_by_the_least_radius() {
+        let right = span(&[[1.0, 2.0], [3.0, 4.0]], &[[0.0, 0.5], [0.25, 0.0]], 0.125);
+        let none = [[0.0; 2]; 2];
+        // |M|·R' + R·|M'| + U·U', with U the slope and the radius together.
+        let product = span(&none, &none, 0.5).times(&right);
+        for (i, j, expected) in [(0, 0, 0.5 * 4.0 + 0.5 * (0.125 + 0.375)), (1, 1, 0.5 * 6.0 + 0.5 * (0.625 + 0.125))] {
+            assert!((product.radius[(i, j)] / expected - 1.0).abs() < 1e-12 && product.radius[(i, j)] >= expected, "{product:?}");
+        }
+        let mut wide = span(&none, &[[0.0, 0.0], [0.0, 1.0]], 0.5);
+        wide.radius[(0, 1)] = 1.5;
+        let product = wide.times(&right);
+        for (i, j, expected) in [
+            (0, 0, 0.5 + 4.5 + 0.5 * 0.125 + 1.5 * 0.375),
+            (1, 1, 0.5 * 6.0 + 0.5 * 0.625 + 1.5 * 0.125),
+            (1, 0, 0.5 * 4.0 + 0.5 * 0.125 + 1.5 * 0.375),
+        ] {
+            assert!((product.radius[(i, j)] / expected - 1.0).abs() < 1e-12 && product.radius[(i, j)] >= expected, "{i} {j} {expected} {product:?}");
+        }
+        assert_eq!(product.slopes[0].row(1), [3.0, 4.0]);
+    }
 }

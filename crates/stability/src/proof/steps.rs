@@ -5,6 +5,7 @@
 //! are still used.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use crate::Matrix;
@@ -39,8 +40,48 @@ pub(super) struct Plan {
     steps: Vec<Step>,
     /// Before each step, and after the last one.
     live: Vec<Vec<SampleName>>,
+    /// The first step of each kind: all others of it have the same matrix.
+    firsts: Vec<usize>,
+    /// The kind of each step.
+    kinds: Vec<usize>,
     /// The age of the oldest sample that is held at a tick \[s\], where ages matter; otherwise 0.
     oldest: f64,
+}
+
+/// All of a step that its matrix depends on. Samples are called by their places: among those before the step, and then those that are taken in it.
+#[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
+struct StepKind {
+    before: usize,
+    /// The nodes that take samples.
+    taken: Vec<usize>,
+    /// The nodes that tick, for how long, and the sample of each node that they hold, with the bits of its age.
+    ticks: Vec<(usize, Duration, Vec<(usize, usize, u64)>)>,
+    after: Vec<Option<usize>>,
+}
+
+impl Step {
+    /// Its kind, between the samples before it and after it.
+    fn kind(&self, before: &[SampleName], after: &[SampleName]) -> StepKind {
+        let place = |name: &SampleName| before.iter().chain(&self.samples).position(|other| other == name);
+        let held = |tick: &Tick| tick.held.iter().filter_map(|(name, age)| Some((name.0, place(name)?, age.to_bits()))).collect();
+        StepKind {
+            before: before.len(),
+            taken: self.samples.iter().map(|name| name.0).collect(),
+            ticks: self.ticks.iter().map(|tick| (tick.node, tick.span, held(tick))).collect(),
+            after: after.iter().map(place).collect(),
+        }
+    }
+}
+
+/// The plans of a timetable, each made when it is first asked for: whether anything is heard, and whether ages matter, is known with the numbers alone.
+#[derive(Debug, Default)]
+pub(super) struct Plans([OnceLock<Plan>; 4]);
+
+impl Plans {
+    /// That of the timetable, which is always the same.
+    pub(super) fn of(&self, timetable: &Timetable, heard: bool, ages: bool) -> &Plan {
+        self.0[usize::from(heard) + 2 * usize::from(ages)].get_or_init(|| Plan::of(timetable, heard, ages))
+    }
 }
 
 /// The numbers of a lifted system, and the units of its states.
@@ -119,7 +160,7 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl Plan {
     /// The steps of a timetable. `heard` says whether anything is heard at all, `ages` whether the ages of samples matter.
-    pub(super) fn of(timetable: &Timetable, heard: bool, ages: bool) -> Self {
+    fn of(timetable: &Timetable, heard: bool, ages: bool) -> Self {
         let nodes = timetable.sent.len();
         let instants = ages.then(|| Instants::of(timetable, nodes));
         let mut oldest = 0.0_f64;
@@ -162,7 +203,14 @@ impl Plan {
             }
         }
         let live = live(&steps, &timetable.sent);
-        Self { steps, live, oldest }
+        let (mut known, mut firsts) = (BTreeMap::new(), Vec::new());
+        let kinds = steps.iter().zip(live.windows(2)).enumerate().map(|(place, (step, live))| {
+            *known.entry(step.kind(&live[0], &live[1])).or_insert_with(|| {
+                firsts.push(place);
+                firsts.len() - 1
+            })
+        });
+        Self { kinds: kinds.collect(), steps, live, firsts, oldest }
     }
 
     /// The states of the frame, in the order of its rows and columns.
@@ -178,9 +226,14 @@ impl Plan {
         names
     }
 
-    /// The matrices of all steps.
+    /// The matrices of each kind of step.
     pub(super) fn matrices(&self, numbers: Numbers<'_>) -> Vec<StepMatrix> {
-        (0..self.steps.len()).map(|step| self.matrix(step, numbers)).collect()
+        self.firsts.iter().map(|step| self.matrix(*step, numbers)).collect()
+    }
+
+    /// The kinds of the steps of a frame, in order.
+    pub(super) fn kinds(&self) -> &[usize] {
+        &self.kinds
     }
 
     fn matrix(&self, step: usize, numbers: Numbers<'_>) -> StepMatrix {
@@ -282,4 +335,48 @@ fn live(steps: &[Step], sent: &[usize]) -> Vec<Vec<SampleName>> {
         }
     }
     live
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::NominalNetwork;
+    use crate::paper_scene::PAPER;
+    use crate::structure::{Contacts, Structure};
+
+    /// Each step of a frame has the matrix of its kind, to the bit, and there are fewer kinds than steps.
+    #[test]
+    fn steps_of_a_kind_have_one_matrix() {
+        let two_kinds = "peers=[{ name = \"peer1\", device = { mass = 0.2 } }]";
+        for (set, of_all) in [
+            (&["link.delay=24ms"][..], true),
+            (&["link.delay=13.7ms", two_kinds], true),
+            (&["link.loss={ packets = [2], every = 5 }", two_kinds], true),
+            (&["coordination.strategy=\"extrapolated\"", "link.delay=3ms"], false),
+            (&["peers=[{ name = \"peer2\", clock = { offset = \"0.4ms\" } }, { name = \"peer3\", tick = \"2ms\" }]"], true),
+        ] {
+            let overrides: Vec<String> = set.iter().map(|text| (*text).to_owned()).collect();
+            let scene = cohaptic_scene::Scene::parse(PAPER, "paper.toml".as_ref(), &overrides).unwrap();
+            let network = NominalNetwork::of(&scene).unwrap();
+            let peers = scene.peers.len();
+            let contacts = Contacts { touching: vec![true; peers], at_wall: false, absent: vec![false; peers] };
+            let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
+            let nodes = structure.nodes(&scene);
+            let time = structure.time(&scene, &nodes);
+            let numbers = Numbers {
+                nodes: &nodes,
+                weights: &structure.weights,
+                sampling: Sampling::of(&nodes),
+                scale: Scale { time, compliance: nodes[0].compliance(time) },
+                tied: structure.tied,
+            };
+            let ages = nodes.iter().any(|node| node.law.horizon.is_some());
+            let plan = Plan::of(&structure.timetable, true, ages);
+            let matrices = plan.matrices(numbers);
+            assert!(matrices.len() < plan.steps.len() || !of_all, "{set:?}: {} of {}", matrices.len(), plan.steps.len());
+            for (step, kind) in plan.kinds().iter().enumerate() {
+                assert_eq!(plan.matrix(step, numbers).matrix, matrices[*kind].matrix, "{set:?}: {step}");
+            }
+        }
+    }
 }

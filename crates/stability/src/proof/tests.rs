@@ -5,11 +5,11 @@ use proptest::prelude::*;
 
 use super::discs::decide;
 use super::mutation::{Mutation, with};
-use super::span::StepSpan;
+use super::span::{FrameSpan, StepSpan};
 use super::steps::StepMatrix;
 use super::*;
 use crate::structure::count;
-use crate::{Family, KeyRange, Matrix, Method, Unwatched, Verdict, analyse};
+use crate::{Family, KeyRange, Matrix, Method, Unwatched, Verdict, Watch, analyse};
 
 const SCENE: &str = r#"
     scene = { duration = "1s", count = 2 }
@@ -146,9 +146,9 @@ fn steps_that_grow_without_end_are_enclosed() {
         };
         let nodes = structure.nodes(&scene);
         let timetable = structure.apart[0].as_ref().unwrap();
-        let common = Common { timetable, tied: true, time: structure.time(&scene, &nodes) };
+        let common = Common { timetable, plans: &Plans::default(), tied: true, time: structure.time(&scene, &nodes) };
         let near = 1000;
-        let box_of_all = corners::steps_beyond([&heard(near), &heard(2 * near), &heard(3 * near)], growth, common).unwrap();
+        let box_of_all = corners::steps_beyond([&heard(near), &heard(2 * near), &heard(3 * near)], growth, common).unwrap().kinds;
         for times in [1, 2, 3, 7, 100, 12_345] {
             // In the units of the box: its compliance is that of the first point.
             let points = [heard(near), heard(times * near)].concat();
@@ -184,7 +184,7 @@ fn steps_of_a_law_that_looks_back_are_enclosed_over_both_gains() {
     let (low, high) = ([100.0, 0.5], [3000.0, 40.0]);
     let corners: Vec<Point> = (0..4).map(|place| at([low[0], high[0]][place & 1], [low[1], high[1]][place >> 1]).0).collect();
     let (_, structure) = at(1000.0, 5.0);
-    let common = Common { timetable: structure.apart[0].as_ref().unwrap(), tied: true, time: 0.01 };
+    let common = Common { timetable: structure.apart[0].as_ref().unwrap(), plans: &Plans::default(), tied: true, time: 0.01 };
     for share in [0.1, 0.5, 0.8] {
         let inside = at(low[0] + share * (high[0] - low[0]), low[1] + (1.0 - share) * (high[1] - low[1])).0;
         let steps = corners::steps_of_each(&[corners.clone(), vec![inside]].concat(), common).unwrap();
@@ -213,7 +213,7 @@ fn scenes_without_a_proof_are_refused_by_name() {
         (&["coordination.strategy=\"extrapolated\"", "link.loss=10%"], "extrapolated coordination uses the ages of samples"),
         (&["coordination.strategy=\"passivity-control\""], "passivity-control"),
         (&["coordination.strategy=\"client-server\""], "client-server coordination is followed as a whole alone"),
-        (&["coordination.strategy=\"wave\""], "follows client-server, not wave"),
+        (&["coordination.strategy=\"wave\"", "link.loss=10%"], "wave coordination is followed as a whole alone"),
         (&["scene.axes=3", "object.inertia=2.7e-4", "peers.peer1.grasp=[0.03, 0, 0]"], "`map` and `boundary` take all components together"),
     ] {
         let message = refused(set);
@@ -221,6 +221,66 @@ fn scenes_without_a_proof_are_refused_by_name() {
     }
     assert!(matches!(prove_every_number(&scene(&[]), 1, None, &Unwatched), Err(ProofError::Numbers)));
     assert!(matches!(prove_every_number(&scene(&[]), 9, Some(8), &Unwatched), Err(ProofError::Numbers)));
+}
+
+/// What is refused is so before a frame is made: here one that would be too long.
+#[test]
+fn peers_without_an_equal_one_are_refused_before_a_frame_is_made() {
+    let clocks = &["peers=[{ name = \"peer2\", clock = { drift = 1.234567e-3 } }]"];
+    assert!(matches!(analyse(&scene(clocks), Method::Reduced), Err(AnalysisError::FrameTooLong { .. } | AnalysisError::NoFrame)));
+    assert!(matches!(prove_every_number(&scene(clocks), 2, None, &Unwatched), Err(ProofError::Unequal)));
+}
+
+/// Stops when it was asked so often.
+#[derive(Default)]
+struct Patience {
+    left: std::sync::atomic::AtomicU64,
+    expected: std::sync::atomic::AtomicU64,
+    done: std::sync::atomic::AtomicU64,
+}
+
+impl Watch for Patience {
+    fn expects(&self, operations: f64) {
+        add(&self.expected, operations);
+    }
+
+    fn done(&self, operations: f64) {
+        add(&self.done, operations);
+    }
+
+    fn stops(&self) -> bool {
+        let left = self.left.load(std::sync::atomic::Ordering::Relaxed);
+        self.left.store(left.saturating_sub(1), std::sync::atomic::Ordering::Relaxed);
+        left == 0
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+fn add(count: &std::sync::atomic::AtomicU64, operations: f64) {
+    count.fetch_add(operations as u64, std::sync::atomic::Ordering::Relaxed);
+}
+
+/// Ended before its time, a proof keeps what it has found, and all other numbers are undecided.
+#[test]
+fn a_proof_that_is_ended_keeps_what_it_has() {
+    let patient = Patience { left: u64::MAX.into(), ..Patience::default() };
+    let whole = prove_every_number(&scene(&[]), 2, None, &patient).unwrap();
+    assert!(whole.is_whole && whole.spans.len() == 2);
+    let counts = [&patient.expected, &patient.done].map(|count| count.load(std::sync::atomic::Ordering::Relaxed));
+    assert_eq!(counts, [whole.attempts; 2]);
+    for left in [0, 1, 20, whole.attempts - 1] {
+        let part = prove_every_number(&scene(&[]), 2, None, &Patience { left: left.into(), ..Patience::default() }).unwrap();
+        assert!(!part.is_whole && part.attempts == left);
+        let (last, before) = part.spans.split_last().unwrap();
+        assert_eq!((last.guarantee, last.to), (Guarantee::Undecided, None));
+        let mut next = 2;
+        for span in before {
+            let of_whole = whole.spans.iter().find(|one| one.from <= span.from && one.to.is_none_or(|to| span.to.is_some_and(|end| end <= to)));
+            assert_eq!((span.from, of_whole.map(|one| one.guarantee)), (next, Some(span.guarantee)), "{part:?}");
+            next = span.to.unwrap() + 1;
+        }
+        assert!(last.from == next && (left < 20) == before.is_empty(), "{part:?}");
+    }
 }
 
 /// In the mean square too: at the ends of spans, in between and at random, the second moments of single scenes, which have bounds of their own, say the same.
@@ -385,9 +445,8 @@ fn the_product_of_the_steps_is_the_frame() {
         let time = structure.time(&scene, std::slice::from_ref(&node));
         for (weight, tied, timetable) in [(1.0, structure.tied, &structure.timetable), (-1.0, true, structure.apart[0].as_ref().unwrap())] {
             let point = Point { nodes: vec![node.clone()], weights: Matrix::from_fn(1, 1, |_, _| weight) };
-            let product = StepSpan::product(
-                &corners::steps(std::slice::from_ref(&point), std::slice::from_ref(&point.nodes), Common { timetable, tied, time }).unwrap(),
-            );
+            let common = Common { timetable, plans: &Plans::default(), tied, time };
+            let product = corners::steps(std::slice::from_ref(&point), std::slice::from_ref(&point.nodes), common).unwrap().product();
             let sampling = crate::lifted::Sampling::of(&point.nodes);
             let lifted = crate::lifted::Lifted { nodes: &point.nodes, weights: &point.weights, timetable, sampling, time, tied };
             let expected = lifted.frame(&mut crate::lifted::frame::Autonomous).monodromy();
@@ -453,7 +512,7 @@ proptest! {
             spans.push(StepSpan::of(corners.iter()));
             exact = there(at.0, at.1).times(&exact);
         }
-        let product = StepSpan::product(&spans);
+        let product = FrameSpan::of(spans).product();
         for i in 0..3 {
             for j in 0..3 {
                 let near = product.mean[(i, j)] + at.0 * product.slopes[0][(i, j)] + at.1 * product.slopes[1][(i, j)];

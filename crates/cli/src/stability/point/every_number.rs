@@ -4,38 +4,47 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{AnalysisError, EveryNumber, NumberSpan, ProofError, prove_every_number};
+use cohaptic_stability::{EveryNumber, NumberProof, NumberSpan, ProofError};
 use serde::Serialize;
 
-use super::ended;
-use crate::analysis_watch::Interruptible;
 use crate::arguments::PointArguments;
 use crate::document_schema::document;
 use crate::failure::Failure;
 use crate::file::write_file;
 use crate::stability::certificate::{self, Given};
-use crate::stability::guarantee;
+use crate::stability::guarantee::{self, PieceWatch};
 use crate::{input, output};
 
 /// A proof, and the file of its certificate.
 pub(super) struct Proof {
-    every: EveryNumber,
+    pub(super) every: EveryNumber,
     pub(super) file: Option<String>,
 }
 
-/// The proof, if it is asked for.
-pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Proof>, Failure> {
+/// What is to be proven, if that is asked for; refuses what cannot be.
+pub(super) fn asked(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<NumberProof>, Failure> {
     let Some((from, to)) = arguments.every_number else { return Ok(None) };
-    let failure = |error| {
-        if matches!(error, ProofError::Analysis(AnalysisError::Stopped)) {
-            return ended();
+    let asked = NumberProof::new(scene, from, to).and_then(|asked| {
+        if arguments.certificate.is_some() {
+            asked.check_certificate()?;
         }
-        let option = format!("{}: --every-number", output::path(input::named(path)));
-        guarantee::failure(error, &option, path, |error| Failure::Input(format!("{option}: {error}")))
-    };
-    let every = prove_every_number(scene, from, to, &Interruptible).map_err(failure)?;
-    let Some(file) = &arguments.certificate else { return Ok(Some(Proof { every, file: None })) };
-    let spans = every.certify(scene, &Interruptible).map_err(failure)?;
+        Ok(asked)
+    });
+    asked.map(Some).map_err(|error| failure(error, path))
+}
+
+fn failure(error: ProofError, path: &Path) -> Failure {
+    let option = format!("{}: --every-number", output::path(input::named(path)));
+    guarantee::failure(error, &option, path, |error| Failure::Input(format!("{option}: {error}")))
+}
+
+/// The proof, if it is asked for.
+pub(super) fn of(asked: Option<&NumberProof>, scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Proof>, Failure> {
+    let Some(asked) = asked else { return Ok(None) };
+    let failure = |error| failure(error, path);
+    let every = asked.prove(&PieceWatch::new()).map_err(failure)?;
+    let Some(file) = arguments.certificate.as_ref().filter(|_| every.is_whole) else { return Ok(Some(Proof { every, file: None })) };
+    let spans = every.certify(scene, &PieceWatch::new()).map_err(failure)?;
     let given = Given { title: &scene.title, text: &input::text(path)?, overrides: &arguments.scene.overrides.set };
     write_file(file, certificate::of_numbers(&given, every.growing, &spans)?)?;
     Ok(Some(Proof { every, file: Some(output::path(file)) }))
@@ -54,6 +63,8 @@ pub(super) fn document(scene: &Scene, Proof { every, file }: &Proof) -> impl Ser
         // What has no limit as N grows; `null` if everything has one, or the numbers end.
         without_limit: every.without_limit.clone(),
         certificates: every.attempts,
+        // Whether the proof was ended before it had looked at all numbers.
+        interrupted: !every.is_whole,
         // The file of the certificate; absent if none is asked for.
         #[serde(flatten)]
         file: file.as_ref().map(|file| document! { file: file.clone() }),

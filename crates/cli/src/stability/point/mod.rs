@@ -20,6 +20,7 @@ use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::{PointArguments, RestName};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, not_analysed};
+use crate::stability::guarantee;
 use crate::{file, input, output};
 
 /// The user asked for the end.
@@ -35,7 +36,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         return Err(Failure::Input("--certificate is of one proof: expected --every-number or --switching".to_owned()));
     }
     // What they refuse is refused before a second moment is followed.
-    let every = every_number::of(&scene, arguments, path)?;
+    let asked = every_number::asked(&scene, arguments, path)?;
     let switching = switching::of(&scene, arguments, path)?;
     let worst = worst::of(&scene, arguments, path)?;
     let mut judgement = match &arguments.graph {
@@ -55,6 +56,8 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         // The answer itself covers it.
         judgement.analysis.notes.iter_mut().for_each(|note| *note = note.replace(CHANGES_LEFT_OUT, "changing between them is judged apart, below"));
     }
+    // Last of all: what it has found when the user ends it is told with all else.
+    let every = every_number::of(asked.as_ref(), &scene, arguments, path)?;
     let more = || {
         let every = every.as_ref().map(|every| every_number::words(&scene, every));
         let switching = switching.as_ref().map(|switching| switching::words(&switching.found, &notes(&judgement)));
@@ -67,7 +70,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         || answer::describe(&scene, &judgement, worst.as_ref()) + &more(),
         every.iter().filter_map(|every| every.file.as_ref()).chain(switching.iter().filter_map(|switching| switching.file.as_ref())),
     )?;
-    Ok(ExitCode::SUCCESS)
+    if every.is_some_and(|every| !every.every.is_whole) { Err(guarantee::ended()) } else { Ok(ExitCode::SUCCESS) }
 }
 
 /// The verdict alone; links that leave something to chance count as if they did not, and a note says so.
