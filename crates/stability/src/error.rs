@@ -39,7 +39,7 @@ pub enum AnalysisError {
     /// The strategy has no linear form.
     #[error(
         "{strategy} coordination is followed as a whole alone, not in parts of equal peers: ask `cohaptic stability point`, `map` or `boundary` for its radius, \
-         without --graph, --switching, --losses-in-a-row and --delay-within; --prove of `map` and `boundary` follows it too, and --every-number follows waves"
+         without --graph, --every-number, --switching, --losses-in-a-row and --delay-within; --prove of `map` and `boundary` follows it too, and of waves --every-number"
     )]
     OtherStrategy {
         /// Its name.

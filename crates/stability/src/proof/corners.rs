@@ -1,7 +1,8 @@
 //! Boxes of numbers: lifted systems between whose corners every step matrix is multi-affine.
 //!
 //! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of them is monotone in m and in b. So
-//! the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box.
+//! the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box. But of a damping b that stays, a force f keeps the velocity f/b,
+//! so that two of them follow from the others: e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h.
 
 use std::borrow::Cow;
 
@@ -210,13 +211,13 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
             point
         };
         all = all.iter().map(|point| set(point, &|_| ranges.map(|(low, _)| low))).collect();
-        for places in together(&ranges) {
+        for places in together(&ranges, &found) {
             all = doubled(&all, |point, upper| {
-                let high = |mut values: [f64; 6]| {
-                    places.iter().for_each(|place| values[*place] = ranges[*place].1);
+                let at = |mut values: [f64; 6]| {
+                    places.iter().for_each(|(place, falls)| values[*place] = if upper == *falls { ranges[*place].0 } else { ranges[*place].1 });
                     values
                 };
-                set(point, &|values| if upper { high(values) } else { values })
+                set(point, &at)
             });
         }
         if all.len() > 1 << MOST_NUMBERS {
@@ -262,9 +263,73 @@ fn ranges(bodies: &[Body]) -> Result<[(f64, f64); 6], ProofError> {
     if [0, 2].iter().any(|place| ranges[*place].0 < ranges[*place].1) { Err(ProofError::TiedBody) } else { Ok(ranges) }
 }
 
-/// Which coefficients vary, those together that are multiples of one number: without a change of the damping over the mass, both effects of a force.
-fn together(ranges: &[(f64, f64); 6]) -> Vec<&'static [usize]> {
+/// Coefficients that are affine in one number, and whether each falls as that grows.
+type Together = &'static [(usize, bool)];
+
+/// Which coefficients vary, those together that are affine in one number: without a change of the damping over the mass, both effects of a force; without a change of the damping, the effects of a velocity and of a force.
+fn together(ranges: &[(f64, f64); 6], bodies: &[Body]) -> Vec<Together> {
     let varies = |place: usize| ranges[place].0 < ranges[place].1;
-    let groups: &[&'static [usize]] = if varies(1) || varies(3) { &[&[1], &[3], &[4], &[5]] } else { &[&[4, 5]] };
-    groups.iter().copied().filter(|places| places.iter().any(|place| varies(*place))).collect()
+    let groups: &[Together] = if !varies(1) && !varies(3) {
+        &[&[(4, false), (5, false)]]
+    } else if keep_their_damping(bodies) {
+        &[&[(1, false), (4, true)], &[(3, false), (5, true)]]
+    } else {
+        &[&[(1, false)], &[(3, false)], &[(4, false)], &[(5, false)]]
+    };
+    groups.iter().copied().filter(|places| places.iter().any(|(place, _)| varies(*place))).collect()
+}
+
+/// Whether bodies that nothing ties to ground have one damping, but for roundings.
+fn keep_their_damping(bodies: &[Body]) -> bool {
+    let of = |body: &Body| {
+        let [e00, e01, e10, e11, g0, g1] = coefficients(&body.only_map()?);
+        let damping = -e11 / g1;
+        (e00 == 0.0 && e10 == 0.0 && damping > 0.0).then_some((damping, e01 + damping * g0))
+    };
+    let is_near = |one: f64, other: f64| (one - other).abs() <= 8.0 * f64::EPSILON * other;
+    let Some(found) = bodies.iter().map(of).collect::<Option<Vec<_>>>() else { return false };
+    found.iter().all(|(damping, span)| is_near(*damping, found[0].0) && is_near(*span, found[0].1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::NominalNetwork;
+    use crate::paper_scene::PAPER;
+    use crate::structure::{Contacts, Structure};
+
+    /// A mass with a damping that stays is two numbers: steps of every mass between the ends are where these say, but for the radius.
+    #[test]
+    fn a_mass_beside_a_damping_that_stays_is_two_numbers() {
+        let at = |mass: f64, damping: f64| {
+            let overrides = [format!("object.mass={mass:?}"), format!("object.damping={damping:?}")];
+            let scene = cohaptic_scene::Scene::parse(PAPER, "paper.toml".as_ref(), &overrides).unwrap();
+            let contacts = Contacts { touching: vec![true; 3], at_wall: false, absent: vec![false; 3] };
+            let structure = Structure::of(&[&scene], &NominalNetwork::of(&scene).unwrap(), &contacts).unwrap();
+            (structure.nodes(&scene), structure)
+        };
+        let weights = || Matrix::from_fn(1, 1, |_, _| -0.5);
+        let point = |nodes: &[Node]| Point { nodes: nodes.to_vec(), weights: weights() };
+        let of_copy = |nodes: &[Node]| coefficients(&nodes[0].object.only_map().unwrap());
+        let ([low, high], structure) = ([at(0.3, 20.0).0, at(0.6, 20.0).0], at(0.3, 20.0).1);
+        let common = Common { timetable: structure.apart[0].as_ref().unwrap(), plans: &Plans::default(), tied: true, time: 0.01 };
+        let span = steps(&[point(&low)], &[low.clone(), high.clone()], common).unwrap();
+        assert!(span.kinds.iter().all(|step| step.slopes.len() == 2));
+        for mass in [0.3, 0.35, 0.45, 0.6] {
+            let inside = at(mass, 20.0).0;
+            // In the units of the box.
+            let exact = steps_of_each(&[point(&low), point(&inside)], common).unwrap().swap_remove(1);
+            let [first, last, here] = [&low, &high, &inside].map(|nodes| of_copy(nodes));
+            let shares = [1, 3].map(|place| (2.0 * here[place] - first[place] - last[place]) / (first[place] - last[place]).abs());
+            for (step, exact) in span.kinds.iter().zip(&exact) {
+                for (i, j) in (0..step.mean.rows()).flat_map(|i| (0..step.mean.columns()).map(move |j| (i, j))) {
+                    let near = step.slopes.iter().zip(shares).map(|(slope, share)| share * slope[(i, j)]).sum::<f64>() + step.mean[(i, j)];
+                    assert!((exact.matrix[(i, j)] - near).abs() <= step.radius[(i, j)] + 1e-13, "{mass} kg, {i} {j}");
+                }
+            }
+        }
+        // A damping that varies too is taken apart.
+        let both = steps(&[point(&low)], &[low.clone(), at(0.6, 21.0).0], common).unwrap();
+        assert!(both.kinds.iter().all(|step| step.slopes.len() == 4));
+    }
 }

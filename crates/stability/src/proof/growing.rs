@@ -8,6 +8,8 @@
 //! Without damping of the object a copy of the mass m/N moves by N times a force, and nothing else of it depends on N. Its forces may be counted in newtons over N: gains are N times as large, copies have the mass m and
 //! devices N times theirs, and the motion is the same. Where gains shrink with N these numbers have limits, and the others have not.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use cohaptic_peer::{Gains, StepMap};
 use cohaptic_scene::Scene;
 
@@ -55,6 +57,8 @@ pub(super) struct Growing {
     pub(super) first: usize,
     /// The least number of peers of which one is of the class that grows.
     pub(super) least: u64,
+    /// The place of the part that was last proven unstable.
+    grown: AtomicUsize,
 }
 
 impl Growing {
@@ -90,7 +94,7 @@ impl Growing {
             motion.divides_forces = motion.has_limits_of_divided_forces();
             motions.push(motion);
         }
-        Ok(Self { motions, first, least: least as u64 })
+        Ok(Self { motions, first, least: least as u64, grown: AtomicUsize::new(0) })
     }
 
     /// What a verdict has no certificate of; `None` if it has one.
@@ -100,17 +104,24 @@ impl Growing {
 
     /// What every number of peers from `low` to `high` has in common, if that is proven, and the certificates of its parts where they are asked for.
     pub(super) fn decide(&self, low: u64, high: u64, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
-        let mut all = Some(Proven::Stable);
-        for motion in &self.motions {
+        let parts_of = |motion: &'_ Motion| {
             let has_differences = |class: &usize| motion.structure.apart[*class].is_some() && (*class != motion.growing || motion.size(low) > 1);
-            let parts = std::iter::once(None).chain((0..motion.structure.classes.len()).filter(has_differences).map(Some));
-            for part in parts {
-                match motion.decide(low, high, part, certified.as_deref_mut())? {
-                    // One part that grows is enough.
-                    Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
-                    Some(Proven::Stable) => {}
-                    None => all = None,
+            std::iter::once(None).chain((0..motion.structure.classes.len()).filter(has_differences).map(Some)).collect::<Vec<_>>()
+        };
+        let parts: Vec<(usize, Option<usize>)> =
+            self.motions.iter().enumerate().flat_map(|(place, motion)| parts_of(motion).into_iter().map(move |part| (place, part))).collect();
+        // That which made other numbers unstable comes first; the verdict is that of any order.
+        let grown = self.grown.load(Ordering::Relaxed).min(parts.len() - 1);
+        let mut all = Some(Proven::Stable);
+        for (place, (motion, part)) in parts.iter().enumerate().cycle().skip(grown).take(parts.len()) {
+            match self.motions[*motion].decide(low, high, *part, certified.as_deref_mut())? {
+                // One part that grows is enough.
+                Some(Proven::Unstable) => {
+                    self.grown.store(place, Ordering::Relaxed);
+                    return Ok(Some(Proven::Unstable));
                 }
+                Some(Proven::Stable) => {}
+                None => all = None,
             }
         }
         Ok(all)

@@ -41,7 +41,7 @@ pub struct EveryNumber {
     pieces: Vec<NumberSpan>,
 }
 
-/// Where nothing has a limit, numbers are followed up to this.
+/// Where something has no limit, or numbers without end are not decided together, they are followed up to this.
 pub const MOST_FOLLOWED: u64 = 100_000;
 /// More certificates than this are not looked for.
 const MOST_ATTEMPTS: u64 = 200_000;
@@ -176,7 +176,9 @@ fn search(
         let is_mixed = low == least && high > low;
         let is_left = attempts > MOST_ATTEMPTS || open > MOST_OPEN;
         let found = if is_left || is_mixed { None } else { decide(low, high)? };
-        if found.is_none() && low < high && !is_left {
+        // Beyond what is followed an end that comes to nothing is not halved: its limit may lie on the circle.
+        let is_far = low > MOST_FOLLOWED && high == ENDLESS;
+        if found.is_none() && low < high && !is_left && !is_far {
             let middle = if is_mixed {
                 low
             } else if high / low > 4 {
