@@ -172,10 +172,13 @@ fn certificates_of_moments_and_of_contacts_hold_too() {
     }
     let desk = Desk::with("scene.toml", EQUAL);
     for (options, words) in [
-        ("--set coordination.strategy=average-position --set object.split-mass=false --set link.loss=20%", "stable from 2 on"),
+        ("--set coordination.strategy=average-position --set object.split-mass=false --set link.loss=20%", "hold: stable from 2 on"),
         ("--set object.split-mass=false --set link.loss=10%", "unstable from"),
-        ("--set coordination.stiffness=60000 --set link.loss=20% --every-number 2..2", "unstable from 2 to 2"),
-        ("--set peer.contact=none --set link.delay=13ms --set link.loss=10% --every-number 2..2", "stable from 2 to 2"),
+        ("--set coordination.stiffness=60000 --set link.loss=20% --every-number 2..2", "hold: unstable from 2 to 2"),
+        (
+            "--set peer.contact=none --set coordination.stiffness=200 --set coordination.damping=2 --set link.loss=10% --every-number 2..2",
+            "hold: stable from 2 to 2",
+        ),
     ] {
         let every = if options.contains("--every-number") { "" } else { "--every-number" };
         desk.text(&format!("stability point scene.toml {options} {every} --certificate numbers.json"));
