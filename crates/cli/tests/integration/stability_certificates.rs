@@ -172,10 +172,16 @@ fn certificates_of_moments_and_of_contacts_hold_too() {
     }
     let desk = Desk::with("scene.toml", EQUAL);
     for (options, words) in [
-        ("--set coordination.strategy=average-position --set object.split-mass=false --set link.loss=20%", "stable from 3 on"),
+        ("--set coordination.strategy=average-position --set object.split-mass=false --set link.loss=20%", "hold: stable from 2 on"),
         ("--set object.split-mass=false --set link.loss=10%", "unstable from"),
+        ("--set coordination.stiffness=60000 --set link.loss=20% --every-number 2..2", "hold: unstable from 2 to 2"),
+        (
+            "--set peer.contact=none --set coordination.stiffness=200 --set coordination.damping=2 --set link.loss=10% --every-number 2..2",
+            "hold: stable from 2 to 2",
+        ),
     ] {
-        desk.text(&format!("stability point scene.toml {options} --every-number --certificate numbers.json"));
+        let every = if options.contains("--every-number") { "" } else { "--every-number" };
+        desk.text(&format!("stability point scene.toml {options} {every} --certificate numbers.json"));
         let output = check(&desk, "numbers.json");
         let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
         assert!(output.status.success() && text.contains(words), "{options}: {text}{refusal}");
@@ -211,7 +217,9 @@ fn certificates_of_moments_and_of_contacts_that_say_more_than_they_show_are_refu
     desk.text("stability point scene.toml --set coordination.strategy=average-position --set object.split-mass=false --set link.loss=20% --every-number 3..9 --certificate numbers.json");
     let push = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/network/push-contact.toml");
     desk.text(&format!("stability point {push} --switching --certificate contacts.json"));
-    let [numbers, contacts] = ["numbers.json", "contacts.json"].map(|file| serde_json::from_str::<Value>(&desk.read(file)).unwrap());
+    desk.text("stability point scene.toml --set link.loss=20% --every-number 2..2 --certificate pair.json");
+    let [numbers, contacts, pair] =
+        ["numbers.json", "contacts.json", "pair.json"].map(|file| serde_json::from_str::<Value>(&desk.read(file)).unwrap());
     let scene = |whole: &Value, from: &str, to: &str| {
         let text = whole["scene"].as_str().unwrap();
         assert!(text.contains(from), "{from}");
@@ -224,6 +232,18 @@ fn certificates_of_moments_and_of_contacts_that_say_more_than_they_show_are_refu
         (&numbers, "/spans/0/moments/0/factor", 0.05.into(), "leaves more"),
         (&numbers, "/spans/0/moments/0/blocks/0", half(&numbers["spans"][0]["moments"][0]["blocks"][0]), "expected a moment"),
         (&numbers, "/scene", scene(&numbers, "stiffness = 1000.0", "stiffness = 60000.0"), "leaves more"),
+        (&pair, "/spans/0/verdict", "unstable".into(), "something else"),
+        (&pair, "/spans/0/moments/0/factor", 1.5.into(), "something else"),
+        (&pair, "/spans/0/moments/0/factor", 0.5.into(), "leaves more"),
+        (&pair, "/spans/0/moments/0/blocks", numbers["spans"][0]["moments"][0]["blocks"].clone(), "expected 2 kinds"),
+        (&pair, "/spans/0/moments/0/blocks/1", half(&pair["spans"][0]["moments"][0]["blocks"][1]), "expected a moment"),
+        (&pair, "/spans/0/moments/0/blocks/0", pair["spans"][0]["moments"][0]["blocks"][1].clone(), "expected a moment"),
+        (&pair, "/spans/0/moments/0/depth", 5.into(), "expected a moment"),
+        (&pair, "/spans/0/moments/0/heard", Value::Null, "two numbers are heard"),
+        (&pair, "/spans/0/to", 3.into(), "two together with more"),
+        (&pair, "/scene", scene(&pair, "stiffness = 1000.0", "stiffness = 60000.0"), "leaves more"),
+        (&pair, "/scene", scene(&pair, "damping = 0.2", "damping = 900.0"), "leaves more"),
+        (&pair, "/scene", scene(&pair, "delay = \"8ms\"", "delay = \"16ms\""), "leaves more|a sample that is missing"),
         (&contacts, "/motions/0/factor", 0.2.into(), "not shown to fall"),
         (&contacts, "/motions/0/multipliers", half(&contacts["motions"][0]["multipliers"]), "another size"),
         (&contacts, "/motions/0/rest", Value::Array(Vec::new()), "missing"),

@@ -81,13 +81,13 @@ fn a_certificate_of_a_server_that_says_more_than_it_shows_is_refused() {
     let returned = parts[0]["states"].as_array().unwrap().iter().position(|state| state[0] == "returned").unwrap();
     let without_one = parts[1..].to_vec();
     let changes = [
-        (with_table("{ returns = \"object\" }"), "a sample that is missing|not dominant|nothing|not those"),
-        (with_table("{ server = \"peer3\" }"), "classes of peers"),
+        (with_table("{ returns = \"object\" }"), "those after them"),
+        (with_table("{ server = \"peer3\" }"), "classes of peers|none of the scene|those of the scene"),
         (with_table("{ returns = \"velocity\" }"), "not covered"),
-        (scene("\"client-server\"", "\"average-position\""), "classes of peers"),
+        (scene("\"client-server\"", "\"average-position\""), "a state that is missing"),
         (scene("delay = \"8ms\"", "delay = \"40ms\""), "a sample that is missing"),
         (scene("update = \"8ms\"", "update = \"9ms\""), "not dominant|sample that is missing"),
-        (scene("count = 3", "count = 6"), "classes of peers"),
+        (scene("count = 3", "count = 6"), "none of the scene"),
         (scene("mass = 0.45", "mass = 0.045"), "not dominant"),
         (scene("damping = 5.0 }, coupling", "damping = 900.0 }, coupling"), "not dominant"),
         (scene("delay = \"8ms\"", "delay = \"8ms\", loss = \"5%\""), "chance"),

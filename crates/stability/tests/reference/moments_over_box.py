@@ -211,7 +211,10 @@ class Moments:
         t0, t1, step = self.timing.t0, self.timing.t1, self.box.scene.peers[peer].tick
         due = {}
         for tick, sent in self.timing.in_force(*self.part.link(0, 0)):
-            due.setdefault(tick, []).append(kept + (sent - self.sends[0]) // self.box.scene.update)
+            number = (sent - self.sends[0]) // self.box.scene.update
+            if number < -self.depth:
+                raise NotCovered(f"a sample that is missing: {number}")
+            due.setdefault(tick, []).append(kept + number)
         for instant in range(self.timing.first_tick(peer, t0), t1, step):
             if instant in self.sends:
                 sample = kept + self.sends.index(instant)
