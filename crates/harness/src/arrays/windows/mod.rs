@@ -297,7 +297,7 @@ impl<'a, const A: usize> Windows<'a, A> {
     fn end(mut self, ending: Ending, until: Instant) -> Summary {
         let Shape { tick, send_every, phases, clocks, .. } = &self.arrays.shape;
         let sent = |sender: usize, sequence: u64| {
-            let clock = clocks.as_ref().map_or(Clock::regular(*tick), |clocks| clocks[sender]);
+            let clock = clocks.as_ref().map_or_else(|| Clock::regular(*tick), |clocks| clocks[sender]);
             clock.instant(phases[sender] + sequence * send_every).unwrap_or(Instant::MAX)
         };
         match &mut self.arrays.samples {
