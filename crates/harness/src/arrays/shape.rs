@@ -244,7 +244,7 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             assert_eq!(refusal(&fits), None, "{fits}");
         }
         for (keys, expected) in [
-            ("peers=[{ name = \"peer1\", clock.tick = \"2ms\" }]".to_owned(), "differ in length"),
+            ("peers=[{ name = \"peer1\", tick = \"2ms\" }]".to_owned(), "differ in length"),
             ("peer.downlink={ corrupt = 0.1 }".to_owned(), "an access line damages"),
             ("link.corrupt=0.1".to_owned(), "a link damages"),
             (change("link = \"all\", set = { corrupt = 0.1 }"), "the timeline makes a link damage"),

@@ -22,9 +22,9 @@ impl<const A: usize> Extremes<A> {
 
     #[inline(always)]
     fn with(mut self, position: &[f64; A]) -> Self {
-        for axis in 0..A {
-            self.low[axis] = smaller(position[axis], self.low[axis]);
-            self.high[axis] = larger(position[axis], self.high[axis]);
+        for (axis, position) in position.iter().enumerate() {
+            self.low[axis] = smaller(*position, self.low[axis]);
+            self.high[axis] = larger(*position, self.high[axis]);
         }
         self
     }

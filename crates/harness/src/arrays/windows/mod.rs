@@ -59,8 +59,6 @@ struct Windows<'a, const A: usize> {
     ticking: Vec<Mask>,
     /// How many windows there were, and this one.
     window: u64,
-    /// The instants at which the senders of the window send.
-    instants: Vec<Instant>,
     /// By peer a nanosecond after its tick; 0 if it does not tick in the window.
     until: Vec<u64>,
     /// Peers that take their means of the same samples.
@@ -98,7 +96,6 @@ impl<'a, const A: usize> Windows<'a, A> {
             rests: Rests::default(),
             ticking: Vec::new(),
             window: 0,
-            instants: Vec::new(),
             until: Vec::new(),
             together: Vec::new(),
             seen: Vec::new(),
@@ -183,10 +180,9 @@ impl<'a, const A: usize> Windows<'a, A> {
 
     /// Those whose time it is send, each at its own tick.
     fn send(&mut self) {
-        let Self { arrays, timetable, window, instants, until, .. } = self;
+        let Self { arrays, timetable, window, until, .. } = self;
         let Arrays { samples, bodies, next_send, shape, senders, sent, .. } = arrays;
         senders.clear();
-        instants.clear();
         for (peer, at, tick) in timetable.ticks() {
             if next_send[peer] != tick {
                 continue;
@@ -196,7 +192,6 @@ impl<'a, const A: usize> Windows<'a, A> {
                 Samples::Broadcast(samples) => samples.send(at.as_nanos(), peer, bodies),
                 Samples::PerPacket(_) => {
                     senders.push(peer);
-                    instants.push(at);
                     sent[peer] = bodies.sample(peer);
                 }
             }
@@ -209,7 +204,7 @@ impl<'a, const A: usize> Windows<'a, A> {
                 let (since, least) = if until[peer] > 0 { ((*window, at), *window) } else { ((*window - 1, first), *window + 1) };
                 NextTick { at, since, least }
             };
-            samples.send_in_turn(*window, (senders, instants), sent, next_tick);
+            samples.send_in_turn(*window, senders, |peer| timetable.instant(peer), sent, next_tick);
         }
     }
 
@@ -302,7 +297,7 @@ impl<'a, const A: usize> Windows<'a, A> {
     fn end(mut self, ending: Ending, until: Instant) -> Summary {
         let Shape { tick, send_every, phases, clocks, .. } = &self.arrays.shape;
         let sent = |sender: usize, sequence: u64| {
-            let clock = clocks.as_ref().map_or(Clock::regular(*tick), |clocks| clocks[sender]);
+            let clock = clocks.as_ref().map_or_else(|| Clock::regular(*tick), |clocks| clocks[sender]);
             clock.instant(phases[sender] + sequence * send_every).unwrap_or(Instant::MAX)
         };
         match &mut self.arrays.samples {

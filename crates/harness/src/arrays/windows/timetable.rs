@@ -55,8 +55,9 @@ impl Beat {
 
     fn advance(&mut self) {
         self.tick += 1;
-        self.at = self.at.saturating_add(self.span + u64::from(self.is_long()));
-        self.rest = (self.rest + self.remainder) % self.speed;
+        let is_long = self.is_long();
+        self.at = self.at.saturating_add(self.span + u64::from(is_long));
+        self.rest = self.rest + self.remainder - if is_long { self.speed } else { 0 };
     }
 }
 

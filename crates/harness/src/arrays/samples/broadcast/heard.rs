@@ -78,8 +78,8 @@ impl<const P: usize> Broadcast<P, 1> {
         let (quads, count) = ((*number - 1).div_ceil(4), count(*number - 1));
         let mut own = [usize::MAX; TOGETHER];
         own.iter_mut().zip(peers).for_each(|(own, peer)| *own = peer / 4);
-        for pair in 0..P {
-            let (before, after, common) = (&heard.before[pair], &held[pair], &mut heard.sums[pair]);
+        for (pair, after) in held.iter().enumerate() {
+            let (before, common) = (&heard.before[pair], &mut heard.sums[pair]);
             let mut sums: [Quad<1>; TOGETHER] = [[[0.0]; 8]; TOGETHER];
             for (sum, peer) in sums.iter_mut().zip(peers) {
                 *sum = sum_before(common, before, peer / 4);

@@ -21,11 +21,14 @@ pub(in crate::arrays) struct NextTick {
 }
 
 impl<const P: usize> PerPacket<P, 1> {
-    /// In a window those peers send what `sent` has in their places, at these instants and in their order.
+    /// In a window those peers send what `sent` has in their places, in the order of their ticks, each at the instant of its own.
+    ///
+    /// Where no packets of two senders meet on a line they go in the order in which links lie: with 200 peers in another order each misses the cache.
     pub(in crate::arrays) fn send_in_turn(
         &mut self,
         window: u64,
-        (senders, instants): (&[usize], &[Instant]),
+        senders: &mut [usize],
+        instant: impl Fn(usize) -> Instant,
         sent: &[Sample<P, 1>],
         next_tick: impl Fn(usize) -> NextTick,
     ) {
@@ -33,20 +36,18 @@ impl<const P: usize> PerPacket<P, 1> {
         let links = match links {
             Links::Direct(links) => links,
             Links::Carried(carrier) => {
-                for (sender, now) in senders.iter().zip(instants) {
-                    carrier.send(*now, &[*sender], sent);
-                }
-                return;
+                return senders.iter().for_each(|sender| carrier.send(instant(*sender), &[*sender], sent));
             }
             Links::Stepped(..) => unreachable!("the shape of a scene says that no link looks ahead where peers tick at instants of their own"),
         };
+        senders.sort_unstable();
         for receiver in receivers.clone() {
             let NextTick { at, since: (from, since), least } = next_tick(receiver);
-            for (sender, now) in senders.iter().zip(instants).filter(|(sender, _)| **sender != receiver) {
+            for sender in senders.iter().filter(|sender| **sender != receiver) {
                 let Some(column) = rows.column(receiver, *sender) else { continue };
                 let link = LinkId::new(rows.link(receiver, column));
                 let sequence = links.offered(link);
-                if let Some((arrival, overtakes)) = links.offer_one(*now, link) {
+                if let Some((arrival, overtakes)) = links.offer_one(instant(*sender), link) {
                     let packet = rows.packet((receiver, column), &sent[*sender], arrival, sequence);
                     let due = (from + in_flight.count(since, arrival.max(at))).max(least);
                     in_flight.push_due((window, due), packet, overtakes);
