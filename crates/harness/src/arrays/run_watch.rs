@@ -165,7 +165,7 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    /// Hands on its row, from what is seen of the eight peers among which it is.
+    /// Hands on its row, from the states and forces of its eight peers.
     fn hand_on<const A: usize>(&self, SeenPlace { axes, turn }: &SeenPlace<A>, on: &mut dyn FnMut(&TickRow<'_>) -> bool) -> bool {
         let (lane, (own, turns)) = (self.peer % WIDTH, self.damping);
         let object = StateOfLane::of(axes.each_ref().map(|seen| &seen.object), lane);

@@ -63,7 +63,7 @@ struct Windows<'a, const A: usize> {
     until: Vec<u64>,
     /// Peers that take their means of the same samples.
     together: Vec<usize>,
-    /// What is seen of the peers before they move, eight after another, if ticks are looked at.
+    /// States and forces before peers move, eight peers after another, if ticks are looked at.
     seen: Vec<SeenPlace<A>>,
     /// The instants of the window with their discrepancies, if they are looked at.
     distances: Vec<(Instant, f64)>,

@@ -19,7 +19,7 @@ pub(super) struct Heard<const P: usize, const L: usize> {
     /// How many samples of others had arrived when a peer took its mean; by peer.
     known: Vec<u64>,
     arrived: u64,
-    /// By quad the sums of those before it of `before`, as far as they are those of what is held.
+    /// By quad the sum of those before it in `before`, up to the first one that has changed.
     sums: [Vec<Quad<L>>; P],
 }
 
