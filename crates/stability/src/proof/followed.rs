@@ -422,7 +422,7 @@ impl Motion {
             Action::Server(_) | Action::Waves(_) => {
                 let has_differences = |class: &usize| match self.action {
                     Action::Server(_) => Server::has_differences(structure, *class),
-                    _ => structure.classes[*class].len() > 1,
+                    Action::Mean | Action::Graph(_) | Action::Waves(_) => structure.classes[*class].len() > 1,
                 };
                 for class in (0..structure.classes.len()).filter(has_differences) {
                     parts.push(PartOf { apart: Some(class), timetable: &structure.timetable, plans: &self.plans.0, tied: true, weight: None });
@@ -444,7 +444,7 @@ impl Motion {
         let Some((growing, numbers)) = self.growing.zip(numbers) else {
             let whole = || match &self.action {
                 Action::Waves(_) => waves::with_shares(&structure.weights, &waves::Part::of(structure, apart).shares()),
-                _ => structure.weights.clone(),
+                Action::Mean | Action::Graph(_) | Action::Server(_) => structure.weights.clone(),
             };
             let weights = apart.map_or_else(whole, |_| Matrix::from_fn(1, 1, |_, _| structure.difference_weight()));
             return ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: weights.clone() }).collect();

@@ -66,7 +66,7 @@ impl Register {
     const fn position_of(self) -> Option<usize> {
         match self {
             Self::Body { class, velocity: false, .. } | Self::Sample { class, velocity: false, .. } => Some(class),
-            _ => None,
+            Self::Body { .. } | Self::Sample { .. } | Self::Pending { .. } | Self::Force { .. } | Self::Returned { .. } | Self::Waves { .. } => None,
         }
     }
 }

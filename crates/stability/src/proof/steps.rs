@@ -48,14 +48,17 @@ pub(super) struct Plan {
     oldest: f64,
 }
 
+/// A sample that is held: its node, its place, and the bits of its age.
+type HeldKind = (usize, usize, u64);
+
 /// All of a step that its matrix depends on. Samples are called by their places: among those before the step, and then those that are taken in it.
 #[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct StepKind {
     before: usize,
     /// The nodes that take samples.
     taken: Vec<usize>,
-    /// The nodes that tick, for how long, and the sample of each node that they hold, with the bits of its age.
-    ticks: Vec<(usize, Duration, Vec<(usize, usize, u64)>)>,
+    /// The nodes that tick, for how long, and what they hold.
+    ticks: Vec<(usize, Duration, Vec<HeldKind>)>,
     after: Vec<Option<usize>>,
 }
 

@@ -174,13 +174,14 @@ fn every_number_of_copies_tied_by_waves_is_judged_as_single_scenes_are() {
     }
     let wall = "object.enclosure={ min = -0.1, max = 0.1, stiffness = 500.0, damping = 1.0 }";
     let far = "links=[{ from = \"peer1\", to = \"peer3\", delay = \"21ms\" }]";
-    for (set, words) in [
-        (&[wall][..], "with wave coordination walls are left out"),
-        (&["scene.count=4", far], "waves are followed over equal links"),
-        (&["scene.count=4", "peers=[{ name = \"peer2\", phase = 3 }]"], "waves are followed over equal links"),
+    let unequal = "waves are followed over equal links";
+    for (set, words, of_numbers) in [
+        (&[wall][..], "with wave coordination walls are left out", None),
+        (&["scene.count=4", far], unequal, Some("no two peers are equal")),
+        (&["scene.count=4", "peers=[{ name = \"peer2\", phase = 3 }]"], unequal, None),
     ] {
         let refused = prove_every_number(&scene(set), 2, None, &Unwatched).unwrap_err().to_string();
-        assert!(refused.contains(words), "{refused}");
+        assert!(refused.contains(of_numbers.unwrap_or(words)), "{refused}");
         let of_line = ProvenLine::prove(&family(set, &["object.mass=0.4..0.5"]), 1.0, &Unwatched).unwrap_err().to_string();
         assert!(of_line.contains(words), "{of_line}");
     }
