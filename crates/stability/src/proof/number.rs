@@ -176,7 +176,7 @@ fn search(
         let is_mixed = low == least && high > low;
         let is_left = attempts > MOST_ATTEMPTS || open > MOST_OPEN;
         let found = if is_left || is_mixed { None } else { decide(low, high)? };
-        // Beyond what is followed an end that comes to nothing is not halved: its limit may lie on the circle.
+        // Beyond the numbers that are followed, an end without a verdict is not halved: its limit may lie on the circle.
         let is_far = low > MOST_FOLLOWED && high == ENDLESS;
         if found.is_none() && low < high && !is_left && !is_far {
             let middle = if is_mixed {

@@ -147,7 +147,7 @@ fn lines_of_waves_are_judged_as_single_scenes_are() {
     assert!(unstable > 0);
 }
 
-/// Every number: single scenes say the same, two peers and classes of others among them; and what is not followed is refused by name.
+/// Every number: single scenes say the same, two peers and classes of others among them; scenes that proofs do not follow are refused by name.
 #[test]
 fn every_number_of_copies_tied_by_waves_is_judged_as_single_scenes_are() {
     let soft = "peer.coupling.stiffness=250000";

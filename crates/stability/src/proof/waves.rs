@@ -120,7 +120,7 @@ impl<'a> Part<'a> {
         Self { structure, apart, rest: structure.classes.len() - 1, is_pair: structure.peers == 2 }
     }
 
-    /// The sizes of all classes beside that whose P follows.
+    /// The sizes of all classes in units of the size of the class whose P follows.
     pub(super) fn shares(&self) -> Vec<f64> {
         let size = |class: usize| count(self.structure.classes[class].len());
         (0..self.structure.classes.len()).map(|class| size(class) / size(self.rest)).collect()

@@ -21,7 +21,7 @@ pub(super) struct Proof {
     pub(super) file: Option<String>,
 }
 
-/// What is to be proven, if that is asked for; refuses what cannot be.
+/// The proof that is asked for, if one is; refuses scenes that have none.
 pub(super) fn asked(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<NumberProof>, Failure> {
     let Some((from, to)) = arguments.every_number else { return Ok(None) };
     let asked = NumberProof::new(scene, from, to).and_then(|asked| {

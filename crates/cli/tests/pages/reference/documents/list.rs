@@ -224,7 +224,10 @@ pub(super) const DOCUMENTS: [Document; 25] = [
                 "numbers with one verdict; `to` is `null` without end",
             ),
             ("every_number.mean_square, every_number.without_limit", "whether in the mean square; what has no limit as N grows, or `null`"),
-            ("every_number.certificates, every_number.file", "how many were tried; the file of `--certificate`"),
+            (
+                "every_number.certificates, every_number.interrupted, every_number.file",
+                "how many were tried; whether numbers were left; the file of `--certificate`",
+            ),
             ("notes", "what the verdict leaves out; where there are two radii, each note names its own"),
         ],
     },
