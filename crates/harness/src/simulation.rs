@@ -37,14 +37,11 @@ impl<'a> Simulation<'a> {
         Self { scene, model, disturbance: Some(disturbance), threads: 1, strategies: FromScene }
     }
 
-    /// [`Simulation::run`] with loops that are compiled for measures, where it needs events.
+    /// [`Simulation::run`], with loops of events that are compiled for measures.
     pub(crate) fn run_measured(&self, measures: &mut Measures) -> Summary {
         let plan = Plan::new(self.scene, self.model, measures.wants_ticks());
-        if self.arrays(&plan, Watch::of(measures)).is_some() {
-            let Ok(summary) = self.run(measures);
-            return summary;
-        }
-        let Ok(summary) = Erased::run_as_itself(measures, |observer| self.run_with_events(&plan, observer));
+        let run = |observer: &mut Erased<'_, Measures>| self.run_in_arrays(&plan, observer).unwrap_or_else(|| self.run_with_events(&plan, observer));
+        let Ok(summary) = Erased::run_as_itself(measures, run);
         summary
     }
 }
@@ -87,40 +84,52 @@ impl<'a, S: Strategies> Simulation<'a, S> {
 
     fn run_observed(&self, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
+        self.run_in_arrays(&plan, observer).unwrap_or_else(|| self.run_with_events(&plan, observer))
+    }
+
+    /// `None` if the run needs events: the observer has seen nothing.
+    fn run_in_arrays(&self, plan: &Plan, observer: &mut AnyObserver<'_>) -> Option<Result<Summary, Ended>> {
         let watch = Watch::of(observer);
-        if let Some((shape, law)) = self.arrays(&plan, watch) {
-            if shape.has_windows() {
-                let summary = if watch == Watch::NOTHING {
-                    arrays::run_in_windows(self.scene, (shape, law), &mut |now| observer.keep_going(now))
-                } else {
-                    let mut watching = Watching { observer, watch, result: Ok(()) };
-                    let summary = arrays::run_in_watched_windows(self.scene, (shape, law), &plan, &mut watching);
-                    watching.result?;
-                    summary
-                };
-                // Which tick comes after the one that diverged is known with events. Rows are not given twice.
-                return summary.map_or_else(|| self.run_again(&plan, observer), Ok);
+        let (shape, law) = self.arrays(plan, watch)?;
+        Some(if shape.has_windows() {
+            self.run_in_windows(plan, (shape, law), watch, observer)
+        } else {
+            self.run_in_lockstep(plan, (shape, law), watch, observer)
+        })
+    }
+
+    fn run_in_windows(&self, plan: &Plan, law: (Shape, BuiltIn), watch: Watch, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
+        let summary = if watch == Watch::NOTHING {
+            arrays::run_in_windows(self.scene, law, &mut |now| observer.keep_going(now))
+        } else {
+            let mut watching = Watching { observer, watch, result: Ok(()) };
+            let summary = arrays::run_in_watched_windows(self.scene, law, plan, &mut watching);
+            watching.result?;
+            summary
+        };
+        // Which tick comes after the one that diverged is known with events. Rows are not given twice.
+        summary.map_or_else(|| self.run_again(plan, observer), Ok)
+    }
+
+    fn run_in_lockstep(&self, plan: &Plan, (shape, law): (Shape, BuiltIn), watch: Watch, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
+        let looks_ahead = shape.looks_ahead();
+        let summary = if watch == Watch::NOTHING {
+            let threads = self.threads.min(shape.threads().0);
+            if threads > 1
+                && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
+            {
+                return Ok(summary);
             }
-            let looks_ahead = shape.looks_ahead();
-            let summary = if watch == Watch::NOTHING {
-                let threads = self.threads.min(shape.threads().0);
-                if threads > 1
-                    && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
-                {
-                    return Ok(summary);
-                }
-                arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now))
-            } else {
-                let mut watching = Watching { observer, watch, result: Ok(()) };
-                let summary = arrays::run_watched(self.scene, (shape, law), &plan, &mut watching);
-                watching.result?;
-                summary
-            };
-            // The counters of queues that have looked ahead are those of a later instant. Rows have none, and are not given twice.
-            let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
-            return if has_looked_too_far { self.run_again(&plan, observer) } else { Ok(summary) };
-        }
-        self.run_with_events(&plan, observer)
+            arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now))
+        } else {
+            let mut watching = Watching { observer, watch, result: Ok(()) };
+            let summary = arrays::run_watched(self.scene, (shape, law), plan, &mut watching);
+            watching.result?;
+            summary
+        };
+        // The counters of queues that have looked ahead are those of a later instant. Rows have none, and are not given twice.
+        let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
+        if has_looked_too_far { self.run_again(plan, observer) } else { Ok(summary) }
     }
 
     /// Runs with events what the observer has seen in arrays.

@@ -169,7 +169,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// Step 1: writes the sample that this peer sends now into `datagram` and gives its length. `local_time` is what the peer's own clock shows.
     ///
     /// For a strategy whose samples are personal, see [`Peer::personal_samples`].
-    #[inline]
+    #[inline(always)]
     pub fn sample(&mut self, local_time: Instant, datagram: &mut [u8; MAX_LEN]) -> usize {
         let sample = self.next_sample(local_time);
         let (kind, axes) = (self.asked.kind, self.config.axes);
@@ -262,7 +262,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// # Errors
     ///
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
-    #[inline]
+    #[inline(always)]
     pub fn handle_sample(&mut self, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
         if self.asked.kind != SampleKind::State {
             return self.handle_extended(sample, &Extra::NONE);

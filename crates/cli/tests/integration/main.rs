@@ -10,6 +10,7 @@ mod against;
 mod campaign;
 mod campaign_pictures;
 mod campaign_verdicts;
+mod certificate_checker;
 mod check;
 mod check_page;
 mod compare;

@@ -1,9 +1,8 @@
-//! Certificates of `stability map --prove`, `boundary --prove` and `point --every-number`, checked by a program that shares no code with this one: `crates/stability/tests/reference/check_certificate.py`.
-
-use std::process::{Command, Output};
+//! Certificates of `stability map --prove`, `boundary --prove` and `point --every-number`, checked by a program that shares no code with this one.
 
 use serde_json::Value;
 
+use crate::certificate_checker::{accepts, assert_shares, can_check, other_scene, refuses};
 use crate::desk::Desk;
 
 const EQUAL: &str = r#"
@@ -50,30 +49,6 @@ link = { delay = "8ms" }
 links = [{ from = "far", to = "a", delay = "13ms" }, { from = "far", to = "b", delay = "13ms" }]
 "#;
 
-pub(crate) fn check(desk: &Desk, file: &str) -> Output {
-    let program = concat!(env!("CARGO_MANIFEST_DIR"), "/../stability/tests/reference/check_certificate.py");
-    Command::new("python3").arg(program).arg(desk.path(file)).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap()
-}
-
-/// With that value in that place the checker refuses the certificate, with one of these words.
-pub(crate) fn refuses(desk: &Desk, whole: &Value, place: &str, value: Value, words: &str) {
-    let mut changed = whole.clone();
-    *changed.pointer_mut(place).unwrap() = value;
-    desk.write("changed.json", changed.to_string());
-    let output = check(desk, "changed.json");
-    let refusal = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && words.split('|').any(|words| refusal.contains(words)), "{place}: {words}: {refusal}");
-}
-
-/// Whether there is a Python that can check; says so if there is none.
-pub(crate) fn can_check() -> bool {
-    let can = Command::new("python3").args(["-c", "import tomllib"]).output().is_ok_and(|output| output.status.success());
-    if !can {
-        eprintln!("skipped: no python3 of version 3.11 or later was found");
-    }
-    can
-}
-
 #[test]
 fn certificates_hold_for_a_checker_that_shares_no_code() {
     if !can_check() {
@@ -96,12 +71,9 @@ fn certificates_hold_for_a_checker_that_shares_no_code() {
     ] {
         let desk = Desk::with("scene.toml", scene);
         let document = desk.json(&format!("stability map scene.toml {options} --certificate --out out --json"));
-        let output = check(&desk, "out/certificate.json");
-        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
-        assert!(output.status.success(), "{options}: {refusal}");
+        let text = accepts(&desk, "out/certificate.json", options);
         let region = &document["regions"][0];
-        let share = |key: &str| format!("{key} {:.3} %", 100.0 * region[key].as_f64().unwrap());
-        assert!(["stable", "unstable", "undecided"].iter().all(|key| text.contains(&share(key))), "{text} {region}");
+        assert_shares(&text, region);
         assert!(region["undecided"].as_f64().unwrap() < 0.9, "{region}");
     }
 }
@@ -115,9 +87,8 @@ fn certificates_of_lines_and_numbers_hold_too() {
     let desk = Desk::with("scene.toml", EQUAL);
     let document =
         desk.json("stability boundary scene.toml --along coordination.stiffness=100..6000 --prove --tolerance 1 --certificate --out out --json");
-    let output = check(&desk, "out/certificate.json");
-    let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
-    assert!(output.status.success() && text.contains(" boxes hold: stable "), "{refusal}");
+    let text = accepts(&desk, "out/certificate.json", "out/certificate.json");
+    assert!(text.contains(" boxes hold: stable "), "{text}");
     let open: f64 = document["stretches"]
         .as_array()
         .unwrap()
@@ -146,9 +117,7 @@ fn certificates_of_lines_and_numbers_hold_too() {
     ] {
         let desk = Desk::with("scene.toml", scene);
         let document = desk.json(&format!("stability point scene.toml {options} --every-number --certificate numbers.json --json"));
-        let output = check(&desk, "numbers.json");
-        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
-        assert!(output.status.success(), "{options}: {refusal}");
+        let text = accepts(&desk, "numbers.json", options);
         let spans = document["every_number"]["spans"].as_array().unwrap();
         assert_eq!(document["every_number"]["without_limit"].is_null(), without_end.is_some(), "{document:#}");
         for span in spans.iter().filter(|span| !span["to"].is_null() && span["to"].as_u64().unwrap() < 100_000) {
@@ -182,17 +151,15 @@ fn certificates_of_moments_and_of_contacts_hold_too() {
     ] {
         let every = if options.contains("--every-number") { "" } else { "--every-number" };
         desk.text(&format!("stability point scene.toml {options} {every} --certificate numbers.json"));
-        let output = check(&desk, "numbers.json");
-        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
-        assert!(output.status.success() && text.contains(words), "{options}: {text}{refusal}");
+        let text = accepts(&desk, "numbers.json", options);
+        assert!(text.contains(words), "{options}: {text}");
     }
     desk.write("axes.toml", TWO_AXES);
     let push = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/network/push-contact.toml");
     for (scene, words) in [(push, "contacts that open and close: stable"), ("axes.toml", "contacts that open and close: stable, stable")] {
         desk.text(&format!("stability point {scene} --switching --certificate contacts.json"));
-        let output = check(&desk, "contacts.json");
-        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
-        assert!(output.status.success() && text.contains(words), "{text}{refusal}");
+        let text = accepts(&desk, "contacts.json", "contacts.json");
+        assert!(text.contains(words), "{text}");
     }
     // Of the second scene no axis may be missing, and none stand there twice.
     let axes: Value = serde_json::from_str(&desk.read("contacts.json")).unwrap();
@@ -220,18 +187,13 @@ fn certificates_of_moments_and_of_contacts_that_say_more_than_they_show_are_refu
     desk.text("stability point scene.toml --set link.loss=20% --every-number 2..2 --certificate pair.json");
     let [numbers, contacts, pair] =
         ["numbers.json", "contacts.json", "pair.json"].map(|file| serde_json::from_str::<Value>(&desk.read(file)).unwrap());
-    let scene = |whole: &Value, from: &str, to: &str| {
-        let text = whole["scene"].as_str().unwrap();
-        assert!(text.contains(from), "{from}");
-        Value::from(text.replace(from, to))
-    };
     let half = |digits: &Value| Value::from(digits.as_str().unwrap()[..16].to_owned());
     let changes = [
         (&numbers, "/spans/0/verdict", "unstable".into(), "something else"),
         (&numbers, "/spans/0/moments/0/factor", 1.5.into(), "something else"),
         (&numbers, "/spans/0/moments/0/factor", 0.05.into(), "leaves more"),
         (&numbers, "/spans/0/moments/0/blocks/0", half(&numbers["spans"][0]["moments"][0]["blocks"][0]), "expected a moment"),
-        (&numbers, "/scene", scene(&numbers, "stiffness = 1000.0", "stiffness = 60000.0"), "leaves more"),
+        (&numbers, "/scene", other_scene(&numbers, "stiffness = 1000.0", "stiffness = 60000.0"), "leaves more"),
         (&pair, "/spans/0/verdict", "unstable".into(), "something else"),
         (&pair, "/spans/0/moments/0/factor", 1.5.into(), "something else"),
         (&pair, "/spans/0/moments/0/factor", 0.5.into(), "leaves more"),
@@ -241,15 +203,15 @@ fn certificates_of_moments_and_of_contacts_that_say_more_than_they_show_are_refu
         (&pair, "/spans/0/moments/0/depth", 5.into(), "expected a moment"),
         (&pair, "/spans/0/moments/0/heard", Value::Null, "two numbers are heard"),
         (&pair, "/spans/0/to", 3.into(), "two together with more"),
-        (&pair, "/scene", scene(&pair, "stiffness = 1000.0", "stiffness = 60000.0"), "leaves more"),
-        (&pair, "/scene", scene(&pair, "damping = 0.2", "damping = 900.0"), "leaves more"),
-        (&pair, "/scene", scene(&pair, "delay = \"8ms\"", "delay = \"16ms\""), "leaves more|a sample that is missing"),
+        (&pair, "/scene", other_scene(&pair, "stiffness = 1000.0", "stiffness = 60000.0"), "leaves more"),
+        (&pair, "/scene", other_scene(&pair, "damping = 0.2", "damping = 900.0"), "leaves more"),
+        (&pair, "/scene", other_scene(&pair, "delay = \"8ms\"", "delay = \"16ms\""), "leaves more|a sample that is missing"),
         (&contacts, "/motions/0/factor", 0.2.into(), "not shown to fall"),
         (&contacts, "/motions/0/multipliers", half(&contacts["motions"][0]["multipliers"]), "another size"),
         (&contacts, "/motions/0/rest", Value::Array(Vec::new()), "missing"),
         (&contacts, "/motions/0/parts", Value::Array(Vec::new()), "missing"),
-        (&contacts, "/scene", scene(&contacts, "stiffness = 3500.0", "stiffness = 350000.0"), "not shown to fall|not dominant"),
-        (&contacts, "/scene", scene(&contacts, "mass = 0.1", "mass = 0.001"), "not shown to fall|not dominant"),
+        (&contacts, "/scene", other_scene(&contacts, "stiffness = 3500.0", "stiffness = 350000.0"), "not shown to fall|not dominant"),
+        (&contacts, "/scene", other_scene(&contacts, "mass = 0.1", "mass = 0.001"), "not shown to fall|not dominant"),
     ];
     for (whole, place, value, words) in changes {
         refuses(&desk, whole, place, value, words);
@@ -272,15 +234,10 @@ fn certificates_of_delays_and_of_every_number_hold_too() {
         ),
     ] {
         desk.text(&format!("stability {command} --certificate --out out"));
-        let output = check(&desk, "out/certificate.json");
-        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
-        assert!(output.status.success() && text.contains(words), "{command}: {text}{refusal}");
+        let text = accepts(&desk, "out/certificate.json", command);
+        assert!(text.contains(words), "{command}: {text}");
         let whole: Value = serde_json::from_str(&desk.read("out/certificate.json")).unwrap();
-        let mut fewer = whole.clone();
-        fewer["boxes"].as_array_mut().unwrap().remove(0);
-        desk.write("changed.json", fewer.to_string());
-        let refusal = String::from_utf8(check(&desk, "changed.json").stderr).unwrap();
-        assert!(["left out", "nothing covers"].iter().any(|words| refusal.contains(words)), "{command}: {refusal}");
+        refuses(&desk, &whole, "/boxes", whole["boxes"].as_array().unwrap()[1..].to_vec().into(), "left out|nothing covers");
     }
 }
 
@@ -329,7 +286,7 @@ fn a_certificate_that_says_more_than_it_shows_is_refused() {
     let (stable, unstable, undecided) = (of("stable"), of("unstable"), of("undecided"));
     let parts = |place: usize| whole["boxes"][place]["parts"].clone();
     let at = |place: usize, key: &str| format!("/boxes/{place}{key}");
-    let scene = |from: &str, to: &str| ("/scene".to_owned(), Value::from(whole["scene"].as_str().unwrap().replace(from, to)));
+    let scene = |from: &str, to: &str| ("/scene".to_owned(), other_scene(&whole, from, to));
     let mut fewer = boxes.clone();
     fewer.remove(undecided);
     let changes = [

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
+use crate::certificate_checker::{accepts, assert_shares, can_check, other_scene, refuses};
 use crate::desk::Desk;
-use crate::stability_certificates::{can_check, check, refuses};
 
 const SERVER: &str = r#"
 scene = { title = "A server", duration = "1s", count = 3 }
@@ -45,12 +45,9 @@ fn certificates_of_servers_hold_for_a_checker_that_shares_no_code() {
     ] {
         let desk = Desk::with("scene.toml", SERVER);
         let document = desk.json(&format!("stability {command} --certificate --out out --json"));
-        let output = check(&desk, "out/certificate.json");
-        let (text, refusal) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
-        assert!(output.status.success(), "{command}: {refusal}");
+        let text = accepts(&desk, "out/certificate.json", &command);
         if let Some(region) = document["regions"].get(0) {
-            let share = |key: &str| format!("{key} {:.3} %", 100.0 * region[key].as_f64().unwrap());
-            assert!(["stable", "unstable", "undecided"].iter().all(|key| text.contains(&share(key))), "{text} {region}");
+            assert_shares(&text, region);
         }
         assert!(text.contains("stable ") && !text.contains("undecided 100"), "{command}: {text}");
     }
@@ -70,11 +67,7 @@ fn a_certificate_of_a_server_that_says_more_than_it_shows_is_refused() {
     let (stable, unstable) = (of("stable"), of("unstable"));
     let parts = whole["boxes"][stable]["parts"].as_array().unwrap();
     let at = |place: usize, key: &str| format!("/boxes/{place}{key}");
-    let scene = |from: &str, to: &str| {
-        let text = whole["scene"].as_str().unwrap();
-        assert!(text.contains(from), "{from}");
-        ("/scene".to_owned(), Value::from(text.replace(from, to)))
-    };
+    let scene = |from: &str, to: &str| ("/scene".to_owned(), other_scene(&whole, from, to));
     let with_table =
         |table: &str| ("/scene".to_owned(), Value::from(format!("coordination.client-server = {table}{}", without_coordination(&whole))));
     // The first part is that of the clients' differences, the last that of averages.

@@ -39,9 +39,10 @@ pub(super) struct Blocks {
     past: Vec<Motions>,
     /// The oldest of those ticks.
     oldest: usize,
-    /// How copies move in a tick, a block of peers after another; one for all if all clocks are equal.
-    object_maps: Vec<StepMap<Lanes>>,
-    /// The maps of each span between two ticks of a peer, if clocks drift.
+    /// How copies move in a tick, if no clock drifts.
+    object_map: StepMap<Lanes>,
+    /// The maps of each span between two ticks of a peer, if clocks drift. Only there blocks are asked for their maps: a map for each block, with equal clocks
+    /// too, cost ten peers 3 %.
     spans: Option<Box<Spans>>,
     /// The forces computed at the latest tick, where anybody applies them a tick late.
     late: Option<Vec<Late>>,
@@ -154,7 +155,7 @@ impl Blocks {
             places,
             axes: A,
             blocks,
-            object_maps: object_maps(places, scenes, spans.as_deref()),
+            object_map: object_map(scenes),
             spans,
             late: any_late.then_some(late),
             walls: walls.iter().any(Option::is_some).then_some(walls),
@@ -270,7 +271,7 @@ impl Blocks {
         if let Some(spans) = &mut self.spans {
             spans.set_objects(self.places, scenes);
         }
-        self.object_maps = object_maps(self.places, scenes, self.spans.as_deref());
+        self.object_map = object_map(scenes);
     }
 
     /// A device touches its copy in that way from now on, in all runs.
@@ -321,7 +322,6 @@ impl Blocks {
         let per_axis = self.places.blocks();
         let (remembered, lag) = (law.remembered() * WIDTH, law.looks_back());
         let oldest = self.oldest * self.axes * per_axis;
-        let all_alike = self.object_maps.len() == 1;
         for axis in 0..self.axes {
             let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
             for place in axis * per_axis..(axis + 1) * per_axis {
@@ -330,12 +330,11 @@ impl Blocks {
                 let past = if lag > 0 { std::mem::replace(&mut self.past[oldest + place], block.object) } else { block.object };
                 let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
                 let memory = if remembered > 0 { &mut self.memory[place * remembered..(place + 1) * remembered] } else { &mut [] };
-                let object_map = &self.object_maps[if all_alike { 0 } else { place - axis * per_axis }];
                 low = block.object.position.smaller(low);
                 high = block.object.position.larger(high);
                 let coupling = grasped.coupling(place);
-                if coupling.is_none() && self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
-                    block.tick(law, &past, lead, memory, object_map);
+                if coupling.is_none() && self.walls.is_none() && self.late.is_none() && self.spans.is_none() && block.contacts.is_none() {
+                    block.tick(law, &past, lead, memory, &self.object_map);
                 } else {
                     let coupling = coupling.copied().unwrap_or_else(|| block.coupling(&block.object));
                     let mut forces = block.forces(coupling, law, &past, lead, memory);
@@ -345,6 +344,7 @@ impl Blocks {
                     if let Some(late) = &mut self.late {
                         forces = late[place].exchange(forces);
                     }
+                    let object_map = self.spans.as_ref().map_or(&self.object_map, |spans| spans.object_map(place - axis * per_axis));
                     block.advance(object_map, &forces);
                 }
                 size = size + block.size();
@@ -454,17 +454,14 @@ impl LawVisitor<Lanes> for Look<'_> {
     }
 }
 
-/// How copies of runs of these scenes move in a tick: [`Blocks::object_maps`].
-fn object_maps(places: Places, scenes: &[&Scene], spans: Option<&Spans>) -> Vec<StepMap<Lanes>> {
-    if let Some(spans) = spans {
-        return (0..places.blocks()).map(|block| spans.object_map(block)).collect();
-    }
+/// How copies of runs of these scenes move in a tick.
+fn object_map(scenes: &[&Scene]) -> StepMap<Lanes> {
     let mut map = ZERO_MAP;
     for lane in 0..WIDTH {
         let scene = scenes[lane % scenes.len()];
         set_map(&mut map, lane, &scene.copy_config(0).plant().step(scene.peers[0].clock.tick, scene.integrator));
     }
-    vec![map]
+    map
 }
 
 /// The distance from the least to the greatest of each run.

@@ -155,7 +155,7 @@ impl Rows {
                 self.model("ticks", format!("lockstep, every {tick}"), "all clocks are equal, without offset or drift");
                 self.leave_out("an event for each tick: all peers tick together");
             }
-            Ticking::EventDriven => self.model("ticks", "an event queue", "ticks, offsets or drifts differ: each peer ticks at its own instants"),
+            Ticking::EventDriven => self.model("ticks", "of each peer by its own clock", "peers have other ticks, offsets or drifts"),
         }
         let integrator = match scene.integrator {
             Integrator::Exact => "the matrix exponential of each body with its held inputs".to_owned(),

@@ -433,7 +433,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     /// The largest distance along an axis between two copies at their latest ticks \[m\].
-    #[inline]
+    #[inline(always)]
     fn measure_discrepancy(&mut self) -> f64 {
         let (mut low, mut high) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A]);
         for (place, position) in self.latest.iter().enumerate() {

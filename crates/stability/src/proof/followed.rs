@@ -72,6 +72,8 @@ struct PartOf<'a> {
     weight: Option<[f64; 2]>,
 }
 
+const NO_CERTIFICATE_OF_WAVES: ProofError = ProofError::NoCertificate { what: "wave coordination" };
+
 /// By what the states of a frame get their names.
 enum Named {
     /// The points that it was computed from.
@@ -184,7 +186,7 @@ impl<'a> Followed<'a> {
     pub(super) fn refuse_certificate(&self) -> Result<(), ProofError> {
         let mut motions = self.stretches.iter().flat_map(|stretch| &stretch.motions);
         if motions.any(|motion| matches!(motion.action, Action::Waves(_))) {
-            return Err(ProofError::NoCertificate { what: "wave coordination" });
+            return Err(NO_CERTIFICATE_OF_WAVES);
         }
         TopologyCertificate::of(self.family).map(drop)
     }
@@ -371,7 +373,7 @@ impl Motion {
                 let (states, compliance) = match named {
                     Named::AtPoints(points) => (states(&points, common)?, None),
                     Named::OfServer(states, compliance) => (states, Some(compliance)),
-                    Named::Never => unreachable!("a certificate of it is refused"),
+                    Named::Never => return Err(NO_CERTIFICATE_OF_WAVES),
                 };
                 let certificate = PartCertificate::new(members, part.apart.is_some(), states, time, &decision.witness);
                 let eigenvalues = part.weight.filter(|_| part.apart.is_some());

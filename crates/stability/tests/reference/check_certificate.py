@@ -344,7 +344,9 @@ def check_boxes(document) -> str:
     for key in document["keys"]:
         if key not in KEYS | {DELAY}:
             raise Refused(f"a key that is not covered: {key}; expected gains, masses, dampings and link.delay")
-    document.setdefault("every_number", None)
+    sides = len(document["keys"]) + (document.setdefault("every_number", None) is not None)
+    if any(len(box["ranges"]) != sides for box in document["boxes"]):
+        raise Refused("a box with sides that are not those of the keys and of the numbers of peers")
     check_cover(document)
     # A side without a length counts as one: a single delay, a single number of peers.
     area = lambda box: math.prod(Fraction(high) - Fraction(low) or 1 for low, high in box["ranges"])

@@ -17,6 +17,8 @@ pub(super) struct Spans {
     objects: Vec<[StepMap<Lanes>; 2]>,
     /// The peers whose span is the longer one, by block of peers.
     are_long: Vec<Mask>,
+    /// Of copies over their present spans, by block of peers.
+    present: Vec<StepMap<Lanes>>,
 }
 
 /// The map of the span of each lane.
@@ -35,7 +37,8 @@ impl Spans {
             for maps in devices.iter_mut().flatten() {
                 (0..WIDTH).for_each(|lane| set_map(maps, lane, &RESTING));
             }
-            let mut spans = Self { devices, objects: vec![[ZERO_MAP; 2]; blocks], are_long: vec![Mask::NONE; blocks] };
+            let mut spans =
+                Self { devices, objects: vec![[ZERO_MAP; 2]; blocks], are_long: vec![Mask::NONE; blocks], present: vec![ZERO_MAP; blocks] };
             spans.set_objects(places, scenes);
             spans
         })
@@ -57,11 +60,14 @@ impl Spans {
                 set_map(maps, lane, &plant.step(span, scenes[0].integrator));
             }
         }
+        for ((present, are_long), maps) in self.present.iter_mut().zip(&self.are_long).zip(&self.objects) {
+            *present = chosen(*are_long, maps);
+        }
     }
 
     /// How the copies of a block of peers move over their present spans.
-    pub(super) fn object_map(&self, block: usize) -> StepMap<Lanes> {
-        chosen(self.are_long[block], &self.objects[block])
+    pub(super) fn object_map(&self, block: usize) -> &StepMap<Lanes> {
+        &self.present[block]
     }
 }
 
@@ -75,7 +81,7 @@ impl Blocks {
                 continue;
             }
             spans.are_long[block] = *are_long;
-            self.object_maps[block] = chosen(*are_long, &spans.objects[block]);
+            spans.present[block] = chosen(*are_long, &spans.objects[block]);
             for place in (block..self.blocks.len()).step_by(per_axis) {
                 self.blocks[place].device_map = chosen(*are_long, &spans.devices[place]);
             }

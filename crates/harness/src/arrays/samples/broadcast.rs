@@ -81,14 +81,20 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
     }
 
     /// What has arrived is held from now on.
-    #[inline]
     pub(in crate::arrays) fn deliver(&mut self, now: u64) {
-        while let Some(&Sent { sender, sample, .. }) = self.on_the_way.front().filter(|sent| sent.due <= now) {
-            self.on_the_way.pop_front();
+        while let Some(Sent { sender, sample, .. }) = self.next_due(now) {
             self.hold(sender, &sample);
             self.arrived[sender] += 1;
             self.changed = if self.changed == Changed::Nothing { Changed::From(sender) } else { Changed::More };
         }
+    }
+
+    /// The next sample that has arrived, which is on the way no more.
+    #[inline(always)]
+    fn next_due(&mut self, now: u64) -> Option<Sent<P, L>> {
+        let sent = *self.on_the_way.front().filter(|sent| sent.due <= now)?;
+        self.on_the_way.pop_front();
+        Some(sent)
     }
 
     /// The sample held from a sender in the first run: with this number of peers there are no others.
@@ -104,9 +110,6 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
         if self.sums.is_some() {
             let before = self.held_from(sender);
             self.sums.iter_mut().for_each(|sums| sums.replace(&before, &sample.state(0)));
-        }
-        if let Some(heard) = &mut self.heard {
-            heard.hold(sender, sample);
         }
         let Some(place) = sender.checked_sub(1) else {
             self.first = *sample;

@@ -3,10 +3,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use cohaptic_peer::State;
 use cohaptic_scene::Topology;
 use cohaptic_units::Instant;
 
-use super::Sample;
 use super::in_flight::Packet;
 
 /// The rows of some receivers, which are counted from 0: a link from each sender, in order, and a place for the sample held from each.
@@ -130,25 +130,25 @@ impl Rows {
         }
     }
 
-    /// The packet to a receiver over the link in a column, in the only run.
+    /// The packet to a receiver over the link in a column, in one of L runs.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
-    pub(super) fn packet<const P: usize>(
+    pub(super) fn packet<const P: usize, const L: usize>(
         &self,
-        (receiver, column): (usize, usize),
-        sample: &Sample<P, 1>,
+        (receiver, column, run): (usize, usize, usize),
+        state: &State<P>,
         arrival: Instant,
         sequence: u64,
     ) -> Packet<P> {
         let weight = self.weight(receiver, column);
-        let weighed = |[number]: [f64; 1]| weight.map_or(number, |weight| number * weight);
+        let weighed = |number: f64| weight.map_or(number, |weight| number * weight);
         Packet {
             arrival,
             sequence,
-            place: self.place(receiver, column) as u32,
+            place: (self.place(receiver, column) * L + run) as u32,
             receiver: receiver as u16,
-            position: sample.position.map(weighed),
-            velocity: sample.velocity.map(weighed),
+            position: state.position.map(weighed),
+            velocity: state.velocity.map(weighed),
         }
     }
 

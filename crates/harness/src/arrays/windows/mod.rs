@@ -235,7 +235,7 @@ impl<'a, const A: usize> Windows<'a, A> {
                         together.clear();
                     }
                     if is_due {
-                        samples.deliver(at.as_nanos());
+                        samples.deliver_in_turn(at.as_nanos());
                     }
                     let has_heard = samples.has_heard(peer);
                     lead(peer, tick, has_heard, &|now, horizon| Lead::of(samples.moving((peer, 0), sent), now, horizon), bodies);
@@ -301,7 +301,7 @@ impl<'a, const A: usize> Windows<'a, A> {
             clock.instant(phases[sender] + sequence * send_every).unwrap_or(Instant::MAX)
         };
         match &mut self.arrays.samples {
-            Samples::Broadcast(samples) => samples.deliver(until.as_nanos()),
+            Samples::Broadcast(samples) => samples.deliver_in_turn(until.as_nanos()),
             Samples::PerPacket(samples) => samples.end_in_turn(until, sent),
         }
         let (ticks, discrepancy) = (self.timetable.most_ticks(), self.arrays.max_discrepancy[0]);

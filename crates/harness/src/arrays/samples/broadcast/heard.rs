@@ -5,7 +5,7 @@
 
 use super::super::quads::{self, Quad};
 use super::super::{Sample, count};
-use super::Broadcast;
+use super::{Broadcast, Sent};
 use crate::arrays::bodies::Bodies;
 
 /// How many means are taken at once.
@@ -49,6 +49,15 @@ impl<const P: usize> Broadcast<P, 1> {
         initial.iter().enumerate().for_each(|(sender, sample)| heard.hold(sender, sample));
         heard.arrived = 0;
         Self { heard: Some(Box::new(heard)), ..Self::new(initial, delay) }
+    }
+
+    /// [`Broadcast::deliver`] to peers that tick one after the other.
+    pub(in crate::arrays) fn deliver_in_turn(&mut self, now: u64) {
+        while let Some(Sent { sender, sample, .. }) = self.next_due(now) {
+            self.hold(sender, &sample);
+            self.arrived[sender] += 1;
+            self.heard.iter_mut().for_each(|heard| heard.hold(sender, &sample));
+        }
     }
 
     /// Whether a peer has heard something since its mean was computed.

@@ -102,20 +102,10 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         if let Links::Carried(carrier) = &mut self.links { carrier.next_arrival(run) } else { None }
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
     fn packet(&self, path: Path, run: usize, arrival: Instant, carried: Carried<P>) -> Packet<P> {
         let receiver = path.to.index() - self.receivers.start;
         let column = self.rows.column(receiver, path.from.index()).expect("packets come over links");
-        let weight = self.rows.weight(receiver, column);
-        let weighed = |number: f64| weight.map_or(number, |weight| number * weight);
-        Packet {
-            arrival,
-            sequence: carried.sequence,
-            place: (self.rows.place(receiver, column) * L + run) as u32,
-            receiver: receiver as u16,
-            position: carried.state.position.map(weighed),
-            velocity: carried.state.velocity.map(weighed),
-        }
+        self.rows.packet::<P, L>((receiver, column, run), &carried.state, arrival, carried.sequence)
     }
 }
 

@@ -48,7 +48,7 @@ impl<const P: usize> PerPacket<P, 1> {
                 let link = LinkId::new(rows.link(receiver, column));
                 let sequence = links.offered(link);
                 if let Some((arrival, overtakes)) = links.offer_one(instant(*sender), link) {
-                    let packet = rows.packet((receiver, column), &sent[*sender], arrival, sequence);
+                    let packet = rows.packet::<P, 1>((receiver, column, 0), &sent[*sender].state(0), arrival, sequence);
                     let due = (from + in_flight.count(since, arrival.max(at))).max(least);
                     in_flight.push_due((window, due), packet, overtakes);
                 }

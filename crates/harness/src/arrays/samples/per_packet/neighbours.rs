@@ -26,16 +26,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         senders.iter().for_each(|sender| sends[*sender] = true);
         let packet = |rows: &Rows, receiver: usize, number: usize, arrival: Instant, sequence: u64| {
             let (column, run) = (number / L, number % L);
-            let (sample, weight) = (&sent[rows.sender(receiver, column)], rows.weight(receiver, column));
-            let weighed = |number: f64| weight.map_or(number, |weight| number * weight);
-            Packet {
-                arrival,
-                sequence,
-                place: (rows.place(receiver, column) * L + run) as u32,
-                receiver: receiver as u16,
-                position: sample.position.map(|runs| weighed(runs[run])),
-                velocity: sample.velocity.map(|runs| weighed(runs[run])),
-            }
+            rows.packet::<P, L>((receiver, column, run), &sent[rows.sender(receiver, column)].state(run), arrival, sequence)
         };
         for receiver in 0..receivers.len() {
             let row = rows.columns(receiver) * L;
