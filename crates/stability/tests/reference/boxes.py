@@ -4,6 +4,7 @@ The numbers of a box are gains, coefficients of step maps, or what they are mult
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 from fractions import Fraction
 
 from frame_over_box import Part
@@ -13,6 +14,7 @@ from numbers_over_box import Affine, NotCovered, Scalar, TooLight, between, scal
 SMALL = 8
 
 
+@cache
 def step(mass, damping, stiffness, span):
     """Increments of one step of m·a = f − b·v − k·x with f held: e00, e01, e10, e11, g0, g1, exact but for 10⁻⁴⁰ of what they are at most; without a mass their limits."""
     h = Fraction(span, 10**9)

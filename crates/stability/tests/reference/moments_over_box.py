@@ -18,16 +18,12 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
+from circles import product
 from frame_over_box import Part
 from numbers_over_box import EPS, UP, Affine, NotCovered, between, scalar
 from timing import Timing
 
 TINY = 1e-290
-
-
-def product(one, other):
-    columns = list(zip(*other))
-    return [[sum(a * b for a, b in zip(row, column) if a and b) for column in columns] for row in one]
 
 
 def plus(*matrices):

@@ -52,7 +52,7 @@ def scalar(affine: Affine) -> Scalar:
     """The nearest doubles of an exact number, and how far they are from it."""
     exact = [affine.mean, *affine.slopes]
     near = [float(number) for number in exact]
-    off = sum(abs(number - Fraction(double)) for number, double in zip(exact, near))
+    off = sum(abs(number - Fraction(double)) for number, double in zip(exact, near) if number)
     return Scalar(near[0], near[1:], float(off) * UP + 5e-324 if off else 0.0)
 
 

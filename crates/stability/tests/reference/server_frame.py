@@ -88,12 +88,17 @@ class ServerPart(Part):
         ways = {(c, way): (self.first[c], server)[::way] for c in self.clients for way in (1, -1)}
         held = {way: number(timing.held(*link)) for way, link in ways.items()}
         due = {way: timing.in_force(*link) for way, link in ways.items()}
+        ticks = {}
         for instant in range(timing.first_tick(server, timing.t0), timing.t1, box.scene.peers[server].tick):
             if instant == sends:
                 rows.update({name: combination(of, rows) for name, of in self.sampled(held).items()})
             for way, arrivals in due.items():
                 held[way] = next((number(sent) for tick, sent in reversed(arrivals) if tick == instant), held[way])
-            moved = {name: self.only(name) for name in rows} | self.tick(held)
+            # Ticks between the same samples are alike.
+            of_held = tuple(held.values())
+            if of_held not in ticks:
+                ticks[of_held] = {name: self.only(name) for name in rows} | self.tick(held)
+            moved = ticks[of_held]
             shift = moved[self.reference] if self.reference else {}
             relative = lambda name, of: difference(of, shift) if shift and POSITION in name else of
             rows = Rows({name: self.zeros(size) if name == self.reference else combination(relative(name, of), rows) for name, of in moved.items()})
