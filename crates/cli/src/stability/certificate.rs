@@ -151,7 +151,7 @@ fn of_part(part: &PartCertificate) -> impl Serialize {
         heard: part.heard.map(|gains| [gains.stiffness, gains.damping]),
         // What velocities are multiplied by, in seconds.
         time: part.time,
-        // With a server, by what forces are multiplied, in m/N.
+        // With a server or waves, by what forces are multiplied, in m/N.
         #[serde(flatten)]
         compliance: part.compliance.map(|compliance| document! { compliance: compliance }),
         coordinates: part.coordinates.as_str(),
@@ -180,6 +180,7 @@ fn of_state(state: &FrameState) -> serde_json::Value {
         FrameState::Copy { class, velocity } => serde_json::json!(["copy", class, which(velocity)]),
         FrameState::Sample { class, number, channel } => serde_json::json!(["sample", class, number, channel]),
         FrameState::Returned { class, number } => serde_json::json!(["returned", class, number]),
+        FrameState::Waves { class, number, of_others } => serde_json::json!(["waves", class, number, if of_others { "sent" } else { "received" }]),
         FrameState::Other { class, row } => serde_json::json!(["other", class, row]),
     }
 }

@@ -60,6 +60,7 @@ mod stability_server_certificates;
 mod stability_switching;
 mod stability_topology_certificates;
 mod stability_wall_certificates;
+mod stability_wave_certificates;
 mod standard_input;
 #[cfg(target_os = "linux")]
 mod stop;

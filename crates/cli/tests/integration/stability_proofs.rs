@@ -191,13 +191,7 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
     let turned = "equal.toml --set scene.axes=3 --set object.inertia=2.7e-4 --set peers.peer1.grasp=[0.03,0,0]";
     let loses = "equal.toml --set coordination.strategy=extrapolated --set link.loss=5%";
     for (line, words) in [
-        (format!("point {} --every-number --certificate numbers.json", set("wave")), "wave coordination has no certificate"),
-        (format!("boundary {} {keys} --certificate --out out", set("wave")), "wave coordination has no certificate"),
         (format!("map {} {GAINS} --prove 2 --every-number", set("client-server")), "client-server coordination: a box of keys holds for"),
-        (
-            format!("map equal.toml {GAINS} --prove 2 --certificate --out out --against coordination.strategy=wave"),
-            "wave coordination has no certificate",
-        ),
         (format!("map equal.toml {GAINS} --prove 2 --every-number --set {ring}"), "expected no --every-number, and one number at a time"),
         (format!("map {} {GAINS} --prove 2 --every-number", set("wave")), "wave coordination: a box of keys holds for"),
         (format!("point {} --losses-in-a-row 1", set("client-server")), "client-server coordination is followed as a whole alone"),

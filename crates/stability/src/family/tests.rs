@@ -239,6 +239,36 @@ fn a_scene_whose_second_moment_cannot_be_followed_is_nominal() {
     assert!(failing.bounded_radius(&[1000.0], &mut scratch).unwrap().is_nominal);
 }
 
+/// Scenes whose second moment grows but a little faster than the square of the mean motion: by a share of 1.1·10⁻⁷ and of 2·10⁻⁹.
+#[test]
+fn noise_that_adds_next_to_nothing_to_the_mean_motion_is_counted() {
+    let first = [
+        "scene.count=4",
+        "link.delay=5457us",
+        "link.loss=0.7914126277627381",
+        "coordination.update=1ms",
+        "coordination.damping=8.414244672528902",
+        "object.mass=1.1833544641871034",
+        "peer.coupling.stiffness=9069.580427994391",
+        "object.split-mass=false",
+        "peer.compute-delay=1",
+    ];
+    let second = [
+        "scene.count=17",
+        "link.delay=9918us",
+        "link.loss=0.21233281572404428",
+        "coordination.update=1ms",
+        "coordination.damping=15.553867375748446",
+        "object.mass=1.2186381347835802",
+        "peer.coupling.stiffness=5146.088345903383",
+        "object.split-mass=false",
+        "coordination.strategy=proportional-derivative",
+    ];
+    for (set, stiffness) in [(first, 2747.3080490121715), (second, 2455.88819999895)] {
+        agrees_in_the_mean_square(&family(&set, &["coordination.stiffness=0..100000"]), &[stiffness], &mut FamilyScratch::default());
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
@@ -247,7 +277,8 @@ proptest! {
     fn equal_peers_that_lose_have_the_radius_of_their_second_moment(
         peers in prop_oneof![2..6_usize, 2..200_usize],
         delay in 0..30_000_u32,
-        loss in 0.0..1.0_f64,
+        // Without a loss the two judge by different criteria.
+        loss in 0.001..1.0_f64,
         every in 1..12_u32,
         stiffness in 0.0..5000.0_f64,
         (damping, mass, coupling) in (0.0..20.0_f64, 0.05..2.0_f64, 100.0..10_000.0_f64),

@@ -268,12 +268,19 @@ impl Block {
     }
 }
 
-/// Where a function that rises with γ becomes zero; `lowest` if it is not below zero just above there.
+/// Where a function that rises with γ becomes zero; `lowest` if it is not below zero within 10⁻⁹ above there.
 ///
 /// The inverse of the relation's radius is nearly a straight line from its pole on, so secants are near at once; bisection is the way out if not.
 fn root(lowest: f64, rise: &mut impl FnMut(f64) -> f64) -> f64 {
-    let mut before = (lowest * (1.0 + 1e-12), 0.0);
-    before.1 = rise(before.0);
+    let mut before = (lowest, 0.0);
+    // Nearest to the pole rounding may leave nothing of a variance, as if the zero were not above it.
+    for away in [1e-12, 1e-11, 1e-10, 1e-9] {
+        let gamma = lowest * (1.0 + away);
+        before = (gamma, rise(gamma));
+        if before.1.is_nan() || before.1 < 0.0 {
+            break;
+        }
+    }
     if before.1.is_nan() || before.1 >= 0.0 {
         return if before.1.is_nan() { f64::NAN } else { lowest };
     }

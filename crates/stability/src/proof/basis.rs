@@ -16,6 +16,8 @@ const FASTER: f64 = 1.3;
 const LEAST: f64 = 0.1;
 /// Eigenvalues below this are small whatever the others are: a matrix may have none but zeros.
 const SMALL: f64 = 0.05;
+/// Matrices with larger entries are divided by them.
+const HUGE: f64 = 1e30;
 
 /// Coordinates: columns that are nearly eigenvectors, and the inverse of that matrix.
 pub(super) struct Basis {
@@ -29,7 +31,10 @@ impl Basis {
         if !matrix.is_finite() {
             return None;
         }
-        let size = matrix.rows();
+        // Coordinates are those of any multiple: squares of entries shall not overflow.
+        let largest = matrix.largest();
+        let scaled = matrix.scaled(if largest > HUGE { 1.0 / largest } else { 1.0 });
+        let (matrix, size) = (&scaled, matrix.rows());
         let decomposition = dense(matrix).eigen().ok()?;
         let (values, vectors) = (decomposition.S(), decomposition.U());
         let modulus = |place: usize| libm::hypot(values[place].re, values[place].im);

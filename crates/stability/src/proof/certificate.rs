@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use cohaptic_peer::Gains;
 use cohaptic_scene::TopologyKind;
 
-use super::corners::States;
+use super::corners::{Common, Point, States, states};
 use super::discs::{FreeCircle, Witness};
 use super::steps::FrameState;
 use super::{Guarantee, ProofError, Proven};
@@ -123,7 +123,7 @@ pub struct PartCertificate {
     pub heard: Option<Gains>,
     /// What velocities are multiplied by \[s\].
     pub time: f64,
-    /// With a server, what forces are multiplied by \[m/N\].
+    /// With a server or waves, what forces are multiplied by \[m/N\].
     pub compliance: Option<f64>,
     /// V, column by column, real and imaginary part of each entry, each as sixteen hexadecimal digits of its IEEE 754 representation.
     pub coordinates: String,
@@ -141,6 +141,31 @@ impl PartCertificate {
         let weights = digits(witness.weights.iter().copied());
         let (states, heard, circle) = (states.names, states.heard, witness.circle);
         Self { members, is_difference, eigenvalues: None, states, heard, time, compliance: None, coordinates, weights, circle }
+    }
+}
+
+/// By what the states of a frame get their names.
+pub(super) enum Named {
+    /// The points that it was computed from.
+    AtPoints(Vec<Point>),
+    /// They have them, with what forces are multiplied by.
+    Known(States, f64),
+}
+
+impl Named {
+    /// The certificate of a part with those states.
+    pub(super) fn certificate(
+        self,
+        members: Vec<Vec<usize>>,
+        is_difference: bool,
+        common: Common<'_>,
+        witness: &Witness,
+    ) -> Result<PartCertificate, ProofError> {
+        let (states, compliance) = match self {
+            Self::AtPoints(points) => (states(&points, common)?, None),
+            Self::Known(states, compliance) => (states, Some(compliance)),
+        };
+        Ok(PartCertificate { compliance, ..PartCertificate::new(members, is_difference, states, common.time, witness) })
     }
 }
 

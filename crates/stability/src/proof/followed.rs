@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
-use super::certificate::{BoxCertificate, Certified, PartCertificate, TopologyCertificate};
-use super::corners::{Common, Point, States, doubled, states, steps};
+use super::certificate::{BoxCertificate, Certified, Named, PartCertificate};
+use super::corners::{Common, Point, doubled, steps};
 use super::delays;
 use super::discs::decide;
 use super::growing::{ENDLESS, nu, plans_of, weights_of_growing};
@@ -70,18 +70,6 @@ struct PartOf<'a> {
     tied: bool,
     /// On a graph, between which numbers the weight is with which a peer hears its own samples.
     weight: Option<[f64; 2]>,
-}
-
-const NO_CERTIFICATE_OF_WAVES: ProofError = ProofError::NoCertificate { what: "wave coordination" };
-
-/// By what the states of a frame get their names.
-enum Named {
-    /// The points that it was computed from.
-    AtPoints(Vec<Point>),
-    /// The frame of a server, with what forces are multiplied by.
-    OfServer(States, f64),
-    /// The checker does not derive the frame.
-    Never,
 }
 
 /// Values of a delay between which no frame differs, and its motions. Without a delay among the keys there is one stretch.
@@ -180,15 +168,6 @@ impl<'a> Followed<'a> {
             found.clear();
         }
         Ok(found)
-    }
-
-    /// Refuses scenes whose verdicts nothing is written for to check them by.
-    pub(super) fn refuse_certificate(&self) -> Result<(), ProofError> {
-        let mut motions = self.stretches.iter().flat_map(|stretch| &stretch.motions);
-        if motions.any(|motion| matches!(motion.action, Action::Waves(_))) {
-            return Err(NO_CERTIFICATE_OF_WAVES);
-        }
-        TopologyCertificate::of(self.family).map(drop)
     }
 
     /// A box with all numbers of peers for which none is decided.
@@ -320,7 +299,6 @@ pub(super) fn certify(
     watch: &dyn Watch,
 ) -> Result<Vec<BoxCertificate>, ProofError> {
     let followed = Followed::new(family, every)?;
-    followed.refuse_certificate()?;
     watch.expects(real(boxes.len()));
     let certificates = boxes.into_par_iter().map(|ranges| {
         if watch.stops() {
@@ -354,30 +332,23 @@ impl Motion {
             let ends: Vec<Vec<Node>> = nodes.iter().map(|nodes| nodes[classes.clone()].to_vec()).collect();
             let common = Common { timetable: part.timetable, plans: part.plans, tied: part.tied, time };
             let (frame, named) = match &self.action {
-                Action::Server(server) => {
-                    let frame = server.frame(structure, &ends, part.apart, time)?;
-                    (frame.steps, Named::OfServer(frame.states, frame.compliance))
-                }
+                Action::Server(server) => server.frame(structure, &ends, part.apart, time)?.into(),
                 Action::Waves(waves) => {
                     let points = self.points(&ends, numbers, part);
-                    (waves.steps(&waves::Part::of(structure, part.apart), &points, &ends, time)?, Named::Never)
+                    waves.frame(&waves::Part::of(structure, part.apart), &points, &ends, time)?.into()
                 }
                 Action::Mean | Action::Graph(_) => {
                     let points = self.points(&ends, numbers, part);
                     (steps(&points, &ends, common)?, Named::AtPoints(points))
                 }
             };
-            let Some(decision) = decide(&frame.product()) else { return Ok(None) };
+            let product = if certified.is_some() { frame.product_in_order() } else { frame.product() };
+            let Some(decision) = decide(&product) else { return Ok(None) };
             if let Some(certified) = certified.as_deref_mut() {
                 let members = classes.map(|class| structure.classes[class].clone()).collect();
-                let (states, compliance) = match named {
-                    Named::AtPoints(points) => (states(&points, common)?, None),
-                    Named::OfServer(states, compliance) => (states, Some(compliance)),
-                    Named::Never => return Err(NO_CERTIFICATE_OF_WAVES),
-                };
-                let certificate = PartCertificate::new(members, part.apart.is_some(), states, time, &decision.witness);
+                let certificate = named.certificate(members, part.apart.is_some(), common, &decision.witness)?;
                 let eigenvalues = part.weight.filter(|_| part.apart.is_some());
-                certified.push((decision.proven, PartCertificate { eigenvalues, compliance, ..certificate }));
+                certified.push((decision.proven, PartCertificate { eigenvalues, ..certificate }));
             }
             Ok::<_, ProofError>(Some(decision.proven))
         };

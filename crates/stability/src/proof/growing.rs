@@ -13,9 +13,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use cohaptic_peer::{Gains, StepMap};
 use cohaptic_scene::Scene;
 
-use super::certificate::{Certified, PartCertificate};
-use super::corners::{Common, Growth, Point, doubled, states, steps, steps_beyond};
+use super::certificate::{Certified, Named};
+use super::corners::{Common, Growth, Point, doubled, steps, steps_beyond};
 use super::discs::decide;
+use super::program::NamedFrame;
 use super::steps::Plans;
 use super::waves::{self, Part, Waves};
 use super::{ProofError, Proven};
@@ -61,6 +62,9 @@ pub(super) struct Growing {
     grown: AtomicUsize,
 }
 
+/// A part by the place of its motion: the averages of all classes, or how the members of one differ.
+pub(super) type PartPlace = (usize, Option<usize>);
+
 impl Growing {
     pub(super) fn new(scene: &Scene, network: &NominalNetwork) -> Result<Self, ProofError> {
         let all = pieces(scene, "the proof for every number of peers")?;
@@ -97,30 +101,40 @@ impl Growing {
         Ok(Self { motions, first, least: least as u64, grown: AtomicUsize::new(0) })
     }
 
-    /// What a verdict has no certificate of; `None` if it has one.
-    pub(super) fn special(&self) -> Option<&'static str> {
-        self.motions.iter().any(|motion| motion.waves.is_some()).then_some("wave coordination")
+    /// Whether waves tie its copies.
+    pub(super) fn has_waves(&self) -> bool {
+        self.motions.iter().any(|motion| motion.waves.is_some())
     }
 
-    /// What every number of peers from `low` to `high` has in common, if that is proven, and the certificates of its parts where they are asked for.
-    pub(super) fn decide(&self, low: u64, high: u64, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
+    /// What every number of peers from `low` to `high` has in common, if that is proven, and the certificates of its parts where they are asked for. Parts that are `stable` for all of these numbers
+    /// are passed over, and those found are added.
+    pub(super) fn decide(
+        &self,
+        low: u64,
+        high: u64,
+        stable: &mut Vec<PartPlace>,
+        mut certified: Certified<'_>,
+    ) -> Result<Option<Proven>, ProofError> {
         let parts_of = |motion: &'_ Motion| {
             let has_differences = |class: &usize| motion.structure.apart[*class].is_some() && (*class != motion.growing || motion.size(low) > 1);
             std::iter::once(None).chain((0..motion.structure.classes.len()).filter(has_differences).map(Some)).collect::<Vec<_>>()
         };
-        let parts: Vec<(usize, Option<usize>)> =
+        let parts: Vec<PartPlace> =
             self.motions.iter().enumerate().flat_map(|(place, motion)| parts_of(motion).into_iter().map(move |part| (place, part))).collect();
         // That which made other numbers unstable comes first; the verdict is that of any order.
         let grown = self.grown.load(Ordering::Relaxed).min(parts.len() - 1);
         let mut all = Some(Proven::Stable);
-        for (place, (motion, part)) in parts.iter().enumerate().cycle().skip(grown).take(parts.len()) {
-            match self.motions[*motion].decide(low, high, *part, certified.as_deref_mut())? {
+        for (place, part) in parts.iter().enumerate().cycle().skip(grown).take(parts.len()) {
+            if stable.contains(part) {
+                continue;
+            }
+            match self.motions[part.0].decide(low, high, part.1, certified.as_deref_mut())? {
                 // One part that grows is enough.
                 Some(Proven::Unstable) => {
                     self.grown.store(place, Ordering::Relaxed);
                     return Ok(Some(Proven::Unstable));
                 }
-                Some(Proven::Stable) => {}
+                Some(Proven::Stable) => stable.push(*part),
                 None => all = None,
             }
         }
@@ -262,15 +276,15 @@ impl Motion {
             .collect()
     }
 
-    /// The verdict on the waves of the averages of all classes, or of how the members of one differ, whose nodes are those at both ends.
-    fn decide_waves(
+    /// The frame of the waves of the averages of all classes, or of how the members of one differ, whose nodes are those at both ends.
+    fn frame_of_waves(
         &self,
         waves: &Waves,
         [low, high]: [u64; 2],
         points: Vec<Point>,
         ends: &[Vec<Node>; 2],
         apart: Option<usize>,
-    ) -> Result<Option<Proven>, ProofError> {
+    ) -> Result<NamedFrame, ProofError> {
         let mut points = points;
         // Of one other peer they are as affine in ν as the weights are.
         if apart.is_none() && self.structure.peers - self.structure.classes[self.growing].len() > 1 {
@@ -279,7 +293,7 @@ impl Motion {
                 doubled(&points, |point, upper| Point { weights: waves::with_shares(&point.weights, &shares[usize::from(upper)]), ..point.clone() });
         }
         let part = Part { structure: &self.structure, apart, rest: self.growing, is_pair: high == 2 };
-        Ok(decide(&waves.steps(&part, &points, ends, self.time(low))?.product()).map(|decision| decision.proven))
+        waves.frame(&part, &points, ends, self.time(low))
     }
 
     fn common(&self, apart: Option<usize>, time: f64) -> Common<'_> {
@@ -358,18 +372,21 @@ impl Motion {
         let time = self.time(low);
         let heard = [gain(&first[0]) * nu(low), gain(&last[0]) * nu(high)];
         let points = self.corners(first.to_vec(), [first, last], heard, true, apart);
-        if let Some(waves) = &self.waves {
-            return self.decide_waves(waves, [low, high], points, &ends, apart);
-        }
         let common = self.common(apart, time);
-        let span = steps(&points, &ends, common)?.product();
-        let span = if certified.is_some() && low < high { span.widened(WIDER) } else { span };
+        let (frame, named) = match &self.waves {
+            None => (steps(&points, &ends, common)?, Named::AtPoints(points)),
+            Some(waves) => self.frame_of_waves(waves, [low, high], points, &ends, apart)?.into(),
+        };
+        let span = match certified {
+            None => frame.product(),
+            Some(_) if low < high => frame.product_in_order().widened(WIDER),
+            Some(_) => frame.product_in_order(),
+        };
         let Some(decision) = decide(&span) else { return Ok(None) };
         if let Some(certified) = certified {
             let classes = apart.map_or(0..self.structure.classes.len(), |class| class..class + 1);
             let members = classes.map(|class| self.structure.classes[class].clone()).collect();
-            let part = PartCertificate::new(members, apart.is_some(), states(&points, common)?, time, &decision.witness);
-            certified.push((decision.proven, part));
+            certified.push((decision.proven, named.certificate(members, apart.is_some(), common, &decision.witness)?));
         }
         Ok(Some(decision.proven))
     }

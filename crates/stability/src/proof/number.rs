@@ -4,7 +4,7 @@
 use cohaptic_scene::Scene;
 
 use super::certificate::{NumberCertificate, needed};
-use super::growing::{ENDLESS, Growing};
+use super::growing::{ENDLESS, Growing, PartPlace};
 use super::mean_square::GrowingMoments;
 use super::{Guarantee, ProofError, Proven};
 use crate::network::NominalNetwork;
@@ -82,7 +82,7 @@ impl NumberProof {
         refuse_topology(scene, "the proof for every number of peers")?;
         let network = NominalNetwork::of(scene)?;
         let growing = Growing::new(scene, &network)?;
-        if growing.special().is_some() && has_chance(scene) {
+        if growing.has_waves() && has_chance(scene) {
             return Err(AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() }.into());
         }
         if to.is_some_and(|to| to < growing.least) {
@@ -93,15 +93,6 @@ impl NumberProof {
         let proof = Self { network, growing, is_mean_square: has_chance(scene), from, to, without_limit };
         proof.moments()?;
         Ok(proof)
-    }
-
-    /// Refuses a scene whose verdicts have no certificate, before they are found.
-    ///
-    /// # Errors
-    ///
-    /// [`ProofError::NoCertificate`].
-    pub fn check_certificate(&self) -> Result<(), ProofError> {
-        refuse_certificate(&self.growing)
     }
 
     /// In the mean square, over links that lose independently.
@@ -122,11 +113,14 @@ impl NumberProof {
             None if without_limit.is_some() => MOST_FOLLOWED.max(*from),
             None => ENDLESS,
         };
-        let decide = |low, high| moments.as_ref().map_or_else(|| growing.decide(low, high, None), |moments| moments.decide(low, high));
-        let Search { mut pieces, attempts, is_whole } = search(*from, end, growing.least, watch, decide)?;
-        if without_limit.is_some() {
-            let is_unstable = is_whole && moments.is_none() && growing.is_unstable_beyond(end)?;
-            let guarantee = if is_unstable { Guarantee::Unstable } else { Guarantee::Undecided };
+        let decide = |low, high, stable: &mut Vec<PartPlace>| match &moments {
+            None => growing.decide(low, high, stable, None),
+            Some(moments) => moments.decide(low, high),
+        };
+        let is_unstable_beyond = |low| Ok(without_limit.is_some() && moments.is_none() && growing.is_unstable_beyond(low)?);
+        let Search { mut pieces, attempts, is_whole } = search([*from, end, growing.least], watch, decide, is_unstable_beyond)?;
+        if without_limit.is_some() && pieces.last().is_some_and(|last| last.to.is_some()) {
+            let guarantee = if is_whole && is_unstable_beyond(end)? { Guarantee::Unstable } else { Guarantee::Undecided };
             pieces.push(NumberSpan { from: end + 1, to: None, guarantee });
         }
         let mut spans: Vec<NumberSpan> = Vec::new();
@@ -141,10 +135,6 @@ impl NumberProof {
     }
 }
 
-fn refuse_certificate(growing: &Growing) -> Result<(), ProofError> {
-    growing.special().map_or(Ok(()), |what| Err(ProofError::NoCertificate { what }))
-}
-
 /// What comes out of a search.
 struct Search {
     pieces: Vec<NumberSpan>,
@@ -153,19 +143,18 @@ struct Search {
     is_whole: bool,
 }
 
-/// Halves spans of numbers until each is decided, or has one number alone. `least` has not all parts of the motion that others have.
+/// Halves spans of numbers until each is decided, or has one number alone. `least` has not all parts of the motion that others have. Behind numbers that are unstable, all beyond are asked for at once.
 fn search(
-    from: u64,
-    end: u64,
-    least: u64,
+    [from, end, least]: [u64; 3],
     watch: &dyn Watch,
-    decide: impl Fn(u64, u64) -> Result<Option<Proven>, ProofError>,
+    decide: impl Fn(u64, u64, &mut Vec<PartPlace>) -> Result<Option<Proven>, ProofError>,
+    is_unstable_beyond: impl Fn(u64) -> Result<bool, ProofError>,
 ) -> Result<Search, ProofError> {
     let (mut pieces, mut attempts, mut open, mut is_whole) = (Vec::new(), 0, 0, true);
-    // From the least number on: an undecided span is halved, and the far half waits.
-    let mut waiting = vec![(from, end)];
+    // From the least number on: an undecided span is halved, and the far half waits. Parts that are stable for all of its numbers are so for those of the halves.
+    let mut waiting: Vec<(u64, u64, Vec<PartPlace>)> = vec![(from, end, Vec::new())];
     watch.expects(1.0);
-    while let Some((low, high)) = waiting.pop() {
+    while let Some((low, high, mut stable)) = waiting.pop() {
         is_whole = is_whole && !watch.stops();
         if !is_whole {
             pieces.push(piece(low, high, None));
@@ -175,7 +164,13 @@ fn search(
         // The least number has no second member of the class that grows, and no differences within it.
         let is_mixed = low == least && high > low;
         let is_left = attempts > MOST_ATTEMPTS || open > MOST_OPEN;
-        let found = if is_left || is_mixed { None } else { decide(low, high)? };
+        let is_behind_unstable = pieces.last().is_some_and(|last: &NumberSpan| last.guarantee == Guarantee::Unstable);
+        if is_behind_unstable && high == end && low < high && is_unstable_beyond(low)? {
+            pieces.push(NumberSpan { from: low, to: None, guarantee: Guarantee::Unstable });
+            watch.done(1.0);
+            continue;
+        }
+        let found = if is_left || is_mixed { None } else { decide(low, high, &mut stable)? };
         // Beyond the numbers that are followed, an end without a verdict is not halved: its limit may lie on the circle.
         let is_far = low > MOST_FOLLOWED && high == ENDLESS;
         if found.is_none() && low < high && !is_left && !is_far {
@@ -186,8 +181,8 @@ fn search(
             } else {
                 low.midpoint(high)
             };
-            waiting.push((middle + 1, high));
-            waiting.push((low, middle));
+            waiting.push((middle + 1, high, stable.clone()));
+            waiting.push((low, middle, stable));
             watch.expects(2.0);
             watch.done(1.0);
             continue;
@@ -212,21 +207,26 @@ impl EveryNumber {
     pub fn certify(&self, scene: &Scene, watch: &dyn Watch) -> Result<Vec<NumberCertificate>, ProofError> {
         let network = NominalNetwork::of(scene)?;
         let growing = Growing::new(scene, &network)?;
-        refuse_certificate(&growing)?;
         let moments = self.is_mean_square.then(|| GrowingMoments::new(&growing, &network)).transpose()?;
         let mut found = Vec::new();
         // An undecided span is halved, and the far half waits: with a certificate there is less room than without.
         let mut waiting: Vec<NumberSpan> = self.pieces.iter().rev().copied().collect();
+        let mut open = 0;
         while let Some(NumberSpan { from, to, guarantee }) = waiting.pop() {
             if watch.stops() {
                 return Err(ProofError::Analysis(AnalysisError::Stopped));
             }
+            if to.is_none() && self.without_limit.is_some() && guarantee != Guarantee::Undecided && from <= MOST_FOLLOWED {
+                waiting.push(NumberSpan { from: MOST_FOLLOWED + 1, to, guarantee });
+                waiting.push(NumberSpan { from, to: Some(MOST_FOLLOWED), guarantee });
+                continue;
+            }
             let (mut parts, mut of_moments) = (Vec::new(), Vec::new());
-            let is_open = guarantee == Guarantee::Undecided || to.is_none() && self.without_limit.is_some();
+            let is_open = guarantee == Guarantee::Undecided || to.is_none() && self.without_limit.is_some() || open > MOST_OPEN;
             let end = to.unwrap_or(ENDLESS);
             let proven = match &moments {
                 _ if is_open => None,
-                None => growing.decide(from, end, Some(&mut parts))?,
+                None => growing.decide(from, end, &mut Vec::new(), Some(&mut parts))?,
                 Some(moments) => moments.certify(from, end)?.map(|(proven, moments)| {
                     of_moments = moments;
                     proven
@@ -238,6 +238,7 @@ impl EveryNumber {
                 waiting.push(NumberSpan { from, to: Some(middle), guarantee });
                 continue;
             }
+            open = if proven.is_some() { 0 } else { open + 1 };
             let guarantee = proven.map_or(Guarantee::Undecided, Guarantee::from);
             found.push(NumberCertificate { from, to, guarantee, parts: needed(proven, parts), moments: of_moments });
         }

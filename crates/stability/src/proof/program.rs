@@ -5,8 +5,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::steps::StepMatrix;
+use super::ProofError;
+use super::certificate::Named;
+use super::corners::{Point, States, enclosed};
+use super::span::FrameSpan;
+use super::steps::{FrameState, StepMatrix};
 use crate::Matrix;
+use crate::lifted::Node;
+use crate::lifted::node::Scale;
 use crate::worst_case::rounding::real;
 
 /// A number that operations set and read.
@@ -43,7 +49,7 @@ pub(super) struct Program {
 }
 
 /// The states of a program between its steps.
-pub(super) struct Layout {
+struct Layout {
     order: Vec<Vec<Register>>,
 }
 
@@ -62,6 +68,20 @@ impl Register {
         }
     }
 
+    /// The state that it is at the beginning of a frame, with another place for its class.
+    fn state(self, placed: impl Fn(usize) -> usize) -> FrameState {
+        match self {
+            Self::Body { class, of_copy: true, velocity } => FrameState::Copy { class: placed(class), velocity },
+            Self::Body { class, of_copy: false, velocity } => FrameState::Device { class: placed(class), velocity },
+            Self::Sample { class, number, velocity } => FrameState::Sample { class: placed(class), number, channel: usize::from(velocity) },
+            Self::Returned { class, number, .. } => FrameState::Returned { class: placed(class), number },
+            Self::Waves { class, number, of_others } => FrameState::Waves { class: placed(class), number, of_others },
+            Self::Pending { class, on_copy } | Self::Force { class, on_copy } => {
+                FrameState::Other { class: placed(class), row: usize::from(on_copy) }
+            }
+        }
+    }
+
     /// The class of which it is a position.
     const fn position_of(self) -> Option<usize> {
         match self {
@@ -71,9 +91,43 @@ impl Register {
     }
 }
 
+/// A frame over a box, and the names of its states.
+pub(super) struct NamedFrame {
+    pub(super) steps: FrameSpan,
+    pub(super) states: States,
+    /// What forces are multiplied by to be lengths \[m/N\].
+    pub(super) compliance: f64,
+}
+
+impl NamedFrame {
+    /// Of the programs at the corners of a box, of the averages of classes or of how the members of one differ. `ends`: the nodes of that part at the corners.
+    pub(super) fn of(
+        points: &[Point],
+        ends: &[Vec<Node>],
+        apart: Option<usize>,
+        scale: Scale,
+        program: impl Fn(&Point) -> Program,
+    ) -> Result<Self, ProofError> {
+        let first = program(&points[0]);
+        let layout = first.layout();
+        let steps = enclosed(points, ends, |point| program(point).matrices(&layout))?;
+        #[cfg(test)]
+        let steps = super::mutation::of_steps(steps);
+        // The classes of a part are counted by themselves.
+        let names = layout.states(&first).map(|register| register.state(|class| class - apart.unwrap_or(0))).collect();
+        Ok(Self { steps: FrameSpan::of(steps), states: States { names, heard: None }, compliance: scale.compliance })
+    }
+}
+
+impl From<NamedFrame> for (FrameSpan, Named) {
+    fn from(frame: NamedFrame) -> Self {
+        (frame.steps, Named::Known(frame.states, frame.compliance))
+    }
+}
+
 impl Layout {
     /// The states at the beginning of a frame, in the order of its rows and columns.
-    pub(super) fn states(&self, program: &Program) -> impl Iterator<Item = Register> {
+    fn states(&self, program: &Program) -> impl Iterator<Item = Register> {
         self.order[0].iter().copied().filter(move |register| program.reference(*register) != Some(*register))
     }
 }
@@ -114,7 +168,7 @@ impl Program {
     }
 
     /// Which states the frame has between its steps: those of all programs that differ in multiples alone.
-    pub(super) fn layout(&self) -> Layout {
+    fn layout(&self) -> Layout {
         let mut order: Vec<Vec<Register>> = self.live().into_iter().map(|live| live.into_iter().collect()).collect();
         // Those that live on from a frame to the next are in one order at both ends.
         order[self.steps.len()] = order[0].iter().map(|register| register.before(&self.sent)).collect();
@@ -122,7 +176,7 @@ impl Program {
     }
 
     /// The matrices of all steps.
-    pub(super) fn matrices(&self, layout: &Layout) -> Vec<StepMatrix> {
+    fn matrices(&self, layout: &Layout) -> Vec<StepMatrix> {
         (0..self.steps.len()).map(|step| self.matrix(step, &layout.order[step], &layout.order[step + 1])).collect()
     }
 

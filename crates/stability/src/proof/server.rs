@@ -11,12 +11,10 @@ use cohaptic_peer::coordination::{Coordination, LawValue};
 use cohaptic_scene::Scene;
 
 use super::ProofError;
-use super::corners::{Point, States, enclosed};
+use super::corners::Point;
 use super::heard::Heard;
-use super::program::{Operation, Program, Register, Sum};
+use super::program::{NamedFrame, Operation, Program, Register, Sum};
 use super::pushed::{Pushed, StateRegisters, coupling, device, moved, negative, state};
-use super::span::FrameSpan;
-use super::steps::FrameState;
 use crate::Matrix;
 use crate::lifted::Node;
 use crate::lifted::node::Scale;
@@ -70,7 +68,7 @@ impl Server {
     }
 
     /// A frame over a box, of the averages of classes or of how the members of one differ. `ends`: the nodes of that part at the corners of the box.
-    pub(super) fn frame(self, structure: &Structure, ends: &[Vec<Node>], apart: Option<usize>, time: f64) -> Result<ServerFrame, ProofError> {
+    pub(super) fn frame(self, structure: &Structure, ends: &[Vec<Node>], apart: Option<usize>, time: f64) -> Result<NamedFrame, ProofError> {
         // Of each class, how many members send to the server.
         let sizes = Matrix::from_fn(1, structure.classes.len(), |_, class| count(structure.classes[class].len()));
         let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: sizes.clone() }).collect();
@@ -81,36 +79,7 @@ impl Server {
             // Of differences there is nothing that all have in common.
             frame.program(&structure.timetable, structure.tied || apart.is_some())
         };
-        let first = program(&points[0]);
-        let layout = first.layout();
-        let steps = enclosed(&points, ends, |point| program(point).matrices(&layout))?;
-        #[cfg(test)]
-        let steps = super::mutation::of_steps(steps);
-        // The classes of a part are counted by themselves.
-        let states = layout.states(&first).map(|register| state_of(register, |class| class - apart.unwrap_or(0)));
-        Ok(ServerFrame { steps: FrameSpan::of(steps), states: States { names: states.collect(), heard: None }, compliance: scale.compliance })
-    }
-}
-
-/// A frame of a server and its clients over a box.
-pub(super) struct ServerFrame {
-    pub(super) steps: FrameSpan,
-    pub(super) states: States,
-    /// What forces are multiplied by to be lengths \[m/N\].
-    pub(super) compliance: f64,
-}
-
-/// The state that a register is at the beginning of a frame, with another place for its class.
-fn state_of(register: Register, placed: impl Fn(usize) -> usize) -> FrameState {
-    match register {
-        Register::Body { class, of_copy: true, velocity } => FrameState::Copy { class: placed(class), velocity },
-        Register::Body { class, of_copy: false, velocity } => FrameState::Device { class: placed(class), velocity },
-        Register::Sample { class, number, velocity } => FrameState::Sample { class: placed(class), number, channel: usize::from(velocity) },
-        Register::Returned { class, number, .. } => FrameState::Returned { class: placed(class), number },
-        Register::Pending { class, on_copy } | Register::Force { class, on_copy } => {
-            FrameState::Other { class: placed(class), row: usize::from(on_copy) }
-        }
-        Register::Waves { .. } => unreachable!("a server sends no waves"),
+        NamedFrame::of(&points, ends, apart, scale, program)
     }
 }
 

@@ -79,15 +79,6 @@ impl SharedProof {
         Self::new(family, line::halving(tolerance), None)
     }
 
-    /// Refuses a family whose verdicts have no certificate, before they are found.
-    ///
-    /// # Errors
-    ///
-    /// [`ProofError::NoCertificate`], and those of the proof.
-    pub fn check_certificate(&self, family: &Family) -> Result<(), ProofError> {
-        Followed::new(family, self.every)?.refuse_certificate()
-    }
-
     fn new(family: &Family, halving: Halving, every: Option<(u64, Option<u64>)>) -> Result<Self, ProofError> {
         let followed = Followed::new(family, every)?;
         let halving = halving.but_for(followed.delay());

@@ -137,6 +137,15 @@ pub enum FrameState {
         /// Which sample, as above.
         number: i64,
     },
+    /// The sum of the waves of a sample that a class gets from all others, or others from it.
+    Waves {
+        /// The place of the class.
+        class: usize,
+        /// Which sample, as above.
+        number: i64,
+        /// Whether others get them.
+        of_others: bool,
+    },
     /// A force that waits, or a number that a law remembers.
     Other {
         /// The place of the class.

@@ -60,6 +60,7 @@ fn every_number_is_judged_as_single_scenes_are() {
         &["coordination.strategy=\"extrapolated\"", "object.split-mass=false", "link.delay=3ms"],
         &["object.damping=2", "peer.device.damping=1"],
         &["peer.compute-delay=1"],
+        &["link.loss={ packets = [2, 3], every = 20 }", "object.split-mass=false"],
         &["scene.count=3", "peers=[{ name = \"peer1\", contact = \"none\" }]"],
         &["scene.count=4", "peers=[{ name = \"peer1\", device = { mass = 0.2 } }, { name = \"peer2\", device = { mass = 0.2 } }]", PD],
         &["scene.axes=3", "object.inertia=2.7e-4", "peer.grasp=[0.03, 0, 0]", "object.split-mass=false"],
@@ -115,6 +116,14 @@ fn numbers_of_which_other_numbers_say_nothing_are_found() {
         let is_stable = expected.iter().any(|(from, to, guarantee)| (*from..=*to).contains(&number) && *guarantee == Guarantee::Stable);
         assert_eq!(single(&["object.split-mass=false", PD], number) == Verdict::Stable, is_stable, "{number}");
     }
+}
+
+/// A frame of 300 ticks, in whose steps forces move a copy by more than it has moved: bounds of roundings that pass through the sizes of all entries decide no number of these.
+#[test]
+fn numbers_of_long_frames_are_decided() {
+    let found = spans(&["link.loss={ packets = [2, 3], every = 30 }", "coordination.update=\"10ms\"", "coordination.damping=60"], 2, Some(40));
+    assert!(found.spans.iter().all(|span| span.guarantee != Guarantee::Undecided), "{found:?}");
+    assert!(found.spans.len() > 1, "{found:?}");
 }
 
 /// Where gains and the effects of forces both grow with N, numbers without end are decided too.
@@ -472,6 +481,13 @@ fn a_matrix_without_eigenvalues_but_zero_is_stable() {
     let moves_on = Matrix::from_fn(5, 5, |row, column| if column == row + 1 { 3.0 } else { 0.0 });
     assert_eq!(proven(&StepSpan::of([StepMatrix { matrix: moves_on, error: 1e-14 }].iter())), Some(Proven::Stable));
     assert_eq!(proven(&StepSpan::of([StepMatrix { matrix: Matrix::zeros(2, 2), error: 0.0 }].iter())), Some(Proven::Stable));
+}
+
+/// Squares of the entries of a frame that grows as much are no numbers.
+#[test]
+fn a_matrix_whose_squares_overflow_is_unstable() {
+    let of = Matrix::from_fn(3, 3, |i, j| if i <= j { 1e180 / count(1 + i + j) } else { 1e170 });
+    assert_eq!(proven(&StepSpan::constant(of, 1)), Some(Proven::Unstable));
 }
 
 /// The diagonal stays and the entries beside it vary, with their sign: [a, s·b; s·c, d] has the eigenvalues (a + d)/2 ± √((a − d)²/4 + s²·b·c).

@@ -19,10 +19,9 @@ use cohaptic_peer::coordination::{Coordination, LawValue};
 use cohaptic_scene::Scene;
 
 use super::ProofError;
-use super::corners::{Point, enclosed};
-use super::program::{Operation, Program, Register, Sum};
+use super::corners::Point;
+use super::program::{NamedFrame, Operation, Program, Register, Sum};
 use super::pushed::{Pushed, copy, coupling, device, moved, negative};
-use super::span::FrameSpan;
 use crate::Matrix;
 use crate::lifted::Node;
 use crate::lifted::node::Scale;
@@ -90,16 +89,11 @@ impl Waves {
         scene.coordination.strategy == Coordination::Wave
     }
 
-    /// The steps of a frame over a box. Weights are those with which classes hear each other, of averages [with shares](with_shares). `ends`: the nodes of the part at the corners of the box.
-    pub(super) fn steps(&self, part: &Part<'_>, points: &[Point], ends: &[Vec<Node>], time: f64) -> Result<FrameSpan, ProofError> {
+    /// A frame over a box. Weights are those with which classes hear each other, of averages [with shares](with_shares). `ends`: the nodes of the part at the corners of the box.
+    pub(super) fn frame(&self, part: &Part<'_>, points: &[Point], ends: &[Vec<Node>], time: f64) -> Result<NamedFrame, ProofError> {
         let scale = Scale { time, compliance: ends[0][0].compliance(time) };
         let heard = InForce::new(&self.line, self.every, self.holds);
-        let program = |point: &Point| Frame { waves: self, part, point, scale, heard: &heard }.program();
-        let layout = program(&points[0]).layout();
-        let steps = enclosed(points, ends, |point| program(point).matrices(&layout))?;
-        #[cfg(test)]
-        let steps = super::mutation::of_steps(steps);
-        Ok(FrameSpan::of(steps))
+        NamedFrame::of(points, ends, part.apart, scale, |point| Frame { waves: self, part, point, scale, heard: &heard }.program())
     }
 }
 

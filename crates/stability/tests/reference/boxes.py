@@ -50,6 +50,15 @@ def step(mass, damping, stiffness, span):
     return total[0][0], total[0][1], total[1][0], total[1][1], total[0][2] / mass, total[1][2] / mass
 
 
+def apart(ranges, place, dampings):
+    """Coefficients of step maps from where to where, each along a number of its own from `place` on. Of one damping b that stays, e01 = h − b·g0 and e11 = −b·g1 go along with the effects of a force."""
+    (e00, e01, e10, e11, g0, g1) = ranges
+    if len(dampings) == 1 and 0 not in dampings and e00 == e10 == (0, 0):
+        back = lambda ends: (ends[1], ends[0])
+        return [(*e00, place), (*back(e01), place), (*e10, place + 1), (*back(e11), place + 1), (*g0, place), (*g1, place + 1)]
+    return [(low, high, place + number) for number, (low, high) in enumerate(ranges)]
+
+
 def refuse(scene, may_lose=False):
     """Refuses what is not covered."""
     if scene.lag is not None or scene.own_age is not None:
@@ -162,8 +171,9 @@ class KeyBox(Parts):
         if len({damping / mass for mass, damping, _ in plants}) == 1:
             self.count += 1
             return [(low, high, place) for low, high in ranges]
-        self.count += 6
-        return [(low, high, place + number) for number, (low, high) in enumerate(ranges)]
+        along = apart(ranges, place, {damping for _, damping, _ in plants})
+        self.count += len({number for *_, number in along})
+        return along
 
     def step(self, peer, body):
         return self.steps[self.plants(peer, body)]
@@ -265,8 +275,9 @@ class NumberBox(Parts):
         if all(low == high for low, high in ranges[:4]):
             self.count += any(low < high for low, high in ranges)
             return [(low, high, place) for low, high in ranges]
-        self.count += 6
-        return [(low, high, place + number) for number, (low, high) in enumerate(ranges)]
+        along = apart(ranges, place, {damping for _, damping, _ in plants} if set(by) == {1} else set())
+        self.count += len({number for *_, number in along})
+        return along
 
     def step(self, peer, body):
         return self.steps[self.bodies(self.scene.peers[peer], self.ends)[body]]

@@ -21,6 +21,7 @@ import json
 import math
 import sys
 import tomllib
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from itertools import product as tuples
@@ -36,6 +37,7 @@ from pushes import Multipliers, PushBox, PushFrame, axes_of, is_shape, walls_of,
 from server_frame import ServerBox, without_server
 from scene import Scene
 from timing import Timing
+from wave_frame import WaveBox, WaveNumberBox, without_waves
 
 KEYS = {
     *("coordination.stiffness", "coordination.damping", "peer.coupling.stiffness", "peer.coupling.damping"),
@@ -92,6 +94,11 @@ def box_of(document, corners, numbers):
         if numbers is not None:
             raise Refused("a server for every number of peers")
         return ServerBox(corners, classes, server, returns_force)
+    _, impedance = without_waves(tables_of(document))
+    if impedance is not None:
+        if numbers is not None:
+            raise Refused("waves for every number of peers, in a box of keys")
+        return WaveBox(corners, classes, impedance)
     if document.get("topology") is None:
         return KeyBox(corners, classes, numbers)
     if numbers is not None:
@@ -170,12 +177,17 @@ def check_moments(scene, growing, span):
 def check_span(document, span) -> str:
     """The verdict of a span of numbers of peers."""
     scene = scene_of(document)
+    _, server, _ = without_server(tables_of(document))
+    _, impedance = without_waves(tables_of(document))
+    if server is not None or span["moments"] and impedance is not None:
+        raise Refused("a server for every number of peers, or waves in the mean square")
     if span["moments"]:
         check_moments(scene, document["growing"], span)
         check_devices([scene])
         return span["verdict"]
     try:
-        return check_verdict(lambda: NumberBox(scene, classes_of([scene]), document["growing"], span["from"], span["to"]), span, [scene])
+        numbers = scene, classes_of([scene]), document["growing"], span["from"], span["to"]
+        return check_verdict(lambda: NumberBox(*numbers) if impedance is None else WaveNumberBox(*numbers, impedance), span, [scene])
     except TooLight:
         # The numbers before are checked all the same.
         return "undecided"
@@ -185,7 +197,10 @@ def scene_of(document, values=()) -> Scene:
     root = tables_with(document["scene"], [*map(override, document["overrides"]), *values])
     if document.get("topology") is not None or root.get("topology", {}).get("kind") == "full":
         root.pop("topology", None)
-    return scenes.read(without_server(root)[0], document["scene"])
+    root, impedance = without_waves(without_server(root)[0])
+    scene = scenes.read(root, document["scene"])
+    # Waves damp each copy.
+    return scene if impedance is None else replace(scene, damping=Fraction(scene.damping) + impedance)
 
 
 def check_verdict(make, certified, scenes) -> str:

@@ -27,7 +27,7 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
     let (families, tolerance) = (std::slice::from_ref(&order.family), order.options.tolerance);
     let shared = SharedProof::of_line(&order.family, tolerance).map_err(|error| failure(order, arguments, error))?;
     if arguments.certificate {
-        shared.check_certificate(&order.family).map_err(|error| failure(order, arguments, error))?;
+        TopologyCertificate::of(&order.family).map_err(|error| failure(order, arguments, error))?;
     }
     let mut header = order.header.clone();
     header[0] = format!("cohaptic {} stability boundary --prove: pieces looked at; the same command goes on from here", env!("CARGO_PKG_VERSION"));

@@ -43,7 +43,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
     let shared = SharedProof::of_region(&order.families[0], halvings, arguments.every_number).map_err(|error| failure(order, arguments, 0, error))?;
     if arguments.certificate {
         for (variant, family) in order.families.iter().enumerate() {
-            shared.check_certificate(family).map_err(|error| failure(order, arguments, variant, error))?;
+            TopologyCertificate::of(family).map_err(|error| failure(order, arguments, variant, error))?;
         }
     }
     let threads = usize::from(arguments.threads.unwrap_or(0));

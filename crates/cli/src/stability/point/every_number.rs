@@ -24,13 +24,7 @@ pub(super) struct Proof {
 /// The proof that is asked for, if one is; refuses scenes that have none.
 pub(super) fn asked(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<NumberProof>, Failure> {
     let Some((from, to)) = arguments.every_number else { return Ok(None) };
-    let asked = NumberProof::new(scene, from, to).and_then(|asked| {
-        if arguments.certificate.is_some() {
-            asked.check_certificate()?;
-        }
-        Ok(asked)
-    });
-    asked.map(Some).map_err(|error| failure(error, path))
+    NumberProof::new(scene, from, to).map(Some).map_err(|error| failure(error, path))
 }
 
 fn failure(error: ProofError, path: &Path) -> Failure {
