@@ -10,7 +10,7 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 
-use crate::laws::delay::{Distribution, GammaLaw, Law, LawError};
+use crate::laws::delay::{Distribution, GammaCubics, GammaLaw, Law, LawError};
 use crate::laws::normal::{in_the_core, in_the_core_or_nan, outside_the_core, standard_normal};
 use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
 use crate::random::{PacketDraws, Purpose};
@@ -341,43 +341,24 @@ impl CorrelatedDelays {
         })
     }
 
-    /// Whether [`CorrelatedDelays::quickly`] knows them.
-    pub(crate) const fn come_quickly(&self) -> bool {
-        matches!(self.marginal, Marginal::Gamma(_))
+    /// What tells most of them for several links at once, if their law does.
+    pub(crate) fn cubics(&self) -> Option<GammaCubics> {
+        match &self.marginal {
+            Marginal::Gamma(law) => law.cubics(),
+            Marginal::Other(_) => None,
+        }
     }
 
-    /// What [`CorrelatedDelays::draw_nanos`] gives for each of several links whose chains and words these are, but for those few that take longer.
+    /// The values of several chains after these, by the words of packets; NaN for a first packet, and for those few that take further words.
     #[inline(always)]
-    pub(crate) fn quickly<const N: usize>(&self, chains: &[f64; N], words: &[u64; N]) -> QuickDelays<N> {
+    pub(crate) fn following<const N: usize>(&self, chains: &[f64; N], words: &[u64; N]) -> [f64; N] {
         // Loops, not `map`, which is a call that no wide registers reach.
-        let mut fresh = [0.0; N];
-        for (fresh, word) in fresh.iter_mut().zip(words) {
-            *fresh = in_the_core_or_nan(*word);
+        let mut following = [0.0; N];
+        for (following, (before, word)) in following.iter_mut().zip(chains.iter().zip(words)) {
+            *following = self.phi * before + self.fresh_share * in_the_core_or_nan(*word);
         }
-        let mut chain = [0.0; N];
-        for (next, (before, fresh)) in chain.iter_mut().zip(chains.iter().zip(&fresh)) {
-            *next = if before.is_nan() { *fresh } else { self.phi * before + self.fresh_share * fresh };
-        }
-        let nanos = match &self.marginal {
-            Marginal::Gamma(law) => law.quickly(&chain),
-            Marginal::Other(_) => [f64::NAN; N],
-        };
-        QuickDelays { chain, nanos }
+        following
     }
-}
-
-/// The chains of several links, and their delays \[ns\] before they are [rounded](whole).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct QuickDelays<const N: usize> {
-    pub(crate) chain: [f64; N],
-    /// NaN where a delay is not known quickly.
-    pub(crate) nanos: [f64; N],
-}
-
-/// A delay as a whole number of nanoseconds; `None` for a NaN and for some weeks or more.
-#[inline(always)]
-pub(crate) fn whole(nanos: f64) -> Option<u64> {
-    (nanos < SMALL).then(|| with_room(nanos).cast_unsigned())
 }
 
 /// What a fresh number adds to a chain of variance one.

@@ -117,6 +117,7 @@ impl<'a, const A: usize> Windows<'a, A> {
             if self.arrays.changes.next_at() <= now {
                 self.arrays.change(0, now, &mut watch);
             }
+            self.window += u64::from(!self.timetable.is_cut());
             until_asked -= self.timetable.begin(self.arrays.changes.next_at().min(end), until_asked);
             let latest = self.timetable.latest();
             let passed = self.pass(&mut watch);
@@ -135,9 +136,8 @@ impl<'a, const A: usize> Windows<'a, A> {
         }
     }
 
-    /// Everything that happens in a window.
+    /// Everything that happens in a window, or in a part of it.
     fn pass(&mut self, watch: &mut WindowWatch<'_>) -> Passed {
-        self.window += 1;
         self.until.clear();
         self.until.resize(self.arrays.shape.peers, 0);
         self.timetable.ticks().for_each(|(peer, at, _)| self.until[peer] = at.as_nanos() + 1);
@@ -180,8 +180,8 @@ impl<'a, const A: usize> Windows<'a, A> {
 
     /// Those whose time it is send, each at its own tick.
     fn send(&mut self) {
-        let Self { arrays, timetable, window, until, .. } = self;
-        let Arrays { samples, bodies, next_send, shape, senders, sent, .. } = arrays;
+        let Self { arrays, timetable, window, .. } = self;
+        let Arrays { samples, bodies, next_send, shape, senders, sent, processor, .. } = arrays;
         senders.clear();
         for (peer, at, tick) in timetable.ticks() {
             if next_send[peer] != tick {
@@ -197,14 +197,16 @@ impl<'a, const A: usize> Windows<'a, A> {
             }
         }
         if let Samples::PerPacket(samples) = samples {
-            let first = timetable.next_instant();
-            let next_tick = |peer: usize| {
-                let at = timetable.instant(peer);
-                // The first of the window ticks in each window at least once in the longest span.
-                let (since, least) = if until[peer] > 0 { ((*window, at), *window) } else { ((*window - 1, first), *window + 1) };
-                NextTick { at, since, least }
+            let (window, first) = (*window, timetable.next_instant());
+            let soon = first.saturating_add_nanos(2 * nanos(shape.tick));
+            // Windows are counted from a tick of the receiver, which has one a window at most; or from this one, which may be long before it ticks at all: the
+            // first of the window ticks in each window at least once in the longest span.
+            let next_tick = |peer: usize| match timetable.instant(peer) {
+                at if timetable.ticks_now(peer) => NextTick { at, since: (window, at), least: window },
+                at if at < soon => NextTick { at, since: (window + 1, at), least: window + 1 },
+                at => NextTick { at, since: (window - 1, first), least: window + 1 },
             };
-            samples.send_in_turn(*window, senders, |peer| timetable.instant(peer), sent, next_tick);
+            samples.send_in_turn((*processor, window), senders, |peer| timetable.instant(peer), sent, next_tick);
         }
     }
 
@@ -248,7 +250,8 @@ impl<'a, const A: usize> Windows<'a, A> {
                 }
             }
             Samples::PerPacket(samples) => {
-                samples.deliver_in_turn(*window, timetable.latest(), |peer| until[peer]);
+                let next = *window + u64::from(!timetable.is_cut());
+                samples.deliver_in_turn((*window, next), timetable.latest(), |peer| until[peer]);
                 for (peer, _, tick) in timetable.ticks() {
                     let has_heard = samples.has_changed(peer, 0);
                     lead(peer, tick, has_heard, &|now, horizon| Lead::of(samples.moving((peer, 0), sent), now, horizon), bodies);

@@ -13,8 +13,12 @@ pub(super) struct Timetable {
     order: Vec<usize>,
     /// The shortest span between two ticks of a peer \[ns\].
     shortest: u64,
-    /// How many of them, from the first on, tick in the window.
+    /// How many of them, from the first on, tick in the part of the window that was begun.
     ticking: usize,
+    /// Where the window ends \[ns\].
+    end: u64,
+    /// Whether some peers tick in the window after that part.
+    is_cut: bool,
     /// The peers whose step from their next tick takes the longer of two spans, by block of peers; empty if no clock drifts.
     are_long: Vec<Mask>,
 }
@@ -70,6 +74,8 @@ impl Timetable {
             order: (0..beats.len()).collect(),
             shortest: beats.iter().map(|beat| beat.span).min().unwrap_or(1),
             ticking: 0,
+            end: 0,
+            is_cut: false,
             are_long: if drifts { vec![Mask::NONE; beats.len().div_ceil(WIDTH)] } else { Vec::new() },
             beats,
         };
@@ -87,17 +93,21 @@ impl Timetable {
         Instant::from_nanos(self.beats[peer].at)
     }
 
-    /// A window from the next tick on: it ends before that instant, after that number of instants of ticks, and before any peer ticks twice. Gives its number of
-    /// instants.
+    /// A window from the next tick on, which ends before that instant and before any peer ticks twice; or the rest of one that was cut. It is cut after that
+    /// number of instants of ticks. Gives its number of instants.
     pub(super) fn begin(&mut self, end: Instant, most: u32) -> u32 {
         let Self { beats, order, shortest, ticking, .. } = self;
         *ticking = 0;
         let at = |place: usize| order.get(place).map(|peer: &usize| beats[*peer].at);
-        let end = at(0).unwrap_or(u64::MAX).saturating_add(*shortest).min(end.as_nanos());
+        if !self.is_cut {
+            self.end = at(0).unwrap_or(u64::MAX).saturating_add(*shortest).min(end.as_nanos());
+        }
+        self.is_cut = false;
         let (mut instants, mut latest) = (0, None);
-        while let Some(now) = at(*ticking).filter(|now| *now < end) {
+        while let Some(now) = at(*ticking).filter(|now| *now < self.end) {
             if latest != Some(now) {
                 if instants == most {
+                    self.is_cut = true;
                     break;
                 }
                 (instants, latest) = (instants + 1, Some(now));
@@ -105,6 +115,16 @@ impl Timetable {
             *ticking += 1;
         }
         instants
+    }
+
+    /// Whether some peers tick in the window after the part that was begun.
+    pub(super) const fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    /// Whether the next tick of a peer is one of the window.
+    pub(super) fn ticks_now(&self, peer: usize) -> bool {
+        self.beats[peer].at < self.end
     }
 
     /// The peers that tick in the window, in the order of their ticks, with their instants and the number of their ticks.

@@ -11,11 +11,11 @@ use super::special::{gamma, gamma_inverse, normal};
 use super::tail::Tail;
 
 /// Cells lie in (−RANGE, RANGE).
-const RANGE: f64 = 8.0;
+pub(super) const RANGE: f64 = 8.0;
 /// Cells per unit of z.
-const DENSITY: f64 = 8.0;
+pub(super) const DENSITY: f64 = 8.0;
 const CELLS: u32 = 128;
-const TERMS: usize = 12;
+pub(super) const TERMS: usize = 12;
 /// Terms computed but not kept: they say how good the kept ones are.
 const WITNESSES: usize = 2;
 /// What the terms left out may add, relative to x.
@@ -66,28 +66,9 @@ impl GammaMap {
         self.exactly(z)
     }
 
-    /// What `delay` makes of [`GammaMap::at_normal`] of each, but of NaN where the exact inverse answers.
-    ///
-    /// It is called number by number, as the series come: numbers that are written one by one are not read together at once.
-    #[inline(always)]
-    pub(super) fn quickly<const N: usize>(&self, z: &[f64; N], delay: impl Fn(f64) -> f64) -> [f64; N] {
-        // From 2^52 on there is no room for a fraction, and the whole number lies in the lower bits: a conversion that saturates takes six instructions more.
-        const ROOM: f64 = 4_503_599_627_370_496.0;
-        let (mut places, mut t) = ([0; N], [0.0; N]);
-        for ((place, t), z) in places.iter_mut().zip(&mut t).zip(z) {
-            let position = (z + RANGE) * DENSITY;
-            let nearest = (position + ROOM) - ROOM;
-            let cell = if nearest > position { nearest - 1.0 } else { nearest };
-            let has_cell = position >= 0.0 && position < f64::from(CELLS);
-            *t = if has_cell { 2.0 * (position - cell) - 1.0 } else { f64::NAN };
-            *place = (cell + ROOM).to_bits();
-        }
-        for (place, t) in places.iter().zip(&mut t) {
-            #[expect(clippy::cast_possible_truncation, reason = "the lower bits are the number of the cell")]
-            let place = *place as usize % CELLS as usize;
-            *t = delay(self.cells[place].sum(*t));
-        }
-        t
+    /// The terms of each cell, NaN where they would not do, and where it begins.
+    pub(super) fn series(&self) -> impl Iterator<Item = ([f64; TERMS], f64)> {
+        self.cells.iter().zip(0..).map(|(cell, number)| (cell.terms(), f64::from(number) / DENSITY - RANGE))
     }
 
     #[cold]
@@ -103,6 +84,10 @@ impl Cell {
 
     fn new(terms: &[f64; TERMS]) -> Self {
         Self(core::array::from_fn(|k| [terms[k], terms[k + 4], terms[k + 8], 0.0]))
+    }
+
+    fn terms(&self) -> [f64; TERMS] {
+        core::array::from_fn(|term| self.0[term % 4][term / 4])
     }
 
     /// Σ terms·tᵏ, in pairs and pairs of pairs: half the latency of Horner's rule.

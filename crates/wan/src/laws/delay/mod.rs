@@ -47,6 +47,7 @@ mod dist_table;
 mod empirical;
 mod error;
 mod fit;
+mod gamma_cubics;
 mod gamma_map;
 mod hermite;
 mod pareto_normal;
@@ -82,6 +83,7 @@ pub use dist_table::{DistTable, DistTableError};
 pub use empirical::{Empirical, EmpiricalError};
 pub use error::LawError;
 use fit::{Asked, Fit, fit};
+pub(crate) use gamma_cubics::GammaCubics;
 use gamma_map::GammaMap;
 use standard::Standard;
 use tail::Tail;
@@ -155,13 +157,9 @@ impl GammaLaw {
         if delay < f64::MAX { delay } else { f64::MAX }
     }
 
-    /// [`GammaLaw::at_normal`] of each, but NaN where that takes longer.
-    #[inline(always)]
-    pub(crate) fn quickly<const N: usize>(&self, z: &[f64; N]) -> [f64; N] {
-        self.map.quickly(z, |x| {
-            let delay = self.origin + self.scale * x;
-            if delay >= self.floor { delay } else { f64::NAN }
-        })
+    /// Its delays in whole numbers, for several at once, if they come so.
+    pub(crate) fn cubics(&self) -> Option<GammaCubics> {
+        GammaCubics::new(self)
     }
 }
 

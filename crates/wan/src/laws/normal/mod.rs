@@ -23,11 +23,12 @@ pub(crate) fn in_the_core(word: u64) -> Option<f64> {
     (size < X[layer + 1]).then(|| signed(word, size))
 }
 
-/// [`in_the_core`], NaN in the other cases.
+/// [`in_the_core`], NaN in the other cases: of positive numbers the larger one has the larger bits.
 #[inline(always)]
 pub(crate) fn in_the_core_or_nan(word: u64) -> f64 {
     let (layer, size) = point(word);
-    if size < X[layer + 1] { signed(word, size) } else { f64::NAN }
+    let is_outside = !(size.to_bits().wrapping_sub(X[layer + 1].to_bits()).cast_signed() >> 63);
+    f64::from_bits(signed(word, size).to_bits() | is_outside.cast_unsigned())
 }
 
 /// The layer, and how far to the right in it. They and the sign are different bits of the word.

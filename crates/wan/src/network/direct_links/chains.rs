@@ -1,16 +1,17 @@
 //! Links whose delays follow those before, eight at a time: each step for all of them before the next, in registers as far as it is the same for all.
 //!
-//! A packet of a link with correlated gamma delays and bursts of loss takes 60 instructions less than one by one.
+//! Most delays come by fewer terms of their series than one alone would need.
 
 use alloc::vec::Vec;
 
 use cohaptic_units::{Instant, Probability};
 
 use super::kind::{Losses, Verdict};
-use super::{Arrivals, DirectLinks, LinkState, draw};
+use super::{Arrivals, DirectLinks, LinkState, OfferedAt};
+use crate::laws::delay::GammaCubics;
 use crate::line::direct::Words;
 use crate::random::PacketDraws;
-use crate::stages::delay::{CorrelatedDelays, QuickDelays, whole};
+use crate::stages::delay::CorrelatedDelays;
 use crate::stages::loss::GilbertElliottState;
 
 /// What links of a kind do that remember the state of their losses and the normal number behind their latest delay, and no more.
@@ -21,6 +22,7 @@ pub(super) struct Chains {
     /// In each state below which number it says that the packet is lost.
     loses: [u64; 2],
     delays: CorrelatedDelays,
+    cubics: GammaCubics,
 }
 
 /// What such links remember, by link; behind the last are some that are none, so that eight can be looked at from any.
@@ -28,7 +30,7 @@ pub(super) struct Chains {
 pub(super) struct ChainStates {
     /// The latest value of the chain of delays, NaN before the first packet.
     normals: Vec<f64>,
-    /// 1 where the link is bad, else 0.
+    /// A bit for each link that is bad.
     bad: Vec<u8>,
 }
 
@@ -59,7 +61,7 @@ impl Chains {
                 ([chain.p, chain.r], [certain[0]?, certain[1]?])
             }
         };
-        delays.come_quickly().then(|| Self { leaves: leaves.map(threshold), loses: loses.map(threshold), delays: delays.clone() })
+        Some(Self { leaves: leaves.map(threshold), loses: loses.map(threshold), delays: delays.clone(), cubics: delays.cubics()? })
     }
 
     /// What becomes of a packet of the link in that place.
@@ -71,9 +73,8 @@ impl Chains {
         [loss_word, jitter_word]: Words,
         packet: PacketDraws,
     ) -> Verdict {
-        let bad = &mut states.bad[place];
-        let state = usize::from(*bad & 1);
-        *bad ^= u8::from(is_below(loss_word, self.leaves[state]));
+        let state = usize::from(states.bad_from(place) & 1);
+        states.change(place, u8::from(is_below(loss_word, self.leaves[state])));
         if is_below(loss_word, self.loses[state]) {
             return Verdict::Lost;
         }
@@ -85,56 +86,68 @@ impl Chains {
     pub(super) fn offer(
         &self,
         (links, states, first): (&mut [LinkState], &mut ChainStates, usize),
-        (now, until): (Instant, Instant),
+        (now, until): (impl OfferedAt, Instant),
         excluded: u8,
         arrivals: &mut Arrivals,
     ) {
-        let words = draw(true, links, &mut arrivals.sequences);
-        let Some((normals, bad)) = states.from(first) else { return };
-        // Those that are none keep their state too, which is that of a link that is yet to be added.
-        #[expect(clippy::cast_possible_truncation, reason = "the bits of eight links")]
-        let excluded = excluded | (0xff_u16 << links.len()) as u8;
-        let mut lost = 0;
-        for (place, [word, _]) in words.into_iter().enumerate() {
-            let state = usize::from(bad[place] & 1);
-            lost |= u8::from(is_below(word, self.loses[state])) << place;
-            bad[place] ^= u8::from(is_below(word, self.leaves[state])) & !(excluded >> place & 1);
-        }
+        let bad = states.bad_from(first);
+        let (mut lost, mut leave) = (0, 0);
         let mut jitter_words = [0; DirectLinks::AT_ONCE];
-        for (jitter_word, [_, word]) in jitter_words.iter_mut().zip(&words) {
-            *jitter_word = *word;
+        for (place, (link, (sequence, word))) in links.iter().zip(arrivals.sequences.iter_mut().zip(&mut jitter_words)).enumerate() {
+            *sequence = link.offered;
+            let [loss_word, jitter_word] = link.draws.packet(link.offered).loss_and_jitter();
+            *word = jitter_word;
+            let state = usize::from(bad >> place & 1);
+            lost |= u8::from(is_below(loss_word, self.loses[state])) << place;
+            leave |= u8::from(is_below(loss_word, self.leaves[state])) << place;
         }
-        let QuickDelays { chain, nanos } = self.delays.quickly(normals, &jitter_words);
-        let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
-        for (place, link) in links.iter_mut().enumerate() {
+        states.change(first, leave & !excluded);
+        let Some(normals) = states.normals_from(first) else { return };
+        let following = self.delays.following(normals, &jitter_words);
+        let nanos = self.cubics.nanos(&following);
+        let (mut bit, mut arrive, mut overtake, mut slow) = (1_u8, 0, 0, 0);
+        let results = normals.iter_mut().zip(following).zip(nanos.into_iter().zip(&mut arrivals.at));
+        for (link, ((normal, following), (nanos, at))) in links.iter_mut().zip(results) {
             if excluded & bit == 0 {
-                let number = link.offered;
                 link.offered += 1;
-                if lost & bit == 0 {
-                    let delay = match whole(nanos[place]) {
-                        Some(delay) => {
-                            normals[place] = chain[place];
-                            delay
-                        }
-                        None => self.slowly(&mut normals[place], words[place][1], link.draws.packet(number)),
-                    };
-                    let at = now.saturating_add_nanos(delay);
-                    arrivals.at[place] = at;
-                    arrive |= bit;
-                    overtake |= if link.count_arrival(now, until, at) { bit } else { 0 };
-                } else {
+                if lost & bit != 0 {
                     link.lost += 1;
+                } else if nanos == GammaCubics::UNKNOWN {
+                    slow |= bit;
+                } else {
+                    let now = now.of(bit.trailing_zeros() as usize);
+                    *normal = following;
+                    *at = now.saturating_add_nanos(nanos);
+                    arrive |= bit;
+                    overtake |= if link.count_arrival(now, until, *at) { bit } else { 0 };
                 }
             }
             bit = bit.wrapping_shl(1);
         }
         (arrivals.arrive, arrivals.overtake) = (arrive, overtake);
+        if slow != 0 {
+            self.offer_slowly((links, normals), (now, until), slow, arrivals);
+        }
     }
 
+    /// Those packets arrive after delays that take longer. Not in the loop over all, which would look up all that it knows after each call.
     #[cold]
     #[inline(never)]
-    fn slowly(&self, chain: &mut f64, word: u64, packet: PacketDraws) -> u64 {
-        self.delays.draw_nanos(chain, word, packet)
+    fn offer_slowly(
+        &self,
+        (links, normals): (&mut [LinkState], &mut [f64; DirectLinks::AT_ONCE]),
+        (now, until): (impl OfferedAt, Instant),
+        slow: u8,
+        arrivals: &mut Arrivals,
+    ) {
+        for (place, link) in links.iter_mut().enumerate().filter(|(place, _)| slow >> place & 1 == 1) {
+            let packet = link.draws.packet(arrivals.sequences[place]);
+            let ([_, word], now) = (packet.loss_and_jitter(), now.of(place));
+            let at = now.saturating_add_nanos(self.delays.draw_nanos(&mut normals[place], word, packet));
+            arrivals.at[place] = at;
+            arrivals.arrive |= 1 << place;
+            arrivals.overtake |= u8::from(link.count_arrival(now, until, at)) << place;
+        }
     }
 }
 
@@ -146,14 +159,29 @@ impl ChainStates {
     /// The state in which the link in that place begins, which is behind all others.
     pub(super) fn begin(&mut self, place: usize, state: GilbertElliottState) {
         self.normals.resize(place + DirectLinks::AT_ONCE, f64::NAN);
-        self.bad.resize(place + DirectLinks::AT_ONCE, 0);
-        self.bad[place] = u8::from(state == GilbertElliottState::Bad);
+        self.bad.resize(place / 8 + 2, 0);
+        self.change(place, u8::from(state == GilbertElliottState::Bad));
     }
 
-    /// Those of eight links.
+    /// The latest values of eight chains.
     #[inline(always)]
-    fn from(&mut self, first: usize) -> Option<(&mut [f64; DirectLinks::AT_ONCE], &mut [u8; DirectLinks::AT_ONCE])> {
-        Some((self.normals.get_mut(first..)?.first_chunk_mut()?, self.bad.get_mut(first..)?.first_chunk_mut()?))
+    fn normals_from(&mut self, first: usize) -> Option<&mut [f64; DirectLinks::AT_ONCE]> {
+        self.normals.get_mut(first..)?.first_chunk_mut()
+    }
+
+    /// Which of eight links are bad.
+    #[inline(always)]
+    fn bad_from(&self, first: usize) -> u8 {
+        let [low, _] = (u16::from_le_bytes([self.bad[first / 8], self.bad[first / 8 + 1]]) >> (first % 8)).to_le_bytes();
+        low
+    }
+
+    /// Those of eight links change their states.
+    #[inline(always)]
+    fn change(&mut self, first: usize, which: u8) {
+        let [low, high] = (u16::from(which) << (first % 8)).to_le_bytes();
+        self.bad[first / 8] ^= low;
+        self.bad[first / 8 + 1] ^= high;
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod chains;
 mod kind;
+mod offered_at;
 
 use alloc::vec::Vec;
 
@@ -9,6 +10,7 @@ use cohaptic_units::{Bytes, Instant};
 
 use chains::ChainStates;
 use kind::{Kind, Remembered, Verdict};
+pub use offered_at::OfferedAt;
 
 use super::id::LinkId;
 use crate::fates::fate::DropCause;
@@ -164,14 +166,14 @@ impl DirectLinks {
         matches!(&self.kinds[..], [(_, Kind { chains: Some(_), .. })] if self.others.is_empty())
     }
 
-    /// [`DirectLinks::offer`], for a driver that asked before a loop [which links they are](DirectLinks::are_chains). Both in one loop take
-    /// two instructions more for a packet of links with jitter and loss.
+    /// [`DirectLinks::offer`], at one instant or each packet at one of its own, for a driver that asked before a loop
+    /// [which links they are](DirectLinks::are_chains). Both in one loop take two instructions more for a packet of links with jitter and loss.
     ///
     /// # Panics
     ///
     /// If there are no such links.
     #[inline(always)]
-    pub fn offer_as<const CHAINS: bool>(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
+    pub fn offer_as<const CHAINS: bool>(&mut self, now: impl OfferedAt, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         (arrivals.arrive, arrivals.overtake) = (0, 0);
         let first = first.index();
         let (links, span) = (&mut self.links[first..first + count], (now, self.until));
@@ -193,11 +195,11 @@ impl DirectLinks {
     }
 
     #[inline(never)]
-    fn offer_one_by_one(&mut self, now: Instant, first: usize, count: usize, excluded: u8, arrivals: &mut Arrivals) {
+    fn offer_one_by_one(&mut self, now: impl OfferedAt, first: usize, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         for place in (0..count).filter(|place| excluded >> place & 1 == 0) {
             let link = LinkId::new(first + place);
             arrivals.sequences[place] = self.offered(link);
-            if let Some((at, overtakes)) = self.offer_one(now, link) {
+            if let Some((at, overtakes)) = self.offer_one(now.of(place), link) {
                 arrivals.at[place] = at;
                 arrivals.arrive |= 1 << place;
                 arrivals.overtake |= u8::from(overtakes) << place;
@@ -325,7 +327,7 @@ fn draw(is_random: bool, links: &[LinkState], sequences: &mut [u64; DirectLinks:
 fn alike<const REMEMBER: bool>(
     kind: &mut Kind,
     (links, remembered): (&mut [LinkState], &mut [Remembered]),
-    (now, until): (Instant, Instant),
+    (now, until): (impl OfferedAt, Instant),
     excluded: u8,
     arrivals: &mut Arrivals,
 ) {
@@ -333,7 +335,7 @@ fn alike<const REMEMBER: bool>(
     let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
     for (place, (link, (words, at))) in links.iter_mut().zip(words.into_iter().zip(&mut arrivals.at)).enumerate() {
         if excluded & bit == 0 {
-            let draws = link.draws.packet(link.offered);
+            let (draws, now) = (link.draws.packet(link.offered), now.of(place));
             let verdict = if REMEMBER { kind.verdict(now, &mut remembered[place], words, draws) } else { kind.fate(now, words, draws) };
             link.offered += 1;
             match verdict {
@@ -473,8 +475,8 @@ mod tests {
         }
     }
 
-    /// Correlated gamma delays: of a shape whose inverse is quick nearly everywhere, of one for which it often takes longer, and over a floor; with losses in bursts, with
-    /// independent ones and without. Eleven links are eight and three.
+    /// Correlated gamma delays: of shapes that four terms tell nearly everywhere, of one for which they do not, and over a floor; with losses in bursts, with
+    /// independent ones and without. Eleven links are eight and three, or twice five and one.
     #[test]
     fn chains_decide_what_whole_links_decide() {
         let gamma = |sd: u64, floor: u64| Jitter {
@@ -487,6 +489,7 @@ mod tests {
             ("loss gemodel 20% 40% 0% 0%", gamma(6, 20)),
             ("loss gemodel 20% 40% 100% 100%", gamma(90, 0)),
             ("loss gemodel 20% 40% 50% 10%", gamma(6, 0)),
+            ("loss gemodel 20% 40%", gamma(20, 0)),
             ("loss 30%", gamma(6, 0)),
             ("", gamma(90, 10)),
         ] {
@@ -499,8 +502,13 @@ mod tests {
         }
     }
 
-    /// All links at once against each as a [`Link`]: the same packets at the same instants, the same counters at the end.
+    /// All links at once, in groups of eight and of five, packets at one instant and a microsecond apart, against each as a [`Link`]: the same packets at the same
+    /// instants, the same counters at the end.
     fn compare(direct: &[LinkModel]) {
+        [(DirectLinks::AT_ONCE, 0), (5, 0), (DirectLinks::AT_ONCE, 1000), (5, 1000)].into_iter().for_each(|groups| compare_in_groups(direct, groups));
+    }
+
+    fn compare_in_groups(direct: &[LinkModel], (together, apart): (usize, u64)) {
         let until = Instant::from_nanos(500 * 8_000_000);
         let mut links = DirectLinks::new(until, Bytes::new(64));
         let name = |place: usize| LinkName::between("a", &format!("b{place}"));
@@ -513,12 +521,19 @@ mod tests {
             // Every third packet is not offered to the second link.
             let excluded = if number % 3 == 0 { 0b10 } else { 0 };
             for (place, link) in whole.iter_mut().enumerate().filter(|(place, _)| u32::from(excluded) >> place & 1 == 0) {
-                link.handle_packet(now, PacketInfo::from(Bytes::new(64)), 0).unwrap_or_else(|error| panic!("{place}: {error}"));
+                link.handle_packet(now.saturating_add_nanos(apart * place as u64), PacketInfo::from(Bytes::new(64)), 0)
+                    .unwrap_or_else(|error| panic!("{place}: {error}"));
             }
             let mut offered = Arrivals::NONE;
-            for first in (0..direct.len()).step_by(DirectLinks::AT_ONCE) {
-                let count = DirectLinks::AT_ONCE.min(direct.len() - first);
-                links.offer(now, LinkId::new(first), count, if first == 0 { excluded } else { 0 }, &mut offered);
+            for first in (0..direct.len()).step_by(together) {
+                let count = together.min(direct.len() - first);
+                let (link, excluded) = (LinkId::new(first), if first == 0 { excluded } else { 0 });
+                let instants = core::array::from_fn(|place| now.saturating_add_nanos(apart * (first + place) as u64));
+                match links.are_chains() {
+                    _ if apart == 0 => links.offer(now, link, count, excluded, &mut offered),
+                    true => links.offer_as::<true>(&instants, link, count, excluded, &mut offered),
+                    false => links.offer_as::<false>(&instants, link, count, excluded, &mut offered),
+                }
                 for place in offered.places() {
                     let so_far = &mut arrivals[first + place];
                     assert_eq!(offered.overtakes(place), so_far.iter().any(|(at, _)| *at > offered.at[place]));

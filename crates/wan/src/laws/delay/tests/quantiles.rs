@@ -90,22 +90,16 @@ fn the_quick_gamma_map_is_exact() {
     }
 }
 
-/// Eight at a time, one by one, and by a law that is asked which it is: the same bits, at the edges of cells and beyond the last too.
+/// By a law that is asked which it is, and by one that is known: the same bits, at the edges of cells and beyond the last too.
 #[test]
-fn gamma_delays_are_the_same_eight_at_a_time() {
+fn gamma_delays_are_those_of_their_law() {
     for (variation, floor) in [(0.08, 0.0), (0.3, 0.5), (1.0, 0.0), (3.0, 0.0)] {
         let law = Law::new(&Distribution::Gamma, 1.0, variation, Some(floor)).unwrap();
         let gamma = law.as_gamma().unwrap();
         let edges = (-640..=640).flat_map(|i| [-1e-15, 0.0, 1e-15].map(|by| f64::from(i) / 64.0 + by));
         for z in edges.chain([-40.0, -37.5, 40.0, 1e300, f64::NEG_INFINITY, f64::INFINITY]) {
-            let exact = law.at_normal(z).to_bits();
-            assert_eq!(gamma.at_normal(z).to_bits(), exact, "{variation}, {z}");
-            let [quick, other] = gamma.quickly(&[z, 0.25]);
-            assert!(quick.is_nan() || quick.to_bits() == exact, "{variation}, {z}: {quick}");
-            assert_eq!(other.to_bits(), law.at_normal(0.25).to_bits());
-            assert!(!quick.is_nan() || variation > 0.5 || z.abs() > 6.0, "{variation}, {z}");
+            assert_eq!(gamma.at_normal(z).to_bits(), law.at_normal(z).to_bits(), "{variation}, {z}");
         }
-        assert!(gamma.quickly(&[f64::NAN])[0].is_nan());
     }
 }
 
