@@ -1,6 +1,8 @@
 //! What a scene makes the program model, what it leaves out, and why.
 
 #[cfg(test)]
+mod costs;
+#[cfg(test)]
 mod links;
 
 use cohaptic_peer::coordination::{Law, LawValue, Pull, UsedGains};
@@ -73,6 +75,7 @@ struct Nanos {
 
 const WITH_EVENTS: Nanos = Nanos { a_tick: 12.0, a_packet: 20.0, an_impaired_packet: 45.0 };
 const IN_ARRAYS: Nanos = Nanos { a_tick: 8.0, a_packet: 1.0, an_impaired_packet: 25.0 };
+const IN_WINDOWS: Nanos = Nanos { a_tick: 20.0, a_packet: 1.0, an_impaired_packet: 30.0 };
 
 /// Bytes of a row of `trajectory.csv` (for its first axis and for each further one) and of `packets.csv`, in scenes of ordinary size.
 const BYTES_A_TICK: f64 = 20.0;
@@ -108,11 +111,16 @@ pub fn explain(scene: &Scene) -> Explanation {
     };
     let nanos = match &arrays {
         None => WITH_EVENTS,
-        Some(shape) if shape.is_broadcast() => IN_ARRAYS,
-        Some(shape) if shape.is_carried() => {
-            Nanos { a_packet: WITH_EVENTS.a_packet, an_impaired_packet: WITH_EVENTS.an_impaired_packet, ..IN_ARRAYS }
+        Some(shape) => {
+            let nanos = if shape.has_windows() { IN_WINDOWS } else { IN_ARRAYS };
+            if shape.is_broadcast() {
+                nanos
+            } else if shape.is_carried() {
+                Nanos { a_packet: WITH_EVENTS.a_packet, an_impaired_packet: WITH_EVENTS.an_impaired_packet, ..nanos }
+            } else {
+                Nanos { a_packet: nanos.an_impaired_packet, ..nanos }
+            }
         }
-        Some(_) => Nanos { a_packet: IN_ARRAYS.an_impaired_packet, ..IN_ARRAYS },
     };
     if let Some(shape) = arrays {
         let (peers, ticks) = if shape.has_windows() {

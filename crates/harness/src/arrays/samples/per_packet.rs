@@ -143,7 +143,14 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 sends.fill(false);
                 senders.iter().for_each(|sender| sends[*sender] = true);
                 let (receivers, sends) = (receivers.clone(), &**sends);
-                on_widest(processor, DirectSending { peers, receivers, links, senders, sends, sent, in_flight, at: (tick, now) });
+                // Eight links of which two are used take longer than two.
+                let (are_few, are_chains) = (L == 1 && senders.len() * 4 < peers, links.are_chains());
+                let sending = DirectSending { peers, receivers, links, senders, sends, sent, in_flight, at: (tick, now) };
+                match are_chains {
+                    _ if are_few => on_widest(processor, BySender(sending)),
+                    true => on_widest(processor, ByChain(sending)),
+                    false => on_widest(processor, ByLink(sending)),
+                }
             }
             Links::Carried(carrier) => carrier.send(now, senders, sent),
             Links::Stepped(links, info) => {
@@ -430,19 +437,35 @@ struct DirectSending<'a, const P: usize, const L: usize> {
     at: (u64, Instant),
 }
 
-impl<const P: usize, const L: usize> NullaryFnOnce for DirectSending<'_, P, L> {
+/// One function for each way: two in one have too few registers, and take ten instructions more for a packet of links with jitter and loss.
+struct BySender<'a, const P: usize, const L: usize>(DirectSending<'a, P, L>);
+struct ByChain<'a, const P: usize, const L: usize>(DirectSending<'a, P, L>);
+struct ByLink<'a, const P: usize, const L: usize>(DirectSending<'a, P, L>);
+
+impl<const P: usize, const L: usize> NullaryFnOnce for BySender<'_, P, L> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        // Eight links of which two are used take longer than two.
-        if L == 1 && self.senders.len() * 4 < self.peers {
-            self.by_sender();
-        } else if self.links.are_chains() {
-            self.by_link::<true>();
-        } else {
-            self.by_link::<false>();
-        }
+        self.0.by_sender();
+    }
+}
+
+impl<const P: usize, const L: usize> NullaryFnOnce for ByChain<'_, P, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.by_link::<true>();
+    }
+}
+
+impl<const P: usize, const L: usize> NullaryFnOnce for ByLink<'_, P, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.by_link::<false>();
     }
 }
 

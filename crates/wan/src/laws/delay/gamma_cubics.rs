@@ -36,7 +36,7 @@ impl GammaCubics {
         [1, 2, 4, 8, 16].into_iter().find_map(|parts| Self::of_parts(law, parts))
     }
 
-    /// With so many cells in place of one.
+    /// With that number of cells in place of one.
     fn of_parts(law: &GammaLaw, parts: u32) -> Option<Self> {
         let whole = f64::from(parts);
         let mut cells = vec![[f64::NAN; 4]; CELLS];

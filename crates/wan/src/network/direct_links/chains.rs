@@ -106,20 +106,21 @@ impl Chains {
         let following = self.delays.following(normals, &jitter_words);
         let nanos = self.cubics.nanos(&following);
         let (mut bit, mut arrive, mut overtake, mut slow) = (1_u8, 0, 0, 0);
-        let results = normals.iter_mut().zip(following).zip(nanos.into_iter().zip(&mut arrivals.at));
-        for (link, ((normal, following), (nanos, at))) in links.iter_mut().zip(results) {
+        for place in 0..links.len().min(DirectLinks::AT_ONCE) {
+            let link = &mut links[place];
             if excluded & bit == 0 {
                 link.offered += 1;
                 if lost & bit != 0 {
                     link.lost += 1;
-                } else if nanos == GammaCubics::UNKNOWN {
+                } else if nanos[place] == GammaCubics::UNKNOWN {
                     slow |= bit;
                 } else {
-                    let now = now.of(bit.trailing_zeros() as usize);
-                    *normal = following;
-                    *at = now.saturating_add_nanos(nanos);
+                    let now = now.of(place);
+                    let at = now.saturating_add_nanos(nanos[place]);
+                    normals[place] = following[place];
+                    arrivals.at[place] = at;
                     arrive |= bit;
-                    overtake |= if link.count_arrival(now, until, *at) { bit } else { 0 };
+                    overtake |= if link.count_arrival(now, until, at) { bit } else { 0 };
                 }
             }
             bit = bit.wrapping_shl(1);

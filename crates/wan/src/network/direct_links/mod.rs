@@ -333,14 +333,15 @@ fn alike<const REMEMBER: bool>(
 ) {
     let words = draw(kind.is_random, links, &mut arrivals.sequences);
     let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
-    for (place, (link, (words, at))) in links.iter_mut().zip(words.into_iter().zip(&mut arrivals.at)).enumerate() {
+    for place in 0..links.len().min(DirectLinks::AT_ONCE) {
+        let (link, words) = (&mut links[place], words[place]);
         if excluded & bit == 0 {
             let (draws, now) = (link.draws.packet(link.offered), now.of(place));
             let verdict = if REMEMBER { kind.verdict(now, &mut remembered[place], words, draws) } else { kind.fate(now, words, draws) };
             link.offered += 1;
             match verdict {
                 Verdict::Arrives(arrival) => {
-                    *at = arrival;
+                    arrivals.at[place] = arrival;
                     arrive |= bit;
                     overtake |= if link.count_arrival(now, until, arrival) { bit } else { 0 };
                 }
