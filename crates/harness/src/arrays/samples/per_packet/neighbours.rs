@@ -10,7 +10,6 @@ use super::{Links, PerPacket};
 
 impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// [`PerPacket::send`] where each receiver has senders of its own.
-    #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
     pub(super) fn send_to_neighbours(
         &mut self,
         (tick, now): (u64, Instant),
