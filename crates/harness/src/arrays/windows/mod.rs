@@ -200,11 +200,11 @@ impl<'a, const A: usize> Windows<'a, A> {
             let (window, first) = (*window, timetable.next_instant());
             let soon = first.saturating_add_nanos(2 * nanos(shape.tick));
             // Windows are counted from a tick of the receiver, which has one a window at most; or from this one, which may be long before it ticks at all: the
-            // first of the window ticks in each window at least once in the longest span.
+            // first of the window ticks in each window at least once in the longest span, which is shorter than two ticks.
             let next_tick = |peer: usize| match timetable.instant(peer) {
-                at if timetable.ticks_now(peer) => NextTick { at, since: (window, at), least: window },
-                at if at < soon => NextTick { at, since: (window + 1, at), least: window + 1 },
-                at => NextTick { at, since: (window - 1, first), least: window + 1 },
+                at if timetable.ticks_now(peer) => NextTick { at, since: (window, at) },
+                at if at < soon => NextTick { at, since: (window + 1, at) },
+                at => NextTick { at, since: (window - 1, first) },
             };
             samples.send_in_turn((*processor, window), senders, |peer| timetable.instant(peer), sent, next_tick);
         }

@@ -21,16 +21,14 @@ pub(in crate::arrays) struct NextTick {
     pub(in crate::arrays) at: Instant,
     /// A window, or one before it, and an instant of a tick in it, from which the windows until any later instant are counted at the longest span of any clock.
     pub(in crate::arrays) since: (u64, Instant),
-    /// The first window in which it may tick.
-    pub(in crate::arrays) least: u64,
 }
 
 impl NextTick {
     /// The first window in which the receiver may tick at or after an arrival.
     #[inline(always)]
     fn due<const P: usize>(self, in_flight: &InFlight<P>, arrival: Instant) -> u64 {
-        let Self { at, since: (from, since), least } = self;
-        (from + in_flight.count(since, arrival.max(at))).max(least)
+        let Self { at, since: (from, since) } = self;
+        from + in_flight.count(since, arrival.max(at))
     }
 }
 
