@@ -5,7 +5,7 @@ use std::time::Duration;
 use cohaptic_peer::Drift;
 use cohaptic_scene::Scene;
 
-/// The largest drift either way [ppm]: that of ordinary quartz.
+/// The largest drift either way \[ppm\]: that of ordinary quartz.
 pub const PPM: u16 = 50;
 
 /// The scene with an offset within a tick and a drift for each peer.
