@@ -35,6 +35,8 @@ mod steps;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
+mod tests_of_matrices;
+#[cfg(test)]
 mod tests_of_waves;
 mod waves;
 
