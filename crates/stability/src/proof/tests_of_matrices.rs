@@ -48,7 +48,7 @@ fn matrix(size: usize) -> impl Strategy<Value = Matrix> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Products over a box enclose the products of what is in it, wherever in the box.
+    /// Products over a box enclose the products of its matrices, wherever in the box.
     #[test]
     fn products_enclose(
         steps in proptest::collection::vec((matrix(3), matrix(3), matrix(3), matrix(3)), 1..5),
@@ -72,7 +72,7 @@ proptest! {
         }
     }
 
-    /// What is decided of all matrices of a box holds for those in it, near the unit circle above all.
+    /// A verdict on a box holds for each of its matrices, near the unit circle above all.
     #[test]
     fn decisions_hold(mean in matrix(4), slope in matrix(4), width in 0.0..0.05_f64, radius in 0.8..1.25_f64, at in -1.0..=1.0_f64) {
         let scale = radius / crate::radius(&mean);
