@@ -10,6 +10,7 @@
 pub mod bare;
 pub mod bare_pair;
 pub mod by_hand;
+pub mod clocks;
 pub mod effort;
 pub mod kernel;
 pub mod machine;
