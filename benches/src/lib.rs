@@ -13,6 +13,7 @@ pub mod by_hand;
 pub mod clocks;
 pub mod effort;
 pub mod kernel;
+pub mod large;
 pub mod machine;
 pub mod one_link;
 pub mod pages;

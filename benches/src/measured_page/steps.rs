@@ -140,8 +140,18 @@ one link alone, a stability map, and what each of the others does not model: [me
         let source = |name, how, tables| Some(Source { name, how, tables });
         match self {
             Self::Speed => {
-                let tables =
-                    &[("## A full mesh", ALL_ROWS), ("## Many runs of one scene", ALL_ROWS), ("## Measures", ALL_ROWS), ("## Memory", ALL_ROWS)];
+                let tables = &[
+                    ("## A full mesh", ALL_ROWS),
+                    ("## Queues and chains", ALL_ROWS),
+                    ("## Clocks of their own", ALL_ROWS),
+                    ("## Many runs of one scene", ALL_ROWS),
+                    ("## One scene on many threads", ALL_ROWS),
+                    ("## Many peers", ALL_ROWS),
+                    ("## Watched runs", ALL_ROWS),
+                    ("## Measures", ALL_ROWS),
+                    ("## Records", ALL_ROWS),
+                    ("## Memory", ALL_ROWS),
+                ];
                 source("measured-speed.md", How::Program("speed-table"), tables)
             }
             Self::Link => source("measured-link.md", How::Program("link-table"), &[("# One link: speed", ALL_ROWS)]),

@@ -114,8 +114,8 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     fn run_in_lockstep(&self, plan: &Plan, (shape, law): (Shape, BuiltIn), watch: Watch, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
         let looks_ahead = shape.looks_ahead();
         let summary = if watch == Watch::NOTHING {
-            let threads = self.threads.min(shape.threads().0);
-            if threads > 1
+            let threads = self.threads.clamp(1, shape.threads().0);
+            if (threads > 1 || shape.pays_in_groups())
                 && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
             {
                 return Ok(summary);

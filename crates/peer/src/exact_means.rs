@@ -28,10 +28,8 @@ impl<const A: usize> ExactMeans<A> {
     #[inline]
     pub fn replace(&mut self, before: &State<A>, now: &State<A>) {
         for (axis, [position, velocity]) in self.sums.iter_mut().enumerate() {
-            position.subtract(before.position[axis]);
-            position.add(now.position[axis]);
-            velocity.subtract(before.velocity[axis]);
-            velocity.add(now.velocity[axis]);
+            position.replace(before.position[axis], now.position[axis]);
+            velocity.replace(before.velocity[axis], now.velocity[axis]);
         }
     }
 

@@ -124,20 +124,6 @@ struct Arrays<'a, B, const A: usize, const P: usize, const L: usize> {
     processor: pulp::Arch,
 }
 
-/// Where the samples of peers come from that are not here.
-trait Others<const P: usize, const L: usize> {
-    /// At that tick these peers send; puts what those of them send that are elsewhere into their places. In the places of those that are here it is already.
-    fn exchange(&mut self, senders: &[usize], sent: &mut [Sample<P, L>]);
-}
-
-/// All peers are here.
-struct Nowhere;
-
-impl<const P: usize, const L: usize> Others<P, L> for Nowhere {
-    #[inline(always)]
-    fn exchange(&mut self, _senders: &[usize], _sent: &mut [Sample<P, L>]) {}
-}
-
 /// How samples travel.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one a run, and a box would be another look-up a packet")]
@@ -213,7 +199,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             if self.finite.contains(&false) && self.end_diverged(tick, now) {
                 return ControlFlow::Break(());
             }
-            let discrepancy = self.step(tick, now, (&mut Nowhere, watch));
+            let discrepancy = self.step(tick, now, watch);
             let ticks = tick + 1;
             if !watch.after_motion(now, discrepancy[0]) || is_asked_before(ticks) && !watch.keep_going(now) {
                 self.end_all(ticks, |_| Ending::Interrupted(now));
@@ -235,13 +221,30 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// Everything that happens at a tick. Gives how far copies are apart \[m\].
     #[inline(always)]
-    fn step(&mut self, tick: u64, now: Instant, (others, watch): (&mut impl Others<P, L>, &mut impl RunWatch<B, A, P>)) -> [f64; L] {
+    fn step(&mut self, tick: u64, now: Instant, watch: &mut impl RunWatch<B, A, P>) -> [f64; L] {
+        if self.begin(tick) {
+            self.send(tick, now);
+        }
+        self.go_on(now, tick, watch)
+    }
+
+    /// What happens at a tick before anything is sent. Says whether something is sent now: then `senders` has the peers of the scene that send, and `sent` has
+    /// in the places of those that are here what each of them sends.
+    #[inline(always)]
+    fn begin(&mut self, tick: u64) -> bool {
         if self.shape.has_queues() && is_asked_before(tick) {
             self.pass(tick);
         }
-        if tick == self.earliest_send {
-            self.send(tick, now, others);
+        let sends = tick == self.earliest_send;
+        if sends {
+            self.gather(tick);
         }
+        sends
+    }
+
+    /// What happens at a tick after all have sent. Gives how far copies are apart \[m\].
+    #[inline(always)]
+    fn go_on(&mut self, now: Instant, tick: u64, watch: &mut impl RunWatch<B, A, P>) -> [f64; L] {
         match &mut self.samples {
             Samples::Broadcast(samples) => samples.deliver(tick),
             Samples::PerPacket(samples) => samples.deliver(tick, now),
@@ -294,7 +297,8 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         }
     }
 
-    fn send(&mut self, tick: u64, now: Instant, others: &mut impl Others<P, L>) {
+    /// Takes the samples of the peers that send at this tick.
+    fn gather(&mut self, tick: u64) {
         self.senders.clear();
         for (peer, next) in self.next_send.iter_mut().enumerate() {
             if *next != tick {
@@ -311,13 +315,16 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
                 }
             }
         }
+        self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
+    }
+
+    /// Samples of all that send at this tick leave for the peers that are here.
+    fn send(&mut self, tick: u64, now: Instant) {
         if let Samples::PerPacket(samples) = &mut self.samples {
-            others.exchange(&self.senders, &mut self.sent);
             let change = self.changes.next_at();
             let next = |sender: usize| until(&self.shape, tick, self.next_send[sender]).min(change);
             samples.send(self.processor, (tick, now), &self.senders, &self.sent, next);
         }
-        self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
     }
 
     /// Queues did nothing yet that happens at this tick or later.

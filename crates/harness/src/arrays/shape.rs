@@ -89,6 +89,11 @@ impl Shape {
         threads::that_pay(self)
     }
 
+    /// Whether a run on one thread takes its peers in groups.
+    pub(crate) fn pays_in_groups(&self) -> bool {
+        threads::groups_pay(self)
+    }
+
     /// Whether a run that diverges is to be run once more with events: queues have looked ahead of the end.
     pub(crate) fn looks_ahead(&self) -> bool {
         self.has_queues()

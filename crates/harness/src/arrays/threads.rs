@@ -1,112 +1,71 @@
-//! One run on several threads, to the same bits as on one.
+//! One run on several threads, or of groups of peers on one, to the same bits as of all peers together.
 //!
 //! Each thread has some of the peers: it moves them, and has the links to them with the samples in flight. Peers act on each other by their
 //! samples alone, so threads meet only at ticks at which some peer sends, and exchange the samples. Fates of packets have addresses, so any thread may
 //! draw them.
+//!
+//! For the same reason a thread need not move all its peers at once. It has them in groups, and takes each group from one meeting to the next before it turns to
+//! another: what a group holds stays in the cache meanwhile. That takes 8 % off a run of a thousand peers.
 
 mod barrier;
+mod exchange;
 
 use std::ops::{ControlFlow, Range};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use self::barrier::Barrier;
+use self::exchange::{Exchange, Thread};
 use super::bodies::Bodies;
-use super::lanes::{larger, smaller};
+use super::lanes::WIDTH;
 use super::run_watch::Unwatched;
 use super::samples::Sample;
 use super::shape::Shape;
-use super::{Arrays, Others, Samples, bodies_of, is_asked_before, nanos, summary};
+use super::{Arrays, Samples, bodies_of, is_asked_before, summary};
+use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::summary::{Ending, Summary};
 
 /// Peers a thread at least: for fewer the threads wait for each other longer than they work.
 const PEERS_A_THREAD: usize = 8;
 
+/// The memory of the samples that a group holds \[bytes\]: half of a cache of the second level, through which links and packets pass besides.
+const HELD_BY_A_GROUP: usize = 1 << 20;
+
 /// How many threads pay for a scene of that shape at most, and why no more.
 pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
-    if shape.delay.is_some() {
-        (1, "all samples travel together: a tick takes less time than threads take to meet")
-    } else if shape.has_windows() {
-        (1, "peers tick at instants of their own: threads would meet in each window")
-    } else if shape.is_carried() {
-        (1, "packets of several peers pass one access line, or links know their fates only as time goes")
-    } else if shape.turns.is_some() {
-        (1, "the object turns: how far copies are turned apart is a matter of all of them")
-    } else {
-        ((shape.peers / PEERS_A_THREAD).max(1), "eight peers a thread; threads meet where samples are sent, and the number of threads changes no bit")
+    match why_together(shape) {
+        Some(why) => (1, why),
+        None => (
+            (shape.peers / PEERS_A_THREAD).max(1),
+            "eight peers a thread; threads meet where samples are sent, and the number of threads changes no bit",
+        ),
     }
 }
 
-/// The words that threads exchange.
-struct Exchange<const P: usize> {
-    /// The words of each thread, in turns: an early thread tells the next while others still read the last.
-    told: [Vec<Mutex<Told<P>>>; 2],
-    barrier: Barrier,
-    goes_on: AtomicBool,
+/// Why all peers move together, if they do.
+fn why_together(shape: &Shape) -> Option<&'static str> {
+    let whys = [
+        (shape.delay.is_some(), "all samples travel together: a tick takes less time than threads take to meet"),
+        (shape.has_windows(), "peers tick at instants of their own: threads would meet in each window"),
+        (shape.is_carried(), "packets of several peers pass one access line, or links know their fates only as time goes"),
+        (shape.turns.is_some(), "the object turns: how far copies are turned apart is a matter of all of them"),
+    ];
+    whys.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
 }
 
-/// The words of a thread at a tick.
-struct Told<const P: usize> {
-    samples: Vec<(usize, Sample<P, 1>)>,
-    /// The least and the greatest position of its copies along each axis, at each tick since it last told.
-    extremes: Vec<(f64, f64)>,
-    is_finite: bool,
+/// Whether groups of peers pay on one thread.
+pub(super) fn groups_pay(shape: &Shape) -> bool {
+    why_together(shape).is_none() && groups(shape, &(0..shape.peers), HELD_BY_A_GROUP).len() > 1
 }
 
-/// A thread's side of the exchange.
-struct Thread<'e, const P: usize> {
-    exchange: &'e Exchange<P>,
-    place: usize,
-    members: Range<usize>,
-    turn: usize,
-    extremes: Vec<(f64, f64)>,
-    /// Those of all threads at a meeting.
-    extremes_of_all: Vec<(f64, f64)>,
-    is_finite: bool,
-    /// As far as all have told.
-    all_are_finite: bool,
-    max_discrepancy: f64,
-}
-
-impl<const P: usize> Exchange<P> {
-    fn new(threads: usize) -> Self {
-        let told = || (0..threads).map(|_| Mutex::new(Told { samples: Vec::new(), extremes: Vec::new(), is_finite: true })).collect();
-        Self { told: [told(), told()], barrier: Barrier::new(threads), goes_on: AtomicBool::new(true) }
-    }
-}
-
-impl<const P: usize> Others<P, 1> for Thread<'_, P> {
-    fn exchange(&mut self, senders: &[usize], sent: &mut [Sample<P, 1>]) {
-        let told = &self.exchange.told[self.turn];
-        self.turn = 1 - self.turn;
-        {
-            let mut own = told[self.place].lock().unwrap_or_else(PoisonError::into_inner);
-            own.samples.clear();
-            own.samples.extend(senders.iter().filter(|sender| self.members.contains(sender)).map(|sender| (*sender, sent[*sender])));
-            // They change places, so that neither is allocated again.
-            own.extremes.clear();
-            std::mem::swap(&mut own.extremes, &mut self.extremes);
-            own.is_finite = self.is_finite;
-        }
-        self.exchange.barrier.wait();
-        self.extremes_of_all.clear();
-        for told in told {
-            let told = told.lock().unwrap_or_else(PoisonError::into_inner);
-            for (sender, sample) in &told.samples {
-                sent[*sender] = *sample;
-            }
-            self.extremes_of_all.resize(told.extremes.len(), (f64::INFINITY, f64::NEG_INFINITY));
-            for ((low, high), told) in self.extremes_of_all.iter_mut().zip(&told.extremes) {
-                (*low, *high) = (smaller(told.0, *low), larger(told.1, *high));
-            }
-            self.all_are_finite &= told.is_finite;
-        }
-        self.max_discrepancy = self.extremes_of_all.iter().fold(self.max_discrepancy, |largest, (low, high)| largest.max(high - low));
-    }
+/// The peers of a thread in groups of whole registers, whose samples held take that memory at most unless one register has more.
+fn groups(shape: &Shape, members: &Range<usize>, held_by_a_group: usize) -> Vec<Range<usize>> {
+    let heard = shape.topology.as_ref().map_or(shape.peers - 1, |topology| topology.links().div_ceil(shape.peers));
+    let held_by_a_peer = heard.max(1) * (size_of::<u64>() + shape.axes * size_of::<[f64; 2]>());
+    let most = (held_by_a_group / held_by_a_peer).max(1).next_multiple_of(WIDTH);
+    let size = members.len().div_ceil(members.len().div_ceil(most).max(1)).next_multiple_of(WIDTH);
+    members.clone().step_by(size).map(|first| first..(first + size).min(members.end)).collect()
 }
 
 /// A run of a scene on that number of threads, to its end; `None` if it diverged, which is known later than it happens.
@@ -117,27 +76,30 @@ pub(super) fn run<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
     threads: usize,
     keep_going: &mut dyn FnMut(Instant) -> bool,
 ) -> Option<Summary> {
-    let members: Vec<Range<usize>> = (0..threads).map(|place| place * shape.peers / threads..(place + 1) * shape.peers / threads).collect();
-    let bodies: Vec<B> = members.iter().map(|members| bodies_of::<B, A, P, 1>(&[scene], members, &[law], None)).collect();
-    let initial: Vec<Sample<P, 1>> =
-        bodies.iter().zip(&members).flat_map(|(bodies, members)| (0..members.len()).map(|peer| bodies.sample(peer))).collect();
+    run_in_groups::<B, A, P>(scene, shape, law, (threads, HELD_BY_A_GROUP), keep_going)
+}
+
+fn run_in_groups<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
+    scene: &Scene,
+    shape: &Shape,
+    law: BuiltIn,
+    (threads, held_by_a_group): (usize, usize),
+    keep_going: &mut dyn FnMut(Instant) -> bool,
+) -> Option<Summary> {
+    let shares = (0..threads).map(|place| place * shape.peers / threads..(place + 1) * shape.peers / threads);
+    let groups: Vec<Vec<Range<usize>>> = shares.map(|share| groups(shape, &share, held_by_a_group)).collect();
+    let bodies: Vec<Vec<B>> =
+        groups.iter().map(|groups| groups.iter().map(|members| bodies_of::<B, A, P, 1>(&[scene], members, &[law], None)).collect()).collect();
+    let all = bodies.iter().flatten().zip(groups.iter().flatten());
+    let initial: Vec<Sample<P, 1>> = all.flat_map(|(bodies, members)| (0..members.len()).map(|peer| bodies.sample(peer))).collect();
     let exchange = Exchange::new(threads);
-    let part = |place: usize, bodies: B, keep_going: Option<&mut dyn FnMut(Instant) -> bool>| {
-        let _broken_if_panicking = exchange.barrier.guard();
-        let members = members[place].clone();
-        let thread = Thread {
-            exchange: &exchange,
-            place,
-            members: members.clone(),
-            turn: 0,
-            extremes: Vec::new(),
-            extremes_of_all: Vec::new(),
-            is_finite: true,
-            all_are_finite: true,
-            max_discrepancy: 0.0,
-        };
-        let arrays = Arrays::of_members([scene], shape.clone(), [law], members, bodies, &initial);
-        Part { arrays, thread, keep_going }.run()
+    let part = |place: usize, bodies: Vec<B>, keep_going: Option<&mut dyn FnMut(Instant) -> bool>| {
+        let _broken_if_panicking = exchange.guard();
+        let groups = &groups[place];
+        let members = groups.first().map_or(0..0, |first| first.start..groups[groups.len() - 1].end);
+        let of_members = |(bodies, members): (B, &Range<usize>)| Arrays::of_members([scene], shape.clone(), [law], members.clone(), bodies, &initial);
+        let groups = bodies.into_iter().zip(groups).map(of_members).collect();
+        Part { groups, thread: Thread::new(&exchange, place, members), keep_going }.run()
     };
     let ended: Vec<Option<Ended<'_, B, A, P>>> = std::thread::scope(|scope| {
         let mut bodies = bodies.into_iter();
@@ -150,13 +112,13 @@ pub(super) fn run<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
     })?;
     let ended: Vec<Ended<'_, B, A, P>> = ended.into_iter().collect::<Option<_>>()?;
     let Ended { ending, ticks, until, max_discrepancy, .. } = ended[0];
-    let parts: Vec<_> = ended.into_iter().map(|ended| ended.part).collect();
-    Some(summary(&parts, 0, ticks, ending, until, max_discrepancy))
+    let groups: Vec<_> = ended.into_iter().flat_map(|ended| ended.groups).collect();
+    Some(summary(&groups, 0, ticks, ending, until, max_discrepancy))
 }
 
 /// The peers of a thread at the end of the run.
 struct Ended<'a, B, const A: usize, const P: usize> {
-    part: Arrays<'a, B, A, P, 1>,
+    groups: Vec<Arrays<'a, B, A, P, 1>>,
     ending: Ending,
     ticks: u64,
     /// Until when packets were delivered.
@@ -164,9 +126,9 @@ struct Ended<'a, B, const A: usize, const P: usize> {
     max_discrepancy: f64,
 }
 
-/// The run of a thread.
+/// The run of a thread, which has one group at least.
 struct Part<'a, 'e, 'k, B, const A: usize, const P: usize> {
-    arrays: Arrays<'a, B, A, P, 1>,
+    groups: Vec<Arrays<'a, B, A, P, 1>>,
     thread: Thread<'e, P>,
     keep_going: Option<&'k mut dyn FnMut(Instant) -> bool>,
 }
@@ -180,62 +142,181 @@ enum Early {
 
 impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> Part<'a, '_, '_, B, A, P> {
     fn run(mut self) -> Option<Ended<'a, B, A, P>> {
-        let (mut tick, last) = (0, self.arrays.shape.tick_at(self.arrays.shape.end));
-        let nobody = &mut Unwatched(&mut |_| true);
+        let shape = self.groups[0].shape.clone();
+        let (mut tick, last) = (0, shape.tick_at(shape.end));
         let (ending, ticks) = loop {
-            let until = self.arrays.next_change().min(last);
+            let until = self.groups[0].next_change().min(last);
             match self.run_over(tick..until) {
                 ControlFlow::Break(Early::Diverged) => return None,
-                ControlFlow::Break(Early::Interrupted(ticks)) => break (Ending::Interrupted(self.arrays.shape.before(ticks).1), ticks),
+                ControlFlow::Break(Early::Interrupted(ticks)) => break (Ending::Interrupted(shape.before(ticks).1), ticks),
                 ControlFlow::Continue(()) => tick = until,
             }
-            let now = self.arrays.shape.instant(tick).min(self.arrays.shape.end);
-            self.arrays.change(tick, now, nobody);
+            let now = shape.instant(tick).min(shape.end);
+            self.groups.iter_mut().for_each(|group| group.change(tick, now, &mut Unwatched(&mut |_| true)));
             if tick == last {
                 break (Ending::Complete, tick);
             }
         };
-        let Self { mut arrays, mut thread, .. } = self;
-        if ending == Ending::Complete
-            && let Samples::PerPacket(samples) = &mut arrays.samples
-        {
-            samples.finish(arrays.shape.before(ticks));
+        let Self { mut groups, mut thread, .. } = self;
+        for group in &mut groups {
+            if ending == Ending::Complete
+                && let Samples::PerPacket(samples) = &mut group.samples
+            {
+                samples.finish(shape.before(ticks));
+            }
         }
-        thread.exchange(&[], &mut arrays.sent);
-        if !thread.all_are_finite {
+        thread.exchange(&[], &mut []);
+        if !thread.all_are_finite() {
             return None;
         }
-        let until = arrays.stop(0, ticks, ending);
-        Some(Ended { part: arrays, ending, ticks, until, max_discrepancy: thread.max_discrepancy })
+        let until = groups.iter_mut().map(|group| group.stop(0, ticks, ending)).max()?;
+        Some(Ended { groups, ending, ticks, until, max_discrepancy: thread.max_discrepancy() })
     }
 
     fn run_over(&mut self, ticks: Range<u64>) -> ControlFlow<Early> {
-        let tick_nanos = nanos(self.arrays.shape.tick);
-        for tick in ticks {
-            if !self.thread.all_are_finite {
+        let mut tick = ticks.start;
+        while tick < ticks.end {
+            if !self.thread.all_are_finite() {
                 return ControlFlow::Break(Early::Diverged);
             }
-            let now = Instant::from_nanos(tick * tick_nanos);
-            self.thread.extremes.extend(self.arrays.bodies.blocks().extremes());
-            self.arrays.step(tick, now, (&mut self.thread, &mut Unwatched(&mut |_| true)));
-            self.thread.is_finite &= self.arrays.finite[0];
-            if is_asked_before(tick + 1) && !self.goes_on(now) {
-                return ControlFlow::Break(Early::Interrupted(tick + 1));
+            let mut sends = false;
+            for group in &mut self.groups {
+                sends = group.begin(tick);
             }
+            if sends {
+                self.meet();
+            }
+            let asked = (tick + 1).next_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS));
+            let end = self.groups[0].earliest_send.min(asked).min(ticks.end);
+            self.go_on(tick..end, sends);
+            let latest = self.groups[0].shape.instant(end - 1);
+            if is_asked_before(end) && !self.goes_on(latest) {
+                return ControlFlow::Break(Early::Interrupted(end));
+            }
+            tick = end;
         }
         ControlFlow::Continue(())
     }
 
+    /// Every group gets the samples of the others.
+    fn meet(&mut self) {
+        let Self { groups, thread, .. } = self;
+        let Some((first, others)) = groups.split_first_mut() else { return };
+        for group in &*others {
+            first.sent[group.members.clone()].copy_from_slice(&group.sent[group.members.clone()]);
+        }
+        thread.exchange(&first.senders, &mut first.sent);
+        others.iter_mut().for_each(|group| group.sent.copy_from_slice(&first.sent));
+    }
+
+    /// Group by group goes through these ticks, which all have begun; in the first of them some peers may send.
+    fn go_on(&mut self, ticks: Range<u64>, sends: bool) {
+        let Self { groups, thread, .. } = self;
+        let noted = thread.ticks_noted();
+        for group in groups {
+            for (tick, place) in ticks.clone().zip(noted..) {
+                let now = group.shape.instant(tick);
+                if sends && tick == ticks.start {
+                    group.send(tick, now);
+                }
+                thread.note_extremes(place, group.bodies.blocks().extremes());
+                group.go_on(now, tick, &mut Unwatched(&mut |_| true));
+                thread.note_finite(group.finite[0]);
+            }
+        }
+    }
+
     /// Whether the run goes on after that instant: the first thread asks the observer.
     fn goes_on(&mut self, before: Instant) -> bool {
-        let Exchange { barrier, goes_on, .. } = self.thread.exchange;
-        if let Some(keep_going) = &mut self.keep_going {
-            goes_on.store(keep_going(before), Ordering::Relaxed);
+        let known = self.keep_going.as_mut().map(|keep_going| keep_going(before));
+        self.thread.goes_on(known)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use cohaptic_scene::FromScene;
+
+    use super::*;
+    use crate::arrays::Translations;
+    use crate::plan::{Model, Plan};
+
+    /// 43 peers over these links, with these settings besides.
+    fn scene(link: &str, settings: &[&str]) -> Scene {
+        let text = format!(
+            r#"
+            scene = {{ duration = "1100ms", count = 43 }}
+            object.mass = 3.0
+            coordination = {{ strategy = "average-position", stiffness = 20.0, damping = 0.5, update = "7ms" }}
+            peer = {{ device = {{ mass = 0.1, damping = 5.0 }}, coupling = {{ stiffness = 1000.0, damping = 5.0 }} }}
+            peers = [{{ name = "peer1", hand = {{ force = 1.5 }} }}, {{ name = "peer9", phase = 3, compute-delay = 1 }}]
+            link = {{ {link} }}
+            "#
+        );
+        let settings: Vec<String> = settings.iter().map(|setting| (*setting).to_owned()).collect();
+        Scene::parse(&text, Path::new("x.toml"), &settings).unwrap_or_else(|error| panic!("{link}, {settings:?}: {error}"))
+    }
+
+    /// What comes of a scene whose peers move in groups of eight or more on that number of threads, or together, until the observer is asked that often.
+    fn runs(scene: &Scene, threads: usize, questions: u32) -> (Option<Summary>, Summary) {
+        let (shape, law) = Shape::of(scene, &Plan::new(scene, Model::Least, false), &FromScene).unwrap();
+        let mut asked = [questions; 2];
+        let [mut one, mut other] = asked.each_mut().map(|asked| {
+            move |_| {
+                *asked -= 1;
+                *asked > 0
+            }
+        });
+        let in_groups = run_in_groups::<Translations<1>, 1, 1>(scene, &shape, law, (threads, 1), &mut one);
+        (in_groups, crate::arrays::run(scene, shape, law, &mut other))
+    }
+
+    /// Links of all kinds, phases, neighbours, a timeline that falls between two meetings, and an observer who ends the run between two meetings.
+    #[test]
+    fn groups_come_to_what_all_come_to_together() {
+        let jitter = "delay = \"9ms\", jitter = \"3ms\", loss = \"5%\"";
+        let change = "timeline=[{ at = \"101500us\", link = \"all\", set = { delay = \"4ms\" } }, { at = \"205ms\", peer = \"peer20\", set = { hand = { force = 1 } } }]";
+        let scenes = [
+            scene(jitter, &[]),
+            scene(jitter, &["coordination.strategy=extrapolated", "coordination.extrapolated.horizon=30ms"]),
+            scene(jitter, &["topology={ kind = \"ring\", neighbours = 4 }"]),
+            scene(jitter, &[change]),
+            scene("delay = \"9ms\", jitter = \"2ms\", rate = \"100kbit\", queue = { limit = \"3 packets\", discipline = \"codel\" }", &[]),
+        ];
+        for (scene, threads, questions) in scenes.iter().flat_map(|scene| [(scene, 1, 9), (scene, 2, 9), (scene, 1, 1)]) {
+            let (in_groups, together) = runs(scene, threads, questions);
+            assert_eq!(in_groups.as_ref(), Some(&together), "{threads} threads, {questions} questions, {:?}", scene.links);
+            assert_eq!(matches!(together.ending, Ending::Interrupted(_)), questions == 1);
         }
-        barrier.wait();
-        let wanted = goes_on.load(Ordering::Relaxed);
-        // The next answer may be given once all have this one.
-        barrier.wait();
-        wanted
+    }
+
+    /// The copies that are farthest apart at first come nearer, while others leave their places: between two meetings, and a change in between.
+    #[test]
+    fn copies_are_apart_at_one_tick() {
+        let apart = "peers=[{ name = \"peer1\", position = 0.012, hand = { force = -200 } }, { name = \"peer2\", hand = { force = -1 } }]";
+        let at_once = "timeline=[{ at = \"2500us\", link = \"all\", set = { delay = \"4ms\" } }]";
+        let (in_groups, together) = runs(&scene("delay = \"9ms\", jitter = \"3ms\"", &["scene.duration=6ms", apart, at_once]), 1, 9);
+        assert_eq!(in_groups, Some(together));
+    }
+
+    #[test]
+    fn groups_that_diverge_say_so() {
+        let (in_groups, together) = runs(&scene("delay = \"9ms\", jitter = \"3ms\"", &["coordination.stiffness=1e9"]), 1, 9);
+        assert!(in_groups.is_none() && matches!(together.ending, Ending::Diverged(_)));
+    }
+
+    #[test]
+    fn groups_are_whole_registers_that_share_all_peers() {
+        let scene = scene("delay = \"9ms\", jitter = \"3ms\"", &["scene.count=1000"]);
+        let (shape, _) = Shape::of(&scene, &Plan::new(&scene, Model::Least, false), &FromScene).unwrap();
+        // A peer holds 999 numbers of samples with position and velocity.
+        for (held, size) in [(1, 8), (999 * 24 * 16, 16), (999 * 24 * 17, 24), (999 * 24 * 900, 504), (usize::MAX, 1000)] {
+            let groups = groups(&shape, &(0..1000), held);
+            assert_eq!(groups[0], 0..size, "{held}");
+            assert!(groups.iter().map(|group| group.start).eq((0..1000).step_by(size)) && groups[groups.len() - 1].end == 1000, "{held}");
+        }
+        assert!(groups_pay(&shape));
     }
 }

@@ -86,10 +86,7 @@ impl<const P: usize> InFlight<P> {
         // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
         let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
         let due = tick.saturating_add(ticks);
-        if ticks >= HORIZON {
-            return self.push_beyond(due, packet, overtakes);
-        }
-        self.push_near(due, packet, overtakes);
+        self.packets_at((ticks, due), overtakes).push(packet);
     }
 
     /// How many ticks lie between two instants, rounded up; the later one is not before the other.
@@ -101,28 +98,30 @@ impl<const P: usize> InFlight<P> {
     /// A packet that is known at this tick and due at that one.
     #[inline(always)]
     pub(super) fn push_due(&mut self, (tick, due): (u64, u64), packet: Packet<P>, overtakes: bool) {
-        if due - tick >= HORIZON {
-            self.push_beyond(due, packet, overtakes);
-        } else {
-            self.push_near(due, packet, overtakes);
-        }
+        self.packets_at((due - tick, due), overtakes).push(packet);
     }
 
+    /// Where a packet goes that is due at a tick, which is that many ticks ahead.
+    ///
+    /// The packet itself is handed to no call: it would be put together on the stack for that, and copied from there in words wider than its parts, for which a
+    /// processor waits. It took an eighth of the time of a thousand peers.
     #[inline(always)]
-    fn push_near(&mut self, due: u64, packet: Packet<P>, overtakes: bool) {
+    fn packets_at(&mut self, (ticks, due): (u64, u64), overtakes: bool) -> &mut Vec<Packet<P>> {
+        if ticks >= HORIZON {
+            return self.packets_beyond(due, overtakes);
+        }
         // Found by adding, without a branch.
         let packets = &mut self.wheel[slot(due) + usize::from(overtakes)];
         if packets.capacity() == 0 {
             *packets = self.emptied.pop().unwrap_or_default();
         }
-        packets.push(packet);
+        packets
     }
 
-    /// A packet that is due at a tick beyond the wheel.
     #[cold]
-    fn push_beyond(&mut self, due: u64, packet: Packet<P>, overtakes: bool) {
+    fn packets_beyond(&mut self, due: u64, overtakes: bool) -> &mut Vec<Packet<P>> {
         let Bucket { in_order, overtaking } = self.beyond.entry(due).or_default();
-        if overtakes { overtaking } else { in_order }.push(packet);
+        if overtakes { overtaking } else { in_order }
     }
 
     /// All of them, in no order.

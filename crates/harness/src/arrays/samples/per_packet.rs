@@ -29,6 +29,8 @@ pub(in crate::arrays) use in_turn::NextTick;
 
 /// Set in the sequence number of a link on which one of the samples that are due overtakes another.
 const IS_OVERTAKEN: u64 = 1 << 63;
+/// Samples whose memory is asked for at once.
+const TAKEN_TOGETHER: usize = 16;
 
 /// The links to some peers, the samples in flight to them, and those that each of them holds of each other peer.
 ///
@@ -315,8 +317,8 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         let overtaking = bucket.overtaking.len();
         // Where no mean is exact there are no sums: to look for one took 1 % of a run of ten peers.
         match self.sums.is_empty() {
-            true => self.take_in_order::<false>(&mut bucket),
-            false => self.take_in_order::<true>(&mut bucket),
+            true => self.take_in_order(&mut bucket),
+            false => self.take_in_together(&mut bucket),
         }
         if overtaking > 0 {
             self.take_in_overtaking(&mut bucket.overtaking, overtaking);
@@ -326,18 +328,49 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// Takes in the samples of the links on which none overtakes; puts the others behind those that overtake.
     #[inline(always)]
-    fn take_in_order<const EXACT: bool>(&mut self, bucket: &mut Bucket<P>) {
+    fn take_in_order(&mut self, bucket: &mut Bucket<P>) {
         for packet in &bucket.in_order {
-            let next = &mut self.next[packet.place as usize];
-            if packet.sequence >= *next {
-                *next = packet.sequence + 1;
-                self.hold::<EXACT>(packet);
-            } else if *next & IS_OVERTAKEN == 0 {
-                self.count_stale(packet);
-            } else {
-                bucket.overtaking.push(*packet);
+            if self.is_newest(packet, &mut bucket.overtaking) {
+                self.hold(packet);
             }
         }
+    }
+
+    /// [`PerPacket::take_in_order`] where means are exact, and what is held is more than caches hold: some samples at once, whose memory is asked for before any
+    /// of them is added to a sum. One by one took 5 % longer for a thousand peers.
+    #[inline(always)]
+    fn take_in_together(&mut self, bucket: &mut Bucket<P>) {
+        for packets in bucket.in_order.chunks(TAKEN_TOGETHER) {
+            let (mut newest, mut count) = ([0; TAKEN_TOGETHER], 0);
+            for (place, packet) in packets.iter().enumerate() {
+                newest[count] = place;
+                count += usize::from(self.is_newest(packet, &mut bucket.overtaking));
+            }
+            let mut before = [State { position: [0.0; P], velocity: [0.0; P] }; TAKEN_TOGETHER];
+            for (place, before) in newest[..count].iter().zip(&mut before) {
+                let packet = &packets[*place];
+                *before = quads::state(&self.held, packet.place as usize / L, packet.place as usize % L);
+                self.hold(packet);
+            }
+            for (place, before) in newest[..count].iter().zip(&before) {
+                self.replace(before, &packets[*place]);
+            }
+        }
+    }
+
+    /// Whether a sample is newer than the one held, which it is from then on; puts one of a link on which some overtake behind those.
+    #[inline(always)]
+    fn is_newest(&mut self, packet: &Packet<P>, overtaking: &mut Vec<Packet<P>>) -> bool {
+        let next = &mut self.next[packet.place as usize];
+        let is_newest = packet.sequence >= *next;
+        if is_newest {
+            *next = packet.sequence + 1;
+        } else if *next & IS_OVERTAKEN == 0 {
+            self.count_stale(packet);
+        } else {
+            overtaking.push(*packet);
+        }
+        is_newest
     }
 
     /// Takes in all samples of the links on which some overtake, which are the first ones.
@@ -357,20 +390,26 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         let next = &mut self.next[packet.place as usize];
         if packet.sequence >= *next {
             *next = packet.sequence + 1;
-            self.hold::<true>(packet);
+            let before = quads::state(&self.held, packet.place as usize / L, packet.place as usize % L);
+            self.replace(&before, packet);
+            self.hold(packet);
         } else {
             self.count_stale(packet);
         }
     }
 
-    /// A sample is held; a mean of the receiver may be EXACT.
+    /// A sample takes the place of the one before it in the sums of its receiver, if there are any.
     #[inline(always)]
-    fn hold<const EXACT: bool>(&mut self, packet: &Packet<P>) {
-        let (place, run) = (packet.place as usize / L, packet.place as usize % L);
-        if EXACT && let Some(Some(sums)) = self.sums.get_mut(usize::from(packet.receiver)) {
-            let now = State { position: packet.position, velocity: packet.velocity };
-            sums.replace(&quads::state(&self.held, place, 0), &now);
+    fn replace(&mut self, before: &State<P>, packet: &Packet<P>) {
+        if let Some(Some(sums)) = self.sums.get_mut(usize::from(packet.receiver)) {
+            sums.replace(before, &State { position: packet.position, velocity: packet.velocity });
         }
+    }
+
+    /// A sample is held.
+    #[inline(always)]
+    fn hold(&mut self, packet: &Packet<P>) {
+        let (place, run) = (packet.place as usize / L, packet.place as usize % L);
         for pair in 0..P {
             quads::set(&mut self.held[pair], place, run, packet.position[pair], packet.velocity[pair]);
         }
