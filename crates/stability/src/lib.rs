@@ -77,9 +77,9 @@ pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square,
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use proof::{
-    BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, KnownPieces, MOST_FOLLOWED, MOST_HALVINGS, MomentCertificate, NumberCertificate,
-    NumberProof, NumberSpan, PartCertificate, ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch, SharedProof, TopologyCertificate,
-    prove_every_number,
+    BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, KnownPieces, MOST_FOLLOWED, MOST_HALVINGS, MomentCertificate, Nearness,
+    NumberCertificate, NumberProof, NumberSpan, Openness, PartCertificate, ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch,
+    SharedProof, TopologyCertificate, prove_every_number,
 };
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use cohaptic_stability::{AnalysisError, FamilyError, ProofError, Watch};
+use cohaptic_units::print::Counted;
 
 use crate::failure::{Failure, not_analysed};
 use crate::interrupt;
@@ -51,4 +52,13 @@ pub(super) fn failure(error: ProofError, option: &str, scene: &Path, family: imp
 /// The words about a proof that was ended: its verdicts hold, but they are not all.
 pub(super) fn ended() -> Failure {
     Failure::Interrupted("the proof was ended; pieces that it had not looked at are undecided, all others hold".to_owned())
+}
+
+/// The note on pieces that have a verdict and no certificate, if there are any.
+pub(super) fn left_open(pieces: usize) -> String {
+    if pieces == 0 {
+        String::new()
+    } else {
+        format!("    note: the certificate leaves open {} of those that are decided here\n", Counted(pieces, "piece"))
+    }
 }

@@ -38,6 +38,37 @@ fn spans_of_numbers_change_where_single_verdicts_do() {
     assert!(text.contains("equal to peer1, proven in the mean square:\n    stable    for 2 <= N <= 9\n"), "{text}");
 }
 
+/// A number next to a change, numbers whose eigenvalue lies on the circle, numbers beyond those that are followed, and numbers in the mean square: each has a reason. What a certificate leaves open is named.
+#[test]
+fn undecided_numbers_have_a_reason_and_uncertified_ones_a_note() {
+    let desk = Desk::with("equal.toml", EQUAL);
+    let reason = |rest: &str, span: &str| {
+        let text = desk.text(&format!("stability point {rest}"));
+        let line = text.lines().find(|line| line.contains("undecided for ")).unwrap_or_else(|| panic!("{text}"));
+        assert!(line.contains(&format!("undecided for {span}: ")), "{text}");
+        line.split_once(": ").map(|(_, reason)| reason.to_owned()).unwrap()
+    };
+    let still = "equal.toml --set coordination.damping=0 --set peer.device.damping=0 --set peer.contact=none --set link.delay=0s --set coordination.strategy=average-position";
+    let on_circle = reason(&format!("{still} --every-number 2..5"), "2 <= N <= 5");
+    assert!(on_circle.starts_with("at N = 2 the largest eigenvalue of a frame, of the size 1"), "{on_circle}");
+    assert!(on_circle.contains(", is too near to the unit circle for bounds of "), "{on_circle}");
+    let shipped = env!("CARGO_MANIFEST_DIR").to_owned() + "/../../scenarios";
+    assert_eq!(reason(&format!("{shipped}/coordination/n50.toml --every-number"), "N >= 100001"), "numbers were followed to 100000");
+    let limit = reason(&format!("{shipped}/coordination/wave.toml --every-number"), "N >= 131071");
+    assert!(limit.starts_with("as N grows, the largest eigenvalue of a frame, of the size 1"), "{limit}");
+    let queue = format!("{shipped}/network/rate-and-queue.toml --every-number 2..1100");
+    assert_eq!(reason(&queue, "1075 <= N <= 1100"), "at N = 1075 the bounds of a frame are no finite numbers");
+    let document = desk.json(&format!("stability point {shipped}/network/rate-and-queue.toml --every-number 30..40 --certificate queue.json --json"));
+    let certificate: serde_json::Value = serde_json::from_str(&desk.read("queue.json")).unwrap();
+    let open = certificate["spans"].as_array().unwrap().iter().filter(|span| span["verdict"] == "undecided");
+    let open: Vec<[u64; 2]> = open.map(|span| ["from", "to"].map(|end| span[end].as_u64().unwrap())).collect();
+    let (first, last) = (open.first().unwrap()[0], open.last().unwrap()[1]);
+    assert_eq!(document["every_number"]["uncertified"], serde_json::json!([{ "from": first, "to": last }]), "{document:#}");
+    assert!(document["every_number"]["spans"].as_array().unwrap().iter().all(|span| span.get("reason").is_none()), "{document:#}");
+    let text = desk.text(&format!("stability point {shipped}/network/rate-and-queue.toml --every-number 30..40 --certificate queue.json"));
+    assert!(text.contains(&format!("note: the certificate leaves open what is decided here: {first} <= N <= {last}\n")), "{text}");
+}
+
 #[test]
 fn a_region_is_written_as_boxes_and_pictures_the_same_on_any_number_of_threads() {
     let desk = Desk::with("equal.toml", EQUAL);

@@ -32,6 +32,11 @@ impl BoxCertificate {
     }
 }
 
+/// How many boxes of a certificate are open, of an answer that leaves that number of boxes open: what is checked is bounded more widely.
+pub(super) fn uncertified(certificate: &[BoxCertificate], undecided: usize) -> usize {
+    certificate.iter().filter(|one| one.guarantee == Guarantee::Undecided).count().saturating_sub(undecided)
+}
+
 /// Numbers of equal peers, and the numbers by which the verdict on them can be checked.
 #[derive(Clone, Debug)]
 pub struct NumberCertificate {

@@ -17,6 +17,7 @@ use super::certificate::{Certified, Named};
 use super::corners::{Common, Growth, Point, doubled, steps, steps_beyond};
 use super::discs::decide;
 use super::program::NamedFrame;
+use super::span::FrameSpan;
 use super::steps::Plans;
 use super::waves::{self, Part, Waves};
 use super::{ProofError, Proven};
@@ -26,6 +27,7 @@ use crate::lifted::node::Body;
 use crate::network::NominalNetwork;
 use crate::parts::alone;
 use crate::pieces::pieces;
+use crate::spectrum::radius;
 use crate::structure::{Structure, check_laws, classes, count};
 use crate::{Matrix, Verdict};
 
@@ -115,12 +117,7 @@ impl Growing {
         stable: &mut Vec<PartPlace>,
         mut certified: Certified<'_>,
     ) -> Result<Option<Proven>, ProofError> {
-        let parts_of = |motion: &'_ Motion| {
-            let has_differences = |class: &usize| motion.structure.apart[*class].is_some() && (*class != motion.growing || motion.size(low) > 1);
-            std::iter::once(None).chain((0..motion.structure.classes.len()).filter(has_differences).map(Some)).collect::<Vec<_>>()
-        };
-        let parts: Vec<PartPlace> =
-            self.motions.iter().enumerate().flat_map(|(place, motion)| parts_of(motion).into_iter().map(move |part| (place, part))).collect();
+        let parts = self.parts(low);
         // That which made other numbers unstable comes first; the verdict is that of any order.
         let grown = self.grown.load(Ordering::Relaxed).min(parts.len() - 1);
         let mut all = Some(Proven::Stable);
@@ -139,6 +136,29 @@ impl Growing {
             }
         }
         Ok(all)
+    }
+
+    /// The parts of the motion of that number of peers.
+    fn parts(&self, number: u64) -> Vec<PartPlace> {
+        let parts_of = |motion: &'_ Motion| {
+            let has_differences = |class: &usize| motion.structure.apart[*class].is_some() && (*class != motion.growing || motion.size(number) > 1);
+            std::iter::once(None).chain((0..motion.structure.classes.len()).filter(has_differences).map(Some)).collect::<Vec<_>>()
+        };
+        self.motions.iter().enumerate().flat_map(|(place, motion)| parts_of(motion).into_iter().map(move |part| (place, part))).collect()
+    }
+
+    /// Of a frame of that number of peers, of all parts that are not proven stable, the size of the largest eigenvalue, nearly, and the largest bound of an entry; `None` if all are.
+    pub(super) fn nearness(&self, number: u64) -> Result<Option<[f64; 2]>, ProofError> {
+        let mut found: Option<[f64; 2]> = None;
+        for (motion, part) in self.parts(number) {
+            let span = self.motions[motion].frame([number; 2], part)?.0.product();
+            if decide(&span).is_none_or(|decision| decision.proven != Proven::Stable) {
+                let bound = if span.mean.is_finite() && span.radius.is_finite() { span.radius.largest() } else { f64::INFINITY };
+                let before = found.unwrap_or_default();
+                found = Some([larger(before[0], radius(&span.mean)), larger(before[1], bound)]);
+            }
+        }
+        Ok(found)
     }
 
     /// Whether all numbers of peers from one on are proven unstable, where something grows without a limit.
@@ -174,6 +194,11 @@ impl Growing {
         }
         Ok(None)
     }
+}
+
+/// The larger of two numbers, or NaN if one is.
+fn larger(one: f64, other: f64) -> f64 {
+    if other > one || other.is_nan() { other } else { one }
 }
 
 /// A body that a force moves less by this factor.
@@ -365,18 +390,23 @@ impl Motion {
         Ok(decide(&span).is_some_and(|decision| decision.proven == Proven::Unstable))
     }
 
-    /// The verdict on the averages of all classes, or on how the members of one differ.
-    fn decide(&self, low: u64, high: u64, apart: Option<usize>, certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
+    /// The frame of the averages of all classes, or of how the members of one differ; and what velocities are multiplied by in it \[s\].
+    fn frame(&self, [low, high]: [u64; 2], apart: Option<usize>) -> Result<(FrameSpan, Named, f64), ProofError> {
         let ends = [low, high].map(|number| self.part(number, apart));
         let [first, last] = ends.each_ref().map(Vec::as_slice);
         let time = self.time(low);
         let heard = [gain(&first[0]) * nu(low), gain(&last[0]) * nu(high)];
         let points = self.corners(first.to_vec(), [first, last], heard, true, apart);
-        let common = self.common(apart, time);
         let (frame, named) = match &self.waves {
-            None => (steps(&points, &ends, common)?, Named::AtPoints(points)),
+            None => (steps(&points, &ends, self.common(apart, time))?, Named::AtPoints(points)),
             Some(waves) => self.frame_of_waves(waves, [low, high], points, &ends, apart)?.into(),
         };
+        Ok((frame, named, time))
+    }
+
+    /// The verdict on the averages of all classes, or on how the members of one differ.
+    fn decide(&self, low: u64, high: u64, apart: Option<usize>, certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
+        let (frame, named, time) = self.frame([low, high], apart)?;
         let span = match certified {
             None => frame.product(),
             Some(_) if low < high => frame.product_in_order().widened(WIDER),
@@ -386,7 +416,7 @@ impl Motion {
         if let Some(certified) = certified {
             let classes = apart.map_or(0..self.structure.classes.len(), |class| class..class + 1);
             let members = classes.map(|class| self.structure.classes[class].clone()).collect();
-            certified.push((decision.proven, named.certificate(members, apart.is_some(), common, &decision.witness)?));
+            certified.push((decision.proven, named.certificate(members, apart.is_some(), self.common(apart, time), &decision.witness)?));
         }
         Ok(Some(decision.proven))
     }

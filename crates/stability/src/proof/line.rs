@@ -1,5 +1,6 @@
 //! A line along one key: stretches of which each is proven stable or proven unstable, and between them stretches that hold every crossing.
 
+use super::certificate::uncertified;
 use super::followed::{Followed, certify};
 use super::halving::{Halved, Halving};
 use super::shared::{KnownPieces, NothingKnown};
@@ -82,5 +83,11 @@ impl ProvenLine {
     /// As [`ProvenLine::prove`], of the family that was proven, and if the watch ends it.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
         certify(family, None, self.pieces.iter().map(|ProvenStretch { low, high, .. }| vec![[*low, *high]]).collect(), watch)
+    }
+
+    /// How many pieces have a verdict of which a certificate says nothing.
+    #[must_use]
+    pub fn uncertified(&self, certificate: &[BoxCertificate]) -> usize {
+        uncertified(certificate, self.pieces.iter().filter(|piece| piece.guarantee == Guarantee::Undecided).count())
     }
 }

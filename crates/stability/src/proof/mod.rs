@@ -44,7 +44,7 @@ pub(crate) use certificate::digits;
 pub use certificate::{BoxCertificate, MomentCertificate, NumberCertificate, PartCertificate, TopologyCertificate};
 pub use discs::FreeCircle;
 pub use line::{ProvenLine, ProvenStretch};
-pub use number::{EveryNumber, MOST_FOLLOWED, NumberProof, NumberSpan, prove_every_number};
+pub use number::{EveryNumber, MOST_FOLLOWED, Nearness, NumberProof, NumberSpan, Openness, prove_every_number};
 pub use region::{MOST_HALVINGS, ProvenBox, ProvenRegion};
 pub use shared::{KnownPieces, SharedProof};
 pub use steps::FrameState;

@@ -22,13 +22,41 @@ pub struct NumberSpan {
     pub guarantee: Guarantee,
 }
 
+/// Why numbers are undecided.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Openness {
+    /// The proof was ended before it had looked at them all.
+    Ended,
+    /// Something has no limit, and they are beyond [`MOST_FOLLOWED`].
+    Beyond,
+    /// No second moment was found that shows a verdict on the first of them.
+    Moment,
+    /// A frame of the first of them has eigenvalues that are nearer to the unit circle, or to each other, than its bounds tell apart.
+    Near(Nearness),
+    /// The first of them is stable; a frame of the limit, as N grows, has such eigenvalues.
+    Limit(Nearness),
+    /// More certificates were looked for than a search may.
+    Exhausted,
+}
+
+/// How far a frame is known whose eigenvalues decide nothing.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Nearness {
+    /// The size of the largest eigenvalue of a part that is not proven stable, nearly.
+    pub radius: f64,
+    /// The largest bound of an entry of such a part; infinite if an entry or a bound is no finite number.
+    pub bound: f64,
+}
+
 /// The verdicts on all numbers of equal peers.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct EveryNumber {
     /// The first of the equal peers of which there are more and more, by its place in [`Scene::peers`].
     pub growing: usize,
     /// In order, without gaps; neighbours differ.
     pub spans: Vec<NumberSpan>,
+    /// Why each of the undecided ones among them is, in their order.
+    pub open: Vec<Openness>,
     /// What grows or vanishes without a limit as N grows, in words.
     pub without_limit: Option<String>,
     /// How many certificates were looked for.
@@ -130,8 +158,27 @@ impl NumberProof {
                 _ => spans.push(*piece),
             }
         }
+        let undecided = spans.iter().filter(|span| span.guarantee == Guarantee::Undecided);
+        let open = undecided.map(|span| self.openness(span, is_whole)).collect::<Result<_, ProofError>>()?;
         let without_limit = without_limit.clone();
-        Ok(EveryNumber { growing: growing.first, spans, without_limit, attempts, is_mean_square: self.is_mean_square, is_whole, pieces })
+        Ok(EveryNumber { growing: growing.first, spans, open, without_limit, attempts, is_mean_square: self.is_mean_square, is_whole, pieces })
+    }
+}
+
+impl NumberProof {
+    /// Why a span is undecided, of a proof that has looked at all numbers or not.
+    fn openness(&self, span: &NumberSpan, is_whole: bool) -> Result<Openness, ProofError> {
+        let nearness = |number| Ok::<_, ProofError>(self.growing.nearness(number)?.map(|[radius, bound]| Nearness { radius, bound }));
+        Ok(match self {
+            _ if !is_whole => Openness::Ended,
+            Self { without_limit: Some(_), .. } if span.from > MOST_FOLLOWED => Openness::Beyond,
+            Self { is_mean_square: true, .. } => Openness::Moment,
+            _ => match (nearness(span.from)?, span.to) {
+                (Some(near), _) => Openness::Near(near),
+                (None, None) => nearness(ENDLESS)?.map_or(Openness::Exhausted, Openness::Limit),
+                (None, Some(_)) => Openness::Exhausted,
+            },
+        })
     }
 }
 
@@ -199,6 +246,27 @@ fn piece(low: u64, high: u64, found: Option<Proven>) -> NumberSpan {
 }
 
 impl EveryNumber {
+    /// The numbers of which a certificate says nothing though they have a verdict, from where to where (`None`: without end), in order.
+    #[must_use]
+    pub fn uncertified(&self, certificate: &[NumberCertificate]) -> Vec<(u64, Option<u64>)> {
+        let last = |to: Option<u64>| to.unwrap_or(u64::MAX);
+        let mut found: Vec<(u64, Option<u64>)> = Vec::new();
+        let open = certificate.iter().filter(|span| span.guarantee == Guarantee::Undecided);
+        let decided = |open: &NumberCertificate| {
+            let (from, to) = (open.from, last(open.to));
+            let decided = self.spans.iter().filter(|span| span.guarantee != Guarantee::Undecided);
+            decided.map(move |span| (span.from.max(from), last(span.to).min(to))).filter(|(from, to)| from <= to).collect::<Vec<_>>()
+        };
+        for (from, to) in open.flat_map(decided) {
+            let to = Some(to).filter(|to| *to < u64::MAX);
+            match found.last_mut() {
+                Some(before) if before.1.is_some_and(|end| end + 1 == from) => before.1 = to,
+                _ => found.push((from, to)),
+            }
+        }
+        found
+    }
+
     /// The spans that are decided with all by which they can be checked, halved as often as that takes, and the others. Of a span beyond all limits nothing can be checked, so that it counts as undecided there. Each is decided once more.
     ///
     /// # Errors
@@ -243,5 +311,28 @@ impl EveryNumber {
             found.push(NumberCertificate { from, to, guarantee, parts: needed(proven, parts), moments: of_moments });
         }
         Ok(found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Unwatched;
+
+    /// Numbers to 9 are stable one by one, from 10 on unstable in spans that end below 1000, and from 70 on all beyond at once: no number is left out, or twice in a piece.
+    #[test]
+    fn pieces_have_no_gaps() {
+        let decide = |low: u64, high: u64, _: &mut Vec<PartPlace>| {
+            Ok(match () {
+                () if low >= 10 && high < 1000 => Some(Proven::Unstable),
+                () if low == high && low < 10 => Some(Proven::Stable),
+                () => None,
+            })
+        };
+        let Search { pieces, is_whole, .. } = search([2, MOST_FOLLOWED, 2], &Unwatched, decide, |from| Ok(from >= 70)).unwrap();
+        assert!(is_whole && pieces.iter().all(|piece| piece.guarantee != Guarantee::Undecided), "{pieces:?}");
+        assert_eq!((pieces[0].from, pieces[pieces.len() - 1].to), (2, None));
+        assert!(pieces.windows(2).all(|pair| pair[0].to.is_some_and(|end| end + 1 == pair[1].from)), "{pieces:?}");
+        assert!(pieces[pieces.len() - 1].from >= 70 && pieces[pieces.len() - 2].guarantee == Guarantee::Unstable, "{pieces:?}");
     }
 }

@@ -1,5 +1,6 @@
 //! A whole region of two keys: boxes of which each is proven stable or proven unstable, and a rest that is not decided.
 
+use super::certificate::uncertified;
 use super::followed::{Followed, certify};
 use super::halving::{Halved, Halving};
 use super::shared::{KnownPieces, NothingKnown};
@@ -82,6 +83,12 @@ impl ProvenRegion {
     /// As [`ProvenRegion::prove`], of the family that was proven, and if the watch ends it.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
         certify(family, self.every, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
+    }
+
+    /// How many boxes have a verdict of which a certificate says nothing.
+    #[must_use]
+    pub fn uncertified(&self, certificate: &[BoxCertificate]) -> usize {
+        uncertified(certificate, self.boxes.iter().filter(|one| one.guarantee == Guarantee::Undecided).count())
     }
 
     /// How many boxes without an area have that verdict: those of a single delay, such as none at all, of which no share tells.

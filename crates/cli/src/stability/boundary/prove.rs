@@ -44,12 +44,13 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
     let rows = proofs.map_or(Ok(Vec::new()), |proofs| proofs.rows(sharing))?;
     let known = Pieces::of(0, &rows, None);
     let line = ProvenLine::prove_with(&order.family, tolerance, &known, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
-    let mut files = Vec::new();
+    let (mut files, mut uncertified) = (Vec::new(), None);
     if let Some(folder) = sharing.folder() {
         std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
         files.push(write_into(folder, "proof.csv", table(order, &line))?);
         if arguments.certificate && line.is_whole {
             let pieces = line.certify(&order.family, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
+            uncertified = Some(line.uncertified(&pieces));
             let topology = TopologyCertificate::of(&order.family).map_err(|error| failure(order, arguments, error))?;
             let given = Given { title: &order.title, text: &order.text, overrides: &arguments.scene.overrides.set };
             files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], None, topology.as_ref(), &pieces)?)?);
@@ -58,7 +59,13 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
             proof_blocks::remove(folder, ROWS)?;
         }
     }
-    output::answer(arguments.scene.json, DocumentSchema::STABILITY_LINE, &answer(order, &line, &files), || describe(order, &line), &files)?;
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::STABILITY_LINE,
+        &answer(order, &line, uncertified, &files),
+        || describe(order, &line, uncertified),
+        &files,
+    )?;
     if line.is_whole { Ok(ExitCode::SUCCESS) } else { Err(guarantee::ended()) }
 }
 
@@ -68,7 +75,7 @@ fn failure(order: &Order, arguments: &BoundaryArguments, error: ProofError) -> F
 }
 
 /// The answer of `cohaptic stability boundary --prove --json`.
-fn answer(order: &Order, line: &ProvenLine, files: &[String]) -> impl Serialize {
+fn answer(order: &Order, line: &ProvenLine, uncertified: Option<usize>, files: &[String]) -> impl Serialize {
     let stretches = line.stretches.iter().map(|stretch| document! { low: stretch.low, high: stretch.high, verdict: stretch.guarantee.word() });
     document! {
         title: order.title.as_str(),
@@ -82,11 +89,14 @@ fn answer(order: &Order, line: &ProvenLine, files: &[String]) -> impl Serialize 
         certificates: line.attempts,
         // Whether the proof was ended before it had looked at all stretches.
         interrupted: !line.is_whole,
+        // How many pieces with a verdict the certificate leaves open; absent without one.
+        #[serde(flatten)]
+        certificate: uncertified.map(|uncertified| document! { uncertified: uncertified }),
         files: files,
     }
 }
 
-fn describe(order: &Order, line: &ProvenLine) -> String {
+fn describe(order: &Order, line: &ProvenLine, uncertified: Option<usize>) -> String {
     let range = &order.range;
     let mut text = format!("{}\n\n", order.title);
     for (place, ProvenStretch { low, high, guarantee }) in line.stretches.iter().enumerate() {
@@ -101,6 +111,7 @@ fn describe(order: &Order, line: &ProvenLine) -> String {
         let _ = writeln!(text, "  {words:<10} from {} to {}", range.text(*low), range.text(*high));
     }
     let _ = writeln!(text, "  {} looked at; nothing crosses anywhere else", Counted(line.attempts, "piece"));
+    text += &uncertified.map_or_else(String::new, guarantee::left_open);
     text
 }
 

@@ -29,6 +29,8 @@ struct Proof {
     overrides: Vec<String>,
     region: ProvenRegion,
     file: Option<String>,
+    /// How many boxes with a verdict its certificate leaves open, if it has one.
+    uncertified: Option<usize>,
 }
 
 /// The shares that an answer has, in this order.
@@ -73,7 +75,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
     let mut proofs = Vec::new();
     for (variant, region) in order.variants.iter().zip(regions) {
         let region = region.map_err(|error| failure(order, arguments, proofs.len(), error))?;
-        proofs.push(Proof { name: variant.name.clone(), overrides: variant.overrides.clone(), region, file: None });
+        proofs.push(Proof { name: variant.name.clone(), overrides: variant.overrides.clone(), region, file: None, uncertified: None });
     }
     let mut files = Vec::new();
     if let Some(folder) = sharing.folder() {
@@ -86,7 +88,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
         }
         files.extend(pictures(order, &proofs, folder, arguments)?);
         if arguments.certificate && proofs.iter().all(|proof| proof.region.is_whole) {
-            files.extend(certificates(order, arguments, &proofs, folder)?);
+            files.extend(certificates(order, arguments, &mut proofs, folder)?);
         }
         if proofs.iter().all(|proof| proof.region.is_whole) {
             proof_blocks::remove(folder, ROWS)?;
@@ -104,11 +106,12 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
 }
 
 /// Writes a certificate for each variant, and gives the names of the files.
-fn certificates(order: &Order, arguments: &MapArguments, proofs: &[Proof], folder: &Path) -> Result<Vec<String>, Failure> {
+fn certificates(order: &Order, arguments: &MapArguments, proofs: &mut [Proof], folder: &Path) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
     let watch = PieceWatch::new();
-    for (number, (proof, family)) in proofs.iter().zip(&order.families).enumerate() {
+    for (number, (proof, family)) in proofs.iter_mut().zip(&order.families).enumerate() {
         let boxes = proof.region.certify(family, &watch).map_err(|error| failure(order, arguments, number, error))?;
+        proof.uncertified = Some(proof.region.uncertified(&boxes));
         let overrides = order.variants[number].on_top_of(&arguments.scene.overrides.set);
         let topology = TopologyCertificate::of(family).map_err(|error| failure(order, arguments, number, error))?;
         let given = Given { title: &order.title, text: &order.text, overrides: &overrides };
@@ -150,6 +153,9 @@ fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64
             unstable_alone: both(&proof.region, Guarantee::Unstable, &proofs[0].region, Guarantee::Stable),
             #[serde(flatten)]
             file: proof.file.as_ref().map(|file| document! { file: file.as_str() }),
+            // How many boxes with a verdict the certificate leaves open; absent without one.
+            #[serde(flatten)]
+            certificate: proof.uncertified.map(|uncertified| document! { uncertified: uncertified }),
         }
     });
     document! {
@@ -201,6 +207,7 @@ fn describe(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f
             let there = percent(both(&proof.region, Guarantee::Unstable, &first.region, Guarantee::Stable));
             let _ = writeln!(text, "    stable where {} is unstable: {here} at least; unstable where it is stable: {there} at least", first.name);
         }
+        text += &proof.uncertified.map_or_else(String::new, guarantee::left_open);
     }
     let _ = writeln!(text, "  {wall_s:.1} s");
     text

@@ -68,7 +68,11 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         DocumentSchema::STABILITY_POINT,
         &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref(), switching.as_ref()),
         || answer::describe(&scene, &judgement, worst.as_ref()) + &more(),
-        every.iter().filter_map(|every| every.file.as_ref()).chain(switching.iter().filter_map(|switching| switching.file.as_ref())),
+        every
+            .iter()
+            .filter_map(|every| every.certificate.as_ref())
+            .map(|certificate| &certificate.file)
+            .chain(switching.iter().filter_map(|switching| switching.file.as_ref())),
     )?;
     if every.is_some_and(|every| !every.every.is_whole) { Err(guarantee::ended()) } else { Ok(ExitCode::SUCCESS) }
 }

@@ -184,7 +184,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             "cohaptic stability point scenarios/paper/5-1-pd-1000.toml --losses-in-a-row 1 --json",
             "cohaptic stability point scenarios/network/push-contact.toml --switching --json",
             "cohaptic stability point scenarios/counterexamples/two-fingers.toml --switching --json",
-            "cohaptic stability point scenarios/coordination/n3.toml --every-number --certificate proof.json --json",
+            "cohaptic stability point scenarios/network/rate-and-queue.toml --every-number --certificate proof.json --json",
         ],
         rows: &[
             ("title", "of the scene"),
@@ -220,13 +220,13 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ),
             ("every_number.peer", "the first of the equal peers"),
             (
-                "every_number.spans[].from, every_number.spans[].to, every_number.spans[].verdict",
-                "numbers with one verdict; `to` is `null` without end",
+                "every_number.spans[].from, every_number.spans[].to, every_number.spans[].verdict, every_number.spans[].reason",
+                "numbers with one verdict; `to` is `null` without end; why, if undecided",
             ),
             ("every_number.mean_square, every_number.without_limit", "whether in the mean square; what has no limit as N grows, or `null`"),
             (
-                "every_number.certificates, every_number.interrupted, every_number.file",
-                "how many were tried; whether numbers were left; the file of `--certificate`",
+                "every_number.certificates, every_number.interrupted, every_number.file, every_number.uncertified[].from, every_number.uncertified[].to",
+                "how many were tried; whether numbers were left; the file of `--certificate`, and which decided numbers it leaves open",
             ),
             ("notes", "what the verdict leaves out; where there are two radii, each note names its own"),
         ],
@@ -255,7 +255,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
     Document {
         command: "stability map --prove",
         lines: &[
-            "cohaptic stability map scenarios/coordination/n3.toml --set object.split-mass=false --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --prove 2 --every-number 3..4 --out proof --json",
+            "cohaptic stability map scenarios/coordination/n3.toml --set object.split-mass=false --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --prove 2 --every-number 3..4 --certificate --out proof --json",
         ],
         rows: &[
             ("title, x_key, x_unit, x_range, y_key, y_unit, y_range, files, wall_s", "as of a map"),
@@ -265,6 +265,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("regions[].stable, regions[].unstable, regions[].undecided", "shares of the area"),
             ("regions[].lines.stable, regions[].lines.unstable, regions[].lines.undecided", "boxes of a single delay, without area"),
             ("regions[].boxes, regions[].certificates, regions[].interrupted", "counts; whether boxes were left"),
+            ("regions[].uncertified", "how many decided boxes `--certificate` leaves open"),
             ("regions[].stable_alone, regions[].unstable_alone", "the share proven so here, and proven otherwise for the first"),
         ],
     },
@@ -285,11 +286,14 @@ pub(super) const DOCUMENTS: [Document; 25] = [
     },
     Document {
         command: "stability boundary --prove",
-        lines: &["cohaptic stability boundary scenarios/paper/5-1-ap-2100.toml --along coordination.stiffness=100..6000 --prove --json"],
+        lines: &[
+            "cohaptic stability boundary scenarios/paper/5-1-ap-2100.toml --along coordination.stiffness=100..6000 --prove --certificate --out proof --json",
+        ],
         rows: &[
             ("title, key, unit, low, high, files", "as of a boundary"),
             ("stretches[].low, stretches[].high, stretches[].verdict", "crossings lie in `undecided` ones"),
             ("tolerance, certificates, interrupted", "length of an undecided stretch; counts; whether stretches were left"),
+            ("uncertified", "how many decided pieces `--certificate` leaves open"),
         ],
     },
     Document {
