@@ -15,7 +15,7 @@ use crate::machine::most_memory;
 /// The option by which a program that writes a page is asked for a run of the row whose place follows, or of a small one if `small` follows.
 const OPTION: &str = "--run-of-many-peers";
 
-/// A scene of many peers, and what is asked of it.
+/// A scene of many peers, with the least speed and the most memory that are asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Large {
     /// The number of peers.

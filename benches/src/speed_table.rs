@@ -294,7 +294,7 @@ fn threads(work: Work) -> Result<(), String> {
 fn many_peers(work: Work) -> Result<(), String> {
     println!("## Many peers\n");
     println!(
-        "The mesh above and a ring, with so many peers and copies of 0.15 kg. Reading the scene, running it, and what came out of it: simulated time by the wall clock, and the most memory that the\nprocess held. The medians of {} runs, each in a process of its own.\n",
+        "The mesh above and a ring, of many peers with copies of 0.15 kg. Reading the scene, running it, and what came out of it: simulated time by the wall clock, and the most memory that the\nprocess held. The medians of {} runs, each in a process of its own.\n",
         work.rounds.min(3)
     );
     println!("| peers | hear | links | threads | simulated | times real time | asked for | memory \\[MB\\] | asked for |");

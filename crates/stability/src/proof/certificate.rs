@@ -32,7 +32,7 @@ impl BoxCertificate {
     }
 }
 
-/// How many boxes of a certificate are open, of an answer that leaves that number of boxes open: what is checked is bounded more widely.
+/// How many boxes of a certificate are open, of an answer that leaves that number of boxes open: certificates bound frames more widely.
 pub(super) fn uncertified(certificate: &[BoxCertificate], undecided: usize) -> usize {
     certificate.iter().filter(|one| one.guarantee == Guarantee::Undecided).count().saturating_sub(undecided)
 }

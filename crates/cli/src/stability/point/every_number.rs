@@ -148,7 +148,7 @@ pub(super) fn words(scene: &Scene, Proof { every, certificate }: &Proof) -> Stri
     let uncertified = certificate.iter().flat_map(|certificate| &certificate.uncertified);
     let uncertified: Vec<String> = uncertified.map(|(from, to)| numbers(*from, *to)).collect();
     if !uncertified.is_empty() {
-        let _ = writeln!(text, "  note: the certificate leaves open what is decided here: {}", uncertified.join("; "));
+        let _ = writeln!(text, "  note: the certificate leaves open numbers that are decided here: {}", uncertified.join("; "));
     }
     text
 }

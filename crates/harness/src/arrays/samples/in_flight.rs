@@ -101,7 +101,7 @@ impl<const P: usize> InFlight<P> {
         self.packets_at((due - tick, due), overtakes).push(packet);
     }
 
-    /// Where a packet goes that is due at a tick, which is that many ticks ahead.
+    /// Where a packet goes that is due at a tick, which is that number of ticks ahead.
     ///
     /// The packet itself is handed to no call: it would be put together on the stack for that, and copied from there in words wider than its parts, for which a
     /// processor waits. It took an eighth of the time of a thousand peers.

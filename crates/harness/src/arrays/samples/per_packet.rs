@@ -336,7 +336,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         }
     }
 
-    /// [`PerPacket::take_in_order`] where means are exact, and what is held is more than caches hold: some samples at once, whose memory is asked for before any
+    /// [`PerPacket::take_in_order`] where means are exact, and samples held are more than a cache has room for: some samples at once, whose memory is asked for before any
     /// of them is added to a sum. One by one took 5 % longer for a thousand peers.
     #[inline(always)]
     fn take_in_together(&mut self, bucket: &mut Bucket<P>) {

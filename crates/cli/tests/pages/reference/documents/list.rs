@@ -226,7 +226,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("every_number.mean_square, every_number.without_limit", "whether in the mean square; what has no limit as N grows, or `null`"),
             (
                 "every_number.certificates, every_number.interrupted, every_number.file, every_number.uncertified[].from, every_number.uncertified[].to",
-                "how many were tried; whether numbers were left; the file of `--certificate`, and which decided numbers it leaves open",
+                "counts; whether numbers were left; the file of `--certificate`; decided numbers without",
             ),
             ("notes", "what the verdict leaves out; where there are two radii, each note names its own"),
         ],
@@ -264,8 +264,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("regions[].name, regions[].overrides, regions[].file", "the scene, then each `--curve`"),
             ("regions[].stable, regions[].unstable, regions[].undecided", "shares of the area"),
             ("regions[].lines.stable, regions[].lines.unstable, regions[].lines.undecided", "boxes of a single delay, without area"),
-            ("regions[].boxes, regions[].certificates, regions[].interrupted", "counts; whether boxes were left"),
-            ("regions[].uncertified", "how many decided boxes `--certificate` leaves open"),
+            ("regions[].boxes, regions[].certificates, regions[].uncertified, regions[].interrupted", "counts; whether boxes were left"),
             ("regions[].stable_alone, regions[].unstable_alone", "the share proven so here, and proven otherwise for the first"),
         ],
     },
@@ -292,8 +291,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
         rows: &[
             ("title, key, unit, low, high, files", "as of a boundary"),
             ("stretches[].low, stretches[].high, stretches[].verdict", "crossings lie in `undecided` ones"),
-            ("tolerance, certificates, interrupted", "length of an undecided stretch; counts; whether stretches were left"),
-            ("uncertified", "how many decided pieces `--certificate` leaves open"),
+            ("tolerance, certificates, uncertified, interrupted", "length of an undecided stretch; counts; whether stretches were left"),
         ],
     },
     Document {
