@@ -163,6 +163,6 @@ mod tests {
         thread.note_finite(false);
         assert!(thread.all_are_finite());
         thread.exchange(&[], &mut []);
-        assert!(!thread.all_are_finite() && thread.max_discrepancy() == 1.5);
+        assert_eq!((thread.max_discrepancy(), thread.all_are_finite()), (1.5, false));
     }
 }
