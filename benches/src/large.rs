@@ -10,7 +10,7 @@ use cohaptic_benches_common::mesh::{Mesh, SEED};
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_scene::Scene;
 
-use crate::machine::most_memory;
+use crate::machine::peak_memory;
 
 /// The option by which a program that writes a page is asked for a run of the row whose place follows, or of a small one if `small` follows.
 const OPTION: &str = "--run-of-many-peers";
@@ -81,8 +81,14 @@ impl Large {
         if summary.duration != scene.duration {
             return Err(format!("{} peers diverge", self.peers));
         }
-        Ok(Run { times_real_time: scene.duration.as_secs_f64() / took.as_secs_f64(), memory: most_memory().unwrap_or_default() })
+        Ok(Run { times_real_time: scene.duration.as_secs_f64() / took.as_secs_f64(), memory: bytes(&peak_memory()).unwrap_or_default() })
     }
+}
+
+/// A number of kilobytes, as the system writes it, in bytes.
+fn bytes(kilobytes: &str) -> Option<u64> {
+    let number: u64 = kilobytes.strip_suffix(" kB")?.parse().ok()?;
+    Some(1024 * number)
 }
 
 /// The mesh for that time with these settings, whose copies have 0.15 kg whatever their number: lighter ones diverge.
@@ -139,7 +145,7 @@ pub fn rows(rounds: usize, small: bool) -> Result<Vec<(Large, Run)>, String> {
 mod tests {
     use super::*;
 
-    /// Where each hears eight neighbours, a period has so many packets.
+    /// A link leads to each peer from each of those that it hears.
     #[test]
     fn each_row_is_a_scene_of_the_size_that_it_says() {
         for row in Large::ALL.map(Large::in_small) {
@@ -149,5 +155,10 @@ mod tests {
             assert_eq!(summary.links.len(), (row.peers * heard) as u64, "{row:?}");
             assert!(row.run().is_ok_and(|run| run.times_real_time > 0.0), "{row:?}");
         }
+    }
+
+    #[test]
+    fn kilobytes_are_1024_bytes() {
+        assert_eq!([bytes("12 kB"), bytes("not told by this system")], [Some(12_288), None]);
     }
 }

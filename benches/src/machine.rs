@@ -67,13 +67,6 @@ pub fn own_memory() -> String {
     field("/proc/self/status", "RssAnon").unwrap_or_else(|| "not told by this system".into())
 }
 
-/// The most memory that this process has held \[bytes\]; `None` if this system does not tell.
-#[must_use]
-pub fn most_memory() -> Option<u64> {
-    let kilobytes: u64 = field("/proc/self/status", "VmHWM")?.strip_suffix(" kB")?.parse().ok()?;
-    Some(1024 * kilobytes)
-}
-
 /// The median processor time of each work in a number of rounds, in which all take turns: a noisy moment hits all of them, and no row of a table alone.
 #[must_use]
 pub fn medians_in_turn<T>(works: &[impl Fn() -> T], rounds: usize) -> Vec<Duration> {

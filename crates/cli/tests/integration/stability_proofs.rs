@@ -38,7 +38,7 @@ fn spans_of_numbers_change_where_single_verdicts_do() {
     assert!(text.contains("equal to peer1, proven in the mean square:\n    stable    for 2 <= N <= 9\n"), "{text}");
 }
 
-/// A number next to a change, numbers whose eigenvalue lies on the circle, numbers beyond those that are followed, and numbers in the mean square: each has a reason. What a certificate leaves open is named.
+/// Numbers whose eigenvalue lies on the circle, beyond those that are followed, near a limit on the circle, with bounds that overflow, and in the mean square: each has a reason. Numbers that a certificate leaves open are named.
 #[test]
 fn undecided_numbers_have_a_reason_and_uncertified_ones_a_note() {
     let desk = Desk::with("equal.toml", EQUAL);
@@ -55,6 +55,8 @@ fn undecided_numbers_have_a_reason_and_uncertified_ones_a_note() {
     assert_eq!(reason(&format!("{shipped}/coordination/n50.toml --every-number"), "N >= 100001"), "numbers were followed to 100000");
     let limit = reason(&format!("{shipped}/coordination/wave.toml --every-number"), "N >= 131071");
     assert!(limit.starts_with("as N grows, the largest eigenvalue of a frame, of the size 1"), "{limit}");
+    let lossy = "equal.toml --set object.mass=1 --set coordination.stiffness=5000 --set link.loss=20% --every-number 30..38";
+    assert_eq!(reason(lossy, "32 <= N <= 37"), "no second moment was found that decides N = 32");
     let queue = format!("{shipped}/network/rate-and-queue.toml --every-number 2..1100");
     assert_eq!(reason(&queue, "1075 <= N <= 1100"), "at N = 1075 the bounds of a frame are no finite numbers");
     let document = desk.json(&format!("stability point {shipped}/network/rate-and-queue.toml --every-number 30..40 --certificate queue.json --json"));
@@ -66,6 +68,30 @@ fn undecided_numbers_have_a_reason_and_uncertified_ones_a_note() {
     assert!(document["every_number"]["spans"].as_array().unwrap().iter().all(|span| span.get("reason").is_none()), "{document:#}");
     let text = desk.text(&format!("stability point {shipped}/network/rate-and-queue.toml --every-number 30..40 --certificate queue.json"));
     assert!(text.contains(&format!("note: the certificate leaves open numbers that are decided here: {first} <= N <= {last}\n")), "{text}");
+}
+
+/// Pieces of a long frame that are decided and left open by the certificate: as many as its open boxes within stretches with a verdict.
+#[test]
+fn pieces_that_a_certificate_leaves_open_are_counted() {
+    let desk = Desk::with("equal.toml", EQUAL);
+    let queue = env!("CARGO_MANIFEST_DIR").to_owned() + "/../../scenarios/network/rate-and-queue.toml";
+    let command = format!("stability boundary {queue} --along coordination.stiffness=100..6000 --prove --certificate --out out");
+    let document = desk.json(&format!("{command} --json"));
+    let certificate: serde_json::Value = serde_json::from_str(&desk.read("out/certificate.json")).unwrap();
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let decided = |at: f64| {
+        document["stretches"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|one| one["verdict"] != "undecided" && number(&one["low"]) < at && at < number(&one["high"]))
+    };
+    let is_open =
+        |one: &&serde_json::Value| one["verdict"] == "undecided" && decided(number(&one["ranges"][0][0]).midpoint(number(&one["ranges"][0][1])));
+    let open = certificate["boxes"].as_array().unwrap().iter().filter(is_open).count();
+    assert!(open > 1, "{document:#}");
+    assert_eq!(document["uncertified"], open, "{document:#}");
+    assert!(desk.text(&command).contains(&format!("note: the certificate leaves open {open} pieces of those that are decided here")), "{command}");
 }
 
 #[test]

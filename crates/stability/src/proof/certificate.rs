@@ -10,6 +10,7 @@ use cohaptic_scene::TopologyKind;
 
 use super::corners::{Common, Point, States, states};
 use super::discs::{FreeCircle, Witness};
+use super::halving::Ranges;
 use super::steps::FrameState;
 use super::{Guarantee, ProofError, Proven};
 use crate::graph::{eigenvectors, weights_of};
@@ -32,9 +33,13 @@ impl BoxCertificate {
     }
 }
 
-/// How many boxes of a certificate are open, of an answer that leaves that number of boxes open: certificates bound frames more widely.
-pub(super) fn uncertified(certificate: &[BoxCertificate], undecided: usize) -> usize {
-    certificate.iter().filter(|one| one.guarantee == Guarantee::Undecided).count().saturating_sub(undecided)
+/// How many boxes of an answer have a verdict and are open in its certificate, which bounds frames more widely. Both are in the same order; an open box of a certificate is a whole one of the answer.
+pub(super) fn uncertified(certificate: &[BoxCertificate], answer: impl Iterator<Item = (Ranges, Guarantee)>) -> usize {
+    let mut open = certificate.iter().filter(|one| one.guarantee == Guarantee::Undecided).peekable();
+    let is_open = |(ranges, guarantee): &(Ranges, Guarantee)| {
+        open.next_if(|one| one.ranges.starts_with(ranges)).is_some() && *guarantee != Guarantee::Undecided
+    };
+    answer.filter(is_open).count()
 }
 
 /// Numbers of equal peers, and the numbers by which the verdict on them can be checked.

@@ -88,6 +88,6 @@ impl ProvenLine {
     /// How many pieces have a verdict of which a certificate says nothing.
     #[must_use]
     pub fn uncertified(&self, certificate: &[BoxCertificate]) -> usize {
-        uncertified(certificate, self.pieces.iter().filter(|piece| piece.guarantee == Guarantee::Undecided).count())
+        uncertified(certificate, self.pieces.iter().map(|piece| (vec![[piece.low, piece.high]], piece.guarantee)))
     }
 }

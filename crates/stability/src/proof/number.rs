@@ -163,9 +163,7 @@ impl NumberProof {
         let without_limit = without_limit.clone();
         Ok(EveryNumber { growing: growing.first, spans, open, without_limit, attempts, is_mean_square: self.is_mean_square, is_whole, pieces })
     }
-}
 
-impl NumberProof {
     /// Why a span is undecided, of a proof that has looked at all numbers or not.
     fn openness(&self, span: &NumberSpan, is_whole: bool) -> Result<Openness, ProofError> {
         let nearness = |number| Ok::<_, ProofError>(self.growing.nearness(number)?.map(|[radius, bound]| Nearness { radius, bound }));

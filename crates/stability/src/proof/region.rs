@@ -88,7 +88,7 @@ impl ProvenRegion {
     /// How many boxes have a verdict of which a certificate says nothing.
     #[must_use]
     pub fn uncertified(&self, certificate: &[BoxCertificate]) -> usize {
-        uncertified(certificate, self.boxes.iter().filter(|one| one.guarantee == Guarantee::Undecided).count())
+        uncertified(certificate, self.boxes.iter().map(|one| (vec![one.x, one.y], one.guarantee)))
     }
 
     /// How many boxes without an area have that verdict: those of a single delay, such as none at all, of which no share tells.
