@@ -41,7 +41,8 @@ fn queues(criterion: &mut Criterion) {
             let scene = scene(peers, keys, ticks);
             group.bench_function(BenchmarkId::new(name, peers), |bencher| bencher.iter(|| Mesh::run(&scene)));
         }
-        for (name, queue) in [("bare jitter and loss", None), ("bare rate and queue", Some(Queue::OF_TABLES))] {
+        for (name, queue) in [("bare jitter and loss", None), ("bare rate and queue", Some(Queue::NEVER_FULL)), ("bare full line", Some(Queue::FULL))]
+        {
             group.bench_function(BenchmarkId::new(name, peers), |bencher| bencher.iter(|| bare::run_through(queue, mesh, ticks)));
         }
     }

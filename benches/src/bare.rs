@@ -61,8 +61,10 @@ pub struct Queue {
 }
 
 impl Queue {
-    /// 64 bytes at 10 Mbit/s, up to 100 of them.
-    pub const OF_TABLES: Self = Self { service: 51_200, limit: 100 };
+    /// 64 bytes at 10 Mbit/s, up to 100 of them: none waits that comes every 8 ms.
+    pub const NEVER_FULL: Self = Self { service: 51_200, limit: 100 };
+    /// 64 bytes at 60 kbit/s, up to 8 of them.
+    pub const FULL: Self = Self { service: 8_533_334, limit: 8 };
 }
 
 /// Coefficients of the motion of a free damped mass over a tick, from the closed form.

@@ -29,12 +29,17 @@ pub use cohaptic_benches_common::mesh::Mesh;
 pub const COPY_DAMPING: f64 = 0.0;
 
 /// Links by name: their keys beside a delay of 24 ms.
-pub const LINKS: [(&str, &str); 6] = [
+pub const LINKS: [(&str, &str); 8] = [
     ("constant", ""),
     ("jitter and loss", Mesh::IMPAIRMENTS),
     ("rate and queue", "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"10Mbit\"\nqueue = { limit = \"100 packets\" }"),
+    ("full line", "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"60kbit\"\nqueue = { limit = \"8 packets\" }"),
     ("chains", "jitter = { sd = \"2ms\", distribution = \"gamma\", correlation = 0.5 }\nloss = { gilbert-elliott = { p = 0.01, r = 0.3 } }"),
     ("CoDel", "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"10Mbit\"\nqueue = { limit = \"100 packets\", discipline = \"codel\" }"),
+    (
+        "full line, CoDel",
+        "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"60kbit\"\nqueue = { limit = \"100 packets\", discipline = { codel = { mtu = \"100B\" } } }",
+    ),
     ("token bucket", "jitter = \"2ms\"\nloss = \"1%\"\ntoken-bucket = { rate = \"10Mbit\", burst = \"3kB\", limit = \"100 packets\" }"),
 ];
 
@@ -66,11 +71,11 @@ mod tests {
         }
     }
 
-    /// The queue of the tables, in which nobody waits, and one that is full most of the time: 64 bytes take 10.24 ms, and come every 8 ms.
+    /// The queues of the tables, in which nobody waits, and which is full most of the time.
     #[test]
     fn the_bare_queue_and_that_of_the_program_agree() {
         for mesh in Mesh::ALL.into_iter().filter(|mesh| mesh.impaired) {
-            for (queue, rate) in [(bare::Queue::OF_TABLES, "10Mbit"), (bare::Queue { service: 10_240_000, limit: 2 }, "50kbit")] {
+            for (queue, rate) in [(bare::Queue::NEVER_FULL, "10Mbit"), (bare::Queue::FULL, "60kbit")] {
                 let keys = format!("{}\nrate = \"{rate}\"\nqueue = {{ limit = \"{} packets\" }}", Mesh::IMPAIRMENTS, queue.limit);
                 compare(mesh, &bare::run_through(Some(queue), mesh, 1000), &mesh.scene_over(&keys, 1000, SEED));
             }

@@ -12,7 +12,7 @@ use cohaptic_benches::large::{self, Large, heavy_mesh};
 use cohaptic_benches::machine::{medians_in_turn, own_memory, peak_memory, time};
 use cohaptic_benches::records;
 use cohaptic_benches::scaling::{THREADS, Window};
-use cohaptic_benches::watched::{Onlooker, Plotter, WithEvents, with_all_measures};
+use cohaptic_benches::watched::{Onlooker, Plotter, WithEvents, checked, with_all_measures, with_expectations};
 use cohaptic_benches::{LINKS, Mesh, bare};
 use cohaptic_harness::measures::Measures;
 use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side};
@@ -117,19 +117,19 @@ fn one_run(work: Work) {
 }
 
 /// How many times as long a packet may take over such links as over those with jitter and loss.
-const ASKED_OF_LINKS: [(&str, f64); 3] = [("rate and queue", 1.6), ("chains", 1.2), ("CoDel", 4.0)];
+const ASKED_OF_LINKS: [(&str, f64); 5] = [("rate and queue", 1.6), ("full line", 1.6), ("chains", 1.2), ("CoDel", 4.0), ("full line, CoDel", 4.0)];
 
 /// Links that have queues or memory, beside links without, in the program and, as far as they have one, in the bare loop.
 fn queues(work: Work) {
     println!("## Queues and chains\n");
     println!(
-        "The mesh above with jitter and loss, and over links that have a line of 10 Mbit/s with a queue of 100 packets besides, dropped from its tail (*rate and queue*) or by"
+        "The mesh above with jitter and loss, and over links that have a line besides, with a queue of packets that are dropped from its tail (*rate and queue*: 10 Mbit/s, 100 packets) or by CoDel, or"
     );
     println!(
-        "CoDel, or gamma jitter with a correlation of 0.5 and Gilbert-Elliott loss (*chains*). Figures are processor time a packet offered, and its multiple of jitter and loss. The"
+        "gamma jitter with a correlation of 0.5 and Gilbert-Elliott loss (*chains*). No sample waits for 10 Mbit/s, which the program knows beforehand; a *full line* has 60 kbit/s for 64, and a queue of 8 packets, or of 100 with CoDel."
     );
     println!(
-        "bare loop of the first two is the one above, with Lindley's recursion over departures for the queue. The median of {} rounds in which all alternate.\n",
+        "Figures are processor time a packet offered, and its multiple of jitter and loss. The bare loop is the one above, with Lindley's recursion over departures for the queue. The median of {} rounds in which all alternate.\n",
         work.rounds
     );
     println!("| peers | links | a packet \\[ns\\] | of jitter and loss | asked for | bare loop \\[ns\\] | ratio |");
@@ -143,7 +143,7 @@ fn queues(work: Work) {
         let scenes: Vec<Scene> = rows.clone().map(|(name, _)| mesh.scene_over(keys(name), ticks, 1)).collect();
         let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
         works.extend(scenes.iter().map(|scene| Box::new(move || drop(black_box(Mesh::run(scene)))) as Box<dyn Fn()>));
-        for queue in [None, Some(Queue::OF_TABLES)] {
+        for queue in [None, Some(Queue::NEVER_FULL), Some(Queue::FULL)] {
             works.push(Box::new(move || drop(black_box(bare::run_through(queue, mesh, ticks)))));
         }
         let nanos: Vec<f64> = medians_in_turn(&works, work.rounds).iter().map(|time| 1e9 * time.as_secs_f64() / packets).collect();
@@ -218,33 +218,35 @@ fn many_runs(work: Work) {
     println!();
 }
 
-/// How many times as long a run may take of which positions are plotted as one that nobody watches.
-const ASKED_OF_PLOTS: f64 = 1.3;
+/// How many times as long a run may take of which positions are plotted or checked as one that nobody watches.
+const ASKED_OF_WATCHED: f64 = 1.3;
 
 /// Runs of which only ticks are looked at.
 fn watched_runs(work: Work) {
     println!("## Watched runs\n");
     println!(
-        "The mesh above, of which nobody sees anything, positions are plotted as in a terminal, or an observer sees each row of each tick and keeps nothing. The median of\n{} rounds in which all of them alternate.\n",
+        "The mesh above, of which nobody sees anything, positions are plotted as in a terminal, a discrepancy, a position and a time of travel are checked, or an observer sees each row of each tick and\nkeeps nothing. The median of {} rounds in which all of them alternate.\n",
         work.rounds
     );
-    println!("| peers | links | unwatched | plotted | times as long | asked for | each row | times as long |");
-    println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |");
+    println!("| peers | links | unwatched | plotted | times as long | checked | times as long | asked for | each row | times as long |");
+    println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     let seconds = |mesh: Mesh| (work.seconds(mesh) / 4).max(1);
-    let scenes = Mesh::ALL.map(|mesh| mesh.scene(seconds(mesh) * 1000, 1));
+    let scenes = Mesh::ALL.map(|mesh| with_expectations(mesh.scene(seconds(mesh) * 1000, 1)));
     let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
     for scene in &scenes {
         works.push(Box::new(|| drop(black_box(Mesh::run(scene)))));
         works.push(Box::new(|| drop(black_box(Simulation::new(scene, Model::Least).run(&mut Plotter::new(scene))))));
+        works.push(Box::new(|| checked(scene)));
         works.push(Box::new(|| drop(black_box(Simulation::new(scene, Model::Least).run(&mut { Onlooker::OF_TICKS })))));
     }
     let times = medians_in_turn(&works, work.rounds);
-    for (mesh, times) in Mesh::ALL.into_iter().zip(times.chunks(3)) {
-        let [unwatched, plotted, seen] = [0, 1, 2].map(|run: usize| seconds(mesh) as f64 / times[run].as_secs_f64());
+    for (mesh, times) in Mesh::ALL.into_iter().zip(times.chunks(4)) {
+        let [unwatched, plotted, checked, seen] = [0, 1, 2, 3].map(|run: usize| seconds(mesh) as f64 / times[run].as_secs_f64());
         let (peers, links) = (mesh.peers, mesh.links());
         println!(
-            "| {peers} | {links} | {unwatched:.0}× | {plotted:.0}× | {:.2} | {ASKED_OF_PLOTS} | {seen:.0}× | {:.2} |",
+            "| {peers} | {links} | {unwatched:.0}× | {plotted:.0}× | {:.2} | {checked:.0}× | {:.2} | {ASKED_OF_WATCHED} | {seen:.0}× | {:.2} |",
             unwatched / plotted,
+            unwatched / checked,
             unwatched / seen
         );
     }

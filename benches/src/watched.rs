@@ -3,9 +3,11 @@
 use std::convert::Infallible;
 use std::hint::black_box;
 
+use cohaptic_harness::check::check;
 use cohaptic_harness::record::Bands;
-use cohaptic_harness::{Observer, TickRow, Ticks};
-use cohaptic_scene::{MeasureName, MeasureSettings, MeasureSpec, Scene};
+use cohaptic_harness::{Model, Observer, TickRow, Ticks};
+use cohaptic_scene::{Bounds, Expect, ExpectPosition, ExpectTravel, MeasureName, MeasureSettings, MeasureSpec, Scene};
+use cohaptic_units::Instant;
 
 /// Sees every row of every tick and keeps nothing.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +80,29 @@ impl Observer for WithEvents {
     fn wants_holds(&self) -> bool {
         true
     }
+}
+
+/// The scene with expectations that hold: how far apart copies are, where that of the first peer is at the end, and when it has moved a centimetre.
+#[must_use]
+pub fn with_expectations(scene: Scene) -> Scene {
+    let (end, any) = (Instant::ZERO.saturating_add(scene.duration), Bounds { min: None, max: Some(1e9) });
+    let expect = Expect {
+        discrepancy: Some(any),
+        positions: vec![ExpectPosition { peer: 0, axis: 0, at: end, bounds: any }],
+        travel: vec![ExpectTravel { peer: 0, axis: 0, distance: 0.01, bounds: any }],
+        ..Expect::default()
+    };
+    Scene { expect: Some(expect), ..scene }
+}
+
+/// Checks the expectations of a scene, as `cohaptic check` does.
+///
+/// # Panics
+///
+/// If one does not hold.
+pub fn checked(scene: &Scene) {
+    let failures = check(scene, Model::Least, || true);
+    assert!(failures.is_empty(), "{failures:?}");
 }
 
 /// The scene with every measure.

@@ -94,7 +94,7 @@ pub use stages::order::Order;
 pub use stages::outage::{IdleOutages, Outage, Outages, OutagesError, RandomOutages};
 pub use stages::path_trace::{Between, PathTrace, PathTraceError};
 pub use stages::queue::{
-    Bottleneck, Cells, CoDel, DeliveryTrace, DeliveryTraceError, Discipline, Framing, MAHIMAHI_BYTES, Peak, QueueLimit, Red, RedError, Service,
+    Bottleneck, Cells, CoDel, DeliveryTrace, DeliveryTraceError, Discipline, Framing, Load, MAHIMAHI_BYTES, Peak, QueueLimit, Red, RedError, Service,
     TokenBucket,
 };
 pub use stages::reorder::{Displacement, Reorder};

@@ -6,6 +6,7 @@ mod bystander;
 mod changes;
 mod clocks;
 mod models;
+mod queues;
 mod threads;
 mod topologies;
 mod turning_arrays;

@@ -7,8 +7,9 @@ use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Clock, Coordination, EXACT_FROM, Integrator};
 use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
+use cohaptic_units::print::Span;
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{DirectLinks, LinkModel, MOST_NODES, SteppedLinks};
+use cohaptic_wan::{DirectLinks, LinkConfig, LinkModel, Load, MOST_NODES, SteppedLinks};
 
 use super::{nanos, threads};
 use crate::plan::{Plan, Ticking};
@@ -31,10 +32,12 @@ pub(crate) struct Shape {
     pub(super) send_every: u64,
     /// The tick at which each peer sends first.
     pub(super) phases: Vec<u64>,
-    /// The size of a sample.
-    pub(super) size: Bytes,
+    /// The samples that a link is offered.
+    pub(super) load: Load,
     /// How the fates of packets become known.
     pub(super) way: Way,
+    /// Whether the timeline changes links.
+    pub(super) links_change: bool,
     /// The delay of all links, if they do nothing but delay, all alike, and lead from all to all.
     pub(super) delay: Option<Duration>,
     /// The neighbours of each peer, if they are not all others.
@@ -84,6 +87,24 @@ impl Shape {
         self.clocks.is_some()
     }
 
+    /// How the queues of these links are simulated, and why; `None` if no link has one.
+    pub(crate) fn queues(&self, links: &[(&LinkModel, u64)]) -> Option<(&'static str, String)> {
+        let have_queues = |config: &LinkConfig| config.bottleneck.is_some() || config.token_bucket.is_some();
+        let mut configs = links.iter().filter_map(|(link, _)| link.as_fixed()).filter(|config| have_queues(config)).peekable();
+        configs.peek()?;
+        let apart = || format!("samples of a link come at least {} apart", Span(self.load.gap));
+        Some(match self.way {
+            Way::Direct if configs.all(|config| !config.makes_wait(self.load)) => {
+                ("none: no sample waits", format!("{}, and each has left by then", apart()))
+            }
+            Way::Direct => {
+                ("when the sample before left the line", "samples have one size, and the newest is dropped where there is no room".to_owned())
+            }
+            Way::Stepped => ("from one sample of a link to its next", format!("{}: until then nothing new can be known", apart())),
+            Way::Carried => ("as time goes", "access lines, limits and replays look at packets on the way".to_owned()),
+        })
+    }
+
     /// How many threads pay for a run at most, and why no more.
     pub(crate) fn threads(&self) -> (usize, &'static str) {
         threads::that_pay(self)
@@ -120,14 +141,13 @@ impl Shape {
         let law = strategies.law(scene, 0).ok_or("the strategy is not a law of the registry")?;
         let clock = scene.peers[0].clock;
         let tick_together = plan.ticking == Ticking::Lockstep;
-        let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
-        let size = Bytes::new(kind.datagram_len(scene.axes.count()) as u64);
+        let load = load(scene);
         let links = scene.used_links();
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
-        let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, size));
+        let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, load));
         let lines = || scene.peers.iter().flat_map(|peer| [&peer.uplink, &peer.downlink]).flatten();
         let has_lines = lines().next().is_some();
-        let delay = one_delay(scene).filter(|_| !links_change && !has_lines);
+        let delay = one_delay(scene, load).filter(|_| !links_change && !has_lines);
         let is_stepped = links.iter().all(|(link, _)| SteppedLinks::takes(link)) && models_to_come(scene).all(SteppedLinks::takes);
         let way = match (are_direct, is_stepped && !has_lines) {
             (true, true) => Way::Direct,
@@ -136,7 +156,6 @@ impl Shape {
         };
         let has_past = |law: BuiltIn| Law::<f64>::lag(&law) > 0 || Law::<f64>::memory(&law) > 0;
         let may_have_past = || has_past(law) || !scene.timeline.is_empty() && scene.laws_in_time(0).any(has_past);
-        let sends_by_difference = |change: &Change| matches!(change.what, ChangeKind::SendWhen(_));
         // Of strategies that are not the scene's own nobody knows the law after a change.
         let changes_law = |change: &Change| matches!(change.what, ChangeKind::Coordination(_) | ChangeKind::Parameters(_));
         let clocks = || scene.peers.iter().map(|peer| &peer.clock);
@@ -148,7 +167,7 @@ impl Shape {
             (links.iter().all(|(link, _)| !link.may_damage()), "a link damages packets"),
             (lines().all(|line| !line.may_damage()), "an access line damages packets"),
             (models_to_come(scene).all(|link| !link.may_damage()), "the timeline makes a link damage packets"),
-            (scene.coordination.send_when.is_none() && !scene.timeline.iter().any(sends_by_difference), "there are dead bands"),
+            (!sends_by_difference(scene), "there are dead bands"),
             (!scene.has_gains_by_peer(), "the gains follow the weight that a peer hears, so they differ from peer to peer"),
             (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
             (scene.rotation.is_none() || scene.peers.len() <= EXACT_FROM, "more than 256 peers turn, and their mean is an exact sum"),
@@ -175,14 +194,20 @@ impl Shape {
             end: Instant::ZERO.saturating_add(scene.duration),
             send_every: scene.samples_every(0),
             phases: scene.peers.iter().map(|peer| peer.phase).collect(),
-            size,
+            load,
             way,
+            links_change,
             delay,
             topology: scene.topology.clone(),
             clocks: (!tick_together).then(|| clocks().copied().collect()),
         };
         Ok((shape, law))
     }
+}
+
+/// Whether some samples are sent only when something has changed.
+fn sends_by_difference(scene: &Scene) -> bool {
+    scene.coordination.send_when.is_some() || scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::SendWhen(_)))
 }
 
 /// The links that the timeline makes.
@@ -200,12 +225,20 @@ fn models_to_come(scene: &Scene) -> impl Iterator<Item = &LinkModel> {
     })
 }
 
-/// The delay of all links, if they have one and nothing else, and lead from all to all.
-fn one_delay(scene: &Scene) -> Option<Duration> {
+/// The samples that each link of a scene is offered, unless they came over an access line.
+fn load(scene: &Scene) -> Load {
+    let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
+    let ticks = |peer: usize| u32::try_from(scene.samples_every(peer)).unwrap_or(u32::MAX);
+    let gaps = scene.peers.iter().enumerate().map(|(peer, spec)| spec.clock.spans().0.saturating_mul(ticks(peer)));
+    Load { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), gap: gaps.min().unwrap_or(Duration::ZERO) }
+}
+
+/// The delay of all links for the samples of a scene, if they do nothing else, and lead from all to all.
+fn one_delay(scene: &Scene, load: Load) -> Option<Duration> {
     if scene.topology.is_some() {
         return None;
     }
-    let mut delays = scene.links.used().map(|(link, _)| link.is_constant_delay().then(|| LinkModel::mean_delay(link)));
+    let mut delays = scene.links.used().map(|(link, _)| link.constant_delay_of(load));
     let first = delays.next()??;
     (first <= LONGEST && delays.all(|delay| delay == Some(first))).then_some(first)
 }

@@ -92,7 +92,8 @@ pub fn explain(scene: &Scene) -> Explanation {
     rows.peers(scene, &plan);
     rows.coordination(scene);
     rows.turns(scene);
-    rows.network(scene);
+    let shape = Shape::of(scene, &plan, &FromScene);
+    rows.network(scene, shape.as_ref().is_ok_and(|(shape, _)| watch.is_of_ticks() && shape.is_broadcast()));
     if let Some(measure) = &scene.measure {
         let count = Counted(measure.names.len(), "number");
         let why = if watch.is_of_ticks() {
@@ -102,7 +103,7 @@ pub fn explain(scene: &Scene) -> Explanation {
         };
         rows.model("measures", format!("{count}, computed tick by tick"), why);
     }
-    let arrays = match Shape::of(scene, &plan, &FromScene) {
+    let arrays = match shape {
         Err(why) => {
             rows.leave_out(format!("arrays: {why}; the run has events"));
             None
@@ -114,7 +115,7 @@ pub fn explain(scene: &Scene) -> Explanation {
         Some(shape) => {
             let nanos = if shape.has_windows() { IN_WINDOWS } else { IN_ARRAYS };
             if shape.is_broadcast() {
-                nanos
+                Nanos { an_impaired_packet: nanos.a_packet, ..nanos }
             } else if shape.is_carried() {
                 Nanos { a_packet: WITH_EVENTS.a_packet, an_impaired_packet: WITH_EVENTS.an_impaired_packet, ..nanos }
             } else {
@@ -133,6 +134,9 @@ pub fn explain(scene: &Scene) -> Explanation {
             format!("in arrays: binary64 in eight lanes, {peers}"),
             format!("{ticks}, and no line damages packets; a run that is recorded has events, since packets are recorded"),
         );
+        if let Some((queues, why)) = shape.queues(&used_links(scene)) {
+            rows.model("queues of such a run", queues, why);
+        }
         let (threads, why) = shape.threads();
         rows.model("threads of such a run, if nobody watches", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
     }
@@ -310,7 +314,7 @@ impl Rows {
         self.model("topology", model, "[topology]: links and samples held are those of neighbours, and no others");
     }
 
-    fn network(&mut self, scene: &Scene) {
+    fn network(&mut self, scene: &Scene, is_broadcast: bool) {
         self.topology(scene);
         let used = used_links(scene);
         for (config, count) in &used {
@@ -323,7 +327,7 @@ impl Rows {
         }
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
         let one_delay = scene.topology.is_none() && used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
-        if one_delay && !links_change && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
+        if is_broadcast || one_delay && !links_change && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
             self.model("packets on the way", "a ring", "all delays are equal, so packets arrive in the order in which they were sent");
             self.leave_out("sorting of arrivals");
         } else {

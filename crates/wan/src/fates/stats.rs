@@ -2,6 +2,8 @@
 
 use core::time::Duration;
 
+use cohaptic_units::Instant;
+
 use crate::fates::fate::DropCause;
 
 /// What one link did so far. At every instant `offered + duplicated = delivered + dropped + in flight`.
@@ -17,6 +19,29 @@ pub(crate) struct Flow {
     pub(crate) offered: u64,
     pub(crate) delivered: u64,
     pub(crate) delay_nanos: u128,
+}
+
+impl Flow {
+    /// Counts a packet that comes out of the far end after it has entered at `entered`.
+    #[inline(always)]
+    pub(crate) fn deliver(&mut self, entered: Instant, at: Instant) {
+        self.delivered += 1;
+        self.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
+    }
+
+    /// [`Flow::deliver`], if it comes out by `until`.
+    #[inline(always)]
+    pub(crate) fn deliver_by(&mut self, until: Instant, entered: Instant, at: Instant) {
+        if at <= until {
+            self.deliver(entered, at);
+        }
+    }
+
+    /// Takes back that such a packet came out.
+    pub(crate) fn forget(&mut self, entered: Instant, at: Instant) {
+        self.delivered -= 1;
+        self.delay_nanos -= u128::from(at.as_nanos() - entered.as_nanos());
+    }
 }
 
 /// The counts of some packets.

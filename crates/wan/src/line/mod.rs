@@ -155,22 +155,13 @@ impl<P, T: Clone> Line<P, T> {
     /// Counts a packet that comes out of the far end after it has entered at `entered`.
     #[inline(always)]
     pub(crate) fn deliver(&mut self, entered: Instant, at: Instant) {
-        self.flow.delivered += 1;
-        self.flow.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
+        self.flow.deliver(entered, at);
     }
 
-    /// [`Line::deliver`], if it comes out by `until`.
+    /// The counters of every packet, for an owner that knows when packets come out.
     #[inline(always)]
-    pub(crate) fn deliver_by(&mut self, until: Instant, entered: Instant, at: Instant) {
-        if at <= until {
-            self.deliver(entered, at);
-        }
-    }
-
-    /// Takes back that such a packet came out.
-    pub(crate) fn forget(&mut self, entered: Instant, at: Instant) {
-        self.flow.delivered -= 1;
-        self.flow.delay_nanos -= u128::from(at.as_nanos() - entered.as_nanos());
+    pub(crate) const fn flow(&mut self) -> &mut Flow {
+        &mut self.flow
     }
 
     /// Whether packets may enter an engine, which must be woken.

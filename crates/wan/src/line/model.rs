@@ -16,6 +16,7 @@ use crate::parameters::{Form, Key, NONE, Table, required, usual};
 use crate::stages::config::LINK_PARAMETERS;
 use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::modulation::Modulated;
+use crate::stages::queue::Load;
 
 /// What a link is: one configuration, several in turn, a recording, or Linux's netem to the bit.
 #[derive(Clone, PartialEq, Debug)]
@@ -115,6 +116,12 @@ impl LinkModel {
     #[must_use]
     pub fn is_constant_delay(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_constant_delay)
+    }
+
+    /// The span by which the link delays every packet of that load, if that is all that it does: see [`LinkConfig::constant_delay_of`].
+    #[must_use]
+    pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
+        self.as_fixed()?.constant_delay_of(load)
     }
 
     /// The mean propagation delay asked for, of all states alike; zero where only a recording knows.

@@ -3,6 +3,8 @@
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::time::Duration;
+
 use cohaptic_units::Bytes;
 use cohaptic_units::print::{Counted, Span};
 use core::fmt;
@@ -17,7 +19,7 @@ use crate::stages::loss::Loss;
 use crate::stages::order::Order;
 use crate::stages::outage::Outages;
 use crate::stages::path_trace::PathTrace;
-use crate::stages::queue::{Bottleneck, Discipline, TokenBucket};
+use crate::stages::queue::{Bottleneck, Discipline, Load, TokenBucket};
 use crate::stages::queue::{bottleneck, token_bucket};
 use crate::stages::reorder::Reorder;
 use crate::stages::slots::Slots;
@@ -123,9 +125,32 @@ impl LinkConfig {
         *self == Self { layout, outages, loss, delay, order, ..Self::default() }
     }
 
-    /// Whether it is [direct](LinkConfig::is_direct) without its bottleneck.
-    pub(crate) fn is_direct_but_for_queue(&self) -> bool {
-        Self { bottleneck: None, ..self.clone() }.is_direct()
+    /// Without its bottleneck, and without a token bucket that no packet of that load waits for.
+    fn without_queues(&self, load: Load) -> Self {
+        // Behind jitter packets come closer together than they were offered.
+        let keeps_gaps = self.layout == Layout::Physical || self.delay.jitter().is_none();
+        let token_bucket = self.token_bucket.filter(|bucket| !(keeps_gaps && bucket.lets_all_pass(load)));
+        Self { bottleneck: None, token_bucket, ..self.clone() }
+    }
+
+    /// Whether it is [direct](LinkConfig::is_direct) under that load without its bottleneck.
+    pub(crate) fn is_direct_but_for_queue(&self, load: Load) -> bool {
+        self.without_queues(load).is_direct()
+    }
+
+    /// Whether a packet of that load may wait for a line or for tokens.
+    #[must_use]
+    pub fn makes_wait(&self, load: Load) -> bool {
+        let waits_for_line =
+            self.bottleneck.as_ref().is_some_and(|bottleneck| self.layout == Layout::Netem || bottleneck.time_without_wait(load).is_none());
+        waits_for_line || self.without_queues(load).token_bucket.is_some()
+    }
+
+    /// The span by which it delays every packet of that load, if that is all that it does: the time on a line, if it has one for which none waits, and the delay.
+    #[must_use]
+    pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
+        let line = self.bottleneck.as_ref().map_or(Some(Duration::ZERO), |bottleneck| bottleneck.time_without_wait(load))?;
+        self.without_queues(load).is_constant_delay().then(|| line.saturating_add(self.delay.mean()))
     }
 }
 

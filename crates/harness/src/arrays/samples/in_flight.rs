@@ -4,21 +4,21 @@ use std::collections::BTreeMap;
 
 use cohaptic_units::Instant;
 
-/// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
-const HORIZON: u64 = 256;
+/// Ticks ahead that lie in the wheel: a second, for a satellite and a queue. What arrives later than that is kept aside, which takes more than twice as long.
+const HORIZON: u64 = 1024;
 
 /// Where the samples of a tick lie in the wheel: those in order, and next to them those that overtake.
 #[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "a remainder by a small number")]
 fn slot(tick: u64) -> usize {
-    // The lower byte: the remainder by HORIZON.
-    2 * usize::from(tick.to_le_bytes()[0])
+    2 * (tick % HORIZON) as usize
 }
 
 /// The samples in flight, by the tick at which they are in force.
 #[derive(Clone, Debug)]
 pub(super) struct InFlight<const P: usize> {
     ticks: Ticks,
-    wheel: Box<[Vec<Packet<P>>; 512]>,
+    wheel: Box<[Vec<Packet<P>>; 2 * HORIZON as usize]>,
     beyond: BTreeMap<u64, Bucket<P>>,
     /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
     emptied: Vec<Vec<Packet<P>>>,
@@ -121,7 +121,11 @@ impl<const P: usize> InFlight<P> {
     #[cold]
     fn packets_beyond(&mut self, due: u64, overtakes: bool) -> &mut Vec<Packet<P>> {
         let Bucket { in_order, overtaking } = self.beyond.entry(due).or_default();
-        if overtakes { overtaking } else { in_order }
+        let packets = if overtakes { overtaking } else { in_order };
+        if packets.capacity() == 0 {
+            *packets = self.emptied.pop().unwrap_or_default();
+        }
+        packets
     }
 
     /// All of them, in no order.
@@ -172,7 +176,10 @@ impl<const P: usize> InFlight<P> {
         if let Some(bucket) = self.beyond.remove(&tick) {
             for (mut packets, slot) in [bucket.in_order, bucket.overtaking].into_iter().zip(slot(tick)..) {
                 packets.append(&mut self.wheel[slot]);
-                self.wheel[slot] = packets;
+                let emptied = std::mem::replace(&mut self.wheel[slot], packets);
+                if emptied.capacity() > 0 {
+                    self.emptied.push(emptied);
+                }
             }
         }
     }
@@ -181,6 +188,31 @@ impl<const P: usize> InFlight<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Samples that are on the way for longer than the wheel is wide, and some that are not: memory is used again, and does not grow with time.
+    #[test]
+    fn late_samples_take_the_memory_of_earlier_ones() {
+        let mut in_flight = InFlight::<1>::new(1);
+        let packet =
+            |arrival: u64| Packet { arrival: Instant::from_nanos(arrival), sequence: 0, place: 0, receiver: 0, position: [0.0], velocity: [0.0] };
+        let mut most = 0;
+        for tick in 0..10_000 {
+            let now = (tick, Instant::from_nanos(tick));
+            for (delay, overtakes) in [(1700, false), (1700, true), (1900, tick % 3 == 0), (7, false)] {
+                in_flight.push(now, packet(tick + delay), overtakes);
+            }
+            if let Some(bucket) = in_flight.due(tick) {
+                assert!(bucket.in_order.iter().chain(&bucket.overtaking).all(|packet| packet.arrival == now.1));
+                in_flight.reuse(bucket);
+            }
+            let lists = in_flight.wheel.iter().chain(in_flight.beyond.values().flat_map(|bucket| [&bucket.in_order, &bucket.overtaking]));
+            let memory = lists.chain(&in_flight.emptied).filter(|packets| packets.capacity() > 0).count();
+            most = most.max(memory);
+        }
+        // Two for each tick ahead up to the latest arrival.
+        assert!(most <= 2 * 1901, "{most} lists");
+        assert_eq!(in_flight.iter().count(), 2 * 1700 + 1900 + 7);
+    }
 
     /// At every edge: of a tick, of the range in which the reciprocal is exact, of the range of ticks that have one.
     #[test]

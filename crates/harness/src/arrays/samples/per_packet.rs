@@ -58,12 +58,12 @@ pub(in crate::arrays) struct PerPacket<const P: usize, const L: usize> {
     stale: Vec<u64>,
 }
 
-/// The links, with what all samples have in common if links ask.
+/// The links.
 #[derive(Clone, Debug)]
 enum Links<const P: usize> {
     Direct(DirectLinks),
     /// They are told when each sender sends next.
-    Stepped(SteppedLinks<Packet<P>>, PacketInfo),
+    Stepped(SteppedLinks<State<P>>),
     /// They are part of a network, which is asked at each tick.
     Carried(Carrier<P>),
 }
@@ -72,10 +72,11 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// The receivers hold the initial states of the others, and nothing is on the way.
     pub(in crate::arrays) fn new(scenes: &[&Scene], initial: &[Sample<P, L>], shape: &Shape, receivers: Range<usize>) -> Self {
         let peers = scenes[0].peers.len();
-        let info = PacketInfo { size: shape.size, ecn_capable: true };
+        let info = PacketInfo { size: shape.load.size, ecn_capable: true };
         let mut links = match shape.way {
-            Way::Direct => Links::Direct(DirectLinks::new(shape.end, shape.size)),
-            Way::Stepped => Links::Stepped(SteppedLinks::new(shape.end), info),
+            Way::Direct => Links::Direct(DirectLinks::new(shape.end, shape.load)),
+            Way::Stepped if shape.links_change => Links::Stepped(SteppedLinks::that_change(shape.end, info)),
+            Way::Stepped => Links::Stepped(SteppedLinks::new(shape.end, info)),
             Way::Carried => Links::Carried(Carrier::new(scenes, info)),
         };
         let rows = Rows::new(peers, shape.topology.as_ref(), receivers.clone());
@@ -88,7 +89,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 let model: &LinkModel = scene.links.between(from, to);
                 match &mut links {
                     Links::Direct(links) => assert!(links.add(scene.seed, &name, model), "the shape of a scene says that its links are direct"),
-                    Links::Stepped(links, _) => links.add(scene.seed, &name, model.clone()),
+                    Links::Stepped(links) => links.add(scene.seed, &name, model),
                     Links::Carried(_) => {}
                 }
             }
@@ -139,7 +140,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         let Rows::All { peers, .. } = self.rows else {
             return self.send_to_neighbours((tick, now), senders, sent, next);
         };
-        let Self { receivers, links, sends, in_flight, .. } = self;
+        let Self { rows, receivers, links, sends, in_flight, .. } = self;
         match links {
             Links::Direct(links) => {
                 sends.fill(false);
@@ -155,14 +156,15 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 }
             }
             Links::Carried(carrier) => carrier.send(now, senders, sent),
-            Links::Stepped(links, info) => {
-                let row = peers * L;
+            Links::Stepped(links) => {
                 for ((receiver, peer), sender) in receivers.clone().enumerate().flat_map(|to| senders.iter().map(move |from| (to, *from))) {
-                    for place in (sender * L..(sender + 1) * L).filter(|_| sender != peer) {
-                        let link = LinkId::new(receiver * row + place);
-                        let packet = packet(peers, (receiver, peer), place, sent, now, links.offered(link));
-                        links.offer((now, next(sender)), link, *info, packet, |arrival, overtakes, packet| {
-                            in_flight.push((tick, now), Packet { arrival, ..packet }, overtakes);
+                    if sender == peer {
+                        continue;
+                    }
+                    for run in 0..L {
+                        let link = LinkId::new((receiver * peers + sender) * L + run);
+                        links.offer((now, next(sender)), link, sent[sender].state(run), |arrival, overtakes, sequence, state| {
+                            in_flight.push((tick, now), rows.packet::<P, L>((receiver, sender, run), &state, arrival, sequence), overtakes);
                         });
                     }
                 }
@@ -173,12 +175,14 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// Time passes on the links of all senders until `next` of each; until the latest tick, which is this one, it has.
     #[cold]
     pub(in crate::arrays) fn pass(&mut self, latest: (u64, Instant), next: impl Fn(usize) -> Instant) {
-        let Self { rows, receivers, links: Links::Stepped(links, _), in_flight, .. } = self else { return };
+        let Self { rows, receivers, links: Links::Stepped(links), in_flight, .. } = self else { return };
         for (receiver, peer) in receivers.clone().enumerate() {
             for column in (0..rows.columns(receiver)).filter(|column| rows.sender(receiver, *column) != peer) {
                 let (next, first) = (next(rows.sender(receiver, column)), rows.link(receiver, column) * L);
-                for link in (first..first + L).map(LinkId::new) {
-                    links.pass(next, link, |arrival, overtakes, packet| in_flight.push(latest, Packet { arrival, ..packet }, overtakes));
+                for run in 0..L {
+                    links.pass(next, LinkId::new(first + run), |arrival, overtakes, sequence, state| {
+                        in_flight.push(latest, rows.packet::<P, L>((receiver, column, run), &state, arrival, sequence), overtakes);
+                    });
                 }
             }
         }
@@ -202,14 +206,14 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         if let Links::Carried(carrier) = &mut self.links {
             return (0..L).for_each(|run| carrier.set_link(at, run, (from, to), model));
         }
-        let Self { rows, receivers, links: Links::Stepped(links, _), in_flight, .. } = self else { return };
+        let Self { rows, receivers, links: Links::Stepped(links), in_flight, .. } = self else { return };
         let receiver = to - receivers.start;
         let Some(column) = rows.column(receiver, from) else { return };
         for (run, scene) in scenes.iter().enumerate() {
             let link = LinkId::new(rows.link(receiver, column) * L + run);
             let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
-            links.set_model(at, link, (scene.seed, &name), model.clone(), |arrival, overtakes, packet| {
-                in_flight.push(latest, Packet { arrival, ..packet }, overtakes)
+            links.set_model(at, link, (scene.seed, &name), model.clone(), |arrival, overtakes, sequence, state| {
+                in_flight.push(latest, rows.packet::<P, L>((receiver, column, run), &state, arrival, sequence), overtakes)
             });
         }
     }
@@ -432,7 +436,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             let link = LinkId::new(self.rows.link(receiver, column) * L + run);
             match &mut self.links {
                 Links::Direct(links) => links.forget(link, sent, packet.arrival),
-                Links::Stepped(links, _) => links.forget(link, sent, packet.arrival),
+                Links::Stepped(links) => links.forget(link, sent, packet.arrival),
                 // It has counted what has arrived, and nothing lies in the wheel.
                 Links::Carried(_) => {}
             }
@@ -449,7 +453,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         let link = LinkId::new(self.rows.link(receiver, self.rows.column(receiver, from)?) * L + run);
         Some(match &self.links {
             Links::Direct(links) => links.stats(link),
-            Links::Stepped(links, _) => links.stats(link),
+            Links::Stepped(links) => links.stats(link),
             Links::Carried(carrier) => return carrier.stats(run, from, self.receivers.start + receiver),
         })
     }

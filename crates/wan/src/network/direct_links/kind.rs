@@ -1,6 +1,6 @@
 //! What links of one configuration have in common, and what each of them remembers.
 
-use cohaptic_units::{Bytes, Instant, Probability};
+use cohaptic_units::{Instant, Probability};
 
 use super::chains::Chains;
 use crate::line::direct::Words;
@@ -9,15 +9,15 @@ use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::delay::{CorrelatedDelays, DelayStage};
 use crate::stages::loss::{GilbertElliott, GilbertElliottState, Loss};
 use crate::stages::order::Order;
-use crate::stages::queue::EqualPackets;
+use crate::stages::queue::{EqualPackets, Load, nanos};
 
 /// A kind of link.
 #[derive(Clone, Debug)]
-pub(super) struct Kind {
-    pub(super) is_random: bool,
+pub(in crate::network) struct Kind {
+    pub(in crate::network) is_random: bool,
     loss: Losses,
     delay: Delays,
-    queue: Option<EqualPackets>,
+    line: Line,
     /// If they remember no more than that has.
     pub(super) chains: Option<Chains>,
 }
@@ -29,6 +29,15 @@ pub(super) enum Losses {
     GilbertElliott(GilbertElliott),
 }
 
+/// The line of a link, for packets of one size.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::network) enum Line {
+    /// No packet waits, and each takes that long \[ns\]; nothing if there is no line.
+    Free(u64),
+    /// Packets may wait.
+    Queued(EqualPackets),
+}
+
 #[derive(Clone, Debug)]
 enum Delays {
     Independent(DelayStage),
@@ -37,7 +46,7 @@ enum Delays {
 
 /// What a link remembers of earlier packets, and a counter that few links need.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Remembered {
+pub(in crate::network) struct Remembered {
     /// When the packet before left the queue.
     departure: Instant,
     /// The latest value of the chain of delays, NaN before the first packet.
@@ -57,8 +66,13 @@ pub(super) enum Verdict {
 }
 
 impl Kind {
-    /// The kind of such links, for packets of that size; `None` if they remember more than [`Remembered`].
-    pub(super) fn new(config: &LinkConfig, size: Bytes) -> Option<Self> {
+    /// The kind of such links, for packets of that load; `None` if they remember more than [`Remembered`].
+    pub(super) fn new(config: &LinkConfig, load: Load) -> Option<Self> {
+        Self::with_line(config, Line::new(config, load)?)
+    }
+
+    /// [`Kind::new`] with that line.
+    pub(in crate::network) fn with_line(config: &LinkConfig, line: Line) -> Option<Self> {
         let loss = match &config.loss {
             Loss::None => Losses::None,
             Loss::Independent(probability) => Losses::Independent(*probability),
@@ -73,21 +87,20 @@ impl Kind {
         if !config.outages.is_empty() || config.order != Order::AllowReordering || remembers_more {
             return None;
         }
-        let queue = queue(config, size)?;
-        let chains = match &delay {
-            Delays::Correlated(delays) if queue.is_none() => Chains::new(&loss, delays),
-            Delays::Correlated(_) | Delays::Independent(_) => None,
+        let chains = match (&delay, line) {
+            (Delays::Correlated(delays), Line::Free(0)) => Chains::new(&loss, delays),
+            (Delays::Correlated(_) | Delays::Independent(_), _) => None,
         };
-        Some(Self { is_random: config.is_random(), loss, delay, queue, chains })
+        Some(Self { is_random: config.is_random(), loss, delay, line, chains })
     }
 
     /// Whether its links remember anything.
     pub(super) const fn remembers(&self) -> bool {
-        self.queue.is_some() || matches!(self.loss, Losses::GilbertElliott(_)) || matches!(self.delay, Delays::Correlated(_))
+        matches!(self.line, Line::Queued(_)) || matches!(self.loss, Losses::GilbertElliott(_)) || matches!(self.delay, Delays::Correlated(_))
     }
 
     /// What a link remembers before its first packet.
-    pub(super) fn beginning(&self, draws: Stream) -> Remembered {
+    pub(in crate::network) fn beginning(&self, draws: Stream) -> Remembered {
         Remembered { state: self.initial_state(draws), ..Remembered::NOTHING }
     }
 
@@ -104,7 +117,13 @@ impl Kind {
     pub(super) fn fate(&mut self, now: Instant, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
         match (&self.loss, &mut self.delay) {
             (Losses::Independent(probability), _) if probability.happens(loss_word) => Verdict::Lost,
-            (_, Delays::Independent(delay)) => Verdict::Arrives(now.saturating_add_nanos(delay.draw_nanos(now, jitter_word, packet))),
+            (_, Delays::Independent(delay)) => {
+                let leaves = match self.line {
+                    Line::Free(nanos) => now.saturating_add_nanos(nanos),
+                    Line::Queued(_) => unreachable!("it remembers when the packet before left"),
+                };
+                Verdict::Arrives(leaves.saturating_add_nanos(delay.draw_nanos(leaves, jitter_word, packet)))
+            }
             (_, Delays::Correlated(_)) => unreachable!("it remembers the delay before"),
         }
     }
@@ -112,17 +131,12 @@ impl Kind {
     /// What becomes of a packet of a link that remembers that.
     #[inline(always)]
     pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
-        let is_lost = match &self.loss {
-            Losses::None => false,
-            Losses::Independent(probability) => probability.happens(loss_word),
-            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, loss_word, || packet.more(Purpose::Loss).next_word()),
-        };
-        if is_lost {
+        if self.loses(link, loss_word, packet) {
             return Verdict::Lost;
         }
-        let leaves = match &self.queue {
-            None => now,
-            Some(queue) => match queue.offer(now, &mut link.departure) {
+        let leaves = match &self.line {
+            Line::Free(nanos) => now.saturating_add_nanos(*nanos),
+            Line::Queued(queue) => match queue.offer(now, &mut link.departure) {
                 Some(leaves) => leaves,
                 None => {
                     link.found_full += 1;
@@ -130,11 +144,27 @@ impl Kind {
                 }
             },
         };
+        Verdict::Arrives(self.arrival(leaves, link, jitter_word, packet))
+    }
+
+    /// Whether a packet is lost before the line.
+    #[inline(always)]
+    pub(in crate::network) fn loses(&self, link: &mut Remembered, word: u64, packet: PacketDraws) -> bool {
+        match &self.loss {
+            Losses::None => false,
+            Losses::Independent(probability) => probability.happens(word),
+            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, word, || packet.more(Purpose::Loss).next_word()),
+        }
+    }
+
+    /// When a packet arrives that leaves the line at that instant.
+    #[inline(always)]
+    pub(in crate::network) fn arrival(&mut self, leaves: Instant, link: &mut Remembered, word: u64, packet: PacketDraws) -> Instant {
         let delay = match &mut self.delay {
-            Delays::Independent(delay) => delay.draw_nanos(leaves, jitter_word, packet),
-            Delays::Correlated(delays) => delays.draw_nanos(&mut link.normal, jitter_word, packet),
+            Delays::Independent(delay) => delay.draw_nanos(leaves, word, packet),
+            Delays::Correlated(delays) => delays.draw_nanos(&mut link.normal, word, packet),
         };
-        Verdict::Arrives(leaves.saturating_add_nanos(delay))
+        leaves.saturating_add_nanos(delay)
     }
 }
 
@@ -143,11 +173,16 @@ impl Remembered {
     pub(super) const NOTHING: Self = Self { departure: Instant::ZERO, normal: f64::NAN, state: GilbertElliottState::Good, found_full: 0 };
 }
 
-/// The queue of a link for packets of that size, if it has one; `None` if it is not one of [`EqualPackets`], or lies behind the delay.
-pub(super) fn queue(config: &LinkConfig, size: Bytes) -> Option<Option<EqualPackets>> {
-    match &config.bottleneck {
-        None => Some(None),
-        Some(_) if config.layout == Layout::Netem => None,
-        Some(bottleneck) => EqualPackets::new(bottleneck, size).map(Some),
+impl Line {
+    /// The line of a link for packets of that load; `None` if departures depend on more than [`EqualPackets`] knows, or lie behind the delay.
+    pub(super) fn new(config: &LinkConfig, load: Load) -> Option<Self> {
+        let Some(bottleneck) = &config.bottleneck else { return Some(Self::Free(0)) };
+        if config.layout == Layout::Netem {
+            return None;
+        }
+        match bottleneck.time_without_wait(load) {
+            Some(time) => Some(Self::Free(nanos(time))),
+            None => EqualPackets::new(bottleneck, load.size).map(Self::Queued),
+        }
     }
 }

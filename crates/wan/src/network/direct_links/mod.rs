@@ -1,15 +1,15 @@
 //! Many links that decide at once what becomes of a packet, for drivers that keep the packets on the way themselves.
 
 mod chains;
-mod kind;
+pub(super) mod kind;
 mod offered_at;
 
 use alloc::vec::Vec;
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::Instant;
 
 use chains::ChainStates;
-use kind::{Kind, Remembered, Verdict};
+use kind::{Kind, Line, Remembered, Verdict};
 pub use offered_at::OfferedAt;
 
 use super::id::LinkId;
@@ -20,10 +20,10 @@ use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
 use crate::random::Stream;
 use crate::stages::config::LinkConfig;
-use crate::stages::queue::EqualPackets;
+use crate::stages::queue::Load;
 
-/// Links that know at once when a packet arrives: outages, loss, a tail-drop queue before a line of one rate, delay with jitter, and order. Each is a function
-/// from a packet to its arrival, with the memory that bursts, correlated delays and the line need. All packets have one size.
+/// Links that know at once when a packet arrives: outages, loss, a tail-drop queue before a line of one rate, or one of any discipline that no packet waits for, delay
+/// with jitter, and order. Each is a function from a packet to its arrival, with the memory that bursts, correlated delays and the line need. All links have one [`Load`].
 ///
 /// It is what [`crate::Network`] compiles such links to, with the same random numbers at the same addresses and the same counters, without the queue of packets
 /// on the way: a driver that looks at arrivals on a lattice of its own has a better one. Whether a packet arrives in time to be counted as delivered is
@@ -33,7 +33,7 @@ use crate::stages::queue::EqualPackets;
 #[derive(Clone, Debug)]
 pub struct DirectLinks {
     until: Instant,
-    size: Bytes,
+    load: Load,
     links: Vec<LinkState>,
     /// What links of a kind have in common.
     kinds: Vec<(LinkConfig, Kind)>,
@@ -85,7 +85,7 @@ enum Memory {
 #[derive(Clone, Debug)]
 struct Other {
     direct: Direct,
-    queue: Option<EqualPackets>,
+    line: Line,
     departure: Instant,
     outage: u64,
     found_full: u64,
@@ -95,16 +95,16 @@ impl DirectLinks {
     /// Number of links to which a packet is offered at once: a processor computes several at the same time.
     pub const AT_ONCE: usize = 8;
 
-    /// No links, for packets of that size; those that arrive by `until` will count as delivered.
+    /// No links, for packets of that load; those that arrive by `until` will count as delivered.
     #[must_use]
-    pub const fn new(until: Instant, size: Bytes) -> Self {
-        Self { until, size, links: Vec::new(), kinds: Vec::new(), remembered: Vec::new(), chained: ChainStates::new(), others: Vec::new() }
+    pub const fn new(until: Instant, load: Load) -> Self {
+        Self { until, load, links: Vec::new(), kinds: Vec::new(), remembered: Vec::new(), chained: ChainStates::new(), others: Vec::new() }
     }
 
-    /// Whether such a link can be added: what becomes of a packet of that size is known as soon as it is offered, nothing is copied, marked or damaged.
+    /// Whether such a link can be added: what becomes of a packet of that load is known as soon as it is offered, nothing is copied, marked or damaged.
     #[must_use]
-    pub fn takes(model: &LinkModel, size: Bytes) -> bool {
-        model.as_fixed().is_some_and(|config| config.is_direct_but_for_queue() && kind::queue(config, size).is_some())
+    pub fn takes(model: &LinkModel, load: Load) -> bool {
+        model.as_fixed().is_some_and(|config| config.is_direct_but_for_queue(load) && Line::new(config, load).is_some())
     }
 
     /// Adds a link, and says whether it could be added: one that they do not [take](DirectLinks::takes) needs an engine, and is left out.
@@ -117,7 +117,7 @@ impl DirectLinks {
         let Some(config) = model.as_fixed() else { return false };
         // A kind that is known was asked for before: to ask of each link took a third of the time of adding it.
         let known = self.kinds.iter().position(|(other, _)| other == config);
-        if known.is_none() && !Self::takes(model, self.size) {
+        if known.is_none() && !Self::takes(model, self.load) {
             return false;
         }
         let draws = Stream::new(seed, name.as_str().as_bytes());
@@ -135,9 +135,9 @@ impl DirectLinks {
             }
             Some((place, _)) => Memory::Plain(place),
             None => {
-                let queue = kind::queue(config, self.size).flatten();
+                let line = Line::new(config, self.load).expect("such a link is taken");
                 let direct = Direct::new(seed, name, config);
-                self.others.push(Other { direct, queue, departure: Instant::ZERO, outage: 0, found_full: 0 });
+                self.others.push(Other { direct, line, departure: Instant::ZERO, outage: 0, found_full: 0 });
                 Memory::Other(u32::try_from(self.others.len() - 1).expect("fewer than 2^32 links fit into memory"))
             }
         };
@@ -277,7 +277,7 @@ impl DirectLinks {
             // Looking a kind up takes longer the more there are.
             None if self.kinds.len() >= 64 => return None,
             None => {
-                self.kinds.push((config.clone(), Kind::new(config, self.size)?));
+                self.kinds.push((config.clone(), Kind::new(config, self.load)?));
                 self.kinds.len() - 1
             }
         };
@@ -287,10 +287,10 @@ impl DirectLinks {
 
 impl Other {
     fn verdict(&mut self, now: Instant, number: u64, words: Words) -> Verdict {
-        let Self { direct, queue, departure, .. } = self;
-        let fate = direct.offer_through(now, number, words, |now| match queue {
-            None => Ok(now),
-            Some(queue) => queue.offer(now, departure).ok_or(DropCause::QueueFull),
+        let Self { direct, line, departure, .. } = self;
+        let fate = direct.offer_through(now, number, words, |now| match line {
+            Line::Free(nanos) => Ok(now.saturating_add_nanos(*nanos)),
+            Line::Queued(queue) => queue.offer(now, departure).ok_or(DropCause::QueueFull),
         });
         match fate {
             Ok(at) => Verdict::Arrives(at),
@@ -415,173 +415,4 @@ impl LinkState {
 }
 
 #[cfg(test)]
-mod tests {
-    use core::time::Duration;
-
-    use cohaptic_units::Rate;
-
-    use super::*;
-    use crate::laws::delay::Distribution;
-    use crate::link::Link;
-    use crate::netem::Netem;
-    use crate::packet::PacketInfo;
-    use crate::stages::config::Layout;
-    use crate::stages::delay::{Correlation, Delay, Jitter};
-    use crate::stages::queue::{Bottleneck, QueueLimit};
-
-    fn model(words: &str) -> LinkModel {
-        Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap().into()
-    }
-
-    /// Those words, with this queue before a line of 100 kbit/s: 5.12 ms for 64 bytes.
-    fn queued(words: &str, limit: Option<QueueLimit>) -> LinkModel {
-        let bottleneck = Bottleneck { limit, ..Bottleneck::at_rate(Rate::bits_per_sec(100_000).unwrap()) };
-        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
-        LinkConfig { bottleneck: Some(bottleneck), layout: Layout::Physical, ..config }.into()
-    }
-
-    const DIRECT: [&str; 9] = [
-        "delay 5ms",
-        "delay 24ms 9ms loss 10%",
-        "delay 24ms 9ms 50% distribution pareto",
-        "loss gemodel 5% 20%",
-        "delay 3ms 2ms distribution normal",
-        "loss 50%",
-        "delay 20ms 5ms distribution normal",
-        "delay 24ms 4ms 50% loss gemodel 5% 20% 30% 2%",
-        "delay 24ms 4ms 50%",
-    ];
-
-    #[test]
-    fn they_decide_what_whole_links_decide() {
-        let direct = DIRECT.map(model);
-        compare(&direct[..8]);
-        compare(&direct[1..]);
-        for model in direct {
-            compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
-        }
-    }
-
-    /// Packets come every 8 ms, or every 4: the line is idle, or its queue fills.
-    #[test]
-    fn queues_decide_what_whole_links_decide() {
-        let limits = [None, Some(QueueLimit::Packets(3)), Some(QueueLimit::Bytes(Bytes::new(200))), Some(QueueLimit::Time(Duration::from_millis(9)))];
-        let words = ["delay 24ms", "delay 24ms 9ms loss 10%", "delay 24ms 4ms 50% loss gemodel 5% 20%", "delay 24ms 9ms loss state 5% 20%"];
-        for limit in limits {
-            let queued = words.map(|words| queued(words, limit));
-            compare(&queued);
-            for model in queued {
-                compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
-            }
-        }
-    }
-
-    /// Correlated gamma delays: of shapes that four terms tell nearly everywhere, of one for which they do not, and over a floor; with losses in bursts, with
-    /// independent ones and without. Eleven links are eight and three, or twice five and one.
-    #[test]
-    fn chains_decide_what_whole_links_decide() {
-        let gamma = |sd: u64, floor: u64| Jitter {
-            floor: Duration::from_millis(floor),
-            correlation: Correlation::PerPacket(0.5),
-            ..Jitter::new(Duration::from_millis(sd), Distribution::Gamma)
-        };
-        for (words, jitter) in [
-            ("loss gemodel 20% 40%", gamma(6, 0)),
-            ("loss gemodel 20% 40% 0% 0%", gamma(6, 20)),
-            ("loss gemodel 20% 40% 100% 100%", gamma(90, 0)),
-            ("loss gemodel 20% 40% 50% 10%", gamma(6, 0)),
-            ("loss gemodel 20% 40%", gamma(20, 0)),
-            ("loss 30%", gamma(6, 0)),
-            ("", gamma(90, 10)),
-        ] {
-            let delay = Delay::with_jitter(Duration::from_millis(24), jitter).unwrap();
-            let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
-            let model = LinkModel::from(LinkConfig { delay, ..config });
-            compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
-            compare(&[const { None }; 11].map(|_: Option<()>| model.clone()));
-            compare(&[DIRECT.map(self::model).as_slice(), &[model.clone(), model]].concat());
-        }
-    }
-
-    /// All links at once, in groups of eight and of five, packets at one instant and a microsecond apart, against each as a [`Link`]: the same packets at the same
-    /// instants, the same counters at the end.
-    fn compare(direct: &[LinkModel]) {
-        [(DirectLinks::AT_ONCE, 0), (5, 0), (DirectLinks::AT_ONCE, 1000), (5, 1000)].into_iter().for_each(|groups| compare_in_groups(direct, groups));
-    }
-
-    fn compare_in_groups(direct: &[LinkModel], (together, apart): (usize, u64)) {
-        let until = Instant::from_nanos(500 * 8_000_000);
-        let mut links = DirectLinks::new(until, Bytes::new(64));
-        let name = |place: usize| LinkName::between("a", &format!("b{place}"));
-        assert!(direct.iter().enumerate().all(|(place, model)| links.add(7, &name(place), model)));
-        let mut whole: Vec<Link<u64>> = direct.iter().enumerate().map(|(place, model)| Link::new(7, &name(place), model.clone())).collect();
-        let mut arrivals: Vec<Vec<(Instant, u64)>> = vec![Vec::new(); direct.len()];
-        for number in 0..500_u64 {
-            // Every 8 ms at first, every 4 ms later.
-            let now = Instant::from_nanos(number.min(250) * 8_000_000 + number.saturating_sub(250) * 4_000_000);
-            // Every third packet is not offered to the second link.
-            let excluded = if number % 3 == 0 { 0b10 } else { 0 };
-            for (place, link) in whole.iter_mut().enumerate().filter(|(place, _)| u32::from(excluded) >> place & 1 == 0) {
-                link.handle_packet(now.saturating_add_nanos(apart * place as u64), PacketInfo::from(Bytes::new(64)), 0)
-                    .unwrap_or_else(|error| panic!("{place}: {error}"));
-            }
-            let mut offered = Arrivals::NONE;
-            for first in (0..direct.len()).step_by(together) {
-                let count = together.min(direct.len() - first);
-                let (link, excluded) = (LinkId::new(first), if first == 0 { excluded } else { 0 });
-                let instants = core::array::from_fn(|place| now.saturating_add_nanos(apart * (first + place) as u64));
-                match links.are_chains() {
-                    _ if apart == 0 => links.offer(now, link, count, excluded, &mut offered),
-                    true => links.offer_as::<true>(&instants, link, count, excluded, &mut offered),
-                    false => links.offer_as::<false>(&instants, link, count, excluded, &mut offered),
-                }
-                for place in offered.places() {
-                    let so_far = &mut arrivals[first + place];
-                    assert_eq!(offered.overtakes(place), so_far.iter().any(|(at, _)| *at > offered.at[place]));
-                    so_far.push((offered.at[place], offered.sequences[place]));
-                }
-            }
-        }
-        for (place, link) in whole.iter_mut().enumerate() {
-            link.handle_timeout(until).unwrap();
-            let mut delivered = Vec::new();
-            while let Some(event) = link.poll_event() {
-                if let crate::fates::fate::Fate::Delivered(at) = event.fate {
-                    delivered.push((at, event.sequence));
-                }
-            }
-            let arrivals = &mut arrivals[place];
-            arrivals.sort_unstable();
-            arrivals.retain(|(at, _)| *at <= until);
-            assert_eq!(delivered, *arrivals, "{}", direct[place].words());
-            assert_eq!(links.stats(LinkId::new(place)), link.stats(), "{}", direct[place].words());
-        }
-    }
-
-    #[test]
-    fn what_is_forgotten_is_on_the_way_for_ever() {
-        // One that would have arrived at the very last instant.
-        let mut links = DirectLinks::new(Instant::from_nanos(5_000_000), Bytes::new(64));
-        assert!(links.add(1, &LinkName::between("a", "b"), &model("delay 5ms")));
-        let mut arrivals = Arrivals::NONE;
-        links.offer(Instant::ZERO, LinkId(0), 1, 0, &mut arrivals);
-        assert_eq!((arrivals.arrive, arrivals.overtake, arrivals.sequences[0]), (1, 0, 0));
-        assert_eq!((links.stats(LinkId(0)).delivered(), links.stats(LinkId(0)).in_flight()), (1, 0));
-        links.forget(LinkId(0), Instant::ZERO, arrivals.at[0]);
-        assert_eq!((links.stats(LinkId(0)).delivered(), links.stats(LinkId(0)).in_flight(), links.stats(LinkId(0)).mean_delay()), (0, 1, None));
-    }
-
-    #[test]
-    fn what_needs_an_engine_is_left_out() {
-        let mut links = DirectLinks::new(Instant::MAX, Bytes::new(64));
-        for words in ["rate 1mbit delay 5ms 1ms", "duplicate 1%", "delay 10ms limit 5", "corrupt 1%"] {
-            assert!(!links.add(1, &LinkName::between("a", "b"), &model(words)), "{words}");
-        }
-        assert!(links.links.is_empty());
-    }
-
-    #[test]
-    fn a_link_without_memory_takes_a_cache_line() {
-        assert_eq!(size_of::<LinkState>(), 64);
-    }
-}
+mod tests;

@@ -71,6 +71,22 @@ impl Bottleneck {
     }
 }
 
+impl Bottleneck {
+    /// How long a mean packet is on the line \[s\]: the unit of the decay of RED's average.
+    pub(crate) fn time_of_mean_packet(&self, red: &Red) -> f64 {
+        match &self.service {
+            Service::Rate(rate) => rate.serialisation_time(self.framing.on_the_line(red.mean_packet())).as_secs_f64(),
+            #[expect(clippy::cast_precision_loss, reason = "a decay")]
+            Service::Recorded(trace) => red.mean_packet().get() as f64 * 8.0 / trace.mean_rate(),
+        }
+    }
+}
+
+/// A span for which the line was idle, in mean packets, each of which takes that long \[s\].
+pub(crate) fn idle_packets(idle: Duration, mean_packet: f64) -> f64 {
+    if mean_packet > 0.0 { idle.as_secs_f64() / mean_packet } else { 0.0 }
+}
+
 /// A part of a packet, in 10⁻⁹ bit: see [`Rate::transmission_time`].
 pub(super) fn giga_bits(bytes: Bytes) -> u128 {
     u128::from(bytes.get()) * 8_000_000_000
@@ -256,12 +272,7 @@ impl<T> BottleneckStage<T> {
         let idle = if self.in_service.is_none() { now.saturating_duration_since(self.idle_since) } else { Duration::ZERO };
         // Time that was idle counts once.
         self.idle_since = now;
-        let unit = match &self.config.service {
-            Service::Rate(rate) => rate.serialisation_time(self.config.framing.on_the_line(red.mean_packet())).as_secs_f64(),
-            #[expect(clippy::cast_precision_loss, reason = "a decay")]
-            Service::Recorded(trace) => red.mean_packet().get() as f64 * 8.0 / trace.mean_rate(),
-        };
-        let idle_packets = if unit > 0.0 { idle.as_secs_f64() / unit } else { 0.0 };
+        let idle_packets = idle_packets(idle, self.config.time_of_mean_packet(red));
         self.red.verdict(red, self.waiting_bytes, idle_packets, ecn_capable, word)
     }
 

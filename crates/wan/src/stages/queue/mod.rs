@@ -6,6 +6,7 @@ mod delivery_trace;
 mod equal_packets;
 mod framing;
 mod limit;
+mod load;
 mod red;
 pub(crate) mod token_bucket;
 
@@ -14,9 +15,12 @@ pub use codel::CoDel;
 pub use delivery_trace::{DeliveryTrace, DeliveryTraceError, MAHIMAHI_BYTES};
 pub use framing::{Cells, Framing};
 pub use limit::QueueLimit;
+pub use load::Load;
 pub use red::{Red, RedError};
 pub use token_bucket::{Peak, TokenBucket};
 
-pub(crate) use bottleneck::BottleneckStage;
-pub(crate) use equal_packets::EqualPackets;
+pub(crate) use bottleneck::{BottleneckStage, idle_packets};
+pub(crate) use codel::{CoDelState, Verdict as CoDelVerdict};
+pub(crate) use equal_packets::{EqualPackets, nanos};
+pub(crate) use red::{RedState, Verdict as RedVerdict};
 pub(crate) use token_bucket::TokenBucketStage;

@@ -54,6 +54,16 @@ impl Red {
         Ok(Self { min, max, max_probability, weight, mean_packet, ecn })
     }
 
+    /// The average queue below which nothing is dropped.
+    pub(crate) const fn min(&self) -> Bytes {
+        self.min
+    }
+
+    /// Whether it marks packets.
+    pub(crate) const fn ecn(&self) -> bool {
+        self.ecn
+    }
+
     /// The mean packet, whose time on the line is the unit of the decay while idle.
     #[must_use]
     pub const fn mean_packet(&self) -> Bytes {

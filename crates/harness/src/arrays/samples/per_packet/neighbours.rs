@@ -4,8 +4,6 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{Arrivals, DirectLinks, LinkId};
 
 use super::super::Sample;
-use super::super::in_flight::Packet;
-use super::super::rows::Rows;
 use super::{Links, PerPacket};
 
 impl<const P: usize, const L: usize> PerPacket<P, L> {
@@ -23,10 +21,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         let Self { rows, receivers, links, sends, in_flight, .. } = self;
         sends.fill(false);
         senders.iter().for_each(|sender| sends[*sender] = true);
-        let packet = |rows: &Rows, receiver: usize, number: usize, arrival: Instant, sequence: u64| {
-            let (column, run) = (number / L, number % L);
-            rows.packet::<P, L>((receiver, column, run), &sent[rows.sender(receiver, column)].state(run), arrival, sequence)
-        };
         for receiver in 0..receivers.len() {
             let row = rows.columns(receiver) * L;
             let first_link = rows.link(receiver, 0) * L;
@@ -44,23 +38,29 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                         }
                         links.offer(now, LinkId::new(first_link + first), count, idle, &mut arrivals);
                         for place in arrivals.places() {
-                            let packet = packet(rows, receiver, first + place, arrivals.at[place], arrivals.sequences[place]);
+                            let (column, run) = ((first + place) / L, (first + place) % L);
+                            let state = sent[rows.sender(receiver, column)].state(run);
+                            let packet = rows.packet::<P, L>((receiver, column, run), &state, arrivals.at[place], arrivals.sequences[place]);
                             in_flight.push((tick, now), packet, arrivals.overtakes(place));
                         }
                     }
                 }
                 Links::Carried(_) => {}
-                Links::Stepped(links, info) => {
+                Links::Stepped(links) => {
                     for number in 0..row {
-                        let sender = rows.sender(receiver, number / L);
+                        let (column, run) = (number / L, number % L);
+                        let sender = rows.sender(receiver, column);
                         if !sends[sender] {
                             continue;
                         }
-                        let link = LinkId::new(first_link + number);
-                        let packet = packet(rows, receiver, number, now, links.offered(link));
-                        links.offer((now, next(sender)), link, *info, packet, |arrival, overtakes, packet| {
-                            in_flight.push((tick, now), Packet { arrival, ..packet }, overtakes);
-                        });
+                        links.offer(
+                            (now, next(sender)),
+                            LinkId::new(first_link + number),
+                            sent[sender].state(run),
+                            |arrival, overtakes, sequence, state| {
+                                in_flight.push((tick, now), rows.packet::<P, L>((receiver, column, run), &state, arrival, sequence), overtakes);
+                            },
+                        );
                     }
                 }
             }

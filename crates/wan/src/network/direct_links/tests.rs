@@ -1,0 +1,217 @@
+use core::time::Duration;
+
+use cohaptic_units::{Bytes, Probability, Rate};
+
+use super::*;
+use crate::laws::delay::Distribution;
+use crate::link::Link;
+use crate::netem::Netem;
+use crate::packet::PacketInfo;
+use crate::stages::config::Layout;
+use crate::stages::delay::{Correlation, Delay, Jitter};
+use crate::stages::queue::{Bottleneck, CoDel, Discipline, Framing, QueueLimit, Red, TokenBucket, nanos};
+
+/// Packets of 64 bytes at any instants.
+const OF_TESTS: Load = Load::of(Bytes::new(64));
+
+fn model(words: &str) -> LinkModel {
+    Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap().into()
+}
+
+/// Those words, with this queue before a line of 100 kbit/s: 5.12 ms for 64 bytes.
+fn queued(words: &str, limit: Option<QueueLimit>) -> LinkModel {
+    let bottleneck = Bottleneck { limit, ..Bottleneck::at_rate(Rate::bits_per_sec(100_000).unwrap()) };
+    let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+    LinkConfig { bottleneck: Some(bottleneck), layout: Layout::Physical, ..config }.into()
+}
+
+const DIRECT: [&str; 9] = [
+    "delay 5ms",
+    "delay 24ms 9ms loss 10%",
+    "delay 24ms 9ms 50% distribution pareto",
+    "loss gemodel 5% 20%",
+    "delay 3ms 2ms distribution normal",
+    "loss 50%",
+    "delay 20ms 5ms distribution normal",
+    "delay 24ms 4ms 50% loss gemodel 5% 20% 30% 2%",
+    "delay 24ms 4ms 50%",
+];
+
+#[test]
+fn they_decide_what_whole_links_decide() {
+    let direct = DIRECT.map(model);
+    compare(&direct[..8]);
+    compare(&direct[1..]);
+    for model in direct {
+        compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
+    }
+}
+
+/// Packets come every 8 ms, or every 4: the line is idle, or its queue fills.
+#[test]
+fn queues_decide_what_whole_links_decide() {
+    let limits = [None, Some(QueueLimit::Packets(3)), Some(QueueLimit::Bytes(Bytes::new(200))), Some(QueueLimit::Time(Duration::from_millis(9)))];
+    let words = ["delay 24ms", "delay 24ms 9ms loss 10%", "delay 24ms 4ms 50% loss gemodel 5% 20%", "delay 24ms 9ms loss state 5% 20%"];
+    for limit in limits {
+        let queued = words.map(|words| queued(words, limit));
+        compare(&queued);
+        for model in queued {
+            compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
+        }
+    }
+}
+
+/// The same line where it is known that no two packets come within 5.12 ms, with every discipline, and a bucket that holds one packet: none waits, whatever the limit.
+#[test]
+fn lines_without_wait_decide_what_whole_links_decide() {
+    let load = Load { gap: Duration::from_micros(5_120), ..OF_TESTS };
+    let red = Red::new(Bytes::new(1), Bytes::new(2), Probability::ONE, 1.0, Bytes::new(64), false).unwrap();
+    let codel = CoDel { target: Duration::ZERO, interval: Duration::ZERO, mtu: Bytes::ZERO, ecn: false };
+    let words = ["delay 24ms", "delay 24ms 9ms loss 10%", "delay 24ms 4ms 50% loss gemodel 5% 20%", "delay 24ms 9ms loss state 5% 20%", "loss 50%"];
+    for discipline in [Discipline::TailDrop, Discipline::HeadDrop, Discipline::CoDel(codel), Discipline::Red(red)] {
+        let lines = words.map(|words| {
+            let LinkModel::Fixed(config) = queued(words, Some(QueueLimit::Bytes(Bytes::ZERO))) else { unreachable!("it is fixed") };
+            let bottleneck = config.bottleneck.map(|bottleneck| Bottleneck { discipline, ..bottleneck });
+            let rate = Rate::bits_per_sec(100_000).unwrap();
+            let bucket = TokenBucket { rate, burst: Bytes::new(64), peak: None, framing: Framing::default(), limit: Some(QueueLimit::Packets(0)) };
+            LinkModel::from(LinkConfig { bottleneck, token_bucket: Some(bucket), ..config })
+        });
+        assert!(lines.iter().all(|line| !DirectLinks::takes(line, Load { gap: Duration::from_nanos(5_119_999), ..load })));
+        compare_under(load, &lines);
+        for line in lines {
+            compare_under(load, &[const { None }; 8].map(|_: Option<()>| line.clone()));
+        }
+    }
+}
+
+/// Behind jitter packets come closer together than they were offered.
+#[test]
+fn a_bucket_behind_jitter_needs_an_engine() {
+    let load = Load { gap: Duration::from_millis(6), ..OF_TESTS };
+    for (words, is_taken) in [("delay 24ms", true), ("delay 24ms 9ms", false)] {
+        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        assert_eq!(config.layout, Layout::Netem);
+        let rate = Rate::bits_per_sec(100_000).unwrap();
+        let bucket = TokenBucket { rate, burst: Bytes::new(64), peak: None, framing: Framing::default(), limit: None };
+        let model = LinkModel::from(LinkConfig { token_bucket: Some(bucket), ..config });
+        assert_eq!(DirectLinks::takes(&model, load), is_taken, "{words}");
+        assert_eq!(model.constant_delay_of(load), is_taken.then_some(Duration::from_millis(24)), "{words}");
+    }
+}
+
+/// Correlated gamma delays: of shapes that four terms tell nearly everywhere, of one for which they do not, and over a floor; with losses in bursts, with
+/// independent ones and without. Eleven links are eight and three, or twice five and one.
+#[test]
+fn chains_decide_what_whole_links_decide() {
+    let gamma = |sd: u64, floor: u64| Jitter {
+        floor: Duration::from_millis(floor),
+        correlation: Correlation::PerPacket(0.5),
+        ..Jitter::new(Duration::from_millis(sd), Distribution::Gamma)
+    };
+    for (words, jitter) in [
+        ("loss gemodel 20% 40%", gamma(6, 0)),
+        ("loss gemodel 20% 40% 0% 0%", gamma(6, 20)),
+        ("loss gemodel 20% 40% 100% 100%", gamma(90, 0)),
+        ("loss gemodel 20% 40% 50% 10%", gamma(6, 0)),
+        ("loss gemodel 20% 40%", gamma(20, 0)),
+        ("loss 30%", gamma(6, 0)),
+        ("", gamma(90, 10)),
+    ] {
+        let delay = Delay::with_jitter(Duration::from_millis(24), jitter).unwrap();
+        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        let model = LinkModel::from(LinkConfig { delay, ..config });
+        compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
+        compare(&[const { None }; 11].map(|_: Option<()>| model.clone()));
+        compare(&[DIRECT.map(self::model).as_slice(), &[model.clone(), model]].concat());
+    }
+}
+
+/// All links at once, in groups of eight and of five, packets at one instant and a microsecond apart, against each as a [`Link`]: the same packets at the same
+/// instants, the same counters at the end.
+fn compare(direct: &[LinkModel]) {
+    compare_under(OF_TESTS, direct);
+}
+
+/// [`compare`], where links know of that load, whose gap is at most 6 ms.
+fn compare_under(load: Load, direct: &[LinkModel]) {
+    [(DirectLinks::AT_ONCE, 0), (5, 0), (DirectLinks::AT_ONCE, 1000), (5, 1000)]
+        .into_iter()
+        .for_each(|groups| compare_in_groups(load, direct, groups));
+}
+
+fn compare_in_groups(load: Load, direct: &[LinkModel], (together, apart): (usize, u64)) {
+    let until = Instant::from_nanos(500 * 8_000_000);
+    let mut links = DirectLinks::new(until, load);
+    let name = |place: usize| LinkName::between("a", &format!("b{place}"));
+    assert!(direct.iter().enumerate().all(|(place, model)| links.add(7, &name(place), model)));
+    let mut whole: Vec<Link<u64>> = direct.iter().enumerate().map(|(place, model)| Link::new(7, &name(place), model.clone())).collect();
+    let mut arrivals: Vec<Vec<(Instant, u64)>> = vec![Vec::new(); direct.len()];
+    for number in 0..500_u64 {
+        // Every 8 ms at first, every 4 ms later, or as close together as the load says.
+        let close = nanos(load.gap).max(4_000_000);
+        let now = Instant::from_nanos(number.min(250) * 8_000_000 + number.saturating_sub(250) * close);
+        // Every third packet is not offered to the second link.
+        let excluded = if number % 3 == 0 { 0b10 } else { 0 };
+        for (place, link) in whole.iter_mut().enumerate().filter(|(place, _)| u32::from(excluded) >> place & 1 == 0) {
+            link.handle_packet(now.saturating_add_nanos(apart * place as u64), PacketInfo::from(Bytes::new(64)), 0)
+                .unwrap_or_else(|error| panic!("{place}: {error}"));
+        }
+        let mut offered = Arrivals::NONE;
+        for first in (0..direct.len()).step_by(together) {
+            let count = together.min(direct.len() - first);
+            let (link, excluded) = (LinkId::new(first), if first == 0 { excluded } else { 0 });
+            let instants = core::array::from_fn(|place| now.saturating_add_nanos(apart * (first + place) as u64));
+            match links.are_chains() {
+                _ if apart == 0 => links.offer(now, link, count, excluded, &mut offered),
+                true => links.offer_as::<true>(&instants, link, count, excluded, &mut offered),
+                false => links.offer_as::<false>(&instants, link, count, excluded, &mut offered),
+            }
+            for place in offered.places() {
+                let so_far = &mut arrivals[first + place];
+                assert_eq!(offered.overtakes(place), so_far.iter().any(|(at, _)| *at > offered.at[place]));
+                so_far.push((offered.at[place], offered.sequences[place]));
+            }
+        }
+    }
+    for (place, link) in whole.iter_mut().enumerate() {
+        link.handle_timeout(until).unwrap();
+        let mut delivered = Vec::new();
+        while let Some(event) = link.poll_event() {
+            if let crate::fates::fate::Fate::Delivered(at) = event.fate {
+                delivered.push((at, event.sequence));
+            }
+        }
+        let arrivals = &mut arrivals[place];
+        arrivals.sort_unstable();
+        arrivals.retain(|(at, _)| *at <= until);
+        assert_eq!(delivered, *arrivals, "{}", direct[place].words());
+        assert_eq!(links.stats(LinkId::new(place)), link.stats(), "{}", direct[place].words());
+    }
+}
+
+#[test]
+fn what_is_forgotten_is_on_the_way_for_ever() {
+    // One that would have arrived at the very last instant.
+    let mut links = DirectLinks::new(Instant::from_nanos(5_000_000), OF_TESTS);
+    assert!(links.add(1, &LinkName::between("a", "b"), &model("delay 5ms")));
+    let mut arrivals = Arrivals::NONE;
+    links.offer(Instant::ZERO, LinkId(0), 1, 0, &mut arrivals);
+    assert_eq!((arrivals.arrive, arrivals.overtake, arrivals.sequences[0]), (1, 0, 0));
+    assert_eq!((links.stats(LinkId(0)).delivered(), links.stats(LinkId(0)).in_flight()), (1, 0));
+    links.forget(LinkId(0), Instant::ZERO, arrivals.at[0]);
+    assert_eq!((links.stats(LinkId(0)).delivered(), links.stats(LinkId(0)).in_flight(), links.stats(LinkId(0)).mean_delay()), (0, 1, None));
+}
+
+#[test]
+fn what_needs_an_engine_is_left_out() {
+    let mut links = DirectLinks::new(Instant::MAX, OF_TESTS);
+    for words in ["rate 1mbit delay 5ms 1ms", "duplicate 1%", "delay 10ms limit 5", "corrupt 1%"] {
+        assert!(!links.add(1, &LinkName::between("a", "b"), &model(words)), "{words}");
+    }
+    assert!(links.links.is_empty());
+}
+
+#[test]
+fn a_link_without_memory_takes_a_cache_line() {
+    assert_eq!(size_of::<LinkState>(), 64);
+}

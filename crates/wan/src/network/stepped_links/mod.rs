@@ -1,0 +1,248 @@
+//! Many links in which packets wait, each driven from one offer to the next, for drivers that keep the packets on the way themselves.
+
+mod queued;
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use cohaptic_units::Instant;
+
+use super::id::LinkId;
+use crate::fates::fate::Fate;
+use crate::fates::stats::LinkStats;
+use crate::line::model::LinkModel;
+use crate::line::name::LinkName;
+use crate::line::pipeline::Outcome;
+use crate::line::{Line, Sink};
+use crate::packet::{Marks, Outputs, PacketInfo};
+use crate::random::Stream;
+use queued::{QueuedKind, QueuedLink};
+
+/// Links of any kind, for a driver that knows when it will offer the next packet to each.
+///
+/// What a queue does with a packet may depend on those that come later, but never before they come. So a link that is told when its next packet comes decides at
+/// once all that happens until then: no queue of events wakes it. It does what [`crate::Network`] does with such links, with the same random numbers at the
+/// same addresses and the same counters. Packets with the payload `T` come out in no order of time, each with its number and the word whether one that came out
+/// before it arrives later or at the same instant.
+///
+/// Links are numbered from 0 as they are added.
+#[derive(Clone, Debug)]
+pub struct SteppedLinks<T> {
+    until: Instant,
+    info: PacketInfo,
+    links: Vec<Stepped<T>>,
+    /// What links with one line of one rate have in common, if links stay as they are.
+    kinds: Option<Vec<(LinkModel, QueuedKind)>>,
+    outputs: Outputs<Sent<T>>,
+    arrivals: Vec<(Instant, Sent<T>)>,
+}
+
+#[derive(Clone, Debug)]
+enum Stepped<T> {
+    /// Of that kind.
+    Queued(u8, QueuedLink<T>),
+    Other(Box<Other<T>>),
+}
+
+/// A link of any kind, and the latest arrival over it so far.
+#[derive(Clone, Debug)]
+struct Other<T> {
+    line: Line<(), Sent<T>>,
+    latest: Instant,
+}
+
+/// A packet, its number, and when it was offered.
+#[derive(Clone, Debug)]
+struct Sent<T> {
+    at: Instant,
+    number: u64,
+    item: T,
+}
+
+/// When a packet is offered, when the next one is, and until when arrivals count.
+#[derive(Clone, Copy)]
+struct Offer {
+    now: Instant,
+    next: Instant,
+    until: Instant,
+}
+
+/// Kinds of links with one line of one rate that are told apart: looking a kind up takes longer the more there are.
+const MOST_KINDS: usize = 64;
+
+impl SteppedLinks<()> {
+    /// Whether such a link can be added: one that damages packets, or counts those inside until they arrive, cannot.
+    #[must_use]
+    pub fn takes(model: &LinkModel) -> bool {
+        let takes = |config: &crate::LinkConfig| config.corruption.is_none() && config.limit.is_none();
+        match model {
+            LinkModel::Fixed(config) => takes(config),
+            LinkModel::Modulated(modulated) => modulated.configs().iter().all(takes),
+            LinkModel::Replay(_) | LinkModel::Kernel(_) => false,
+        }
+    }
+}
+
+impl<T: Clone> SteppedLinks<T> {
+    /// No links, for such packets; those that arrive by `until` will count as delivered. Links stay as they are.
+    #[must_use]
+    pub const fn new(until: Instant, info: PacketInfo) -> Self {
+        Self { until, info, links: Vec::new(), kinds: Some(Vec::new()), outputs: Vec::new(), arrivals: Vec::new() }
+    }
+
+    /// No links, of which the model [may change](SteppedLinks::set_model): a line with its queue takes ten times the memory.
+    #[must_use]
+    pub fn that_change(until: Instant, info: PacketInfo) -> Self {
+        Self { kinds: None, ..Self::new(until, info) }
+    }
+
+    /// Adds a link that can be [taken](SteppedLinks::takes).
+    pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) {
+        let link = match self.kind(model) {
+            Some((place, kind)) => Stepped::Queued(place, QueuedLink::new(Stream::new(seed, name.as_str().as_bytes()), kind)),
+            None => Stepped::Other(Box::new(Other { line: Line::new(seed, name, model.clone(), false), latest: Instant::ZERO })),
+        };
+        self.links.push(link);
+    }
+
+    /// The kind of a link with one line of one rate and its place, if it is such a link, and there are not too many kinds.
+    fn kind(&mut self, model: &LinkModel) -> Option<(u8, &QueuedKind)> {
+        let kinds = self.kinds.as_mut()?;
+        let place = match kinds.iter().position(|(other, _)| other == model) {
+            Some(place) => place,
+            None if kinds.len() >= MOST_KINDS => return None,
+            None => {
+                kinds.push((model.clone(), QueuedKind::new(model, self.info.size)?));
+                kinds.len() - 1
+            }
+        };
+        Some((u8::try_from(place).ok()?, &kinds[place].1))
+    }
+
+    /// Offers a packet to a link, and says until when nothing else is offered to it. `arrives` is told of each packet of which it is known by then that it arrives:
+    /// when, whether not after all that were told before, and its number on the link, from 0. Instants must not go back.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    #[inline]
+    pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, item: T, arrives: impl FnMut(Instant, bool, u64, T)) {
+        let Self { until, kinds, links, .. } = self;
+        // What happens after the end is not counted.
+        let offer = Offer { now, next: next.min(*until), until: *until };
+        match (&mut links[link.index()], kinds) {
+            (Stepped::Queued(kind, link), Some(kinds)) => link.offer(offer, &mut kinds[usize::from(*kind)].1, item, arrives),
+            _ => self.offer_to_other(offer, link, item, arrives),
+        }
+    }
+
+    fn offer_to_other(&mut self, Offer { now, next, until }: Offer, link: LinkId, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
+        let Self { info, links, outputs, arrivals, .. } = self;
+        let Stepped::Other(other) = &mut links[link.index()] else { return };
+        let Other { line, latest } = &mut **other;
+        let fate = match line.offer(now, None) {
+            Outcome::Arrives(at) => Some(Ok(at)),
+            Outcome::Dropped(cause) => Some(Err(cause)),
+            // Most packets find an idle line. To lead them through its stages took more than half of their time.
+            Outcome::Enters => line.enter_at_once(now, *info, next),
+        };
+        let number = line.offered() - 1;
+        match fate {
+            Some(Ok(at)) => {
+                line.flow().deliver_by(until, now, at);
+                arrives(at, at <= *latest, number, item);
+                *latest = at.max(*latest);
+            }
+            Some(Err(cause)) => line.drop(cause),
+            None => {
+                line.enter(now, *info, Marks::default(), Sent { at: now, number, item }, outputs, &mut Arriving(arrivals));
+                self.pass(next, link, arrives);
+            }
+        }
+    }
+
+    /// Lets time pass on a link until `next`, before which nothing is offered to it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    pub fn pass(&mut self, next: Instant, link: LinkId, mut arrives: impl FnMut(Instant, bool, u64, T)) {
+        let Self { until, links, kinds, outputs, arrivals, .. } = self;
+        // What happens after the end is not counted.
+        let next = next.min(*until);
+        let Other { line, latest } = match (&mut links[link.index()], kinds) {
+            (Stepped::Queued(kind, link), Some(kinds)) => return link.pass((next, *until), &mut kinds[usize::from(*kind)].1, arrives),
+            (Stepped::Queued(..), None) => unreachable!("links with a kind have kinds"),
+            (Stepped::Other(other), _) => &mut **other,
+        };
+        if line.next_wake().is_some_and(|wake| wake <= next) {
+            line.wake(next, outputs, &mut Arriving(arrivals));
+        }
+        for (at, Sent { at: sent, number, item }) in arrivals.drain(..) {
+            line.flow().deliver_by(*until, sent, at);
+            arrives(at, at <= *latest, number, item);
+            *latest = at.max(*latest);
+        }
+    }
+
+    /// Changes the model of a link, of which `seed` and `name` are those that it was added with; see [`crate::Network::set_link`]. Until then time has passed on it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link, or links [stay](SteppedLinks::new) as they are.
+    pub fn set_model(
+        &mut self,
+        now: Instant,
+        link: LinkId,
+        (seed, name): (u64, &LinkName),
+        model: LinkModel,
+        mut arrives: impl FnMut(Instant, bool, u64, T),
+    ) {
+        self.pass(now, link, &mut arrives);
+        let Self { links, outputs, arrivals, .. } = self;
+        let Stepped::Other(other) = &mut links[link.index()] else { panic!("the links stay as they are") };
+        other.line.reconfigure(now, seed, name, model, outputs, &mut Arriving(arrivals));
+        self.pass(now, link, arrives);
+    }
+
+    /// Takes back that a packet is delivered: nobody will look when it arrives.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    pub fn forget(&mut self, link: LinkId, sent: Instant, arrival: Instant) {
+        if arrival <= self.until {
+            match &mut self.links[link.index()] {
+                Stepped::Queued(_, link) => link.forget(sent, arrival),
+                Stepped::Other(other) => other.line.flow().forget(sent, arrival),
+            }
+        }
+    }
+
+    /// The counters of a link.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    #[must_use]
+    pub fn stats(&self, link: LinkId) -> LinkStats {
+        match &self.links[link.index()] {
+            Stepped::Queued(_, link) => link.stats(),
+            Stepped::Other(other) => other.line.stats(),
+        }
+    }
+}
+
+/// Where packets that leave a line's stages go.
+struct Arriving<'a, T>(&'a mut Vec<(Instant, Sent<T>)>);
+
+impl<T> Sink<Sent<T>> for Arriving<'_, T> {
+    fn arrives(&mut self, at: Instant, packet: Sent<T>, _copy: u8, _marks: Marks) {
+        self.0.push((at, packet));
+    }
+
+    fn happened(&mut self, _at: Instant, _fate: Fate, _packet: Sent<T>, _copy: u8, _marks: Marks) {}
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,136 @@
+use core::time::Duration;
+
+use cohaptic_units::{Bytes, Probability, Rate};
+use proptest::prelude::*;
+
+use super::*;
+use crate::link::Link;
+use crate::netem::Netem;
+use crate::stages::config::{Layout, LinkConfig};
+use crate::stages::delay::{Delay, Jitter};
+use crate::stages::loss::Loss;
+use crate::stages::queue::{Bottleneck, CoDel, Discipline, QueueLimit, Red};
+
+const SIZE: Bytes = Bytes::new(64);
+
+fn millis(n: u64) -> Instant {
+    Instant::from_nanos(n * 1_000_000)
+}
+
+fn bottleneck(discipline: Discipline, limit: Option<QueueLimit>, bits: u64) -> Bottleneck {
+    Bottleneck { limit, discipline, ..Bottleneck::at_rate(Rate::bits_per_sec(bits).unwrap()) }
+}
+
+fn codel(interval: u64, mtu: u64, ecn: bool) -> Discipline {
+    Discipline::CoDel(CoDel { target: Duration::from_millis(5), interval: Duration::from_millis(interval), mtu: Bytes::new(mtu), ecn })
+}
+
+fn red(ecn: bool) -> Discipline {
+    Discipline::Red(Red::new(SIZE, Bytes::new(320), Probability::new(0.5).unwrap(), 0.1, SIZE, ecn).unwrap())
+}
+
+/// What becomes of packets that are offered at these instants, by a whole link and by a stepped one, of which `then` is the model from that packet on.
+fn compare(model: &LinkModel, then: Option<(usize, &LinkModel)>, (instants, until): (&[Instant], Instant)) {
+    let (name, info) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn_capable: true });
+    let mut whole = Link::new(7, &name, model.clone());
+    let mut stepped = if then.is_some() { SteppedLinks::that_change(until, info) } else { SteppedLinks::new(until, info) };
+    stepped.add(7, &name, model);
+    let mut arrivals = Vec::new();
+    for (place, now) in instants.iter().enumerate() {
+        if let Some((_, model)) = then.filter(|(at, _)| *at == place) {
+            whole.set_model(*now, model.clone()).unwrap();
+            stepped.set_model(*now, LinkId(0), (7, &name), model.clone(), |at, _, number, item| arrivals.push((at, number, item)));
+        }
+        whole.handle_packet(*now, info, 1000 - place).unwrap();
+        let next = instants.get(place + 1).copied().unwrap_or(Instant::MAX);
+        stepped.offer((*now, next), LinkId(0), 1000 - place, |at, is_late, number, item| {
+            assert_eq!(is_late, arrivals.iter().any(|(other, ..)| *other >= at));
+            arrivals.push((at, number, item));
+        });
+    }
+    whole.handle_timeout(until).unwrap();
+    let mut delivered = Vec::new();
+    while let Some(event) = whole.poll_event() {
+        if matches!(event.fate, Fate::Delivered(_)) {
+            delivered.push((event.at, event.sequence, event.payload));
+        }
+    }
+    arrivals.retain(|(at, ..)| *at <= until);
+    arrivals.sort_unstable();
+    assert_eq!(delivered, arrivals, "{}", model.words());
+    assert_eq!(stepped.stats(LinkId(0)), whole.stats(), "{}", model.words());
+}
+
+/// Packets of 64 bytes take 5.12 ms and come in bursts of 40 that are 3 ms apart, then 120 that are 8 ms apart: most find an idle line, some a queue, and some leave
+/// just when the next one comes.
+fn bursts() -> Vec<Instant> {
+    (0..320).map(|n: u64| millis(n / 160 * 1_500 + (n % 160).min(40) * 3 + (n % 160).saturating_sub(40) * 8)).collect()
+}
+
+/// As they are, and where the discipline is another one from the second burst on.
+#[test]
+fn they_decide_what_whole_links_decide() {
+    let model = |discipline, bits, layout| -> LinkModel {
+        let limit = if matches!(discipline, Discipline::Red(_)) { QueueLimit::Bytes(Bytes::new(640)) } else { QueueLimit::Packets(6) };
+        let delay = Delay::with_jitter(Duration::from_millis(24), Jitter::new(Duration::from_millis(6), Default::default())).unwrap();
+        let loss = Loss::Independent(Probability::new(0.1).unwrap());
+        LinkConfig { bottleneck: Some(bottleneck(discipline, Some(limit), bits)), delay, loss, layout, ..LinkConfig::default() }.into()
+    };
+    let disciplines = [Discipline::TailDrop, Discipline::HeadDrop, codel(30, 64, false), codel(30, 64, true), red(false), red(true)];
+    // At 64 kbit/s a packet takes 8 ms, and leaves when the next one comes.
+    for (discipline, bits, layout) in disciplines.into_iter().flat_map(|discipline| {
+        [(discipline, 100_000, Layout::Physical), (discipline, 64_000, Layout::Physical), (discipline, 100_000, Layout::Netem)]
+    }) {
+        let marks = matches!(discipline, Discipline::CoDel(codel) if codel.ecn) || discipline == red(true);
+        let queued = QueuedKind::new(&model(discipline, bits, layout), SIZE);
+        assert_eq!(queued.is_some(), layout == Layout::Physical && !marks, "{discipline:?}");
+        for then in [None, Some((160, &model(red(false), bits, layout)))] {
+            compare(&model(discipline, bits, layout), then, (&bursts(), millis(2_900)));
+        }
+    }
+}
+
+/// Losses in bursts and delays that follow those before, which remember.
+#[test]
+fn queues_between_memories_decide_what_whole_links_decide() {
+    for words in ["delay 24ms 4ms 50% loss gemodel 5% 20%", "delay 24ms", "loss 30%"] {
+        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        for discipline in [Discipline::HeadDrop, codel(30, 0, false), red(false)] {
+            let model = LinkConfig { bottleneck: Some(bottleneck(discipline, None, 100_000)), layout: Layout::Physical, ..config.clone() }.into();
+            assert!(QueuedKind::new(&model, SIZE).is_some());
+            compare(&model, None, (&bursts(), millis(2_900)));
+        }
+    }
+}
+
+fn limits() -> impl Strategy<Value = Option<QueueLimit>> {
+    prop_oneof![
+        Just(None),
+        (0_u64..9).prop_map(|packets| Some(QueueLimit::Packets(packets))),
+        (0_u64..900).prop_map(|bytes| Some(QueueLimit::Bytes(Bytes::new(bytes)))),
+        (0_u64..90).prop_map(|millis| Some(QueueLimit::Time(Duration::from_millis(millis)))),
+    ]
+}
+
+proptest! {
+    /// With gaps from none to longer than the queue, limits of each kind, and intervals of CoDel that are long over before the end or never.
+    #[test]
+    fn queues_decide_what_whole_links_decide(
+        limit in limits(),
+        bits in prop_oneof![Just(64_000_u64), 40_000_u64..200_000],
+        discipline in prop_oneof![
+            Just(Discipline::HeadDrop), Just(red(false)), (1_u64..300, 0_u64..300).prop_map(|(interval, mtu)| codel(interval, mtu, false))
+        ],
+        gaps in prop::collection::vec(prop_oneof![Just(0_u64), 0..6_000_000_u64, 4_000_000..9_000_000_u64, Just(8_000_000), Just(90_000_000)], 1..200),
+        until in 0_u64..1_500_000_000,
+    ) {
+        let instants: Vec<Instant> = gaps.iter().scan(0, |at, gap| { *at += gap; Some(Instant::from_nanos(*at)) }).collect();
+        let loss = Loss::Independent(Probability::new(0.05).unwrap());
+        let delay = Delay::with_jitter(Duration::from_millis(24), Jitter::new(Duration::from_millis(6), Default::default())).unwrap();
+        let model = LinkConfig { bottleneck: Some(bottleneck(discipline, limit, bits)), loss, delay, ..LinkConfig::default() }.into();
+        prop_assert!(QueuedKind::new(&model, SIZE).is_some());
+        // A run ends when its last packet was offered, or later.
+        let until = Instant::from_nanos(until).max(*instants.last().expect("there is one"));
+        compare(&model, None, (&instants, until));
+    }
+}

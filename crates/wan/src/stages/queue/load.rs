@@ -1,0 +1,89 @@
+//! What a link is offered: under a load that it carries with ease, no packet waits, and a queue need not be simulated.
+
+use core::time::Duration;
+
+use cohaptic_units::Bytes;
+
+use super::bottleneck::giga_bits;
+use super::{Bottleneck, Discipline, Service, TokenBucket};
+
+/// Packets of one size that are offered to a link, of which no two come closer together than that. The program that offers them knows it; nothing checks it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Load {
+    /// The size of each packet.
+    pub size: Bytes,
+    /// The least time between two of them; zero if nothing is known.
+    pub gap: Duration,
+}
+
+impl Load {
+    /// Packets of that size, of which several may come at once.
+    #[must_use]
+    pub const fn of(size: Bytes) -> Self {
+        Self { size, gap: Duration::ZERO }
+    }
+}
+
+impl Bottleneck {
+    /// How long each packet of the load is on the line, if each has left before the next one comes: then none waits, and no discipline and no limit ever does anything.
+    /// `None` if one may wait.
+    pub(crate) fn time_without_wait(&self, load: Load) -> Option<Duration> {
+        let Self { service: Service::Rate(rate), framing, limit: _, discipline } = self else { return None };
+        // With nothing waiting the average of RED is zero, which is not below a threshold of zero.
+        if matches!(discipline, Discipline::Red(red) if red.min() == Bytes::ZERO) {
+            return None;
+        }
+        let time = rate.transmission_time(giga_bits(framing.on_the_line(load.size)));
+        (time <= load.gap).then_some(time)
+    }
+}
+
+impl TokenBucket {
+    /// Whether each packet of the load finds the bucket full enough: what it takes comes back before the next one. The bucket begins full.
+    pub(crate) fn lets_all_pass(&self, load: Load) -> bool {
+        let needed = giga_bits(self.framing.on_the_line(load.size));
+        let buckets = [Some((self.rate, self.burst)), self.peak.map(|peak| (peak.rate, peak.burst))];
+        buckets.into_iter().flatten().all(|(rate, burst)| needed <= giga_bits(burst) && needed <= rate.bits_sent(load.gap))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_units::{Probability, Rate};
+
+    use super::*;
+    use crate::stages::queue::{CoDel, Framing, Peak, QueueLimit, Red};
+
+    /// 64 bytes take 512 µs at 1 Mbit/s.
+    fn load(micros: u64) -> Load {
+        Load { size: Bytes::new(64), gap: Duration::from_micros(micros) }
+    }
+
+    #[test]
+    fn a_line_is_free_when_the_next_packet_comes_as_the_one_before_leaves() {
+        let line = |discipline| Bottleneck {
+            discipline,
+            limit: Some(QueueLimit::Packets(0)),
+            ..Bottleneck::at_rate(Rate::bits_per_sec(1_000_000).unwrap())
+        };
+        let red = |min| Discipline::Red(Red::new(Bytes::new(min), Bytes::new(1000), Probability::ONE, 0.1, Bytes::new(64), false).unwrap());
+        for discipline in [Discipline::TailDrop, Discipline::HeadDrop, Discipline::CoDel(CoDel::default()), red(1)] {
+            assert_eq!(line(discipline).time_without_wait(load(512)), Some(Duration::from_micros(512)), "{discipline:?}");
+            assert_eq!(line(discipline).time_without_wait(load(511)), None, "{discipline:?}");
+        }
+        assert_eq!(line(red(0)).time_without_wait(load(512)), None);
+    }
+
+    #[test]
+    fn a_bucket_lets_pass_what_comes_back_in_time() {
+        let rate = Rate::bits_per_sec(1_000_000).unwrap();
+        let bucket = |burst, peak| TokenBucket { rate, burst: Bytes::new(burst), peak, framing: Framing::default(), limit: None };
+        assert!(bucket(64, None).lets_all_pass(load(512)));
+        assert!(!bucket(64, None).lets_all_pass(load(511)));
+        assert!(!bucket(63, None).lets_all_pass(load(9_999)));
+        let peak = |bits, burst| Some(Peak { rate: Rate::bits_per_sec(bits).unwrap(), burst: Bytes::new(burst) });
+        assert!(bucket(128, peak(2_000_000, 64)).lets_all_pass(load(512)));
+        assert!(!bucket(128, peak(999_999, 64)).lets_all_pass(load(512)));
+        assert!(!bucket(128, peak(2_000_000, 63)).lets_all_pass(load(512)));
+    }
+}

@@ -1,0 +1,90 @@
+//! Lines and token buckets for which no sample waits, because the one before has just left, and those for which one does, because it has not: the same as event by event, to
+//! the bit.
+
+use std::sync::Arc;
+
+use cohaptic_harness::{Model, NoObserver, Simulation, run_side_by_side, same_shape};
+use cohaptic_peer::wire::SampleKind;
+use cohaptic_scene::{Scene, Topology};
+use cohaptic_tests::{cases, drafts};
+use proptest::prelude::*;
+
+use super::arrays::{difference, run, run_interrupted};
+use super::watched::found;
+
+/// How many bits a second a line sends, of those that are offered: the samples of a link, a little less, a little more, or far more.
+fn parts() -> impl Strategy<Value = (f64, i64)> {
+    (prop_oneof![3 => Just(1.0), 1 => 0.8..1.3, 1 => Just(100.0)], -1..=1_i64)
+}
+
+fn disciplines() -> impl Strategy<Value = String> {
+    prop_oneof![
+        Just("\"tail-drop\"".to_owned()),
+        Just("\"head-drop\"".to_owned()),
+        (1..20_u32, 1..60_u32, 0..200_u32).prop_map(|(target, interval, mtu)| {
+            format!("{{ codel = {{ target = \"{target}ms\", interval = \"{interval}ms\", mtu = \"{mtu}B\" }} }}")
+        }),
+        (0..100_u32, 0.0..1.0).prop_map(|(min, weight)| format!(
+            "{{ red = {{ min = \"{min}B\", max = \"300B\", max-probability = 0.5, weight = {}, mean-packet = \"64B\" }} }}",
+            1.0 - weight
+        )),
+    ]
+}
+
+/// Keys of a link, of which the rates are written as `{rate}` and `{tokens}`.
+fn keys() -> impl Strategy<Value = String> {
+    let delay = prop_oneof![
+        Just("delay = \"9ms\""),
+        Just("delay = \"9ms\", jitter = \"2ms\""),
+        Just("delay = \"9ms\", jitter = { sd = \"2ms\", correlation = 0.5 }, loss = { gilbert-elliott = { p = 0.2, r = 0.3 } }"),
+        Just("delay = \"1100ms\", jitter = \"30ms\", loss = 0.1"),
+    ];
+    let line = (disciplines(), 0..500_u32)
+        .prop_map(|(discipline, limit)| format!(", rate = \"{{rate}}bit\", queue = {{ limit = \"{limit}B\", discipline = {discipline} }}"));
+    let bucket = (0..200_u32).prop_map(|more| format!(", token-bucket = {{ rate = \"{{tokens}}bit\", burst = \"{{size+{more}}}B\" }}"));
+    (delay, prop::option::weighted(0.8, line), prop::option::weighted(0.3, bucket))
+        .prop_map(|(delay, line, bucket)| format!("{delay}{}{}", line.unwrap_or_default(), bucket.unwrap_or_default()))
+}
+
+proptest! {
+    #![proptest_config(cases(600))]
+
+    #[test]
+    fn they_come_to_what_their_events_come_to(
+        mut drafts in drafts::alike(Just(1)), keys in keys(), (part, more) in parts(), tokens in parts(), drift in prop_oneof![Just(0), -2000..2000_i32],
+        on_ring: bool, breaths in 1..3_usize,
+    ) {
+        let draft = &mut drafts[0];
+        let size = SampleKind::State.datagram_len(draft.axes);
+        let offered = 8e6 * size as f64 / draft.update as f64;
+        let rate = |part: f64, more: i64| ((offered * part) as u64).saturating_add_signed(more).to_string();
+        let keys = keys.replace("{rate}", &rate(part, more)).replace("{tokens}", &rate(tokens.0, tokens.1));
+        draft.link = match keys.split_once("{size+") {
+            None => keys,
+            Some((before, rest)) => {
+                let (more, after) = rest.split_once('}').unwrap();
+                format!("{before}{}{after}", size + more.parse::<usize>().unwrap())
+            }
+        };
+        draft.links.clear();
+        draft.gains = draft.gains.scaled(0.1);
+        draft.duration = if draft.link.contains("1100ms") { 1500 } else { draft.duration };
+        draft.peers.iter_mut().for_each(|peer| (peer.uplink, peer.downlink, peer.drift) = (None, None, drift));
+        let scene = draft.scene();
+        let topology = if on_ring { Topology::ring(scene.peers.len(), 2).map(Arc::new) } else { None };
+        let scene = Scene { topology, ..scene };
+        prop_assert!(scene.has_gains_by_peer() || same_shape(&scene, &scene), "it is run in arrays");
+        let expected = run(&scene, Model::General);
+        prop_assert_eq!(difference(&run(&scene, Model::Least), &expected), None, "{}", draft.link);
+        let Ok(on_threads) = Simulation::new(&scene, Model::Least).on_threads(2).run(&mut NoObserver);
+        prop_assert_eq!(difference(&on_threads, &expected), None, "{}", draft.link);
+        if !scene.has_gains_by_peer() {
+            prop_assert_eq!(found(&scene, |_| ()), None, "{}", draft.link);
+            for together in run_side_by_side(&vec![scene.clone(); 8]) {
+                prop_assert_eq!(difference(&together, &expected), None, "{}", draft.link);
+            }
+        }
+        let interrupted = |model| run_interrupted(&scene, model, breaths);
+        prop_assert_eq!(difference(&interrupted(Model::Least), &interrupted(Model::General)), None, "{}", draft.link);
+    }
+}
