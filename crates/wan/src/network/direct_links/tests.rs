@@ -68,14 +68,21 @@ fn lines_without_wait_decide_what_whole_links_decide() {
     let red = Red::new(Bytes::new(1), Bytes::new(2), Probability::ONE, 1.0, Bytes::new(64), false).unwrap();
     let codel = CoDel { target: Duration::ZERO, interval: Duration::ZERO, mtu: Bytes::ZERO, ecn: false };
     let words = ["delay 24ms", "delay 24ms 9ms loss 10%", "delay 24ms 4ms 50% loss gemodel 5% 20%", "delay 24ms 9ms loss state 5% 20%", "loss 50%"];
+    let gamma = Jitter { correlation: Correlation::PerPacket(0.5), ..Jitter::new(Duration::from_millis(6), Distribution::Gamma) };
+    let configs = words.map(|words| Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap());
+    let chain = LinkConfig { delay: Delay::with_jitter(Duration::from_millis(24), gamma).unwrap(), ..configs[2].clone() };
     for discipline in [Discipline::TailDrop, Discipline::HeadDrop, Discipline::CoDel(codel), Discipline::Red(red)] {
-        let lines = words.map(|words| {
-            let LinkModel::Fixed(config) = queued(words, Some(QueueLimit::Bytes(Bytes::ZERO))) else { unreachable!("it is fixed") };
-            let bottleneck = config.bottleneck.map(|bottleneck| Bottleneck { discipline, ..bottleneck });
-            let rate = Rate::bits_per_sec(100_000).unwrap();
-            let bucket = TokenBucket { rate, burst: Bytes::new(64), peak: None, framing: Framing::default(), limit: Some(QueueLimit::Packets(0)) };
-            LinkModel::from(LinkConfig { bottleneck, token_bucket: Some(bucket), ..config })
-        });
+        let lines: Vec<LinkModel> = configs
+            .iter()
+            .chain([&chain])
+            .map(|config| {
+                let rate = Rate::bits_per_sec(100_000).unwrap();
+                let bottleneck = Bottleneck { discipline, limit: Some(QueueLimit::Bytes(Bytes::ZERO)), ..Bottleneck::at_rate(rate) };
+                let bucket =
+                    TokenBucket { rate, burst: Bytes::new(64), peak: None, framing: Framing::default(), limit: Some(QueueLimit::Packets(0)) };
+                LinkConfig { bottleneck: Some(bottleneck), token_bucket: Some(bucket), layout: Layout::Physical, ..config.clone() }.into()
+            })
+            .collect();
         assert!(lines.iter().all(|line| !DirectLinks::takes(line, Load { gap: Duration::from_nanos(5_119_999), ..load })));
         compare_under(load, &lines);
         for line in lines {
