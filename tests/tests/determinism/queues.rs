@@ -1,12 +1,13 @@
 //! Lines and token buckets for which no sample waits, because the one before has just left, and those for which one does, because it has not: the same as event by event, to
 //! the bit.
+#![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss, reason = "rates of some kilobits a second")]
 
 use std::sync::Arc;
 
 use cohaptic_harness::{Model, NoObserver, Simulation, run_side_by_side, same_shape};
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_scene::{Scene, Topology};
-use cohaptic_tests::{cases, drafts};
+use cohaptic_tests::{Draft, cases, drafts};
 use proptest::prelude::*;
 
 use super::arrays::{difference, run, run_interrupted};
@@ -46,6 +47,40 @@ fn keys() -> impl Strategy<Value = String> {
         .prop_map(|(delay, line, bucket)| format!("{delay}{}{}", line.unwrap_or_default(), bucket.unwrap_or_default()))
 }
 
+/// Keys with the rates, as parts of what is offered.
+fn written(keys: &str, draft: &Draft, line: (f64, i64), tokens: (f64, i64)) -> String {
+    let size = SampleKind::State.datagram_len(draft.axes);
+    let offered = 8e6 * size as f64 / draft.update as f64;
+    let rate = |(part, more): (f64, i64)| ((offered * part) as u64).saturating_add_signed(more).to_string();
+    let keys = keys.replace("{rate}", &rate(line)).replace("{tokens}", &rate(tokens));
+    let Some((before, rest)) = keys.split_once("{size+") else { return keys };
+    let (more, after) = rest.split_once('}').unwrap();
+    format!("{before}{}{after}", size + more.parse::<usize>().unwrap())
+}
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    /// The timeline makes links others, while samples are on lines and before them.
+    #[test]
+    fn what_is_inside_when_links_change_comes_to_the_same(
+        mut drafts in drafts::alike(Just(1)), keys in prop::array::uniform3(keys()), parts in prop::array::uniform3((parts(), parts())), at in prop::array::uniform2(0..300_000_u32),
+    ) {
+        let draft = &mut drafts[0];
+        let [link, first, second] = std::array::from_fn(|place| written(&keys[place], draft, parts[place].0, parts[place].1));
+        (draft.link, draft.gains, draft.duration) = (link, draft.gains.scaled(0.1), 400);
+        draft.links.clear();
+        draft.peers.iter_mut().for_each(|peer| (peer.uplink, peer.downlink) = (None, None));
+        for (at, keys) in [(at[0].min(at[1]), first), (at[0].max(at[1]), second)] {
+            draft.timeline.push(format!("at = \"{at}us\"\nlink = \"all\"\nset = {{ {keys} }}"));
+        }
+        let scene = draft.scene();
+        prop_assert!(same_shape(&scene, &scene), "it is run in arrays");
+        let expected = run(&scene, Model::General);
+        prop_assert_eq!(difference(&run(&scene, Model::Least), &expected), None, "{}, {:?}", draft.link, draft.timeline);
+    }
+}
+
 proptest! {
     #![proptest_config(cases(600))]
 
@@ -55,17 +90,7 @@ proptest! {
         on_ring: bool, breaths in 1..3_usize,
     ) {
         let draft = &mut drafts[0];
-        let size = SampleKind::State.datagram_len(draft.axes);
-        let offered = 8e6 * size as f64 / draft.update as f64;
-        let rate = |part: f64, more: i64| ((offered * part) as u64).saturating_add_signed(more).to_string();
-        let keys = keys.replace("{rate}", &rate(part, more)).replace("{tokens}", &rate(tokens.0, tokens.1));
-        draft.link = match keys.split_once("{size+") {
-            None => keys,
-            Some((before, rest)) => {
-                let (more, after) = rest.split_once('}').unwrap();
-                format!("{before}{}{after}", size + more.parse::<usize>().unwrap())
-            }
-        };
+        draft.link = written(&keys, draft, (part, more), tokens);
         draft.links.clear();
         draft.gains = draft.gains.scaled(0.1);
         draft.duration = if draft.link.contains("1100ms") { 1500 } else { draft.duration };

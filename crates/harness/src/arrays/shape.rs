@@ -36,8 +36,6 @@ pub(crate) struct Shape {
     pub(super) load: Load,
     /// How the fates of packets become known.
     pub(super) way: Way,
-    /// Whether the timeline changes links.
-    pub(super) links_change: bool,
     /// The delay of all links, if they do nothing but delay, all alike, and lead from all to all.
     pub(super) delay: Option<Duration>,
     /// The neighbours of each peer, if they are not all others.
@@ -196,7 +194,6 @@ impl Shape {
             phases: scene.peers.iter().map(|peer| peer.phase).collect(),
             load,
             way,
-            links_change,
             delay,
             topology: scene.topology.clone(),
             clocks: (!tick_together).then(|| clocks().copied().collect()),

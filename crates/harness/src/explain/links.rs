@@ -1,16 +1,48 @@
-//! Links in words: each stage that is configured, with its numbers.
+//! Links in words: each stage that is configured, with its numbers, and what is simulated of queues.
 
 use cohaptic_scene::Scene;
 use std::path::Path;
 
-fn described(keys: &str) -> String {
+use super::explain;
+
+/// Two peers that send 64 bytes every 8 ms over links with these keys.
+fn scene(keys: &str) -> Scene {
     let text = format!(
         "modulators = [{{ name = \"cell\", states = [{{ name = \"a\", sojourn = \"2s\" }}, {{ name = \"b\", sojourn = {{ fixed = \"1s\" }} }}] }}]\n\
          scene = {{ duration = \"1s\", count = 2 }}\nobject.mass = 1\npeer.contact = \"none\"\npeer.device.mass = 1\n\
          coordination = {{ strategy = \"average-position\", stiffness = 1, update = \"8ms\" }}\n[link]\n{keys}"
     );
-    let scene = Scene::parse(&text, Path::new("x.toml"), &[]).unwrap_or_else(|error| panic!("{error}"));
-    scene.links.between(0, 1).words()
+    Scene::parse(&text, Path::new("x.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn described(keys: &str) -> String {
+    scene(keys).links.between(0, 1).words()
+}
+
+/// A line of 64 kbit/s sends a sample just before the next one comes.
+#[test]
+fn queues_in_which_no_sample_waits_are_left_out() {
+    let queues = |keys: &str| {
+        let found = explain(&scene(keys)).models;
+        let row = |part: &str| found.iter().find(|row| row.part == part).map(|row| (row.model.clone(), row.reason.clone()));
+        (row("queues of such a run"), row("packets on the way").map(|(model, _)| model))
+    };
+    let told = |keys: &str, model: &str, reason: &str, way: &str| {
+        let expected = (Some((model.to_owned(), reason.to_owned())), Some(way.to_owned()));
+        assert_eq!(queues(keys), expected, "{keys}");
+    };
+    let no_wait = "samples of a link come at least 8ms apart, and each has left by then";
+    let codel = "queue = { limit = \"9 packets\", discipline = \"codel\" }";
+    told(&format!("rate = \"64kbit\"\n{codel}"), "none: no sample waits", no_wait, "a ring");
+    told("token-bucket = { rate = \"64kbit\", burst = \"64B\" }", "none: no sample waits", no_wait, "a ring");
+    told(&format!("rate = \"64kbit\"\njitter = \"1ms\"\ndelay = \"9ms\"\n{codel}"), "none: no sample waits", no_wait, "a calendar queue");
+    let one_size = "samples have one size, and the newest is dropped where there is no room";
+    told("rate = \"63kbit\"", "when the sample before left the line", one_size, "a calendar queue");
+    let until = "samples of a link come at least 8ms apart: until then nothing new can be known";
+    told(&format!("rate = \"63kbit\"\n{codel}"), "from one sample of a link to its next", until, "a calendar queue");
+    let on_the_way = "access lines, limits and replays look at packets on the way";
+    told("rate = \"64kbit\"\nlimit = \"9 packets\"", "as time goes", on_the_way, "a calendar queue");
+    assert_eq!(queues("delay = \"9ms\"").0, None);
 }
 
 #[test]

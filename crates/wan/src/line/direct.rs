@@ -61,21 +61,31 @@ impl Direct {
         &mut self,
         now: Instant,
         number: u64,
-        [loss_word, jitter_word]: Words,
+        words: Words,
         queue: impl FnOnce(Instant) -> Result<Instant, DropCause>,
     ) -> Result<Instant, DropCause> {
+        match self.dropped(now, number, words) {
+            Some(cause) => Err(cause),
+            None => Ok(self.arrival(queue(now)?, number, words)),
+        }
+    }
+
+    /// Why a packet does not come to the queue, if it does not.
+    #[inline(always)]
+    pub(crate) fn dropped(&mut self, now: Instant, number: u64, [word, _]: Words) -> Option<DropCause> {
         if self.is_down(now) {
-            return Err(DropCause::Outage);
+            return Some(DropCause::Outage);
         }
         let packet = self.draws.packet(number);
-        if let Some(loss) = &mut self.loss
-            && loss.loses(now, number, loss_word, packet)
-        {
-            return Err(DropCause::Loss);
-        }
-        let leaves = queue(now)?;
-        let delay = self.delay.draw_nanos(leaves, jitter_word, packet);
-        Ok(self.order.arrival(leaves.saturating_add_nanos(delay)))
+        let is_lost = self.loss.as_mut().is_some_and(|loss| loss.loses(now, number, word, packet));
+        is_lost.then_some(DropCause::Loss)
+    }
+
+    /// When a packet arrives that leaves the queue at that instant.
+    #[inline(always)]
+    pub(crate) fn arrival(&mut self, leaves: Instant, number: u64, [_, word]: Words) -> Instant {
+        let delay = self.delay.draw_nanos(leaves, word, self.draws.packet(number));
+        self.order.arrival(leaves.saturating_add_nanos(delay))
     }
 
     pub(crate) const fn has_outages(&self) -> bool {

@@ -64,6 +64,11 @@ impl<P, T: Clone> Line<P, T> {
         Self { flow: Flow::default(), pipeline: Pipeline::new(seed, name, model, general), rare: None }
     }
 
+    /// A line that goes on from where another one was.
+    pub(crate) fn resumed(stats: LinkStats, pipeline: Pipeline<T>) -> Self {
+        Self { flow: stats.flow, pipeline, rare: Some(Box::new(Rare { filter: None, seldom: stats.seldom })) }
+    }
+
     /// Drops every packet of which the filter says so, before anything else happens to it.
     pub(crate) fn set_filter(&mut self, filter: Filter<P>) {
         self.rare().filter = Some(filter);

@@ -23,6 +23,7 @@ use crate::random::{Purpose, Stream};
 use crate::stages::config::LinkConfig;
 use crate::stages::modulation::ModulationStage;
 use crate::stages::order::{Order, OrderStage};
+use crate::stages::queue::BottleneckStage;
 
 /// Time was given that is earlier than a time given before. Nothing was changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
@@ -73,6 +74,11 @@ impl<T: Clone> Pipeline<T> {
                 Self::Engine(Box::new(Engine::new(kind(Instant::ZERO, seed, name, model, None))))
             }
         }
+    }
+
+    /// An engine with a bottleneck besides the stages that decide at once, and what is in it.
+    pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
+        Self::Engine(Box::new(Engine::new(Kind::Staged(Box::new(Staged::resumed(now, direct, config, bottleneck))))))
     }
 
     /// The first random words of packet number `number`, which [`Pipeline::offer`] takes; zeros if it needs none.

@@ -196,6 +196,14 @@ impl<T: Clone> Staged<T> {
         stages
     }
 
+    /// A link with a bottleneck besides the stages that decide at once, and what is in it.
+    pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
+        // To configure the stages that decide at once as they are changes nothing.
+        let mut stages = Self { bottleneck: Some(bottleneck), ..Self::new(now, direct, config, None) };
+        stages.look_ahead();
+        stages
+    }
+
     /// The order of the stages.
     pub(crate) fn layout(&self) -> Layout {
         if self.layout[self.layout.len() - 1] == Stage::Propagation { Layout::Physical } else { Layout::Netem }

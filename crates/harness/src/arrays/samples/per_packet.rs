@@ -75,7 +75,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         let info = PacketInfo { size: shape.load.size, ecn_capable: true };
         let mut links = match shape.way {
             Way::Direct => Links::Direct(DirectLinks::new(shape.end, shape.load)),
-            Way::Stepped if shape.links_change => Links::Stepped(SteppedLinks::that_change(shape.end, info)),
             Way::Stepped => Links::Stepped(SteppedLinks::new(shape.end, info)),
             Way::Carried => Links::Carried(Carrier::new(scenes, info)),
         };

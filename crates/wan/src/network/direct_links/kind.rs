@@ -13,8 +13,8 @@ use crate::stages::queue::{EqualPackets, Load, nanos};
 
 /// A kind of link.
 #[derive(Clone, Debug)]
-pub(in crate::network) struct Kind {
-    pub(in crate::network) is_random: bool,
+pub(super) struct Kind {
+    pub(super) is_random: bool,
     loss: Losses,
     delay: Delays,
     line: Line,
@@ -31,7 +31,7 @@ pub(super) enum Losses {
 
 /// The line of a link, for packets of one size.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::network) enum Line {
+pub(super) enum Line {
     /// No packet waits, and each takes that long \[ns\]; nothing if there is no line.
     Free(u64),
     /// Packets may wait.
@@ -46,7 +46,7 @@ enum Delays {
 
 /// What a link remembers of earlier packets, and a counter that few links need.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::network) struct Remembered {
+pub(super) struct Remembered {
     /// When the packet before left the queue.
     departure: Instant,
     /// The latest value of the chain of delays, NaN before the first packet.
@@ -68,11 +68,6 @@ pub(super) enum Verdict {
 impl Kind {
     /// The kind of such links, for packets of that load; `None` if they remember more than [`Remembered`].
     pub(super) fn new(config: &LinkConfig, load: Load) -> Option<Self> {
-        Self::with_line(config, Line::new(config, load)?)
-    }
-
-    /// [`Kind::new`] with that line.
-    pub(in crate::network) fn with_line(config: &LinkConfig, line: Line) -> Option<Self> {
         let loss = match &config.loss {
             Loss::None => Losses::None,
             Loss::Independent(probability) => Losses::Independent(*probability),
@@ -87,6 +82,7 @@ impl Kind {
         if !config.outages.is_empty() || config.order != Order::AllowReordering || remembers_more {
             return None;
         }
+        let line = Line::new(config, load)?;
         let chains = match (&delay, line) {
             (Delays::Correlated(delays), Line::Free(0)) => Chains::new(&loss, delays),
             (Delays::Correlated(_) | Delays::Independent(_), _) => None,
@@ -100,7 +96,7 @@ impl Kind {
     }
 
     /// What a link remembers before its first packet.
-    pub(in crate::network) fn beginning(&self, draws: Stream) -> Remembered {
+    pub(super) fn beginning(&self, draws: Stream) -> Remembered {
         Remembered { state: self.initial_state(draws), ..Remembered::NOTHING }
     }
 
@@ -131,7 +127,12 @@ impl Kind {
     /// What becomes of a packet of a link that remembers that.
     #[inline(always)]
     pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
-        if self.loses(link, loss_word, packet) {
+        let is_lost = match &self.loss {
+            Losses::None => false,
+            Losses::Independent(probability) => probability.happens(loss_word),
+            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, loss_word, || packet.more(Purpose::Loss).next_word()),
+        };
+        if is_lost {
             return Verdict::Lost;
         }
         let leaves = match &self.line {
@@ -144,27 +145,11 @@ impl Kind {
                 }
             },
         };
-        Verdict::Arrives(self.arrival(leaves, link, jitter_word, packet))
-    }
-
-    /// Whether a packet is lost before the line.
-    #[inline(always)]
-    pub(in crate::network) fn loses(&self, link: &mut Remembered, word: u64, packet: PacketDraws) -> bool {
-        match &self.loss {
-            Losses::None => false,
-            Losses::Independent(probability) => probability.happens(word),
-            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, word, || packet.more(Purpose::Loss).next_word()),
-        }
-    }
-
-    /// When a packet arrives that leaves the line at that instant.
-    #[inline(always)]
-    pub(in crate::network) fn arrival(&mut self, leaves: Instant, link: &mut Remembered, word: u64, packet: PacketDraws) -> Instant {
         let delay = match &mut self.delay {
-            Delays::Independent(delay) => delay.draw_nanos(leaves, word, packet),
-            Delays::Correlated(delays) => delays.draw_nanos(&mut link.normal, word, packet),
+            Delays::Independent(delay) => delay.draw_nanos(leaves, jitter_word, packet),
+            Delays::Correlated(delays) => delays.draw_nanos(&mut link.normal, jitter_word, packet),
         };
-        leaves.saturating_add_nanos(delay)
+        Verdict::Arrives(leaves.saturating_add_nanos(delay))
     }
 }
 

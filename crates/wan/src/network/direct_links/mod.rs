@@ -1,7 +1,7 @@
 //! Many links that decide at once what becomes of a packet, for drivers that keep the packets on the way themselves.
 
 mod chains;
-pub(super) mod kind;
+mod kind;
 mod offered_at;
 
 use alloc::vec::Vec;

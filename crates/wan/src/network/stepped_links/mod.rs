@@ -15,7 +15,6 @@ use crate::line::name::LinkName;
 use crate::line::pipeline::Outcome;
 use crate::line::{Line, Sink};
 use crate::packet::{Marks, Outputs, PacketInfo};
-use crate::random::Stream;
 use queued::{QueuedKind, QueuedLink};
 
 /// Links of any kind, for a driver that knows when it will offer the next packet to each.
@@ -31,8 +30,8 @@ pub struct SteppedLinks<T> {
     until: Instant,
     info: PacketInfo,
     links: Vec<Stepped<T>>,
-    /// What links with one line of one rate have in common, if links stay as they are.
-    kinds: Option<Vec<(LinkModel, QueuedKind)>>,
+    /// What links have in common on which nothing waits but before a line of one rate.
+    kinds: Vec<(LinkModel, QueuedKind)>,
     outputs: Outputs<Sent<T>>,
     arrivals: Vec<(Instant, Sent<T>)>,
 }
@@ -59,15 +58,7 @@ struct Sent<T> {
     item: T,
 }
 
-/// When a packet is offered, when the next one is, and until when arrivals count.
-#[derive(Clone, Copy)]
-struct Offer {
-    now: Instant,
-    next: Instant,
-    until: Instant,
-}
-
-/// Kinds of links with one line of one rate that are told apart: looking a kind up takes longer the more there are.
+/// Kinds of links that are told apart: looking a kind up takes longer the more there are.
 const MOST_KINDS: usize = 64;
 
 impl SteppedLinks<()> {
@@ -84,39 +75,32 @@ impl SteppedLinks<()> {
 }
 
 impl<T: Clone> SteppedLinks<T> {
-    /// No links, for such packets; those that arrive by `until` will count as delivered. Links stay as they are.
+    /// No links, for such packets; those that arrive by `until` will count as delivered.
     #[must_use]
     pub const fn new(until: Instant, info: PacketInfo) -> Self {
-        Self { until, info, links: Vec::new(), kinds: Some(Vec::new()), outputs: Vec::new(), arrivals: Vec::new() }
-    }
-
-    /// No links, of which the model [may change](SteppedLinks::set_model): a line with its queue takes ten times the memory.
-    #[must_use]
-    pub fn that_change(until: Instant, info: PacketInfo) -> Self {
-        Self { kinds: None, ..Self::new(until, info) }
+        Self { until, info, links: Vec::new(), kinds: Vec::new(), outputs: Vec::new(), arrivals: Vec::new() }
     }
 
     /// Adds a link that can be [taken](SteppedLinks::takes).
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) {
         let link = match self.kind(model) {
-            Some((place, kind)) => Stepped::Queued(place, QueuedLink::new(Stream::new(seed, name.as_str().as_bytes()), kind)),
+            Some(place) => Stepped::Queued(place, QueuedLink::new(seed, name, &self.kinds[usize::from(place)].1)),
             None => Stepped::Other(Box::new(Other { line: Line::new(seed, name, model.clone(), false), latest: Instant::ZERO })),
         };
         self.links.push(link);
     }
 
-    /// The kind of a link with one line of one rate and its place, if it is such a link, and there are not too many kinds.
-    fn kind(&mut self, model: &LinkModel) -> Option<(u8, &QueuedKind)> {
-        let kinds = self.kinds.as_mut()?;
-        let place = match kinds.iter().position(|(other, _)| other == model) {
+    /// The place of the kind of a link on which nothing waits but before a line of one rate, if it is such a link, and there are not too many kinds.
+    fn kind(&mut self, model: &LinkModel) -> Option<u8> {
+        let place = match self.kinds.iter().position(|(other, _)| other == model) {
             Some(place) => place,
-            None if kinds.len() >= MOST_KINDS => return None,
+            None if self.kinds.len() >= MOST_KINDS => return None,
             None => {
-                kinds.push((model.clone(), QueuedKind::new(model, self.info.size)?));
-                kinds.len() - 1
+                self.kinds.push((model.clone(), QueuedKind::new(model, self.info.size)?));
+                self.kinds.len() - 1
             }
         };
-        Some((u8::try_from(place).ok()?, &kinds[place].1))
+        u8::try_from(place).ok()
     }
 
     /// Offers a packet to a link, and says until when nothing else is offered to it. `arrives` is told of each packet of which it is known by then that it arrives:
@@ -126,17 +110,26 @@ impl<T: Clone> SteppedLinks<T> {
     ///
     /// If there is no such link.
     #[inline]
-    pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, item: T, arrives: impl FnMut(Instant, bool, u64, T)) {
-        let Self { until, kinds, links, .. } = self;
+    pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
         // What happens after the end is not counted.
-        let offer = Offer { now, next: next.min(*until), until: *until };
-        match (&mut links[link.index()], kinds) {
-            (Stepped::Queued(kind, link), Some(kinds)) => link.offer(offer, &mut kinds[usize::from(*kind)].1, item, arrives),
-            _ => self.offer_to_other(offer, link, item, arrives),
+        let (until, next) = (self.until, next.min(self.until));
+        match &mut self.links[link.index()] {
+            Stepped::Queued(kind, link) => {
+                let kind = &self.kinds[usize::from(*kind)].1;
+                link.offer((now, until), kind, item, &mut arrives);
+                link.pass((next, until), kind, arrives);
+            }
+            Stepped::Other(_) => self.offer_to_other((now, next, until), link, item, arrives),
         }
     }
 
-    fn offer_to_other(&mut self, Offer { now, next, until }: Offer, link: LinkId, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
+    fn offer_to_other(
+        &mut self,
+        (now, next, until): (Instant, Instant, Instant),
+        link: LinkId,
+        item: T,
+        mut arrives: impl FnMut(Instant, bool, u64, T),
+    ) {
         let Self { info, links, outputs, arrivals, .. } = self;
         let Stepped::Other(other) = &mut links[link.index()] else { return };
         let Other { line, latest } = &mut **other;
@@ -170,10 +163,9 @@ impl<T: Clone> SteppedLinks<T> {
         let Self { until, links, kinds, outputs, arrivals, .. } = self;
         // What happens after the end is not counted.
         let next = next.min(*until);
-        let Other { line, latest } = match (&mut links[link.index()], kinds) {
-            (Stepped::Queued(kind, link), Some(kinds)) => return link.pass((next, *until), &mut kinds[usize::from(*kind)].1, arrives),
-            (Stepped::Queued(..), None) => unreachable!("links with a kind have kinds"),
-            (Stepped::Other(other), _) => &mut **other,
+        let Other { line, latest } = match &mut links[link.index()] {
+            Stepped::Queued(kind, link) => return link.pass((next, *until), &kinds[usize::from(*kind)].1, arrives),
+            Stepped::Other(other) => &mut **other,
         };
         if line.next_wake().is_some_and(|wake| wake <= next) {
             line.wake(next, outputs, &mut Arriving(arrivals));
@@ -189,7 +181,7 @@ impl<T: Clone> SteppedLinks<T> {
     ///
     /// # Panics
     ///
-    /// If there is no such link, or links [stay](SteppedLinks::new) as they are.
+    /// If there is no such link.
     pub fn set_model(
         &mut self,
         now: Instant,
@@ -199,9 +191,21 @@ impl<T: Clone> SteppedLinks<T> {
         mut arrives: impl FnMut(Instant, bool, u64, T),
     ) {
         self.pass(now, link, &mut arrives);
-        let Self { links, outputs, arrivals, .. } = self;
-        let Stepped::Other(other) = &mut links[link.index()] else { panic!("the links stay as they are") };
-        other.line.reconfigure(now, seed, name, model, outputs, &mut Arriving(arrivals));
+        let (until, info, kind) = (self.until, self.info, self.kind(&model));
+        let Self { links, kinds, outputs, arrivals, .. } = self;
+        let changed = &mut links[link.index()];
+        match (&mut *changed, kind) {
+            (Stepped::Queued(place, queued), Some(kind)) => {
+                queued.reconfigure((now, until), (&kinds[usize::from(*place)].1, &kinds[usize::from(kind)].1), &mut arrives);
+                *place = kind;
+            }
+            (Stepped::Queued(place, queued), None) => {
+                let mut other = queued.clone().into_other(now, &kinds[usize::from(*place)].1, info);
+                other.line.reconfigure(now, seed, name, model, outputs, &mut Arriving(arrivals));
+                *changed = Stepped::Other(Box::new(other));
+            }
+            (Stepped::Other(other), _) => other.line.reconfigure(now, seed, name, model, outputs, &mut Arriving(arrivals)),
+        }
         self.pass(now, link, arrives);
     }
 

@@ -1,29 +1,47 @@
-//! Links with one line of one rate, before which packets of one size wait under a discipline that looks at them while they wait: CoDel, RED, dropping from the head.
+//! Links on which nothing waits but before a line of one rate, for packets of one size.
 //!
-//! A packet's time on the line is known, so that all that is kept is when the line will be free, the discipline's memory, and the packets that wait. It does what
-//! [`BottleneckStage`](crate::stages::queue::BottleneckStage) does between the stages of [`Staged`](crate::line::staged::Staged), in a tenth of the memory.
+//! Kept are the stages that decide at once, the packet on the line, and those that wait. It does what [`BottleneckStage`] does between the stages of
+//! [`Staged`](crate::line::staged::Staged), in a tenth of the memory.
 
+use alloc::boxed::Box;
 use alloc::collections::VecDeque;
+use core::time::Duration;
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Instant, Rate};
 
-use super::Offer;
+use super::{Other, Sent};
 use crate::fates::fate::DropCause;
-use crate::fates::stats::{Flow, LinkStats};
+use crate::fates::stats::{Flow, LinkStats, Seldom};
+use crate::line::Line;
+use crate::line::direct::Direct;
 use crate::line::model::LinkModel;
-use crate::network::direct_links::kind::{Kind, Line, Remembered};
-use crate::random::{Purpose, Stream};
+use crate::line::name::LinkName;
+use crate::line::pipeline::Pipeline;
+use crate::packet::{Carried, Marks, Packet, PacketInfo};
+use crate::random::Purpose;
 use crate::stages::config::{Layout, LinkConfig};
-use crate::stages::queue::{CoDelState, CoDelVerdict, Discipline, EqualPackets, Load, RedState, RedVerdict, idle_packets};
+use crate::stages::queue::{
+    Bottleneck, BottleneckStage, CoDelState, CoDelVerdict, Discipline, InService, Load, QueueLimit, RedState, RedVerdict, Service, Waiting,
+    giga_bits, idle_packets,
+};
 
 /// What such links of one configuration have in common.
 #[derive(Clone, Debug)]
 pub(super) struct QueuedKind {
-    /// Loss before the line, and delay behind it.
-    stages: Kind,
-    queue: EqualPackets,
-    discipline: Discipline,
+    config: LinkConfig,
+    line: Option<LineKind>,
+}
+
+/// A line of one rate and the queue before it, for packets of one size.
+#[derive(Clone, Debug)]
+struct LineKind {
+    bottleneck: Bottleneck,
+    rate: Rate,
     size: Bytes,
+    /// What a packet takes on the line, in 10⁻⁹ bit.
+    bits: u128,
+    /// How long it takes.
+    time: Duration,
     /// How long a mean packet of RED is on the line \[s\].
     mean_packet: f64,
 }
@@ -31,39 +49,72 @@ pub(super) struct QueuedKind {
 impl QueuedKind {
     /// The kind of such links, for packets of that size; `None` if they are no such links, or mark packets.
     pub(super) fn new(model: &LinkModel, size: Bytes) -> Option<Self> {
-        let config: &LinkConfig = model.as_fixed()?;
-        let bottleneck = config.bottleneck.as_ref()?;
+        let config = model.as_fixed()?;
         if config.layout == Layout::Netem || !config.is_direct_but_for_queue(Load::of(size)) {
             return None;
         }
+        let line = match &config.bottleneck {
+            None => None,
+            Some(bottleneck) => Some(LineKind::new(bottleneck, size)?),
+        };
+        Some(Self { config: config.clone(), line })
+    }
+}
+
+impl LineKind {
+    fn new(bottleneck: &Bottleneck, size: Bytes) -> Option<Self> {
+        let Service::Rate(rate) = bottleneck.service else { return None };
         let mean_packet = match bottleneck.discipline {
             Discipline::TailDrop | Discipline::HeadDrop => 0.0,
             Discipline::CoDel(codel) if !codel.ecn => 0.0,
             Discipline::Red(red) if !red.ecn() => bottleneck.time_of_mean_packet(&red),
             Discipline::CoDel(_) | Discipline::Red(_) => return None,
         };
-        let queue = EqualPackets::of_any_discipline(bottleneck, size)?;
-        Some(Self { stages: Kind::with_line(config, Line::Queued(queue))?, queue, discipline: bottleneck.discipline, size, mean_packet })
+        let bits = giga_bits(bottleneck.framing.on_the_line(size));
+        Some(Self { bottleneck: bottleneck.clone(), rate, size, bits, time: rate.transmission_time(bits), mean_packet })
+    }
+
+    fn bytes(&self, packets: usize) -> u128 {
+        packets as u128 * u128::from(self.size.get())
     }
 }
 
-/// One such link, with the packets that wait.
+/// One such link, with the packets on the line and before it.
 #[derive(Clone, Debug)]
 pub(super) struct QueuedLink<T> {
-    draws: Stream,
+    direct: Direct,
     flow: Flow,
     latest: Instant,
-    /// When the packet on the line leaves; `None` if there is none.
-    leaves: Option<Instant>,
+    line: Option<LineState<T>>,
+    /// In a box, as whatever is seldom.
+    seldom: Option<Box<Seldom>>,
+}
+
+/// What is on a line and before it.
+#[derive(Clone, Debug)]
+struct LineState<T> {
+    on_line: Option<OnLine<T>>,
     /// Since when the line has had nothing to send.
     idle_since: Instant,
-    waiting: VecDeque<Waiting<T>>,
+    waiting: VecDeque<Offered<T>>,
     discipline: DisciplineState,
-    remembered: Remembered,
-    lost: u64,
-    /// Packets that the discipline dropped before the queue was full.
-    dropped: u64,
-    found_full: u64,
+}
+
+/// A packet on the line: what was left of it at an instant, in 10⁻⁹ bit, and when it leaves.
+#[derive(Clone, Debug)]
+struct OnLine<T> {
+    packet: Offered<T>,
+    since: Instant,
+    left: u128,
+    leaves: Instant,
+}
+
+/// A packet, its number on the link, and when it was offered.
+#[derive(Clone, Debug)]
+struct Offered<T> {
+    at: Instant,
+    number: u64,
+    item: T,
 }
 
 /// What a discipline remembers.
@@ -74,131 +125,97 @@ enum DisciplineState {
     Red(RedState),
 }
 
-#[derive(Clone, Debug)]
-struct Waiting<T> {
-    since: Instant,
-    number: u64,
-    item: T,
+impl DisciplineState {
+    fn new(discipline: &Discipline) -> Self {
+        match discipline {
+            Discipline::TailDrop | Discipline::HeadDrop => Self::Nothing,
+            Discipline::CoDel(_) => Self::CoDel(CoDelState::default()),
+            Discipline::Red(_) => Self::Red(RedState::default()),
+        }
+    }
 }
 
 impl<T> QueuedLink<T> {
     /// An idle link of that kind.
-    pub(super) fn new(draws: Stream, kind: &QueuedKind) -> Self {
-        let discipline = match kind.discipline {
-            Discipline::TailDrop | Discipline::HeadDrop => DisciplineState::Nothing,
-            Discipline::CoDel(_) => DisciplineState::CoDel(CoDelState::default()),
-            Discipline::Red(_) => DisciplineState::Red(RedState::default()),
-        };
-        Self {
-            draws,
-            flow: Flow::default(),
-            latest: Instant::ZERO,
-            leaves: None,
-            idle_since: Instant::ZERO,
-            waiting: VecDeque::new(),
-            discipline,
-            remembered: kind.stages.beginning(draws),
-            lost: 0,
-            dropped: 0,
-            found_full: 0,
-        }
+    pub(super) fn new(seed: u64, name: &LinkName, kind: &QueuedKind) -> Self {
+        let line = kind.line.as_ref().map(LineState::new);
+        Self { direct: Direct::new(seed, name, &kind.config), flow: Flow::default(), latest: Instant::ZERO, line, seldom: None }
     }
 
     /// See [`SteppedLinks::offer`](super::SteppedLinks::offer).
     #[inline(always)]
-    pub(super) fn offer(
-        &mut self,
-        Offer { now, next, until }: Offer,
-        kind: &mut QueuedKind,
-        item: T,
-        mut arrives: impl FnMut(Instant, bool, u64, T),
-    ) {
+    pub(super) fn offer(&mut self, (now, until): (Instant, Instant), kind: &QueuedKind, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
         let number = self.flow.offered;
         self.flow.offered += 1;
-        self.take((now, until), kind, Waiting { since: now, number, item }, &mut arrives);
-        self.pass((next, until), kind, arrives);
+        let packet = Offered { at: now, number, item };
+        let draws = self.direct.draws;
+        match (self.direct.dropped(now, number, self.direct.words(number)), &mut self.line, &kind.line) {
+            (Some(cause), ..) => self.count_drop(cause),
+            (None, Some(line), Some(kind)) => {
+                let dropped = |cause| count_drop(&mut self.seldom, cause);
+                line.take(now, kind, packet, || draws.packet(number).first(Purpose::Queue), dropped);
+            }
+            (None, ..) => self.propagate((now, until), packet, &mut arrives),
+        }
     }
 
     /// See [`SteppedLinks::pass`](super::SteppedLinks::pass).
     #[inline(always)]
-    pub(super) fn pass(&mut self, (next, until): (Instant, Instant), kind: &mut QueuedKind, mut arrives: impl FnMut(Instant, bool, u64, T)) {
-        while let Some(leaves) = self.leaves.filter(|leaves| *leaves <= next) {
-            match self.waiting.pop_front() {
-                Some(first) => self.serve((leaves, until), kind, first, &mut arrives),
-                None => self.run_empty(leaves),
-            }
+    pub(super) fn pass(&mut self, (next, until): (Instant, Instant), kind: &QueuedKind, mut arrives: impl FnMut(Instant, bool, u64, T)) {
+        let Some(kind) = &kind.line else { return };
+        while let Some(line) = &mut self.line
+            && let Some((leaves, packet)) = line.leave(next, kind, |cause| count_drop(&mut self.seldom, cause))
+        {
+            self.propagate((leaves, until), packet, &mut arrives);
         }
     }
 
-    /// A packet is lost, or dropped at once, or on the line, or waits.
     #[inline(always)]
-    fn take(&mut self, (now, until): (Instant, Instant), kind: &mut QueuedKind, packet: Waiting<T>, arrives: &mut impl FnMut(Instant, bool, u64, T)) {
-        let draws = self.draws.packet(packet.number);
-        let [word, _] = if kind.stages.is_random { draws.loss_and_jitter() } else { [0; 2] };
-        if kind.stages.loses(&mut self.remembered, word, draws) {
-            self.lost += 1;
-            return;
-        }
-        let waiting = self.waiting.len() as u64;
-        if let (DisciplineState::Red(state), Discipline::Red(red)) = (&mut self.discipline, &kind.discipline) {
-            let idle = if self.leaves.is_none() { now.saturating_duration_since(self.idle_since) } else { core::time::Duration::ZERO };
-            // Time that was idle counts once.
-            self.idle_since = now;
-            let queued = u128::from(waiting) * u128::from(kind.size.get());
-            let verdict = state.verdict(red, queued, idle_packets(idle, kind.mean_packet), false, draws.first(Purpose::Queue));
-            if verdict == RedVerdict::Drop {
-                self.dropped += 1;
-                return;
-            }
-        }
-        let Some(leaves) = self.leaves else {
-            return self.serve((now, until), kind, packet, arrives);
-        };
-        while !kind.queue.admits(now, leaves, self.waiting.len() as u64) {
-            self.found_full += 1;
-            if kind.discipline != Discipline::HeadDrop || self.waiting.pop_front().is_none() {
-                return;
-            }
-        }
-        self.waiting.push_back(packet);
-    }
-
-    /// Begins to send a packet, or one behind it if CoDel drops it. When it arrives is known then.
-    #[inline(always)]
-    fn serve(
-        &mut self,
-        (now, until): (Instant, Instant),
-        kind: &mut QueuedKind,
-        mut packet: Waiting<T>,
-        arrives: &mut impl FnMut(Instant, bool, u64, T),
-    ) {
-        if let (DisciplineState::CoDel(state), Discipline::CoDel(codel)) = (&mut self.discipline, &kind.discipline) {
-            let left = |waiting: usize| waiting as u128 * u128::from(kind.size.get());
-            while state.verdict(codel, now, now.saturating_duration_since(packet.since), left(self.waiting.len()), false) == CoDelVerdict::Drop {
-                self.dropped += 1;
-                match self.waiting.pop_front() {
-                    Some(next) => packet = next,
-                    None => return self.run_empty(now),
-                }
-            }
-        }
-        let leaves = kind.queue.departure(now);
-        self.leaves = Some(leaves);
-        let draws = self.draws.packet(packet.number);
-        let [_, word] = if kind.stages.is_random { draws.loss_and_jitter() } else { [0; 2] };
-        let at = kind.stages.arrival(leaves, &mut self.remembered, word, draws);
-        self.flow.deliver_by(until, packet.since, at);
+    fn propagate(&mut self, (leaves, until): (Instant, Instant), packet: Offered<T>, arrives: &mut impl FnMut(Instant, bool, u64, T)) {
+        let at = self.direct.arrival(leaves, packet.number, self.direct.words(packet.number));
+        self.flow.deliver_by(until, packet.at, at);
         arrives(at, at <= self.latest, packet.number, packet.item);
         self.latest = at.max(self.latest);
     }
 
-    /// Nothing is left to send.
-    fn run_empty(&mut self, now: Instant) {
-        self.leaves = None;
-        self.idle_since = now;
-        if let DisciplineState::CoDel(state) = &mut self.discipline {
-            state.empty();
-        }
+    #[inline(never)]
+    fn count_drop(&mut self, cause: DropCause) {
+        count_drop(&mut self.seldom, cause);
+    }
+
+    /// The link is of another kind from now on: see [`Staged::reconfigure`](crate::line::staged::Staged::reconfigure).
+    pub(super) fn reconfigure(
+        &mut self,
+        (now, until): (Instant, Instant),
+        (before, kind): (&QueuedKind, &QueuedKind),
+        mut arrives: impl FnMut(Instant, bool, u64, T),
+    ) {
+        self.direct.reconfigure(now, &kind.config);
+        self.line = match (self.line.take(), &before.line, &kind.line) {
+            (Some(mut line), Some(before), Some(kind)) => {
+                line.reconfigure(now, before, kind);
+                Some(line)
+            }
+            (line, _, kind) => {
+                let given_up = line.into_iter().flat_map(LineState::dismantle);
+                given_up.for_each(|packet| self.propagate((now, until), packet, &mut arrives));
+                kind.as_ref().map(LineState::new)
+            }
+        };
+    }
+
+    /// As a link of any kind, with all that is inside.
+    pub(super) fn into_other(self, now: Instant, kind: &QueuedKind, info: PacketInfo) -> Other<T>
+    where
+        T: Clone,
+    {
+        let Self { direct, flow, latest, line, seldom } = self;
+        let stats = LinkStats { flow, seldom: seldom.map_or_else(Seldom::default, |seldom| *seldom) };
+        let pipeline = match (line, &kind.line) {
+            (Some(line), Some(line_kind)) => Pipeline::resumed(now, direct, kind.config.clone(), line.into_stage(line_kind, info)),
+            _ => Pipeline::Direct(Box::new(direct)),
+        };
+        Other { line: Line::resumed(stats, pipeline), latest }
     }
 
     /// Takes back that a packet is delivered.
@@ -208,12 +225,126 @@ impl<T> QueuedLink<T> {
 
     /// The counters.
     pub(super) fn stats(&self) -> LinkStats {
-        let Flow { offered, delivered, delay_nanos } = self.flow;
-        let cause = match self.discipline {
-            DisciplineState::Red(_) => DropCause::Red,
-            DisciplineState::Nothing | DisciplineState::CoDel(_) => DropCause::CoDel,
+        LinkStats { flow: self.flow, seldom: self.seldom.as_ref().map_or_else(Seldom::default, |seldom| **seldom) }
+    }
+}
+
+fn count_drop(seldom: &mut Option<Box<Seldom>>, cause: DropCause) {
+    seldom.get_or_insert_default().dropped[cause.index()] += 1;
+}
+
+impl<T> LineState<T> {
+    fn new(kind: &LineKind) -> Self {
+        let discipline = DisciplineState::new(&kind.bottleneck.discipline);
+        Self { on_line: None, idle_since: Instant::ZERO, waiting: VecDeque::new(), discipline }
+    }
+
+    /// A packet is dropped at once, perhaps others in its stead, or on the line, or waits. `word` is its random word for queues.
+    #[inline(always)]
+    fn take(&mut self, now: Instant, kind: &LineKind, packet: Offered<T>, word: impl FnOnce() -> u64, mut dropped: impl FnMut(DropCause)) {
+        if let (DisciplineState::Red(state), Discipline::Red(red)) = (&mut self.discipline, &kind.bottleneck.discipline) {
+            let idle = if self.on_line.is_none() { now.saturating_duration_since(self.idle_since) } else { Duration::ZERO };
+            // Time that was idle counts once.
+            self.idle_since = now;
+            let verdict = state.verdict(red, kind.bytes(self.waiting.len()), idle_packets(idle, kind.mean_packet), false, word());
+            if verdict == RedVerdict::Drop {
+                return dropped(DropCause::Red);
+            }
+        }
+        if self.on_line.is_none() {
+            return self.serve(now, kind, packet, dropped);
+        }
+        while !self.admits(now, kind) {
+            dropped(DropCause::QueueFull);
+            if kind.bottleneck.discipline != Discipline::HeadDrop || self.waiting.pop_front().is_none() {
+                return;
+            }
+        }
+        self.waiting.push_back(packet);
+    }
+
+    fn admits(&self, now: Instant, kind: &LineKind) -> bool {
+        let Some(limit) = kind.bottleneck.limit else { return true };
+        let (packets, bytes) = (self.waiting.len(), kind.bytes(self.waiting.len()));
+        let time = match (limit, &self.on_line) {
+            (QueueLimit::Time(_), Some(on_line)) => {
+                let sent = kind.rate.bits_sent(now.saturating_duration_since(on_line.since));
+                kind.rate.transmission_time(on_line.left.saturating_sub(sent) + packets as u128 * kind.bits)
+            }
+            _ => Duration::ZERO,
         };
-        let dropped = [(DropCause::Loss, self.lost), (DropCause::QueueFull, self.found_full), (cause, self.dropped)];
-        LinkStats::counted(offered, delivered, delay_nanos, dropped)
+        limit.admits(Waiting { packets: packets as u64, bytes, time }, kind.size)
+    }
+
+    /// The packet that leaves the line by `next`, and when; the first that waits is on the line then.
+    #[inline(always)]
+    fn leave(&mut self, next: Instant, kind: &LineKind, dropped: impl FnMut(DropCause)) -> Option<(Instant, Offered<T>)> {
+        let OnLine { packet, leaves, .. } = self.on_line.take_if(|on_line| on_line.leaves <= next)?;
+        match self.waiting.pop_front() {
+            Some(first) => self.serve(leaves, kind, first, dropped),
+            None => self.run_empty(leaves),
+        }
+        Some((leaves, packet))
+    }
+
+    /// Begins to send a packet, or one behind it if CoDel drops it.
+    #[inline(always)]
+    fn serve(&mut self, now: Instant, kind: &LineKind, mut packet: Offered<T>, mut dropped: impl FnMut(DropCause)) {
+        if let (DisciplineState::CoDel(state), Discipline::CoDel(codel)) = (&mut self.discipline, &kind.bottleneck.discipline) {
+            let waited = |packet: &Offered<T>| now.saturating_duration_since(packet.at);
+            while state.verdict(codel, now, waited(&packet), kind.bytes(self.waiting.len()), false) == CoDelVerdict::Drop {
+                dropped(DropCause::CoDel);
+                match self.waiting.pop_front() {
+                    Some(next) => packet = next,
+                    None => return self.run_empty(now),
+                }
+            }
+        }
+        self.on_line = Some(OnLine { packet, since: now, left: kind.bits, leaves: now.saturating_add(kind.time) });
+    }
+
+    /// Nothing is left to send.
+    fn run_empty(&mut self, now: Instant) {
+        self.idle_since = now;
+        if let DisciplineState::CoDel(state) = &mut self.discipline {
+            state.empty();
+        }
+    }
+
+    /// See [`BottleneckStage::reconfigure`].
+    fn reconfigure(&mut self, now: Instant, before: &LineKind, kind: &LineKind) {
+        if let Some(OnLine { since, left, leaves, .. }) = &mut self.on_line {
+            *left = left.saturating_sub(before.rate.bits_sent(now.saturating_duration_since(*since)));
+            (*since, *leaves) = (now, now.saturating_add(kind.rate.transmission_time(*left)));
+        }
+        if core::mem::discriminant(&before.bottleneck.discipline) != core::mem::discriminant(&kind.bottleneck.discipline) {
+            self.discipline = DisciplineState::new(&kind.bottleneck.discipline);
+        }
+    }
+
+    /// Everything that is on the line or waits, in order.
+    fn dismantle(self) -> impl Iterator<Item = Offered<T>> {
+        self.on_line.into_iter().map(|on_line| on_line.packet).chain(self.waiting)
+    }
+
+    /// As the stage that takes packets of any size.
+    fn into_stage(self, kind: &LineKind, info: PacketInfo) -> BottleneckStage<Sent<T>> {
+        let Self { on_line, idle_since, waiting, discipline } = self;
+        let packet = |Offered { at, number, item }| -> (Instant, Carried<Sent<T>>) {
+            (at, Packet::new(number, info, Marks::default(), Sent { at, number, item }))
+        };
+        let in_service = on_line.map(|OnLine { packet: offered, since, left, leaves }| InService {
+            packet: packet(offered).1,
+            since,
+            left,
+            next: leaves,
+            opportunities: 0,
+        });
+        let (red, codel) = match discipline {
+            DisciplineState::Nothing => (RedState::default(), CoDelState::default()),
+            DisciplineState::CoDel(codel) => (RedState::default(), codel),
+            DisciplineState::Red(red) => (red, CoDelState::default()),
+        };
+        BottleneckStage::resumed(kind.bottleneck.clone(), in_service, waiting.into_iter().map(packet).collect(), (idle_since, red, codel))
     }
 }

@@ -9,7 +9,8 @@ use crate::netem::Netem;
 use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::delay::{Delay, Jitter};
 use crate::stages::loss::Loss;
-use crate::stages::queue::{Bottleneck, CoDel, Discipline, QueueLimit, Red};
+use crate::stages::outage::{Outage, Outages};
+use crate::stages::queue::{Bottleneck, CoDel, Discipline, Framing, QueueLimit, Red};
 
 const SIZE: Bytes = Bytes::new(64);
 
@@ -29,17 +30,18 @@ fn red(ecn: bool) -> Discipline {
     Discipline::Red(Red::new(SIZE, Bytes::new(320), Probability::new(0.5).unwrap(), 0.1, SIZE, ecn).unwrap())
 }
 
-/// What becomes of packets that are offered at these instants, by a whole link and by a stepped one, of which `then` is the model from that packet on.
-fn compare(model: &LinkModel, then: Option<(usize, &LinkModel)>, (instants, until): (&[Instant], Instant)) {
+/// What becomes of packets that are offered at these instants, by a whole link and by a stepped one, of which `then` has the models from
+/// those packets on.
+fn compare(model: &LinkModel, then: &[(usize, &LinkModel)], (instants, until): (&[Instant], Instant)) {
     let (name, info) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn_capable: true });
     let mut whole = Link::new(7, &name, model.clone());
-    let mut stepped = if then.is_some() { SteppedLinks::that_change(until, info) } else { SteppedLinks::new(until, info) };
+    let mut stepped = SteppedLinks::new(until, info);
     stepped.add(7, &name, model);
     let mut arrivals = Vec::new();
     for (place, now) in instants.iter().enumerate() {
-        if let Some((_, model)) = then.filter(|(at, _)| *at == place) {
-            whole.set_model(*now, model.clone()).unwrap();
-            stepped.set_model(*now, LinkId(0), (7, &name), model.clone(), |at, _, number, item| arrivals.push((at, number, item)));
+        for (_, model) in then.iter().filter(|(at, _)| *at == place) {
+            whole.set_model(*now, (*model).clone()).unwrap();
+            stepped.set_model(*now, LinkId(0), (7, &name), (*model).clone(), |at, _, number, item| arrivals.push((at, number, item)));
         }
         whole.handle_packet(*now, info, 1000 - place).unwrap();
         let next = instants.get(place + 1).copied().unwrap_or(Instant::MAX);
@@ -67,26 +69,62 @@ fn bursts() -> Vec<Instant> {
     (0..320).map(|n: u64| millis(n / 160 * 1_500 + (n % 160).min(40) * 3 + (n % 160).saturating_sub(40) * 8)).collect()
 }
 
-/// As they are, and where the discipline is another one from the second burst on.
+fn with(discipline: Discipline, bits: u64, layout: Layout) -> LinkModel {
+    let limit = if matches!(discipline, Discipline::Red(_)) { QueueLimit::Bytes(Bytes::new(640)) } else { QueueLimit::Packets(6) };
+    let delay = Delay::with_jitter(Duration::from_millis(24), Jitter::new(Duration::from_millis(6), Default::default())).unwrap();
+    let loss = Loss::Independent(Probability::new(0.1).unwrap());
+    LinkConfig { bottleneck: Some(bottleneck(discipline, Some(limit), bits)), delay, loss, layout, ..LinkConfig::default() }.into()
+}
+
+const DISCIPLINES: usize = 6;
+
+fn discipline(place: usize) -> Discipline {
+    [Discipline::TailDrop, Discipline::HeadDrop, codel(30, 64, false), codel(30, 64, true), red(false), red(true)][place]
+}
+
 #[test]
 fn they_decide_what_whole_links_decide() {
-    let model = |discipline, bits, layout| -> LinkModel {
-        let limit = if matches!(discipline, Discipline::Red(_)) { QueueLimit::Bytes(Bytes::new(640)) } else { QueueLimit::Packets(6) };
-        let delay = Delay::with_jitter(Duration::from_millis(24), Jitter::new(Duration::from_millis(6), Default::default())).unwrap();
-        let loss = Loss::Independent(Probability::new(0.1).unwrap());
-        LinkConfig { bottleneck: Some(bottleneck(discipline, Some(limit), bits)), delay, loss, layout, ..LinkConfig::default() }.into()
-    };
-    let disciplines = [Discipline::TailDrop, Discipline::HeadDrop, codel(30, 64, false), codel(30, 64, true), red(false), red(true)];
     // At 64 kbit/s a packet takes 8 ms, and leaves when the next one comes.
-    for (discipline, bits, layout) in disciplines.into_iter().flat_map(|discipline| {
+    for (discipline, bits, layout) in (0..DISCIPLINES).map(discipline).flat_map(|discipline| {
         [(discipline, 100_000, Layout::Physical), (discipline, 64_000, Layout::Physical), (discipline, 100_000, Layout::Netem)]
     }) {
         let marks = matches!(discipline, Discipline::CoDel(codel) if codel.ecn) || discipline == red(true);
-        let queued = QueuedKind::new(&model(discipline, bits, layout), SIZE);
+        let queued = QueuedKind::new(&with(discipline, bits, layout), SIZE);
         assert_eq!(queued.is_some(), layout == Layout::Physical && !marks, "{discipline:?}");
-        for then in [None, Some((160, &model(red(false), bits, layout)))] {
-            compare(&model(discipline, bits, layout), then, (&bursts(), millis(2_900)));
+        compare(&with(discipline, bits, layout), &[], (&bursts(), millis(2_900)));
+    }
+}
+
+/// From a packet of the first burst on, which finds others on the line and before it, a link is another one: of another rate, discipline or limit, without a queue, with a
+/// stage that needs an engine, and back.
+#[test]
+fn what_is_inside_stays_when_links_change() {
+    let words = |words: &str| LinkModel::from(Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap());
+    let few = Bottleneck {
+        framing: Framing { overhead: -30, ..Framing::default() },
+        ..bottleneck(Discipline::HeadDrop, Some(QueueLimit::Time(Duration::from_millis(9))), 90_000)
+    };
+    let outages = Outages::new(vec![Outage { from: millis(60), to: millis(100) }]).unwrap();
+    let models: Vec<LinkModel> = (0..DISCIPLINES)
+        .map(|place| with(discipline(place), 100_000, Layout::Physical))
+        .chain((0..DISCIPLINES).step_by(2).map(|place| with(discipline(place), 400_000, Layout::Physical)))
+        .chain([
+            words("delay 5ms"),
+            words("delay 24ms 9ms loss gemodel 5% 20%"),
+            words("delay 24ms 4ms 50%"),
+            words("delay 24ms 4ms 50% duplicate 5%"),
+            words("delay 24ms rate 100kbit"),
+        ])
+        .chain([LinkConfig { bottleneck: Some(few), outages, ..LinkConfig::default() }.into()])
+        .chain([with(Discipline::TailDrop, 100_000, Layout::Netem)])
+        .collect();
+    for (from, to) in models.iter().flat_map(|from| models.iter().map(move |to| (from, to))) {
+        // The line is busy or, at the last, idle.
+        for at in [1, 17, 30, 100] {
+            compare(from, &[(at, to)], (&bursts(), millis(2_900)));
         }
+        // Again while one packet is on the line, to a discipline that needs an engine.
+        compare(from, &[(17, to), (18, &models[3])], (&bursts(), millis(2_900)));
     }
 }
 
@@ -98,7 +136,7 @@ fn queues_between_memories_decide_what_whole_links_decide() {
         for discipline in [Discipline::HeadDrop, codel(30, 0, false), red(false)] {
             let model = LinkConfig { bottleneck: Some(bottleneck(discipline, None, 100_000)), layout: Layout::Physical, ..config.clone() }.into();
             assert!(QueuedKind::new(&model, SIZE).is_some());
-            compare(&model, None, (&bursts(), millis(2_900)));
+            compare(&model, &[], (&bursts(), millis(2_900)));
         }
     }
 }
@@ -131,6 +169,6 @@ proptest! {
         prop_assert!(QueuedKind::new(&model, SIZE).is_some());
         // A run ends when its last packet was offered, or later.
         let until = Instant::from_nanos(until).max(*instants.last().expect("there is one"));
-        compare(&model, None, (&instants, until));
+        compare(&model, &[], (&instants, until));
     }
 }

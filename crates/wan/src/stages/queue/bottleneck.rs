@@ -88,7 +88,7 @@ pub(crate) fn idle_packets(idle: Duration, mean_packet: f64) -> f64 {
 }
 
 /// A part of a packet, in 10⁻⁹ bit: see [`Rate::transmission_time`].
-pub(super) fn giga_bits(bytes: Bytes) -> u128 {
+pub(crate) fn giga_bits(bytes: Bytes) -> u128 {
     u128::from(bytes.get()) * 8_000_000_000
 }
 
@@ -110,17 +110,18 @@ pub(crate) struct BottleneckStage<T> {
     codel: CoDelState,
 }
 
+/// The packet on the line.
 #[derive(Clone, Debug)]
-struct InService<T> {
-    packet: Carried<T>,
+pub(crate) struct InService<T> {
+    pub(crate) packet: Carried<T>,
     /// Since when the rest of the packet is sent at the present rate.
-    since: Instant,
+    pub(crate) since: Instant,
     /// What was left then, in 10⁻⁹ bit.
-    left: u128,
+    pub(crate) left: u128,
     /// When something happens to it next: it has left, or some of it may leave.
-    next: Instant,
+    pub(crate) next: Instant,
     /// How many opportunities there are then, on a recorded line.
-    opportunities: u64,
+    pub(crate) opportunities: u64,
 }
 
 impl<T> BottleneckStage<T> {
@@ -137,6 +138,19 @@ impl<T> BottleneckStage<T> {
             red: RedState::default(),
             codel: CoDelState::default(),
         }
+    }
+
+    /// With a packet on the line, others that have waited since then, the instant since when the line was idle, and what disciplines remember.
+    pub(crate) fn resumed(
+        config: Bottleneck,
+        in_service: Option<InService<T>>,
+        waiting: VecDeque<(Instant, Carried<T>)>,
+        (idle_since, red, codel): (Instant, RedState, CoDelState),
+    ) -> Self {
+        let mut stage = Self { in_service, waiting, idle_since, red, codel, ..Self::new(config) };
+        stage.waiting_bytes = stage.waiting.iter().map(|(_, packet)| u128::from(packet.info.size.get())).sum();
+        stage.waiting_bits = stage.bits_of_waiting();
+        stage
     }
 
     /// When a packet of that size leaves that is offered `now` and finds nothing before it: no discipline but RED, which draws, does anything to such a packet.
@@ -233,13 +247,17 @@ impl<T> BottleneckStage<T> {
             (self.red, self.codel) = (RedState::default(), CoDelState::default());
         }
         (self.config, self.latest_service) = (config, None);
-        self.waiting_bits = self.waiting.iter().map(|(_, packet)| giga_bits(self.config.framing.on_the_line(packet.info.size))).sum();
+        self.waiting_bits = self.bits_of_waiting();
         self.announce(now);
     }
 
     /// Everything that waits or is on the line, in order: what a link gives up with its bottleneck.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
         self.in_service.into_iter().map(|service| service.packet).chain(self.waiting.into_iter().map(|(_, packet)| packet))
+    }
+
+    fn bits_of_waiting(&self) -> u128 {
+        self.waiting.iter().map(|(_, packet)| self.on_the_line(packet)).sum()
     }
 
     fn on_the_line(&self, packet: &Carried<T>) -> u128 {

@@ -22,12 +22,7 @@ pub(crate) struct EqualPackets {
 impl EqualPackets {
     /// The queue for packets of that size; `None` if departures depend on more than the latest one.
     pub(crate) fn new(bottleneck: &Bottleneck, size: Bytes) -> Option<Self> {
-        if bottleneck.discipline == Discipline::TailDrop { Self::of_any_discipline(bottleneck, size) } else { None }
-    }
-
-    /// Time on the line and limit for packets of that size; `None` if they cannot be told in nanoseconds alone.
-    pub(crate) fn of_any_discipline(bottleneck: &Bottleneck, size: Bytes) -> Option<Self> {
-        let Bottleneck { service: Service::Rate(rate), framing, limit, discipline: _ } = bottleneck else { return None };
+        let Bottleneck { service: Service::Rate(rate), framing, limit, discipline: Discipline::TailDrop } = bottleneck else { return None };
         let line = Line { rate: *rate, bits: giga_bits(framing.on_the_line(size)) };
         let service = line.service();
         let most = match *limit {
@@ -40,17 +35,6 @@ impl EqualPackets {
         };
         // Departures beyond the end of time are all at the end, and say nothing about how many wait.
         (service == 0 || most < END).then_some(Self { service, most })
-    }
-
-    /// When a packet leaves that is on the line from `now` on.
-    pub(crate) const fn departure(&self, now: Instant) -> Instant {
-        now.saturating_add_nanos(self.service)
-    }
-
-    /// Whether there is room for a packet that finds the line busy until `departure`, and that number of packets waiting.
-    pub(crate) const fn admits(&self, now: Instant, departure: Instant, waiting: u64) -> bool {
-        let work = departure.as_nanos().saturating_sub(now.as_nanos()).saturating_add(self.service.saturating_mul(waiting));
-        work <= self.most
     }
 
     /// When a packet leaves that is offered `now`, if there is room for it. `departure` is that of the packet before, then its own.

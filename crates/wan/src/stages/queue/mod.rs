@@ -19,8 +19,9 @@ pub use load::Load;
 pub use red::{Red, RedError};
 pub use token_bucket::{Peak, TokenBucket};
 
-pub(crate) use bottleneck::{BottleneckStage, idle_packets};
+pub(crate) use bottleneck::{BottleneckStage, InService, giga_bits, idle_packets};
 pub(crate) use codel::{CoDelState, Verdict as CoDelVerdict};
 pub(crate) use equal_packets::{EqualPackets, nanos};
+pub(crate) use limit::Waiting;
 pub(crate) use red::{RedState, Verdict as RedVerdict};
 pub(crate) use token_bucket::TokenBucketStage;
