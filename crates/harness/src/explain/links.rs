@@ -1,4 +1,4 @@
-//! Links in words: each stage that is configured, with its numbers, and what is simulated of queues.
+//! Links in words: each stage that is configured, with its numbers, and how queues are simulated.
 
 use cohaptic_scene::Scene;
 use std::path::Path;

@@ -76,7 +76,7 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// An engine with a bottleneck besides the stages that decide at once, and what is in it.
+    /// An engine with a bottleneck besides the stages that decide at once, with the packets in it.
     pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
         Self::Engine(Box::new(Engine::new(Kind::Staged(Box::new(Staged::resumed(now, direct, config, bottleneck))))))
     }

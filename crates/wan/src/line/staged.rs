@@ -196,7 +196,7 @@ impl<T: Clone> Staged<T> {
         stages
     }
 
-    /// A link with a bottleneck besides the stages that decide at once, and what is in it.
+    /// A link with a bottleneck besides the stages that decide at once, with the packets in it.
     pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
         // To configure the stages that decide at once as they are changes nothing.
         let mut stages = Self { bottleneck: Some(bottleneck), ..Self::new(now, direct, config, None) };

@@ -6,10 +6,11 @@ use cohaptic_units::Instant;
 
 /// Ticks ahead that lie in the wheel: a second, for a satellite and a queue. What arrives later than that is kept aside, which takes more than twice as long.
 const HORIZON: u64 = 1024;
+/// Two for each of them.
+const SLOTS: usize = 2048;
 
 /// Where the samples of a tick lie in the wheel: those in order, and next to them those that overtake.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "a remainder by a small number")]
 fn slot(tick: u64) -> usize {
     2 * (tick % HORIZON) as usize
 }
@@ -18,7 +19,7 @@ fn slot(tick: u64) -> usize {
 #[derive(Clone, Debug)]
 pub(super) struct InFlight<const P: usize> {
     ticks: Ticks,
-    wheel: Box<[Vec<Packet<P>>; 2 * HORIZON as usize]>,
+    wheel: Box<[Vec<Packet<P>>; SLOTS]>,
     beyond: BTreeMap<u64, Bucket<P>>,
     /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
     emptied: Vec<Vec<Packet<P>>>,

@@ -37,6 +37,7 @@ pub struct SteppedLinks<T> {
 }
 
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "most links are queued, and lie together: a box for each would be one more place to look at")]
 enum Stepped<T> {
     /// Of that kind.
     Queued(u8, QueuedLink<T>),

@@ -90,7 +90,7 @@ pub(super) struct QueuedLink<T> {
     seldom: Option<Box<Seldom>>,
 }
 
-/// What is on a line and before it.
+/// The packets on a line and before it.
 #[derive(Clone, Debug)]
 struct LineState<T> {
     on_line: Option<OnLine<T>>,
