@@ -71,7 +71,7 @@ mod tests {
         }
     }
 
-    /// The queues of the tables, in which nobody waits, and which is full most of the time.
+    /// The queues of the tables: one in which no sample waits, and one that is full most of the time.
     #[test]
     fn the_bare_queue_and_that_of_the_program_agree() {
         for mesh in Mesh::ALL.into_iter().filter(|mesh| mesh.impaired) {

@@ -1,6 +1,5 @@
 //! Lines and token buckets for which no sample waits, because the one before has just left, and those for which one does, because it has not: the same as event by event, to
 //! the bit.
-#![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss, reason = "rates of some kilobits a second")]
 
 use std::sync::Arc;
 
@@ -48,6 +47,12 @@ fn keys() -> impl Strategy<Value = String> {
 }
 
 /// Keys with the rates, as parts of what is offered.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "sizes of some bytes, rates of some kilobits a second"
+)]
 fn written(keys: &str, draft: &Draft, line: (f64, i64), tokens: (f64, i64)) -> String {
     let size = SampleKind::State.datagram_len(draft.axes);
     let offered = 8e6 * size as f64 / draft.update as f64;

@@ -10,6 +10,7 @@ use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::delay::{Delay, Jitter};
 use crate::stages::loss::Loss;
 use crate::stages::outage::{Outage, Outages};
+use crate::stages::queue::limit::strategies::limits;
 use crate::stages::queue::{Bottleneck, CoDel, Discipline, Framing, QueueLimit, Red};
 
 const SIZE: Bytes = Bytes::new(64);
@@ -27,7 +28,7 @@ fn codel(interval: u64, mtu: u64, ecn: bool) -> Discipline {
 }
 
 fn red(ecn: bool) -> Discipline {
-    Discipline::Red(Red::new(SIZE, Bytes::new(320), Probability::new(0.5).unwrap(), 0.1, SIZE, ecn).unwrap())
+    Discipline::Red(Red::new(SIZE, Bytes::new(320), Probability::new(0.5).unwrap(), 0.02, SIZE, ecn).unwrap())
 }
 
 /// What becomes of packets that are offered at these instants, by a whole link and by a stepped one, of which `then` has the models from
@@ -99,7 +100,8 @@ fn they_decide_what_whole_links_decide() {
 /// stage that needs an engine, and back.
 #[test]
 fn what_is_inside_stays_when_links_change() {
-    let words = |words: &str| LinkModel::from(Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap());
+    let netem = |words: &str| Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+    let words = |words: &str| LinkModel::from(LinkConfig { layout: Layout::Physical, ..netem(words) });
     let few = Bottleneck {
         framing: Framing { overhead: -30, ..Framing::default() },
         ..bottleneck(Discipline::HeadDrop, Some(QueueLimit::Time(Duration::from_millis(9))), 90_000)
@@ -113,18 +115,19 @@ fn what_is_inside_stays_when_links_change() {
             words("delay 24ms 9ms loss gemodel 5% 20%"),
             words("delay 24ms 4ms 50%"),
             words("delay 24ms 4ms 50% duplicate 5%"),
-            words("delay 24ms rate 100kbit"),
+            netem("delay 24ms rate 100kbit").into(),
+            with(Discipline::TailDrop, 20_000, Layout::Physical),
         ])
         .chain([LinkConfig { bottleneck: Some(few), outages, ..LinkConfig::default() }.into()])
         .chain([with(Discipline::TailDrop, 100_000, Layout::Netem)])
         .collect();
     for (from, to) in models.iter().flat_map(|from| models.iter().map(move |to| (from, to))) {
-        // The line is busy or, at the last, idle.
-        for at in [1, 17, 30, 100] {
+        // The line is busy, or has just sent all, or has been idle for long.
+        for at in [1, 17, 30, 44, 52, 60, 68, 100] {
             compare(from, &[(at, to)], (&bursts(), millis(2_900)));
         }
         // Again while one packet is on the line, to a discipline that needs an engine.
-        compare(from, &[(17, to), (18, &models[3])], (&bursts(), millis(2_900)));
+        compare(from, &[(16, to), (17, &models[3])], (&bursts(), millis(2_900)));
     }
 }
 
@@ -141,20 +144,11 @@ fn queues_between_memories_decide_what_whole_links_decide() {
     }
 }
 
-fn limits() -> impl Strategy<Value = Option<QueueLimit>> {
-    prop_oneof![
-        Just(None),
-        (0_u64..9).prop_map(|packets| Some(QueueLimit::Packets(packets))),
-        (0_u64..900).prop_map(|bytes| Some(QueueLimit::Bytes(Bytes::new(bytes)))),
-        (0_u64..90).prop_map(|millis| Some(QueueLimit::Time(Duration::from_millis(millis)))),
-    ]
-}
-
 proptest! {
     /// With gaps from none to longer than the queue, limits of each kind, and intervals of CoDel that are long over before the end or never.
     #[test]
     fn queues_decide_what_whole_links_decide(
-        limit in limits(),
+        limit in limits(90_000_000),
         bits in prop_oneof![Just(64_000_u64), 40_000_u64..200_000],
         discipline in prop_oneof![
             Just(Discipline::HeadDrop), Just(red(false)), (1_u64..300, 0_u64..300).prop_map(|(interval, mtu)| codel(interval, mtu, false))

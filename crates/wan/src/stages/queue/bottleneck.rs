@@ -69,9 +69,7 @@ impl Bottleneck {
     pub fn at_rate(rate: Rate) -> Self {
         Self { service: Service::Rate(rate), framing: Framing::default(), limit: None, discipline: Discipline::default() }
     }
-}
 
-impl Bottleneck {
     /// How long a mean packet is on the line \[s\]: the unit of the decay of RED's average.
     pub(crate) fn time_of_mean_packet(&self, red: &Red) -> f64 {
         match &self.service {

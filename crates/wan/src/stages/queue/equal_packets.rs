@@ -104,6 +104,7 @@ mod tests {
 
     use super::*;
     use crate::packet::{Exit, Marks, Packet, PacketInfo};
+    use crate::stages::queue::limit::strategies::limits;
     use crate::stages::queue::{BottleneckStage, Framing};
 
     /// What becomes of each packet by the stage that keeps packets: when it leaves, or that it is dropped.
@@ -127,21 +128,12 @@ mod tests {
         fates
     }
 
-    fn limits() -> impl Strategy<Value = Option<QueueLimit>> {
-        prop_oneof![
-            Just(None),
-            (0_u64..6).prop_map(|packets| Some(QueueLimit::Packets(packets))),
-            (0_u64..900).prop_map(|bytes| Some(QueueLimit::Bytes(Bytes::new(bytes)))),
-            (0_u64..3_000_000).prop_map(|nanos| Some(QueueLimit::Time(Duration::from_nanos(nanos)))),
-        ]
-    }
-
     proptest! {
         /// Departures and drops are those of the stage that keeps packets, with gaps from none to longer than the queue, at rates whose time on the line
         /// is rounded or not.
         #[test]
         fn departures_and_drops_are_those_of_the_queue(
-            limit in limits(),
+            limit in limits(3_000_000),
             rate in prop_oneof![Just(8_000_000_u64), 1_000_u64..20_000_000, 1_000_000_000_u64..4_000_000_000],
             size in 0_u64..300,
             gaps in prop::collection::vec(prop_oneof![Just(0_u64), 0_u64..200_000, 0_u64..3_000_000], 1..60),

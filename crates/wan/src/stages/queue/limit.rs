@@ -52,3 +52,20 @@ pub(super) fn words_of_limit(limit: Option<QueueLimit>) -> String {
         Some(QueueLimit::Time(wait)) => Span(wait).to_string(),
     }
 }
+
+#[cfg(test)]
+pub(crate) mod strategies {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Any limit, or none: of some packets, some bytes, or a wait below that \[ns\].
+    pub(crate) fn limits(wait: u64) -> impl Strategy<Value = Option<QueueLimit>> {
+        prop_oneof![
+            Just(None),
+            (0_u64..9).prop_map(|packets| Some(QueueLimit::Packets(packets))),
+            (0_u64..900).prop_map(|bytes| Some(QueueLimit::Bytes(Bytes::new(bytes)))),
+            (0..wait).prop_map(|nanos| Some(QueueLimit::Time(Duration::from_nanos(nanos)))),
+        ]
+    }
+}

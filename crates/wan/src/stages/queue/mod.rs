@@ -5,7 +5,7 @@ mod codel;
 mod delivery_trace;
 mod equal_packets;
 mod framing;
-mod limit;
+pub(crate) mod limit;
 mod load;
 mod red;
 pub(crate) mod token_bucket;
