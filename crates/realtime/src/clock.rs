@@ -115,6 +115,15 @@ impl KernelStamps {
     }
 }
 
+/// Of datagrams that came in that order, after `earliest`: an instant later than one behind it becomes that one, one before `earliest` becomes that.
+pub(crate) fn put_in_order(arrivals: &mut [Instant], earliest: Instant) {
+    let mut latest = arrivals.last().copied().unwrap_or(earliest);
+    for arrival in arrivals.iter_mut().rev() {
+        latest = latest.min(*arrival);
+        *arrival = latest.max(earliest);
+    }
+}
+
 fn nanos(time: Timespec) -> u64 {
     // Neither clock is negative, and both fit: 584 years of nanoseconds.
     let (seconds, nanos) = (u64::try_from(time.tv_sec).unwrap_or(0), u64::try_from(time.tv_nsec).unwrap_or(0));
@@ -141,6 +150,22 @@ mod tests {
         assert_eq!(back(Duration::from_secs(2)), stamps.now);
         assert_eq!(stamps.instant(Some(stamps.unix + Duration::from_nanos(1))), stamps.now);
         assert_eq!(stamps.instant(None), stamps.now);
+    }
+
+    #[test]
+    fn an_instant_is_no_later_than_those_behind_it_and_no_earlier_than_the_last_of_the_batch_before() {
+        let ordered = |given: &[u64], earliest: u64| {
+            let mut instants: Vec<Instant> = given.iter().copied().map(Instant::from_nanos).collect();
+            put_in_order(&mut instants, Instant::from_nanos(earliest));
+            instants.into_iter().map(Instant::as_nanos).collect::<Vec<u64>>()
+        };
+        assert_eq!(ordered(&[3, 5, 5, 9], 3), [3, 5, 5, 9]);
+        // Two were stamped when they were read, at 20, before the kernel stamped what came at 7 and 9.
+        assert_eq!(ordered(&[20, 20, 7, 9], 0), [7, 7, 7, 9]);
+        // All of the batch before were, at 8.
+        assert_eq!(ordered(&[5, 7, 9], 8), [8, 8, 9]);
+        assert_eq!(ordered(&[9, 6, 7], 8), [8, 8, 8]);
+        assert_eq!(ordered(&[], 8), []);
     }
 
     #[test]

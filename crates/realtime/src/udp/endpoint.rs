@@ -16,6 +16,7 @@ use super::counts::kernel_drops;
 use super::outbox::{Outbox, Run};
 use super::{Ecn, EndpointCounts};
 use crate::MonotonicClock;
+use crate::clock::put_in_order;
 
 /// What to ask for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,7 +56,8 @@ pub struct Datagram<'a> {
     pub bytes: &'a [u8],
     /// Its congestion bits; `None`: its ends do not understand them.
     pub ecn: Option<Ecn>,
-    /// When the kernel saw it come in; when it was read, where the kernel does not say.
+    /// When the kernel saw it come in; where the kernel does not say, no later than it was read or than the kernel saw the next one. Never before the
+    /// datagram that the same socket gave before it.
     pub at: Instant,
 }
 
@@ -69,6 +71,8 @@ pub struct UdpEndpoint {
     config: EndpointConfig,
     outbox: Outbox,
     counts: EndpointCounts,
+    /// When the last datagram that was read came in.
+    last: Instant,
 }
 
 impl UdpEndpoint {
@@ -102,7 +106,7 @@ impl UdpEndpoint {
             setsockopt(&socket, Ipv4PacketInfo, &false)?;
         }
         let (address, granted) = (socket.local_addr()?, sockopt::socket_recv_buffer_size(&socket)?);
-        Ok(Self { socket, state, address, granted, config, outbox: Outbox::default(), counts: EndpointCounts::default() })
+        Ok(Self { socket, state, address, granted, config, outbox: Outbox::default(), counts: EndpointCounts::default(), last: Instant::ZERO })
     }
 
     /// Where it listens.
@@ -147,10 +151,17 @@ impl UdpEndpoint {
         };
         // After reading: no stamp lies in the future.
         let stamps = clock.stamps();
-        for place in 0..count {
+        let mut arrivals = [self.last; BATCH_SIZE];
+        for (arrival, told) in arrivals.iter_mut().zip(&buffers.told[..count]) {
+            *arrival = stamps.instant(told.timestamp);
+        }
+        // The kernel begins to stamp a moment after a socket was opened. What came before is stamped when it is read, later than what came after it; a stamp
+        // that is not believed is the time of reading, too.
+        put_in_order(&mut arrivals[..count], self.last);
+        for (place, &at) in arrivals[..count].iter().enumerate() {
+            self.last = at;
             let told = buffers.told[place];
             let bytes = buffers.room(place, told.len);
-            let at = stamps.instant(told.timestamp);
             // The kernel may have put several of one sender together. An empty datagram is one, too.
             let mut rest = Some(bytes);
             while let Some(bytes) = rest {

@@ -52,6 +52,7 @@ fn what_goes_out_together_comes_in_one_by_one_in_order_with_its_congestion_bits(
             assert!(bytes.iter().enumerate().all(|(place, byte)| usize::from(*byte) == (n + place) % 256));
             assert!((before..=after).contains(at));
         }
+        assert!(received.is_sorted_by_key(|(.., at)| *at));
         assert_eq!((sender.counts().sent, sender.counts().failures.in_all(), receiver.counts().received), (200, 0, 200));
         assert!(sender.counts().send_calls <= 200);
         assert_eq!(receiver.kernel_drops().unwrap(), Some(0));
@@ -130,4 +131,19 @@ fn an_address_that_is_taken_is_refused_with_the_address() {
         // Somebody else may have it.
         assert_eq!(error.source.kind(), std::io::ErrorKind::AddrInUse);
     }
+}
+
+#[test]
+fn what_came_while_the_kernel_did_not_stamp_yet_is_not_placed_behind_what_came_later() {
+    let clock = MonotonicClock::start();
+    let mut receiver = endpoint("127.0.0.1:0", EndpointConfig::default());
+    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    // The kernel begins to stamp at the first socket that asks for it, within some milliseconds: in the midst of these, as a rule.
+    for n in 0..200_u8 {
+        sender.send_to(&[n], receiver.local_address()).unwrap();
+        std::thread::sleep(Duration::from_micros(50));
+    }
+    let received = receive(&mut receiver, &clock, 200);
+    assert!(received.iter().map(|(_, bytes, ..)| bytes[0]).eq(0..200));
+    assert!(received.is_sorted_by_key(|(.., at)| *at));
 }
