@@ -138,7 +138,7 @@ fn what_came_while_the_kernel_did_not_stamp_yet_is_not_placed_behind_what_came_l
     let clock = MonotonicClock::start();
     let mut receiver = endpoint("127.0.0.1:0", EndpointConfig::default());
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
-    // The kernel begins to stamp at the first socket that asks for it, within some milliseconds: in the midst of these, as a rule.
+    // The kernel begins to stamp some milliseconds after the first socket has asked for it: now and then in the midst of these.
     for n in 0..200_u8 {
         sender.send_to(&[n], receiver.local_address()).unwrap();
         std::thread::sleep(Duration::from_micros(50));
