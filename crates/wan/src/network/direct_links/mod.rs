@@ -41,6 +41,9 @@ pub struct DirectLinks {
     remembered: Vec<Remembered>,
     chained: ChainStates,
     others: Vec<Other>,
+    /// When each link was offered its latest packet.
+    #[cfg(debug_assertions)]
+    latest: Vec<Option<Instant>>,
 }
 
 /// Packets that were offered to neighbouring links at one instant: one bit, and one place, for each link.
@@ -98,7 +101,17 @@ impl DirectLinks {
     /// No links, for packets of that load; those that arrive by `until` will count as delivered.
     #[must_use]
     pub const fn new(until: Instant, load: Load) -> Self {
-        Self { until, load, links: Vec::new(), kinds: Vec::new(), remembered: Vec::new(), chained: ChainStates::new(), others: Vec::new() }
+        Self {
+            until,
+            load,
+            links: Vec::new(),
+            kinds: Vec::new(),
+            remembered: Vec::new(),
+            chained: ChainStates::new(),
+            others: Vec::new(),
+            #[cfg(debug_assertions)]
+            latest: Vec::new(),
+        }
     }
 
     /// Whether such a link can be added: what becomes of a packet of that load is known as soon as it is offered, nothing is copied, marked or damaged.
@@ -150,7 +163,7 @@ impl DirectLinks {
     ///
     /// # Panics
     ///
-    /// If there are no such links.
+    /// If there are no such links; with debug assertions also if a packet comes earlier than the [`Load`] says.
     #[inline(always)]
     pub fn offer(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         if self.are_chains() {
@@ -171,11 +184,13 @@ impl DirectLinks {
     ///
     /// # Panics
     ///
-    /// If there are no such links.
+    /// As [`DirectLinks::offer`].
     #[inline(always)]
     pub fn offer_as<const CHAINS: bool>(&mut self, now: impl OfferedAt, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         (arrivals.arrive, arrivals.overtake) = (0, 0);
         let first = first.index();
+        #[cfg(debug_assertions)]
+        (0..count).filter(|place| excluded >> place & 1 == 0).for_each(|place| self.assert_load(now.of(place), first + place));
         let (links, span) = (&mut self.links[first..first + count], (now, self.until));
         // Drawing for eight links what two need takes longer than one by one.
         let are_few = count == Self::AT_ONCE && excluded.count_zeros() <= 2;
@@ -199,7 +214,7 @@ impl DirectLinks {
         for place in (0..count).filter(|place| excluded >> place & 1 == 0) {
             let link = LinkId::new(first + place);
             arrivals.sequences[place] = self.offered(link);
-            if let Some((at, overtakes)) = self.offer_one(now.of(place), link) {
+            if let Some((at, overtakes)) = self.offer_alone(now.of(place), link) {
                 arrivals.at[place] = at;
                 arrivals.arrive |= 1 << place;
                 arrivals.overtake |= u8::from(overtakes) << place;
@@ -222,9 +237,27 @@ impl DirectLinks {
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// As [`DirectLinks::offer`].
     #[inline]
     pub fn offer_one(&mut self, now: Instant, link: LinkId) -> Option<(Instant, bool)> {
+        #[cfg(debug_assertions)]
+        self.assert_load(now, link.index());
+        self.offer_alone(now, link)
+    }
+
+    /// A link is offered a packet, which must not come earlier than the load says.
+    #[cfg(debug_assertions)]
+    fn assert_load(&mut self, now: Instant, link: usize) {
+        if self.latest.len() < self.links.len() {
+            self.latest.resize(self.links.len(), None);
+        }
+        let (before, gap) = (self.latest[link].replace(now), self.load.gap);
+        let since = before.map_or(gap, |before| now - before);
+        assert!(since >= gap, "link {link} was offered a packet {since:?} after the one before, and was to be offered none within {gap:?}");
+    }
+
+    #[inline]
+    fn offer_alone(&mut self, now: Instant, link: LinkId) -> Option<(Instant, bool)> {
         let place = link.index();
         let link = &mut self.links[place];
         let (words, draws) = (link.words(&self.kinds), link.draws.packet(link.offered));

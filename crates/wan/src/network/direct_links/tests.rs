@@ -222,3 +222,27 @@ fn what_needs_an_engine_is_left_out() {
 fn a_link_without_memory_takes_a_cache_line() {
     assert_eq!(size_of::<LinkState>(), 64);
 }
+
+#[test]
+#[cfg(debug_assertions)]
+fn packets_that_come_earlier_than_the_load_says_are_an_error_of_the_program() {
+    let load = Load { gap: Duration::from_millis(5), ..OF_TESTS };
+    let offered = |second: u64, alone: bool| {
+        std::panic::catch_unwind(move || {
+            let mut links = DirectLinks::new(Instant::MAX, load);
+            (0..2).for_each(|to| assert!(links.add(1, &LinkName::between("a", &to.to_string()), &model("delay 5ms"))));
+            links.offer(Instant::from_nanos(0), LinkId::new(0), 2, 0b01, &mut Arrivals::NONE.clone());
+            match alone {
+                true => assert!(links.offer_one(Instant::from_nanos(second), LinkId::new(1)).is_some()),
+                false => links.offer(Instant::from_nanos(second), LinkId::new(1), 1, 0, &mut Arrivals::NONE.clone()),
+            }
+            // It was left out of the first ones.
+            links.offer_one(Instant::from_nanos(1), LinkId::new(0));
+        })
+        .is_ok()
+    };
+    for alone in [true, false] {
+        assert!(offered(5_000_000, alone));
+        assert!(!offered(4_999_999, alone));
+    }
+}

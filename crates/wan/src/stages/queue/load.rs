@@ -7,7 +7,7 @@ use cohaptic_units::Bytes;
 use super::bottleneck::giga_bits;
 use super::{Bottleneck, Discipline, Service, TokenBucket};
 
-/// Packets of one size that are offered to a link, of which no two come closer together than that. The program that offers them knows it; nothing checks it.
+/// Packets of one size that are offered to a link, of which no two come closer together than that. The program that offers them knows it; debug assertions check it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Load {
     /// The size of each packet.
