@@ -138,7 +138,7 @@ impl UdpEndpoint {
     }
 
     /// Hands on what has come in, one batch at most, in the order in which it came, and says how many datagrams the kernel gave: after fewer than
-    /// [`UdpEndpoint::BATCH`] there are no more for now. Never blocks.
+    /// [`UdpEndpoint::BATCH`] there are no more for now. Never blocks. One clock is given to all calls of an endpoint.
     ///
     /// # Errors
     ///
