@@ -115,12 +115,25 @@ impl KernelStamps {
     }
 }
 
-/// Of datagrams that came in that order, after `earliest`: an instant later than one behind it becomes that one, one before `earliest` becomes that.
-pub(crate) fn put_in_order(arrivals: &mut [Instant], earliest: Instant) {
-    let mut latest = arrivals.last().copied().unwrap_or(earliest);
-    for arrival in arrivals.iter_mut().rev() {
-        latest = latest.min(*arrival);
-        *arrival = latest.max(earliest);
+/// The order in which the datagrams of one socket came in.
+#[derive(Debug)]
+pub(crate) struct ArrivalOrder {
+    latest: Instant,
+}
+
+impl ArrivalOrder {
+    /// Before the first datagram.
+    pub(crate) const NEW: Self = Self { latest: Instant::ZERO };
+
+    /// Puts the instants of the next datagrams, which came in that order, in order: none is later than one behind it, nor earlier than the last one of those before.
+    pub(crate) fn put_in_order(&mut self, arrivals: &mut [Instant]) {
+        let Some(last) = arrivals.last().copied() else { return };
+        let (mut earliest_behind, before) = (last, self.latest);
+        self.latest = last.max(before);
+        for arrival in arrivals.iter_mut().rev() {
+            earliest_behind = earliest_behind.min(*arrival);
+            *arrival = earliest_behind.max(before);
+        }
     }
 }
 
@@ -154,18 +167,21 @@ mod tests {
 
     #[test]
     fn an_instant_is_no_later_than_those_behind_it_and_no_earlier_than_the_last_of_the_batch_before() {
-        let ordered = |given: &[u64], earliest: u64| {
+        let mut order = ArrivalOrder::NEW;
+        let mut ordered = |given: &[u64]| {
             let mut instants: Vec<Instant> = given.iter().copied().map(Instant::from_nanos).collect();
-            put_in_order(&mut instants, Instant::from_nanos(earliest));
+            order.put_in_order(&mut instants);
             instants.into_iter().map(Instant::as_nanos).collect::<Vec<u64>>()
         };
-        assert_eq!(ordered(&[3, 5, 5, 9], 3), [3, 5, 5, 9]);
-        // Two were stamped when they were read, at 20, before the kernel stamped what came at 7 and 9.
-        assert_eq!(ordered(&[20, 20, 7, 9], 0), [7, 7, 7, 9]);
-        // All of the batch before were, at 8.
-        assert_eq!(ordered(&[5, 7, 9], 8), [8, 8, 9]);
-        assert_eq!(ordered(&[9, 6, 7], 8), [8, 8, 8]);
-        assert_eq!(ordered(&[], 8), []);
+        assert_eq!(ordered(&[3, 5, 5, 9]), [3, 5, 5, 9]);
+        // Two were stamped when they were read, at 20, before the kernel stamped those of 10 and 12.
+        assert_eq!(ordered(&[20, 20, 10, 12]), [10, 10, 10, 12]);
+        // All of this batch were stamped when they were read, and those of the next ones had come by then.
+        assert_eq!(ordered(&[25, 25]), [25, 25]);
+        assert_eq!(ordered(&[]), []);
+        assert_eq!(ordered(&[22, 24, 26]), [25, 25, 26]);
+        assert_eq!(ordered(&[27, 21, 23]), [26, 26, 26]);
+        assert_eq!(ordered(&[24, 28]), [26, 28]);
     }
 
     #[test]

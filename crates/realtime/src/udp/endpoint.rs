@@ -16,7 +16,7 @@ use super::counts::kernel_drops;
 use super::outbox::{Outbox, Run};
 use super::{Ecn, EndpointCounts};
 use crate::MonotonicClock;
-use crate::clock::put_in_order;
+use crate::clock::ArrivalOrder;
 
 /// What to ask for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -71,8 +71,7 @@ pub struct UdpEndpoint {
     config: EndpointConfig,
     outbox: Outbox,
     counts: EndpointCounts,
-    /// When the last datagram that was read came in.
-    last: Instant,
+    order: ArrivalOrder,
 }
 
 impl UdpEndpoint {
@@ -106,7 +105,7 @@ impl UdpEndpoint {
             setsockopt(&socket, Ipv4PacketInfo, &false)?;
         }
         let (address, granted) = (socket.local_addr()?, sockopt::socket_recv_buffer_size(&socket)?);
-        Ok(Self { socket, state, address, granted, config, outbox: Outbox::default(), counts: EndpointCounts::default(), last: Instant::ZERO })
+        Ok(Self { socket, state, address, granted, config, outbox: Outbox::default(), counts: EndpointCounts::default(), order: ArrivalOrder::NEW })
     }
 
     /// Where it listens.
@@ -138,7 +137,7 @@ impl UdpEndpoint {
     }
 
     /// Hands on what has come in, one batch at most, in the order in which it came, and says how many datagrams the kernel gave: after fewer than
-    /// [`UdpEndpoint::BATCH`] there are no more for now. Never blocks. One clock is given to all calls of an endpoint.
+    /// [`UdpEndpoint::BATCH`] none is left to read. Never blocks. One clock is given to all calls of an endpoint.
     ///
     /// # Errors
     ///
@@ -151,15 +150,14 @@ impl UdpEndpoint {
         };
         // After reading: no stamp lies in the future.
         let stamps = clock.stamps();
-        let mut arrivals = [self.last; BATCH_SIZE];
+        let mut arrivals = [stamps.now(); BATCH_SIZE];
         for (arrival, told) in arrivals.iter_mut().zip(&buffers.told[..count]) {
             *arrival = stamps.instant(told.timestamp);
         }
         // The kernel begins to stamp a moment after a socket was opened. What came before is stamped when it is read, later than what came after it; a stamp
         // that is not believed is the time of reading, too.
-        put_in_order(&mut arrivals[..count], self.last);
+        self.order.put_in_order(&mut arrivals[..count]);
         for (place, &at) in arrivals[..count].iter().enumerate() {
-            self.last = at;
             let told = buffers.told[place];
             let bytes = buffers.room(place, told.len);
             // The kernel may have put several of one sender together. An empty datagram is one, too.

@@ -43,7 +43,7 @@ pub struct DirectLinks {
     others: Vec<Other>,
     /// When each link was offered its latest packet.
     #[cfg(debug_assertions)]
-    latest: Vec<Option<Instant>>,
+    latest_offers: Vec<Option<Instant>>,
 }
 
 /// Packets that were offered to neighbouring links at one instant: one bit, and one place, for each link.
@@ -110,7 +110,7 @@ impl DirectLinks {
             chained: ChainStates::new(),
             others: Vec::new(),
             #[cfg(debug_assertions)]
-            latest: Vec::new(),
+            latest_offers: Vec::new(),
         }
     }
 
@@ -248,10 +248,10 @@ impl DirectLinks {
     /// A link is offered a packet, which must not come earlier than the load says.
     #[cfg(debug_assertions)]
     fn assert_load(&mut self, now: Instant, link: usize) {
-        if self.latest.len() < self.links.len() {
-            self.latest.resize(self.links.len(), None);
+        if self.latest_offers.len() < self.links.len() {
+            self.latest_offers.resize(self.links.len(), None);
         }
-        let (before, gap) = (self.latest[link].replace(now), self.load.gap);
+        let (before, gap) = (self.latest_offers[link].replace(now), self.load.gap);
         let since = before.map_or(gap, |before| now - before);
         assert!(since >= gap, "link {link} was offered a packet {since:?} after the one before, and was to be offered none within {gap:?}");
     }
