@@ -6,8 +6,23 @@ use crate::metadata::{Tree, metadata};
 use crate::{files, name, root};
 
 /// Packages that use nothing of Linux.
-const PORTABLE: [&str; 14] =
-    ["units", "files", "wan", "peer", "linkfile", "scene", "harness", "stability", "answers", "measure", "campaign", "picture", "testkit", "paper"];
+const PORTABLE: [&str; 15] = [
+    "units",
+    "files",
+    "wan",
+    "capture",
+    "peer",
+    "linkfile",
+    "scene",
+    "harness",
+    "stability",
+    "answers",
+    "measure",
+    "campaign",
+    "picture",
+    "testkit",
+    "paper",
+];
 
 /// Packages of this project that need Linux.
 const LINUX: [&str; 5] = ["realtime", "relay", "router", "live", "accuracy"];

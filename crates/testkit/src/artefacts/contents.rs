@@ -76,7 +76,7 @@ fn counts(log: &cohaptic_wan::FateLog) -> String {
 fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> Vec<u8> {
     let segments = segments(record, path);
     let write = || -> std::io::Result<Vec<u8>> {
-        let mut capture = cohaptic_measure::pcapng::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
+        let mut capture = cohaptic_capture::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
         for seen in record.packets_of(path) {
             let packet = seen.without_path();
             if segments.contains(&packet.sequence) { capture.write_packet(&packet, &seen.payload)? } else { capture.write(&packet, &seen.payload)? }

@@ -1,6 +1,8 @@
 //! The fates of packets as a capture file that packet analysers open (pcapng, draft-ietf-opsawg-pcapng).
 //!
-//! Every record is one frame at the instant at which it happened, with the fate as its comment:
+//! You need it if you want to look at the packets of an emulated link in Wireshark or tshark.
+//!
+//! A [`CaptureWriter`] writes every record as one frame at the instant at which it happened, with the fate as its comment:
 //!
 //! ```text
 //! packet 17 delivered after 24.1ms, copy 1, marked
@@ -12,6 +14,24 @@
 //! right, from 192.0.2.1:49152 to 192.0.2.2:49153 (RFC 5737: addresses of documentation), and the number of the packet, modulo 2¹⁶, as IP
 //! identification. A mark of congestion is the CE codepoint. Packets whose headers are known are written as they are
 //! ([`CaptureWriter::write_packet`]). Time zero is 1970-01-01 00:00 UTC, timestamps count nanoseconds.
+//!
+//! ```
+//! use cohaptic_capture::CaptureWriter;
+//! use cohaptic_wan::FateLog;
+//!
+//! let log = FateLog::parse(
+//!     "sequence,copy,offered_ns,size,at_ns,fate,marked,damaged\n\
+//!      0,0,0,5,24000000,delivered,0,0\n",
+//! )?;
+//! let mut capture = CaptureWriter::new(Vec::new(), "left -> right")?;
+//! for record in log.records() {
+//!     capture.write(record, b"hello")?;
+//! }
+//! let file = capture.finish()?;
+//! // Every pcapng file begins with the type of its section header.
+//! assert_eq!(file[..4], [0x0a, 0x0d, 0x0d, 0x0a]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod block;
 
