@@ -36,9 +36,9 @@ fn test(name: &str) -> (bool, String) {
 
 #[test]
 fn they_depend_on_the_test_kit_alone() {
-    let plain = r#"cohaptic-testkit = { path = "../../../crates/testkit" }"#;
-    let with_quic = r#"cohaptic-testkit = { path = "../../../crates/testkit", features = ["quinn"] }"#;
-    for (name, dependency) in [("reliable-udp", plain), ("first-test", plain), ("network-test", with_quic)] {
+    let at_random = r#"cohaptic-testkit = { path = "../../../crates/testkit", features = ["strategies"] }"#;
+    let with_quic = r#"cohaptic-testkit = { path = "../../../crates/testkit", features = ["quinn", "strategies"] }"#;
+    for (name, dependency) in [("reliable-udp", at_random), ("first-test", at_random), ("network-test", with_quic)] {
         let manifest = std::fs::read_to_string(example(name).join("Cargo.toml")).unwrap();
         let dependencies: Vec<&str> = manifest
             .lines()
