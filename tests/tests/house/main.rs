@@ -7,6 +7,7 @@ mod packages;
 mod size;
 mod systems;
 mod terms;
+mod testkit;
 
 use std::fs;
 use std::path::{Path, PathBuf};
