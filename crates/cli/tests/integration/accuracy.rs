@@ -1,6 +1,6 @@
 //! `cohaptic accuracy`: speed against error.
 
-use crate::desk::{Desk, parse};
+use crate::integration::desk::{Desk, parse};
 
 const NAMES: [&str; 7] = ["motion", "rotation", "time", "network", "analysis", "real-time", "least-model"];
 
@@ -99,7 +99,8 @@ fn an_interruption_keeps_what_was_measured_and_says_so() {
     let desk = Desk::new();
     desk.write("out/rows.csv", "of an earlier measurement");
     // The whole measurement of motion takes seconds; SIGINT is caught long before its end.
-    let outcome = crate::interrupt::interrupted(&desk, "accuracy --only motion,time --json --out out", crate::interrupt::listens);
+    let outcome =
+        crate::integration::interrupt::interrupted(&desk, "accuracy --only motion,time --json --out out", crate::integration::interrupt::listens);
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(130), ""));
     let document = parse(&outcome.stdout);
     assert_eq!(document["interrupted"], true);

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::{PLANE, RANDOM, TWO};
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{PLANE, RANDOM, TWO};
 
 fn left_out(document: &Value) -> Vec<&str> {
     document["left_out"].as_array().unwrap().iter().map(|what| what.as_str().unwrap()).collect()

@@ -1,7 +1,7 @@
 //! `--help` and wrong usage.
 
-use crate::desk::Desk;
-use crate::scenes::TWO;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
 
 #[test]
 fn help_names_the_commands() {

@@ -10,8 +10,8 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::desk::{Desk, Outcome, parse};
-use crate::running::{Client, PATIENCE, Running, TOKEN};
+use crate::integration::desk::{Desk, Outcome, parse};
+use crate::integration::running::{Client, PATIENCE, Running, TOKEN};
 
 /// Set in a process that is in namespaces of its own.
 const INSIDE: &str = "COHAPTIC_CLI_TEST_INSIDE";

@@ -2,8 +2,8 @@
 
 use cohaptic_picture::testing::{page_faults, page_in_browser};
 
-use crate::desk::Desk;
-use crate::scenes::{RANDOM, TWO};
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{RANDOM, TWO};
 
 fn page(desk: &Desk, line: &str) -> String {
     desk.text(&format!("{line} --out out"));

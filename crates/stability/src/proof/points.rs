@@ -156,6 +156,7 @@ fn structures(followed: &mut Followed<'_>, change: impl Fn(&mut crate::structure
 
 /// Each fault makes a box that holds a point of the other kind, or leaves more than half of the points undecided, which the test without faults refuses too.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn faults_of_the_prover_are_seen() {
     let cases = cases();
     for (what, mutation, change) in FAULTS {

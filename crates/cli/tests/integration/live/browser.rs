@@ -10,7 +10,7 @@ use serde_json::json;
 use super::peer::Peer;
 use super::peer_elsewhere::{SCENE, keyless};
 use super::session::Session;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// Waits until the picture of the copies changes, again and again: they move.
 fn wait_moving(browser: &mut Browser) {

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::browser::chromium::Browser;
 use super::play_page::{cube, end, millimetres, open, release};
 use super::session::Session;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 fn key(browser: &mut Browser, kind: &str, key: &str, code: u32) {
     browser.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code }));
@@ -282,7 +282,7 @@ fn a_stick_moves_the_hand_and_motors_give_its_force() {
 fn an_object_that_turns_is_held_by_its_corner() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
-    let mut session = Session::play(&desk, &crate::desk::shipped("rigid/tray.toml").display().to_string());
+    let mut session = Session::play(&desk, &crate::integration::desk::shipped("rigid/tray.toml").display().to_string());
     let url = session.told("open ");
     assert!(session.told("the pointer of the page ").contains("hand of north-east"));
     let control = super::http::Control::at(&url);

@@ -6,7 +6,7 @@ use super::browser::chromium::Browser;
 use super::http::Control;
 use super::records::trajectory;
 use super::session::Session;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// The middle of the own room, where the cube is.
 pub(super) fn cube(browser: &mut Browser) -> [f64; 2] {
