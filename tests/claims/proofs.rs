@@ -52,7 +52,7 @@ fn average_position_is_stable_throughout_a_region_for_three_and_six() {
 
 /// All of the region: 396 combinations, some hundred thousand boxes.
 #[test]
-#[ignore = "takes two minutes of processor time"]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn average_position_is_stable_throughout_the_region_in_which_it_contains_that_of_pd() {
     prove(3..=6, |peers| (0..=peers).collect(), &[0, 1, 2, 3, 4, 5, 6, 7, 8]);
 }

@@ -86,6 +86,7 @@ fn no_plot_leaves_the_page_away_and_a_second_run_has_its_own() {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_browser_shows_the_page_without_scrolling_and_its_texts_apart() {
     let desk = Desk::with("three.toml", RANDOM);
     let page = page(&desk, "run three.toml");

@@ -129,7 +129,7 @@ fn no_box_holds_a_point_of_the_other_kind() {
 }
 
 #[test]
-#[ignore = "takes half a minute of processor time"]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn no_box_holds_one_of_a_hundred_thousand_points_of_the_other_kind() {
     let (judged, points) = judged(&cases());
     assert!(points > 100_000 && judged > points / 2, "{judged} of {points}");
