@@ -18,7 +18,7 @@ pub(super) fn after(examples: &[&str]) -> String {
 
 /// The examples of the program, the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
-    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: accuracy, falcon, live, play, relay, router." };
+    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: falcon, live, play, relay, router." };
     after(PROGRAM) + needs
 }
 
@@ -120,8 +120,6 @@ pub(super) const LINK: &[&str] = &[
 pub(super) const FIT: &[&str] = &["cohaptic fit fates.csv --out link.toml", "cohaptic fit sender.pcapng receiver.pcapng --port 5000 --skew"];
 
 pub(super) const PAPER: &[&str] = &["cohaptic paper --quick", "cohaptic paper --out paper"];
-
-pub(super) const ACCURACY: &[&str] = &["cohaptic accuracy --quick", "cohaptic accuracy --only motion,time --out accuracy"];
 
 pub(super) const INIT: &[&str] =
     &["cohaptic init", "cohaptic init four.toml --from paper/5-1 --peers 4", "cohaptic init - --from network/jitter-normal", "cohaptic init --list"];

@@ -11,7 +11,7 @@ pub(super) struct Document {
 /// What the router needs: two devices in namespaces.
 pub(super) const NAMESPACES: &str = "unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V";
 
-pub(super) const DOCUMENTS: [Document; 25] = [
+pub(super) const DOCUMENTS: [Document; 24] = [
     Document {
         command: "run",
         lines: &[
@@ -473,16 +473,6 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("claims[].scene, claims[].how", "text of its scene, or `null`; how it was computed"),
             ("figures[].id, figures[].file, figures[].title", "`file` is `null` without `--out`"),
             ("wall_s", "the time it took"),
-        ],
-    },
-    Document {
-        command: "accuracy",
-        lines: &["cohaptic accuracy --quick --only motion --json"],
-        rows: &[
-            ("rows[].subject, rows[].case, rows[].method, rows[].setting", "what was measured"),
-            ("rows[].cost, rows[].cost_unit, rows[].error, rows[].error_unit", "`null` where there is no such number"),
-            ("rows[].reference, rows[].note", "what the error is against; remarks"),
-            ("interrupted, wall_s", "whether cut short; the time"),
         ],
     },
     Document {
