@@ -49,7 +49,8 @@ pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
 }
 
 /// The program that took over the command `accuracy`.
-const FORMER_COMMAND: &str = "\nSpeed against error is a program of its own: cargo run --release -p cohaptic-accuracy.";
+const FORMER_COMMAND: &str =
+    "\nSpeed against error is a program of its own: cargo run --release -p cohaptic-accuracy. Of one scene: cohaptic explain SCENE --cost.";
 
 /// Returns whether the command that was typed is `accuracy`, which earlier versions had.
 fn is_former_command(error: &clap::Error) -> bool {

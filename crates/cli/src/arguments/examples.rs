@@ -38,7 +38,11 @@ pub(super) const CHECK: &[&str] = &[
     "cohaptic check scene.toml --set link.delay=40ms --page check.html",
 ];
 
-pub(super) const EXPLAIN: &[&str] = &["cohaptic explain scenarios/network/rate-and-queue.toml", "cohaptic explain scene.toml --set scene.axes=3"];
+pub(super) const EXPLAIN: &[&str] = &[
+    "cohaptic explain scenarios/network/rate-and-queue.toml",
+    "cohaptic explain scene.toml --set scene.axes=3",
+    "cohaptic explain scene.toml --cost --out cost",
+];
 
 pub(super) const CAMPAIGN: &[&str] = &[
     "cohaptic campaign scene.toml --vary link.delay=8ms..48ms/6 --runs 100 --out delays",

@@ -40,7 +40,7 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
     for (command, options) in [
         ("run", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--against <KEY=VALUE>", "--out <DIR>", "--no-plot", "--general"][..]),
         ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--threads <N>", "--jobs", "--general"]),
-        ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
+        ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--cost", "--out <DIR>"]),
         (
             "campaign",
             &[
