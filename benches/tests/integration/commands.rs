@@ -5,6 +5,7 @@
 //! | a program of this package | run, with the least work: see below, one test each |
 //! | `benches/measure` | run by `script.rs`, as the program that it starts |
 //! | `cohaptic …` | run by `crates/cli/tests/integration/measured.rs`, which is where that program can be had |
+//! | `cohaptic-accuracy` | run by `crates/accuracy/tests/integration/program.rs`, which is where that program can be had. Its whole line is known |
 //! | of `benches/realtime` | not run here: they wait by the wall clock, for an hour even. Package, program and arguments are looked up |
 //! | the ignored test of `crates/cli/tests/cluster` | not run here: it takes minutes, and schedulers. Its text is known |
 //! | of `benches/peers` | not run here: a workspace of its own with the crates of others, which CI does not build. Folder, programs and scripts are looked up |
@@ -26,6 +27,8 @@ enum Kind {
     Script,
     /// Of the command line, with these words.
     Cohaptic,
+    /// The program of speed against error.
+    Accuracy,
     /// Programs of another package, by folder and name.
     Elsewhere(&'static str, Vec<String>),
     /// An ignored test of the command line, which is where the program and schedulers can be had.
@@ -39,6 +42,9 @@ fn kind(command: &str) -> Option<Kind> {
     }
     if command.starts_with("cohaptic ") {
         return Some(Kind::Cohaptic);
+    }
+    if command == "cargo run --release -p cohaptic-accuracy -- --json --out out/measured/accuracy" {
+        return Some(Kind::Accuracy);
     }
     if command == "cargo build --release && COHAPTIC_PROGRAM=target/release/cohaptic cargo test --workspace --test cluster -- --ignored" {
         return Some(Kind::IgnoredTest);
@@ -105,7 +111,7 @@ fn every_page_has_its_command_and_every_command_is_known() {
         let [first, rest @ ..] = &its[..] else { panic!("docs/{page} has no command") };
         if page == "measured.md" {
             assert_eq!(*first, &Kind::Script);
-            assert!(rest.contains(&&Kind::Cohaptic));
+            assert!(rest.contains(&&Kind::Cohaptic) && rest.contains(&&Kind::Accuracy));
         } else {
             assert!(rest.is_empty() && text.contains("This page is written by\n\n    "), "docs/{page}");
         }
@@ -117,7 +123,7 @@ fn every_page_has_its_command_and_every_command_is_known() {
         // A command on two pages is the same on both.
         let whole = command.replace(" -- --quick", "");
         let known = all.iter().any(|(of, other, _)| *of != "measured.md" && other.replace(" -- --quick", "") == whole);
-        assert!(known || matches!(kind, Kind::Script | Kind::Cohaptic), "{command}");
+        assert!(known || matches!(kind, Kind::Script | Kind::Cohaptic | Kind::Accuracy), "{command}");
     }
 }
 
@@ -131,7 +137,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
                 // That the script starts this program is tested in script.rs.
                 Kind::Script => program == "measured-page",
                 Kind::Elsewhere(of, others) => *of == folder && others.contains(&program),
-                Kind::Cohaptic | Kind::IgnoredTest => false,
+                Kind::Cohaptic | Kind::Accuracy | Kind::IgnoredTest => false,
             });
             assert!(found, "{program} of {name} is on no page");
         }
@@ -140,7 +146,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
         let (folder, used) = match kind {
             Kind::Table { program, .. } => ("benches", std::slice::from_ref(program)),
             Kind::Elsewhere(folder, used) => (*folder, &used[..]),
-            Kind::Script | Kind::Cohaptic | Kind::IgnoredTest => continue,
+            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::IgnoredTest => continue,
         };
         assert!(used.iter().all(|program| programs(folder).contains(program)), "{command}");
     }
@@ -154,6 +160,7 @@ fn what_is_not_a_command_of_ours_is_not_known() {
         "cargo run --release -p cohaptic-wan --bin x > docs/x.md",
         "cd benches/peers && cargo test > ../../docs/x.md",
         "cargo run --release -p cohaptic-benches-realtime --bin soak -- 2h --out docs/measured-soak.md",
+        "cargo run --release -p cohaptic-accuracy -- --json --out elsewhere",
         "rm -r docs",
     ] {
         assert_eq!(kind(command), None, "{command}");
@@ -165,7 +172,7 @@ pub(crate) fn prints_its_page(path: &str, program: &str) {
     let all = all();
     let of_program = all.iter().find_map(|(_, _, kind)| match kind {
         Kind::Table { program: of, page, .. } if of == program => Some(page.clone()),
-        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Elsewhere(..) | Kind::IgnoredTest => None,
+        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Elsewhere(..) | Kind::IgnoredTest => None,
     });
     let page = of_program.unwrap_or_else(|| panic!("{program} is on no page"));
     let output = Command::new(path).arg("--smoke").output().unwrap();

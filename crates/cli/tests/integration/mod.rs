@@ -4,7 +4,6 @@
 #![allow(clippy::print_stderr, reason = "a test that cannot run here says so")]
 #![expect(clippy::float_cmp, reason = "what is printed is what was computed, to the bit")]
 
-mod accuracy;
 mod admittance;
 mod against;
 mod campaign;
