@@ -18,4 +18,6 @@ mod sockets;
 mod stall;
 #[cfg(feature = "strategies")]
 mod strategies;
+#[cfg(feature = "tcp")]
+mod tcp;
 mod waiting;
