@@ -11,8 +11,6 @@ mod like_tokio;
 mod link_files;
 mod misuse;
 mod nodes;
-#[cfg(feature = "quinn")]
-mod quic;
 mod seeds;
 mod sockets;
 mod stall;
