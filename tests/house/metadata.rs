@@ -1,23 +1,29 @@
 //! The answers of `cargo metadata`.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
 use crate::house::root;
 
-/// Without the network if all packages are on this machine.
+/// Returns the metadata of the project's workspace, without the network if all packages are on this machine.
 pub(crate) fn metadata(options: &[&str]) -> Value {
+    metadata_of(&root(), options)
+}
+
+/// Returns the metadata of the workspace in a folder.
+pub(crate) fn metadata_of(workspace: &Path, options: &[&str]) -> Value {
     let ask = |mode: &[&str]| {
         let mut command = Command::new(env!("CARGO"));
-        command.current_dir(root()).args(["metadata", "--format-version", "1", "--locked"]).args(mode).args(options).output().unwrap()
+        command.current_dir(workspace).args(["metadata", "--format-version", "1", "--locked"]).args(mode).args(options).output().unwrap()
     };
     let mut output = ask(&["--offline"]);
     if !output.status.success() {
         output = ask(&[]);
     }
-    assert!(output.status.success(), "cargo metadata {options:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "cargo metadata {options:?} in {}: {}", workspace.display(), String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 

@@ -1,12 +1,13 @@
 //! Packages are ready to publish, and may be: their own descriptions, and the licences of all that they are built from.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
-use crate::house::metadata::{list, metadata, text};
+use crate::house::metadata::{list, metadata, metadata_of, text};
 use crate::house::{files, name, root};
 
 /// Licences that ask for no more than that they are named. `MIT-0` and `CC0-1.0` do not even ask for that, and only tests and build scripts have them.
@@ -64,16 +65,41 @@ fn one(words: &mut Words<'_>) -> bool {
     ACCEPTED.contains(&format!("{word}{exception}").as_str())
 }
 
+/// Workspaces of this project whose tests decide about a change or run at night: the folder, from the folder of the project.
+const WORKSPACES: [&str; 2] = ["", "tests/programs"];
+
+/// All features, because `cargo metadata` leaves out packages that only a feature needs which is off.
 #[test]
-fn every_licence_in_the_lock_file_is_accepted() {
-    let metadata = metadata(&[]);
-    let packages = list(&metadata, "packages");
-    let refused: Vec<String> = packages
-        .iter()
-        .filter(|package| !is_accepted(text(package, "license")))
-        .map(|package| format!("{} {}: {:?}", text(package, "name"), text(package, "version"), text(package, "license")))
-        .collect();
-    assert!(packages.len() > 100 && refused.is_empty(), "of {} packages:\n{}", packages.len(), refused.join("\n"));
+fn every_licence_in_the_lock_files_is_accepted() {
+    for workspace in WORKSPACES {
+        let metadata = metadata_of(&root().join(workspace), &["--all-features"]);
+        let packages = list(&metadata, "packages");
+        let refused: Vec<String> = packages
+            .iter()
+            .filter(|package| !is_accepted(text(package, "license")))
+            .map(|package| format!("{} {}: {:?}", text(package, "name"), text(package, "version"), text(package, "license")))
+            .collect();
+        assert!(packages.len() > 100 && refused.is_empty(), "{workspace}: of {} packages:\n{}", packages.len(), refused.join("\n"));
+    }
+}
+
+/// Names and versions of the packages of others that a lock file lists.
+fn locked(workspace: &str) -> BTreeSet<(String, String)> {
+    let file = fs::read_to_string(root().join(workspace).join("Cargo.lock")).unwrap();
+    let field = |entry: &str, key: &str| entry.split_once(&format!("\n{key} = \"")).map(|(_, rest)| rest.split('"').next().unwrap().to_owned());
+    let of_others = |entry: &str| field(entry, "source").and_then(|_| Some((field(entry, "name")?, field(entry, "version")?)));
+    file.split("[[package]]").filter_map(of_others).collect()
+}
+
+/// The programs of others run with the versions that the test kit is built from, unless the project itself does not have the package.
+#[test]
+fn the_tests_of_programs_lock_the_versions_of_the_project() {
+    let project = locked("");
+    let programs = locked("tests/programs");
+    let is_of_project = |name: &str| project.iter().any(|package| package.0 == name);
+    let other: Vec<_> = programs.difference(&project).filter(|(name, _)| is_of_project(name)).collect();
+    let hint = "`cargo update PACKAGE --precise VERSION` in tests/programs brings its Cargo.lock up to date";
+    assert!(programs.len() > 100 && other.is_empty(), "not in Cargo.lock of the project: {other:?}; {hint}");
 }
 
 #[test]

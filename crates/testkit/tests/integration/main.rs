@@ -11,11 +11,11 @@ mod like_tokio;
 mod link_files;
 mod misuse;
 mod nodes;
-#[cfg(feature = "quinn")]
-mod quic;
 mod seeds;
 mod sockets;
 mod stall;
 #[cfg(feature = "strategies")]
 mod strategies;
+#[cfg(feature = "tcp")]
+mod tcp;
 mod waiting;

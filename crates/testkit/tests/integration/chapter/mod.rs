@@ -4,20 +4,19 @@ mod files;
 mod misuse;
 mod nodes;
 mod programs;
-#[cfg(feature = "quinn")]
-mod quic;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const CHAPTER: &str = include_str!("../../../../../docs/testing.md");
 
-/// The code in which the blocks must stand as they are. What needs the feature `scenes` is among the tests across crates, which always have it.
+/// The code in which the blocks must stand as they are. Blocks that use axum are among the tests of programs of others, a workspace of its own: they are compared
+/// here, and compiled and run there. Blocks that need the feature `scenes` are among the tests across crates, which always have it.
 const CODE: [&str; 6] = [
     include_str!("programs.rs"),
     include_str!("files.rs"),
     include_str!("nodes.rs"),
-    include_str!("../../programs/phone/each_part.rs"),
-    include_str!("../../programs/phone/whole_photo.rs"),
+    include_str!("../../../../../tests/programs/tests/phone/each_part.rs"),
+    include_str!("../../../../../tests/programs/tests/phone/whole_photo.rs"),
     include_str!("../../../../../tests/testkit/chapter.rs"),
 ];
 
@@ -31,7 +30,7 @@ fn blocks(language: &str) -> Vec<&'static str> {
 }
 
 #[test]
-fn every_block_of_rust_is_compiled_and_run() {
+fn every_block_of_rust_is_in_a_test() {
     let blocks = blocks("rust");
     assert_eq!(blocks.len(), CHAPTER.matches("```rust").count());
     for block in blocks {

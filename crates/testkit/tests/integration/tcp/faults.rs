@@ -7,8 +7,8 @@ use cohaptic_testkit::tcp::Keepalive;
 use cohaptic_testkit::{TcpListener, time};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-use crate::ends::pair;
-use crate::{R, beds, millis};
+use crate::tcp::ends::pair;
+use crate::tcp::{R, beds, millis};
 
 #[test]
 fn a_crash_is_silent_and_the_sockets_of_the_host_say_so() {

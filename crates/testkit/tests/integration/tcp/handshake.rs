@@ -8,7 +8,7 @@ use cohaptic_testkit::tcp::{Flags, State, TcpConfig};
 use cohaptic_testkit::{Bed, Instant, TcpSocket, TcpStream, Testbed, time};
 use tokio::io::AsyncReadExt;
 
-use crate::{R, beds, millis};
+use crate::tcp::{R, beds, millis};
 
 #[test]
 fn connect_takes_a_round_trip_and_accept_half_of_one_more() {

@@ -1,5 +1,4 @@
 //! Tests of streams and listeners.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::cast_possible_truncation, reason = "tests")]
 
 mod ends;
 mod faults;

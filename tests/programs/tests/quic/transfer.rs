@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use cohaptic_testkit::quinn::congestion::NewRenoConfig;
 use cohaptic_testkit::quinn::{self, Connection, Endpoint, SendStream, TransportConfig, VarInt};
+use cohaptic_testkit::units::{Bytes, Probability, Rate};
 use cohaptic_testkit::wan::{Bottleneck, Delay, DropCause, LinkConfig, Loss, QueueLimit};
 use cohaptic_testkit::{Bed, Instant, JoinHandle, Testbed};
-use cohaptic_units::{Bytes, Probability, Rate};
 
 use super::new_reno::{Path, transfer_time};
 

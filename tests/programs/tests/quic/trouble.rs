@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_testkit::quinn::{self, ConnectionError, TransportConfig, VarInt};
+use cohaptic_testkit::units::Rate;
 use cohaptic_testkit::wan::{Bottleneck, CoDel, Delay, Discipline, LinkConfig};
 use cohaptic_testkit::{Bed, Host, Instant, JoinHandle, Testbed, time};
-use cohaptic_units::Rate;
 
 const SIZE: usize = 2_000_000;
 const PORT: u16 = 443;

@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use cohaptic_testkit::tcp::TcpConfig;
 use cohaptic_testkit::{Bed, TcpListener, TcpSocket, TcpStream, Testbed, time};
 
-use crate::beds;
+use crate::tcp::beds;
 
 /// An error, in words.
 fn said<T>(outcome: io::Result<T>) -> String {
@@ -86,7 +86,7 @@ fn a_loop_that_reads_the_end_again_and_again_is_found() {
             let listener = bed.host("b").listen("0.0.0.0:80").unwrap();
             let client = bed.host("a").connect("b:80").await.unwrap();
             drop(listener.accept().await.unwrap());
-            time::sleep(crate::R).await;
+            time::sleep(crate::tcp::R).await;
             while client.try_read(&mut [0; 8]).is_ok() {}
         };
         let panic = catch_unwind(AssertUnwindSafe(|| bed.patience(1000).run(program))).unwrap_err();

@@ -1,4 +1,4 @@
-//! What docs/testing.md says of QUIC.
+//! The section of docs/testing.md on QUIC: endpoints of quinn with the certificate and the random numbers of the test bed.
 
 use cohaptic_testkit::wan::DropCause;
 use cohaptic_testkit::{Testbed, quinn};

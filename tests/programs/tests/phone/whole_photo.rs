@@ -28,7 +28,7 @@ fn a_phone_sends_a_photo() {
 
 #[test]
 fn a_limit_for_the_whole_photo_comes_down_to_a_slow_link() {
-    const CHAPTER: &str = include_str!("../../../../../docs/testing.md");
+    const CHAPTER: &str = include_str!("../../../../docs/testing.md");
     let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
     let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let failed = runner.run(&links_like(LinkBounds::phone()), |link| {

@@ -7,8 +7,8 @@ use cohaptic_testkit::tcp::{Keepalive, TcpConfig};
 use cohaptic_testkit::{Bed, Testbed};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-use crate::ends::pair;
-use crate::{beds, octets, read_all, send_all};
+use crate::tcp::ends::pair;
+use crate::tcp::{beds, octets, read_all, send_all};
 
 #[test]
 fn the_trace_shows_flags_relative_numbers_and_windows() {
@@ -202,7 +202,7 @@ fn a_closed_window_is_no_reason_to_give_up_while_a_program_waits_for_time() {
             }
             read_all(&mut server, 200_000).await;
             writing.await.unwrap();
-            assert!(bed.now() < crate::millis(7_210_000), "{}", bed.now());
+            assert!(bed.now() < crate::tcp::millis(7_210_000), "{}", bed.now());
         });
     }
 }

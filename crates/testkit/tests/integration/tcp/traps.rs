@@ -8,8 +8,8 @@ use cohaptic_testkit::wan::{Chance, Checksum, Corruption, Flips, LinkConfig};
 use cohaptic_testkit::{Bed, Happening, Lost, Testbed, time};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-use crate::ends::pair;
-use crate::{R, beds, millis, octet, octets, read_all, send_all};
+use crate::tcp::ends::pair;
+use crate::tcp::{R, beds, millis, octet, octets, read_all, send_all};
 
 /// Both ways at once; gives when all was read.
 async fn both_ways(bed: Bed, count: usize) -> cohaptic_testkit::Instant {

@@ -7,7 +7,7 @@ use cohaptic_testkit::tcp::State;
 use cohaptic_testkit::{Bed, TcpListener, TcpStream, time};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-use crate::{R, beds, millis, octets, read_all, send_all};
+use crate::tcp::{R, beds, millis, octets, read_all, send_all};
 
 /// A connection between the hosts, after half a second: the client's end, the server's, and the listener.
 pub(super) async fn pair(bed: &Bed) -> (TcpStream, TcpStream, TcpListener) {

@@ -1,0 +1,7 @@
+//! Unmodified QUIC endpoints over emulated links.
+
+mod determinism;
+mod letter;
+mod new_reno;
+mod transfer;
+mod trouble;
