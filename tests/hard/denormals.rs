@@ -6,7 +6,7 @@ use cohaptic_harness::Model;
 use cohaptic_peer::{Contact, Gains};
 use cohaptic_tests::{Body, Draft, Log, Tick, run};
 
-use crate::gain::{Gain, PerTick};
+use crate::hard::gain::{Gain, PerTick};
 
 const TICK: Duration = Duration::from_millis(1);
 /// η, the smallest double above zero.

@@ -18,8 +18,8 @@ use cohaptic_peer::{Contact, Gains};
 use cohaptic_stability::{Boundary, BoundaryOptions, Cell, KeyRange, Method, Monodromy, StateKind, Verdict, analyse, monodromy};
 use cohaptic_tests::Draft;
 
-use crate::ROUNDING;
-use crate::watch::OnTick;
+use crate::hard::ROUNDING;
+use crate::hard::watch::OnTick;
 
 const TICKS: usize = 1_000_000;
 

@@ -14,7 +14,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-use crate::ROUNDING;
+use crate::hard::ROUNDING;
 
 /// Spans at the edges of 64 bits, of a signed one, and of a `Duration` itself.
 fn span() -> impl Strategy<Value = Duration> {

@@ -8,9 +8,9 @@ use cohaptic_harness::{Model, Simulation, TickRow};
 use cohaptic_peer::{ArmConfig, Contact, Gains, Integrator, Plant};
 use cohaptic_tests::{Draft, DraftHand, Log, run};
 
-use crate::ROUNDING;
-use crate::gain::{Gain, PerTick};
-use crate::watch::OnTick;
+use crate::hard::ROUNDING;
+use crate::hard::gain::{Gain, PerTick};
+use crate::hard::watch::OnTick;
 
 /// How far away \[m\].
 const FAR: f64 = 1e6;

@@ -8,7 +8,7 @@ use std::time::Duration;
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Matrix, Monodromy, StateKind, monodromy};
 
-use crate::ROUNDING;
+use crate::hard::ROUNDING;
 
 /// The gain of a stable scene that samples at every tick, all ticks together.
 #[derive(Debug)]

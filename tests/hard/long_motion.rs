@@ -14,8 +14,8 @@ use cohaptic_harness::{Model, Simulation, TickRow};
 use cohaptic_tests::{Draft, DraftHand};
 use qd::Quad;
 
-use crate::ROUNDING;
-use crate::watch::OnTick;
+use crate::hard::ROUNDING;
+use crate::hard::watch::OnTick;
 
 /// The time of tick `k` of `tick` µs, exactly \[s\].
 fn seconds(k: u64, tick: u64) -> Quad {

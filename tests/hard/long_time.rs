@@ -11,8 +11,8 @@ use cohaptic_tests::{Draft, DraftPeer};
 use cohaptic_units::{Hertz, Instant};
 use cohaptic_wan::Fate;
 
-use crate::ROUNDING;
-use crate::watch::{OnPacket, OnTick};
+use crate::hard::ROUNDING;
+use crate::hard::watch::{OnPacket, OnTick};
 
 /// Peers that tick every `tick` µs by clocks of that offset \[ns\] and drift [parts per 10⁹], for `seconds`, with a sample every 1000 ticks.
 fn scene(tick: u64, seconds: u64, clocks: &[(u64, i32)]) -> Draft {

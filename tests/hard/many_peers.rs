@@ -10,8 +10,8 @@ use cohaptic_tests::{Draft, same_cases};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
-use crate::ROUNDING;
-use crate::exact_sum::ExactSum;
+use crate::hard::ROUNDING;
+use crate::hard::exact_sum::ExactSum;
 
 /// How many others there are: the most whose mean is a sum in a fixed order, and many.
 const FEW: usize = EXACT_FROM - 1;

@@ -13,7 +13,7 @@ use cohaptic_wan::{
     Bottleneck, Chance, Delay, Distribution, Fate, Jitter, Link, LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId, PacketEvent,
 };
 
-use crate::watch::OnTick;
+use crate::hard::watch::OnTick;
 
 const COUNT: u64 = 1_000_000;
 const SIZE: Bytes = Bytes::new(64);

@@ -21,7 +21,7 @@ use cohaptic_stability::{Method, Verdict, analyse};
 use cohaptic_tests::Draft;
 use qd::Quad;
 
-use crate::ROUNDING;
+use crate::hard::ROUNDING;
 
 const TICK: Duration = Duration::from_millis(1);
 

@@ -91,7 +91,7 @@ fn with_everything_lost_for_ever_each_swings_about_where_the_other_began() {
         let (mut d, mut v) = (start.0 - other, start.1);
         let (h, m) = (1e-3, draft.mass / 2.0);
         for row in log.of(peer) {
-            let bound = 6000.0 * crate::ROUNDING * (0.1 + 0.7 * 0.1);
+            let bound = 6000.0 * crate::hard::ROUNDING * (0.1 + 0.7 * 0.1);
             assert!((row.object.position[0] - other - d).abs() <= bound, "peer {peer} at {}: {} for {}", row.at, row.object.position[0], other + d);
             let a = -(draft.gains.stiffness * d + draft.gains.damping * (v - speed)) / m;
             (d, v) = (d + h * v + h * h / 2.0 * a, v + h * a);

@@ -29,10 +29,14 @@ use std::path::{Path, PathBuf};
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
 
-/// A property test of this number of cases that leaves no files behind.
+/// The variable of the environment with which a property test draws all of its cases. `.ci/nightly` sets it.
+pub const ALL_CASES_VARIABLE: &str = "COHAPTIC_TEST_ALL_CASES";
+
+/// A property test that leaves no files behind. It draws `count` cases if [`ALL_CASES_VARIABLE`] is set, and the first quarter of them otherwise.
 #[must_use]
 pub fn cases(count: u32) -> ProptestConfig {
-    ProptestConfig { cases: count, failure_persistence: None, max_shrink_iters: 400, ..ProptestConfig::default() }
+    let cases = if std::env::var_os(ALL_CASES_VARIABLE).is_some() { count } else { count.div_ceil(4) };
+    ProptestConfig { cases, failure_persistence: None, max_shrink_iters: 400, ..ProptestConfig::default() }
 }
 
 /// [`cases`] that are the same at every run.

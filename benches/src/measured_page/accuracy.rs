@@ -1,4 +1,4 @@
-//! `cohaptic accuracy`: its rows as tables of Markdown, and the plots that say most.
+//! `cohaptic-accuracy`: its rows as tables of Markdown, and the plots that say most.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -10,7 +10,9 @@ use serde::Deserialize;
 
 use crate::programs::{Measured, Programs};
 
-/// Where everything that the command writes lies.
+/// The program that measures.
+const PROGRAM: &str = "cohaptic-accuracy";
+/// Folder of all files that the program writes.
 const FOLDER: &str = "out/measured/accuracy";
 /// Where the plots lie that the page shows, in `docs/`.
 const IMAGES: &str = "images/measured";
@@ -43,7 +45,7 @@ const PLOTS: [(&str, &str, &str); 12] = [
     ("real-time", "real-time-release-of-24-packets-under-way-lateness-99-s", "How late packets leave against processor time: sleeping and spinning"),
 ];
 
-/// What `cohaptic accuracy --json` prints.
+/// The document of `cohaptic-accuracy --json`.
 #[derive(Debug, Deserialize)]
 struct AccuracyDocument {
     rows: Vec<Row>,
@@ -64,17 +66,22 @@ struct Row {
     note: String,
 }
 
-/// The words behind `cohaptic`.
-pub(crate) fn words(effort: Effort) -> String {
-    format!("accuracy{} --json --out {FOLDER}", effort.of("", " --quick", " --quick"))
+/// The arguments of the program.
+fn arguments(effort: Effort) -> String {
+    format!("{}--json --out {FOLDER}", effort.of("", "--quick ", "--quick "))
+}
+
+/// The command that a reader can type.
+pub(crate) fn command(effort: Effort) -> String {
+    format!("cargo run --release -p cohaptic-accuracy -- {}", arguments(effort))
 }
 
 pub(crate) fn measure(programs: &Programs) -> Result<Measured, String> {
-    let printed = programs.cohaptic(&words(programs.effort))?;
+    let printed = programs.beside(PROGRAM, &arguments(programs.effort))?;
     let document: AccuracyDocument =
-        serde_json::from_str(&printed).map_err(|error| format!("what cohaptic printed is no document of accuracy: {error}"))?;
+        serde_json::from_str(&printed).map_err(|error| format!("what {PROGRAM} printed is no document of accuracy: {error}"))?;
     if document.interrupted {
-        return Err("cohaptic accuracy was interrupted".to_owned());
+        return Err(format!("{PROGRAM} was interrupted"));
     }
     let read = |(_, plot, _): &(&str, &str, &str)| {
         let path = Programs::root().join(FOLDER).join(format!("{plot}.svg"));

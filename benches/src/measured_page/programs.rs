@@ -26,21 +26,26 @@ impl Programs {
     /// What a program of this package prints: a page.
     pub(crate) fn table(&self, program: &str) -> Result<String, String> {
         let option = Some(self.effort.option()).filter(|option| !option.is_empty());
-        self.printed(Command::new(self.beside(program)).args(option), program)
+        self.printed(Command::new(self.path(program)).args(option), program)
     }
 
-    /// What `cohaptic` prints with these words behind it, none of which has a space in it.
-    pub(crate) fn cohaptic(&self, words: &str) -> Result<String, String> {
-        eprintln!("      cohaptic {words}");
-        self.printed(Command::new(self.beside("cohaptic")).args(words.split(' ')), "cohaptic")
+    /// Runs `cohaptic` with these arguments, none of which has a space in it, and returns what it prints.
+    pub(crate) fn cohaptic(&self, arguments: &str) -> Result<String, String> {
+        self.beside("cohaptic", arguments)
+    }
+
+    /// Runs a program that lies beside this one with these arguments, none of which has a space in it, and returns what it prints.
+    pub(crate) fn beside(&self, program: &str, arguments: &str) -> Result<String, String> {
+        eprintln!("      {program} {arguments}");
+        self.printed(Command::new(self.path(program)).args(arguments.split(' ')), program)
     }
 
     /// What a line prints that is typed into a shell.
     pub(crate) fn shell(&self, line: &str) -> Result<String, String> {
-        self.printed(Command::new("sh").args(["-c", line]).env("COHAPTIC", self.beside("cohaptic")), line)
+        self.printed(Command::new("sh").args(["-c", line]).env("COHAPTIC", self.path("cohaptic")), line)
     }
 
-    fn beside(&self, program: &str) -> PathBuf {
+    fn path(&self, program: &str) -> PathBuf {
         self.folder.join(format!("{program}{}", std::env::consts::EXE_SUFFIX))
     }
 

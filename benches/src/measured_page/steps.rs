@@ -14,7 +14,7 @@ pub(crate) enum Step {
     Speed,
     /// Whole campaigns on one thread and on all
     Campaign,
-    /// `cohaptic accuracy`: speed against error, tables and plots
+    /// `cohaptic-accuracy`: speed against error, tables and plots
     Accuracy,
     /// Also writes measured-link.md
     Link,
@@ -174,7 +174,7 @@ one link alone, a stability map, and what each of the others does not model: [me
         match (self, self.source()) {
             (_, Some(source)) => vec![source.command(effort)],
             (Self::Campaign, None) => campaign::commands(effort),
-            (_, None) => vec![format!("cohaptic {}", accuracy::words(effort))],
+            (_, None) => vec![accuracy::command(effort)],
         }
     }
 

@@ -5,6 +5,7 @@
 //! | a program of this package | run, with the least work: see below, one test each |
 //! | `benches/measure` | run by `script.rs`, as the program that it starts |
 //! | `cohaptic …` | run by `crates/cli/tests/integration/measured.rs`, which is where that program can be had |
+//! | `cohaptic-accuracy` | run by `crates/accuracy/tests/integration/program.rs`, which is where that program can be had. Its whole line is known |
 //! | of `benches/realtime` | not run here: they wait by the wall clock, for an hour even. Package, program and arguments are looked up |
 //! | the ignored test of `crates/cli/tests/cluster` | not run here: it takes minutes, and schedulers. Its text is known |
 //! | `benches/first-result` | not run here: it compiles the project several times, and downloads. Its rows are looked up |
@@ -27,6 +28,8 @@ enum Kind {
     Script,
     /// Of the command line, with these words.
     Cohaptic,
+    /// The program of speed against error.
+    Accuracy,
     /// Programs of another package, by folder and name.
     Elsewhere(&'static str, Vec<String>),
     /// The script that measures how long a new user waits.
@@ -45,6 +48,9 @@ fn kind(command: &str) -> Option<Kind> {
     }
     if command.starts_with("cohaptic ") {
         return Some(Kind::Cohaptic);
+    }
+    if command == "cargo run --release -p cohaptic-accuracy -- --json --out out/measured/accuracy" {
+        return Some(Kind::Accuracy);
     }
     if command == "cargo build --release && COHAPTIC_PROGRAM=target/release/cohaptic cargo test --workspace --test cluster -- --ignored" {
         return Some(Kind::IgnoredTest);
@@ -111,7 +117,7 @@ fn every_page_has_its_command_and_every_command_is_known() {
         let [first, rest @ ..] = &its[..] else { panic!("docs/{page} has no command") };
         if page == "measured.md" {
             assert_eq!(*first, &Kind::Script);
-            assert!(rest.contains(&&Kind::Cohaptic));
+            assert!(rest.contains(&&Kind::Cohaptic) && rest.contains(&&Kind::Accuracy));
         } else {
             assert!(rest.is_empty() && text.contains("This page is written by\n\n    "), "docs/{page}");
         }
@@ -123,7 +129,7 @@ fn every_page_has_its_command_and_every_command_is_known() {
         // A command on two pages is the same on both.
         let whole = command.replace(" -- --quick", "");
         let known = all.iter().any(|(of, other, _)| *of != "measured.md" && other.replace(" -- --quick", "") == whole);
-        assert!(known || matches!(kind, Kind::Script | Kind::Cohaptic), "{command}");
+        assert!(known || matches!(kind, Kind::Script | Kind::Cohaptic | Kind::Accuracy), "{command}");
     }
 }
 
@@ -137,7 +143,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
                 // That the script starts this program is tested in script.rs.
                 Kind::Script => program == "measured-page",
                 Kind::Elsewhere(of, others) => *of == folder && others.contains(&program),
-                Kind::Cohaptic | Kind::FirstResult | Kind::IgnoredTest => false,
+                Kind::Cohaptic | Kind::Accuracy | Kind::FirstResult | Kind::IgnoredTest => false,
             });
             assert!(found, "{program} of {name} is on no page");
         }
@@ -146,7 +152,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
         let (folder, used) = match kind {
             Kind::Table { program, .. } => ("benches", std::slice::from_ref(program)),
             Kind::Elsewhere(folder, used) => (*folder, &used[..]),
-            Kind::Script | Kind::Cohaptic | Kind::FirstResult | Kind::IgnoredTest => continue,
+            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::FirstResult | Kind::IgnoredTest => continue,
         };
         assert!(used.iter().all(|program| programs(folder).contains(program)), "{command}");
     }
@@ -179,6 +185,7 @@ fn what_is_not_a_command_of_ours_is_not_known() {
         "cd benches/peers && cargo test > ../../docs/x.md",
         "cargo run --release -p cohaptic-benches-realtime --bin soak -- 2h --out docs/measured-soak.md",
         "benches/first-result programmer > docs/measured-first.md",
+        "cargo run --release -p cohaptic-accuracy -- --json --out elsewhere",
         "rm -r docs",
     ] {
         assert_eq!(kind(command), None, "{command}");
@@ -190,7 +197,7 @@ pub(crate) fn prints_its_page(path: &str, program: &str) {
     let all = all();
     let of_program = all.iter().find_map(|(_, _, kind)| match kind {
         Kind::Table { program: of, page, .. } if of == program => Some(page.clone()),
-        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Elsewhere(..) | Kind::FirstResult | Kind::IgnoredTest => None,
+        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Elsewhere(..) | Kind::FirstResult | Kind::IgnoredTest => None,
     });
     let page = of_program.unwrap_or_else(|| panic!("{program} is on no page"));
     let output = Command::new(path).arg("--smoke").output().unwrap();

@@ -6,7 +6,7 @@
 //! otherwise) and differs from run to run; an error is computed against a reference that is named in the row, and is the same every time unless the row
 //! says that it was measured too.
 //!
-//! [`text`], [`csv`], [`plots`] and [`html`] show rows, and look at nothing but them.
+//! [`text`], [`csv`], [`plots`] and [`html`] show rows, and look at nothing but them. The program `cohaptic-accuracy` of this package measures, prints and writes them.
 //!
 //! It does not say which method is best: that depends on the error that one can live with, and this is what the rows are for.
 //! ```
@@ -25,7 +25,6 @@ mod csv;
 mod error;
 mod groups;
 mod html;
-pub mod least;
 pub mod motion;
 pub mod network;
 mod numbers;

@@ -1,6 +1,6 @@
 //! The subjects of the measurement.
 
-use crate::{AccuracyError, Options, Row, Watch, analysis, least, motion, network, real_time, rotation, time};
+use crate::{AccuracyError, Options, Row, Watch, analysis, motion, network, real_time, rotation, time};
 
 /// What a group of methods is for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -17,13 +17,11 @@ pub enum Subject {
     Analysis,
     /// Leaving on time by the wall clock.
     RealTime,
-    /// What each thing that a scene can need costs.
-    LeastModel,
 }
 
 impl Subject {
     /// Every subject, in the order in which they are measured and shown.
-    pub const ALL: [Self; 7] = [Self::Motion, Self::Rotation, Self::Time, Self::Network, Self::Analysis, Self::RealTime, Self::LeastModel];
+    pub const ALL: [Self; 6] = [Self::Motion, Self::Rotation, Self::Time, Self::Network, Self::Analysis, Self::RealTime];
 
     /// The name, as on the command line.
     #[must_use]
@@ -35,7 +33,6 @@ impl Subject {
             Self::Network => "network",
             Self::Analysis => "analysis",
             Self::RealTime => "real-time",
-            Self::LeastModel => "least-model",
         }
     }
 
@@ -47,7 +44,6 @@ impl Subject {
             Self::Network => network::rows(options.of(network::Effort::FULL, network::Effort::QUICK), watch),
             Self::Analysis => analysis::rows(options.of(analysis::Effort::FULL, analysis::Effort::QUICK), watch),
             Self::RealTime => real_time::rows(options.of(real_time::Effort::FULL, real_time::Effort::QUICK), watch),
-            Self::LeastModel => least::rows(options.of(least::Effort::FULL, least::Effort::QUICK), watch),
         }
     }
 }

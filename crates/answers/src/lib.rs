@@ -3,9 +3,9 @@
 //! You need it if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
 //!
 //! [`run()`] is a run, [`explanation()`] the model of a scene, [`check()`] a scene and its expectations, where [`quick_verdict()`] tells first whether the
-//! scene is stable. [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
+//! scene is stable. [`methods()`] lists the methods that a scene can choose between, and [`measure()`] says what each costs and how wrong it is. [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
-//! Nothing here reads a clock or prints.
+//! Nothing here reads a clock or prints: [`measure()`] is given a clock.
 //!
 //! ```
 //! use cohaptic_answers::run;
@@ -29,6 +29,7 @@
 mod check;
 mod document;
 mod explanation;
+mod methods;
 mod notes;
 mod parts;
 mod pictures;
@@ -37,6 +38,7 @@ mod run;
 
 pub use check::{Answered, OutcomeDocument, check};
 pub use explanation::explanation;
+pub use methods::{Kind, Measured, MeasuredMethod, MeasurementWatch, Method, cost_picture, error_in_words, explanation_with_costs, measure, methods};
 pub use notes::notes;
 pub use parts::{MOST_LINKS, access_line, ending_name, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 pub use pictures::{

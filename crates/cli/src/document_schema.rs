@@ -38,7 +38,6 @@ impl DocumentSchema {
     pub(crate) const LINK: Self = Self { name: "cohaptic/link", version: 1 };
     pub(crate) const FIT: Self = Self { name: "cohaptic/fit", version: 1 };
     pub(crate) const PAPER: Self = Self { name: "cohaptic/paper", version: 1 };
-    pub(crate) const ACCURACY: Self = Self { name: "cohaptic/accuracy", version: 1 };
     pub(crate) const ERROR: Self = Self { name: "cohaptic/error", version: 1 };
 
     /// The document with its kind and version in front.

@@ -20,7 +20,6 @@ macro_rules! need_linux {
 }
 
 need_linux! {
-    accuracy: AccuracyArguments,
     falcon: FalconArguments,
     live: LiveArguments,
     play: PlayArguments,

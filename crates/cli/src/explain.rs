@@ -1,28 +1,126 @@
 //! `cohaptic explain`.
 
 use std::fmt::Write as _;
+use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
 
+use cohaptic_answers::{Kind, Measured, MeasuredMethod, MeasurementWatch, Method, cost_picture, error_in_words};
 use cohaptic_harness::explain::{self as harness, Explanation};
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Diagnostic, Scene, SceneError};
+use cohaptic_units::print::Span;
 
 use crate::arguments::ExplainArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::{input, output};
+use crate::file::write_into;
+use crate::progress::Progress;
+use crate::{input, interrupt, output};
 
-/// Says what a scene makes the program model.
+/// Says what a scene makes the program model, and with `--cost` what its methods cost.
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
-    let scene = input::with(&arguments.scene.scene, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
+    let scene = read(arguments, &[])?;
+    if let Some(folder) = &arguments.out {
+        // Before the measurement, which a folder that cannot be made must not cost.
+        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
+    }
     let explanation = harness::explain(&scene);
+    let measured = arguments.cost.then(|| measured(arguments, &scene, &explanation));
+    let file = match (&measured, &arguments.out) {
+        (Some(measured), Some(folder)) => Some(draw(folder, arguments, &scene, measured)?),
+        _ => None,
+    };
     output::answer(
         arguments.scene.json,
         DocumentSchema::EXPLAIN,
-        &cohaptic_answers::explanation(&scene, &explanation),
-        || describe(&scene, &explanation),
-        output::NO_FILES,
+        &cohaptic_answers::explanation_with_costs(&scene, &explanation, measured.as_ref()),
+        || describe(&scene, &explanation) + &measured.as_ref().map(table).unwrap_or_default(),
+        file,
     )?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn read(arguments: &ExplainArguments, more: &[&str]) -> Result<Scene, SceneError> {
+    let overrides: Vec<String> = arguments.scene.overrides.set.iter().map(String::as_str).chain(more.iter().copied()).map(str::to_owned).collect();
+    input::with(&arguments.scene.scene, |text, file| Scene::parse(text, file, &overrides))
+}
+
+fn measured(arguments: &ExplainArguments, scene: &Scene, explanation: &Explanation) -> Measured {
+    let refusal = |error: &SceneError| error.diagnostic().map_or_else(|| error.to_string(), |diagnostic| Diagnostic::message(diagnostic).to_owned());
+    let methods = cohaptic_answers::methods(scene, explanation, &|more| read(arguments, more).map_err(|error| refusal(&error)));
+    let shown = Shown(Progress::new(methods.len() as u64, "{bar:30} {pos}/{len} methods, {elapsed} passed: {msg}"));
+    let measured = cohaptic_answers::measure(&methods, &processor_time, &shown);
+    shown.0.clear();
+    measured
+}
+
+/// Shows which method is measured, and ends the measurement when the user asks for it.
+struct Shown(Progress);
+
+impl MeasurementWatch for Shown {
+    fn begins(&self, method: &Method) {
+        self.0.one_more();
+        self.0.note(method.name.clone());
+    }
+
+    fn stops(&self) -> bool {
+        interrupt::requested()
+    }
+}
+
+/// The processor time that all threads of the program have used.
+#[cfg(target_os = "linux")]
+fn processor_time() -> Duration {
+    rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime).try_into().unwrap_or_default()
+}
+
+/// The wall time since the first call, which is at least the processor time of one thread.
+#[cfg(not(target_os = "linux"))]
+fn processor_time() -> Duration {
+    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    START.get_or_init(std::time::Instant::now).elapsed()
+}
+
+fn draw(folder: &Path, arguments: &ExplainArguments, scene: &Scene, measured: &Measured) -> Result<String, Failure> {
+    write_into(folder, "cost.svg", cost_picture(&scene.title, measured).size(arguments.pictures.size()).svg())
+}
+
+/// The measured methods, kind by kind.
+fn table(measured: &Measured) -> String {
+    let mut text = format!("\nMeasured on this machine, over {} of the scene, set-up included\n", Span(measured.span));
+    for kind in Kind::ALL {
+        let methods: Vec<&MeasuredMethod> = measured.methods.iter().filter(|method| method.kind == kind).collect();
+        if !methods.is_empty() {
+            text.push_str(&table_of(kind, &methods));
+        }
+    }
+    if measured.interrupted {
+        text.push_str("  INTERRUPTED: the kinds that are missing were not measured\n");
+    }
+    text
+}
+
+fn table_of(kind: Kind, methods: &[&MeasuredMethod]) -> String {
+    let cost = |method: &MeasuredMethod| method.cost_ms.map_or_else(|| "–".to_owned(), |cost| format!("{cost:.3}"));
+    let head = [kind.heading().to_owned(), kind.cost_unit().to_owned(), format!("error [{}]", kind.error_unit()), String::new()];
+    let rows = methods.iter().map(|method| {
+        let chosen = if method.chosen { " *" } else { "" };
+        let words = [method.option.as_str(), method.note.as_str()].into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>();
+        [format!("  {}{chosen}", method.name), cost(method), error_in_words(method.error), words.join("; ")]
+    });
+    let lines: Vec<[String; 4]> = std::iter::once(head).chain(rows).collect();
+    let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or_default();
+    let [name, cost, error] = [width(0), width(1), width(2)];
+    let mut text = String::new();
+    for [a, b, c, words] in &lines {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{}", format!("  {a:<name$}  {b:>cost$}  {c:>error$}  {words}").trim_end());
+    }
+    let against: Vec<&str> = methods.iter().filter_map(|method| method.reference.as_deref()).collect();
+    if let Some(reference) = against.first() {
+        let _ = writeln!(text, "    *: of this scene; errors: of the {}, against \"{reference}\"", kind.error_of());
+    }
+    text
 }
 
 fn describe(scene: &Scene, explanation: &Explanation) -> String {

@@ -1,14 +1,12 @@
 //! `cohaptic`: runs, checks, explains and analyses scenes of people who move one object together over a bad network, in virtual time and by the
-//! wall clock; drives and estimates links; reproduces a paper; sets speed against error.
+//! wall clock; drives and estimates links; reproduces a paper.
 //!
-//! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
+//! This program alone prints what the libraries compute, apart from `cohaptic-accuracy`. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard
 //! output was closed.
 #![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
 #![cfg_attr(not(target_os = "linux"), allow(dead_code, unused_imports, reason = "the commands that need Linux use them"))]
 
-#[cfg(target_os = "linux")]
-mod accuracy;
 mod admittance;
 mod analysis_watch;
 mod arguments;
@@ -59,7 +57,7 @@ use clap::Parser as _;
 
 use arguments::{Arguments, Command};
 #[cfg(not(target_os = "linux"))]
-use elsewhere::{accuracy, falcon, live, play, relay, router};
+use elsewhere::{falcon, live, play, relay, router};
 
 fn main() -> ExitCode {
     if std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json") {
@@ -86,7 +84,6 @@ fn main() -> ExitCode {
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),
-        Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Init(arguments) => init::init(&arguments),
         Command::Schema(arguments) => texts::schema(&arguments),
         Command::Completions(arguments) => texts::completions(&arguments),

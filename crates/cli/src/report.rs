@@ -38,11 +38,23 @@ pub(crate) fn report(failure: &Failure) -> ExitCode {
 pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
     // As clap itself does it: what cannot be printed is not said.
     let _ = error.print();
+    if is_former_command(error) {
+        let _ = writeln!(io::stderr(), "{FORMER_COMMAND}");
+    }
     let status = u8::try_from(error.exit_code()).unwrap_or(BAD_INPUT);
     if error.use_stderr() && output::wants_json_error() {
         let _ = print_usage(&error.render().to_string(), status);
     }
     ExitCode::from(status)
+}
+
+/// The program that took over the command `accuracy`.
+const FORMER_COMMAND: &str =
+    "\nSpeed against error is a program of its own: cargo run --release -p cohaptic-accuracy. Of one scene: cohaptic explain SCENE --cost.";
+
+/// Returns whether the command that was typed is `accuracy`, which earlier versions had.
+fn is_former_command(error: &clap::Error) -> bool {
+    matches!(error.get(ContextKind::InvalidSubcommand), Some(ContextValue::String(command)) if command == "accuracy")
 }
 
 /// The refusal of an argument, in which nothing that was typed disturbs a terminal.

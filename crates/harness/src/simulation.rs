@@ -141,8 +141,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     fn run_with_events(&self, plan: &Plan, observer: &mut (impl Observer<Error = Ended> + ?Sized)) -> Result<Summary, Ended> {
         match plan.axes {
             Axes::One => run_to_end(self.world::<1, _>(plan, NoRemote), observer),
-            Axes::Two => run_to_end(self.world::<2, _>(plan, NoRemote), observer),
-            Axes::Three => run_to_end(self.world::<3, _>(plan, NoRemote), observer),
+            Axes::Two | Axes::Three => run_to_end(self.world::<3, _>(plan, NoRemote), observer),
         }
     }
 

@@ -5,7 +5,7 @@
 //! | module | is |
 //! | --- | --- |
 //! | [`fates`] | the fate log as a file: a streaming writer and a reader |
-//! | [`pcapng`] | the fates as a capture file that packet analysers open |
+//! | [`pcapng`] | the fates as a capture file that packet analysers open: the crate `cohaptic-capture` |
 //! | [`achieved`] | figures of a link's delays, losses and order, each with its uncertainty, to be compared with those asked for |
 //! | [`steady`] | a steady stream of packets over one link |
 //! | [`asked`] | the figures that follow from the laws of a link |
@@ -40,8 +40,9 @@ mod batches;
 pub mod comparison;
 pub mod fates;
 pub mod fit;
-pub mod pcapng;
 mod series;
 pub mod steady;
 #[cfg(test)]
 mod tests;
+
+pub use cohaptic_capture as pcapng;

@@ -54,6 +54,7 @@ fn claims_that_hold_hold_and_the_others_come_with_a_scene() {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn a_second_time_every_byte_is_the_same() {
     let second = again();
     assert_eq!(&second, quick());
@@ -62,6 +63,7 @@ fn a_second_time_every_byte_is_the_same() {
 
 /// One column is 85 mm; where two plots with their labels need more, a drawing is a little wider.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn drawings_have_the_size_that_was_asked_for_and_numbers_do_not_depend_on_it() {
     let narrow = reproduce(Options { quick: true, size: Size::ONE_COLUMN }, &Unwatched).unwrap();
     assert_eq!(narrow.claims, quick().claims);

@@ -129,11 +129,16 @@ const LARGE: usize = 500;
 /// Up to how many signals the determinant is small.
 const FEW: usize = 32;
 
+/// More signals than this have no determinant even if it is asked for: its matrix has their number of rows and columns. Clocks that drift have a frame of minutes
+/// and 50,000 signals, whose matrix would take 40 GB.
+const MOST_SIGNALS: usize = 1024;
+
 /// The part of a scene that a lifted system is.
 pub(crate) fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
     let frame = lifted.frame_watched(&mut Autonomous, watch).ok_or(AnalysisError::Stopped)?;
     let size = frame.size();
-    let long = method == Method::Determinant && frame.history() > 0 || size > LARGE && frame.signals() <= FEW;
+    let asked = method == Method::Determinant && frame.history() > 0 && frame.signals() <= MOST_SIGNALS;
+    let long = asked || size > LARGE && frame.signals() <= FEW;
     let delayed = if long { frame.delayed_loop().ok() } else { None };
     if let Some(delayed) = delayed {
         let radius = delayed.bounded_radius_watched(frame.error, watch).ok_or(AnalysisError::Stopped)?;

@@ -1,5 +1,6 @@
 //! Every constant of a connection.
 
+use core::fmt;
 use core::time::Duration;
 
 /// The constants of a connection. [`TcpConfig::default`] is Linux 6, [`TcpConfig::textbook`] what books teach.
@@ -144,22 +145,31 @@ impl Default for TcpConfig {
 }
 
 /// Why a [`TcpConfig`] cannot be.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum ConfigError {
     /// An MTU below 128: headers of IPv6 and TCP with all options take 100 octets.
-    #[error("the MTU {0} is below 128 bytes")]
     Mtu(usize),
     /// A count, size or time that must not be zero.
-    #[error("{0} is zero")]
     Zero(&'static str),
     /// A least above a greatest.
-    #[error("{0} is above {1}")]
     Order(&'static str, &'static str),
     /// A receive buffer beyond 1 GiB, the largest window (RFC 7323, section 2.3).
-    #[error("the receive buffer {0} is above 1 GiB")]
     ReceiveBuffer(usize),
 }
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mtu(octets) => write!(f, "the MTU {octets} is below 128 bytes"),
+            Self::Zero(name) => write!(f, "{name} is zero"),
+            Self::Order(least, greatest) => write!(f, "{least} is above {greatest}"),
+            Self::ReceiveBuffer(octets) => write!(f, "the receive buffer {octets} is above 1 GiB"),
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
 
 impl TcpConfig {
     /// TCP as in books: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, no selective acknowledgements, timestamps or tail

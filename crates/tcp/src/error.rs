@@ -1,25 +1,36 @@
 //! What goes wrong on a connection.
 
+use core::fmt;
+
 /// Why a call on a [`Connection`](crate::Connection) did not do what it was asked for. The names are those of `std::io::ErrorKind`.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[non_exhaustive]
 pub enum Error {
     /// There is nothing to read yet, or no room to write.
-    #[error("the call would block")]
     WouldBlock,
     /// The peer refused the SYN with a RST.
-    #[error("connection refused")]
     ConnectionRefused,
     /// The peer reset the connection.
-    #[error("connection reset by peer")]
     ConnectionReset,
     /// The peer did not answer for as long as the configuration allows.
-    #[error("connection timed out")]
     TimedOut,
     /// The write half is shut, by this side or because the connection is gone.
-    #[error("broken pipe")]
     BrokenPipe,
     /// The connection is not established.
-    #[error("not connected")]
     NotConnected,
 }
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::WouldBlock => f.write_str("the call would block"),
+            Self::ConnectionRefused => f.write_str("connection refused"),
+            Self::ConnectionReset => f.write_str("connection reset by peer"),
+            Self::TimedOut => f.write_str("connection timed out"),
+            Self::BrokenPipe => f.write_str("broken pipe"),
+            Self::NotConnected => f.write_str("not connected"),
+        }
+    }
+}
+
+impl core::error::Error for Error {}

@@ -18,6 +18,14 @@
 //! assert_eq!(took, Instant::from_nanos(24_000_000));
 //! ```
 //!
+//! Links and networks at random are a choice: tests that draw them, and shrink them to the least impaired that fails, need the feature `strategies`, which brings
+//! proptest. In `Cargo.toml`:
+//!
+//! ```toml
+//! [dev-dependencies]
+//! cohaptic-testkit = { git = "URL of this repository", features = ["strategies"] }
+//! ```
+//!
 //! The chapter "Testing your own program over a bad network", `docs/testing.md` in the repository, begins with nothing and shows all of it by example.
 //!
 //! # Contents
@@ -52,15 +60,16 @@
 //!
 //! | feature | on by default | brings |
 //! | --- | --- | --- |
-//! | `strategies` | yes | strategies of proptest for links and networks, and `proptest` itself |
-//! | `tcp` | yes | TCP, by `cohaptic-tcp` |
+//! | `tcp` | yes | TCP, by `cohaptic-tcp`, and the words of hits that are about segments of TCP |
 //! | `tokio` | yes | `Testbed::on_tokio`, for programs that use tokio's timers and tasks, and the traits and methods of sockets that are of tokio's types |
-//! | `pcapng` | yes | captures among what a failed test leaves behind |
+//! | `pcapng` | yes | captures among what a failed test leaves behind, by `cohaptic-capture` |
+//! | `strategies` | | strategies of proptest for links, networks and hits, and `proptest` itself |
+//! | `tokio-net` | | the methods `ready`, `try_io` and `async_io` of sockets, whose types tokio has only with its own feature `net`; brings `tokio` |
 //! | `files` | | relay files (TOML) as hosts and links; files of plain words need no feature |
 //! | `scenes` | | scene files as hosts and links and as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
-//! | `hyper` | | connectors and executors for hyper and hyper-util |
-//! | `axum` | | `TcpListener` as a listener of `axum::serve` |
-//! | `tonic` | | `TcpStream` as a connection of a tonic server |
+//! | `hyper` | | connectors and executors for hyper and hyper-util; brings `tcp` and `tokio` |
+//! | `axum` | | `TcpListener` as a listener of `axum::serve`; brings `tcp` and `tokio` |
+//! | `tonic` | | `TcpStream` as a connection of a tonic server; brings `tcp` and `tokio` |
 //! | `quinn` | | QUIC by quinn, and `quinn` itself |
 //!
 //! # Variables of the environment

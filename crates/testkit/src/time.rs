@@ -2,6 +2,7 @@
 //!
 //! On tokio's clock (`Testbed::on_tokio`) these work too: they go off to the nanosecond where tokio's own timers are rounded up to milliseconds.
 
+use std::fmt;
 use std::future::{Future, poll_fn};
 use std::pin::{Pin, pin};
 use std::sync::Arc;
@@ -96,8 +97,8 @@ impl Sleep {
     }
 }
 
-impl std::fmt::Debug for Sleep {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Debug for Sleep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Sleep").field("deadline", &self.deadline).finish_non_exhaustive()
     }
 }
@@ -131,9 +132,16 @@ impl Drop for Sleep {
 }
 
 /// The time was up.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("the time was up")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Elapsed;
+
+impl fmt::Display for Elapsed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the time was up")
+    }
+}
+
+impl std::error::Error for Elapsed {}
 
 impl From<Elapsed> for std::io::Error {
     fn from(elapsed: Elapsed) -> Self {
@@ -191,8 +199,8 @@ impl Interval {
     }
 }
 
-impl std::fmt::Debug for Interval {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Debug for Interval {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Interval").field("next", &self.next).field("period", &self.period).finish_non_exhaustive()
     }
 }

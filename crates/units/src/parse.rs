@@ -3,15 +3,15 @@
 //! Decimals are read exactly, as integers, and rounded once, half up, to the unit of the quantity. What was expected is part of every error.
 
 use alloc::string::{String, ToString};
+use core::fmt;
 use core::time::Duration;
 
 use crate::{Bytes, Probability, Rate, Visible};
 
 /// Why a text is not the quantity that was expected.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum ParseError {
     /// The text does not begin with a decimal number, or has a sign or an exponent.
-    #[error("\"{}\" does not begin with a plain decimal number: expected {expected}", Visible(text))]
     Number {
         /// The text as given.
         text: String,
@@ -19,7 +19,6 @@ pub enum ParseError {
         expected: &'static str,
     },
     /// The number has no unit, or one that this quantity does not have.
-    #[error("{} in \"{}\": expected {expected} (units: {units})", no_unit(unit), Visible(text))]
     Unit {
         /// The text as given.
         text: String,
@@ -31,7 +30,6 @@ pub enum ParseError {
         units: &'static str,
     },
     /// The number is too large, or zero where zero has no meaning.
-    #[error("\"{}\" is out of range: expected {expected}", Visible(text))]
     Range {
         /// The text as given.
         text: String,
@@ -39,6 +37,20 @@ pub enum ParseError {
         expected: &'static str,
     },
 }
+
+impl fmt::Display for ParseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number { text, expected } => write!(f, "\"{}\" does not begin with a plain decimal number: expected {expected}", Visible(text)),
+            Self::Unit { text, unit, expected, units } => {
+                write!(f, "{} in \"{}\": expected {expected} (units: {units})", no_unit(unit), Visible(text))
+            }
+            Self::Range { text, expected } => write!(f, "\"{}\" is out of range: expected {expected}", Visible(text)),
+        }
+    }
+}
+
+impl core::error::Error for ParseError {}
 
 fn no_unit(unit: &str) -> String {
     if unit.is_empty() { "no unit".to_string() } else { alloc::format!("unknown unit \"{}\"", Visible(unit)) }

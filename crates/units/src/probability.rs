@@ -7,12 +7,20 @@ use core::fmt;
 pub struct Probability(f64);
 
 /// Why a number is no probability.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[error("{value} is not a probability: expected a number from 0 to 1")]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ProbabilityError {
     /// The number that was given.
     pub value: f64,
 }
+
+impl fmt::Display for ProbabilityError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { value } = self;
+        write!(f, "{value} is not a probability: expected a number from 0 to 1")
+    }
+}
+
+impl core::error::Error for ProbabilityError {}
 
 impl Probability {
     /// Never.

@@ -4,9 +4,9 @@
 
 mod analysis;
 mod documents;
-mod least;
 mod network;
 mod plots;
+mod program;
 mod real_time;
 mod rows;
 mod watching;

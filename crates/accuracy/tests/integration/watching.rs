@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use cohaptic_accuracy::{AccuracyError, Options, Row, Subject, Unwatched, Watch, measure};
+use cohaptic_accuracy::{AccuracyError, Options, Row, Subject, Unwatched, Watch, analysis, measure, network, real_time};
 
 /// Keeps what it sees and stops after so many rows.
 struct Until {
@@ -38,6 +38,15 @@ fn the_work_ends_soon_after_it_is_asked_to() {
         let seen = watch.rows.borrow().len();
         assert!((5..10).contains(&seen), "{seen} rows");
     }
+}
+
+#[test]
+fn subjects_that_measure_for_long_ask_the_watcher_too() {
+    let until = |most| Until { rows: RefCell::default(), most };
+    let stopped = |found| matches!(found, Err(AccuracyError::Stopped));
+    assert!(stopped(network::rows(network::Effort::QUICK, &until(1))));
+    assert!(stopped(analysis::rows(analysis::Effort::QUICK, &until(1))));
+    assert!(stopped(real_time::rows(real_time::Effort::QUICK, &until(0))));
 }
 
 /// Costs are measured; errors are computed, and the same every time.

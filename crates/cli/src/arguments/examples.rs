@@ -18,7 +18,7 @@ pub(super) fn after(examples: &[&str]) -> String {
 
 /// The examples of the program, the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
-    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: accuracy, falcon, live, play, relay, router." };
+    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: falcon, live, play, relay, router." };
     after(PROGRAM) + needs
 }
 
@@ -38,7 +38,11 @@ pub(super) const CHECK: &[&str] = &[
     "cohaptic check scene.toml --set link.delay=40ms --page check.html",
 ];
 
-pub(super) const EXPLAIN: &[&str] = &["cohaptic explain scenarios/network/rate-and-queue.toml", "cohaptic explain scene.toml --set scene.axes=3"];
+pub(super) const EXPLAIN: &[&str] = &[
+    "cohaptic explain scenarios/network/rate-and-queue.toml",
+    "cohaptic explain scene.toml --set scene.axes=3",
+    "cohaptic explain scene.toml --cost --out cost",
+];
 
 pub(super) const CAMPAIGN: &[&str] = &[
     "cohaptic campaign scene.toml --vary link.delay=8ms..48ms/6 --runs 100 --out delays",
@@ -120,8 +124,6 @@ pub(super) const LINK: &[&str] = &[
 pub(super) const FIT: &[&str] = &["cohaptic fit fates.csv --out link.toml", "cohaptic fit sender.pcapng receiver.pcapng --port 5000 --skew"];
 
 pub(super) const PAPER: &[&str] = &["cohaptic paper --quick", "cohaptic paper --out paper"];
-
-pub(super) const ACCURACY: &[&str] = &["cohaptic accuracy --quick", "cohaptic accuracy --only motion,time --out accuracy"];
 
 pub(super) const INIT: &[&str] =
     &["cohaptic init", "cohaptic init four.toml --from paper/5-1 --peers 4", "cohaptic init - --from network/jitter-normal", "cohaptic init --list"];

@@ -25,7 +25,7 @@ pub(crate) use falcon::{
 };
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
-pub(crate) use paper::{AccuracyArguments, PaperArguments};
+pub(crate) use paper::PaperArguments;
 pub(crate) use realtime::{LiveArguments, PlayArguments, RealTimeArguments, RelayArguments, RouterArguments};
 pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments, TableFormat};
 pub(crate) use shards::{ShardArguments, ShardName};
@@ -75,8 +75,6 @@ pub(crate) enum Command {
     Fit(FitArguments),
     /// Computes every figure and claim of Rakhsha and Constantinescu (2015) again, and says which hold
     Paper(PaperArguments),
-    /// Measures what every method costs and how wrong it is, on the same work
-    Accuracy(AccuracyArguments),
     /// Writes a scene to begin with, in which every key is explained
     Init(InitArguments),
     /// Prints a JSON Schema of scenes, relay files or router files: names, meanings, units and defaults of all keys, for editors

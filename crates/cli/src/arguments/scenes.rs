@@ -78,6 +78,14 @@ pub(crate) struct CheckArguments {
 pub(crate) struct ExplainArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
+    /// Measure too what each method costs that the scene can choose, and how wrong it is: engines, axes, integrators, sampling, analysis. A second or two
+    #[arg(long)]
+    pub(crate) cost: bool,
+    /// With --cost, draw costs against errors (cost.svg) into this folder
+    #[arg(long, value_name = "DIR", requires = "cost")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
 }
 
 #[derive(Debug, Args)]

@@ -2,9 +2,9 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::TWO;
-use crate::svg;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
+use crate::integration::svg;
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))

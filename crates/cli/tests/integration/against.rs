@@ -1,7 +1,7 @@
 //! `cohaptic run --against`: a scene and a variant of it side by side.
 
-use crate::desk::{Desk, timeless};
-use crate::scenes::{RANDOM, TWO};
+use crate::integration::desk::{Desk, timeless};
+use crate::integration::scenes::{RANDOM, TWO};
 
 #[test]
 fn both_runs_are_in_the_document_and_each_is_what_it_is_alone() {

@@ -3,8 +3,8 @@
 
 use std::fs;
 
-use crate::desk::Desk;
-use crate::scenes::{RANDOM, TWO};
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{RANDOM, TWO};
 
 /// Six runs.
 const SIX: &str = "campaign random.toml --vary coordination.stiffness=500..1500/2 --runs 3";
@@ -36,7 +36,7 @@ fn measures_of_a_campaign_are_those_of_the_runs_alone() {
         let cell = |name: &str| row[header.iter().position(|found| found == name).unwrap_or_else(|| panic!("no {name}"))].clone();
         let set = format!("--set coordination.stiffness={} --seed {}", cell("coordination.stiffness"), cell("seed"));
         let alone = desk.text(&format!("run random.toml --json --measure all --set measure.probe.peer=left {set}"));
-        let measures = crate::desk::parse(&alone)["measures"].as_object().unwrap().clone();
+        let measures = crate::integration::desk::parse(&alone)["measures"].as_object().unwrap().clone();
         assert_eq!(measures.len(), 23, "twenty of the run and one of each peer");
         for (name, value) in &measures {
             let column = cell(name);
@@ -72,7 +72,7 @@ fn a_run_of_a_campaign_is_the_run_that_a_user_would_do_alone() {
             assert_eq!(float(&format!("peers.{peer}.position_x_m")), number(its, "position_m"));
             assert_eq!(float(&format!("peers.{peer}.velocity_x_m_s")), number(its, "velocity_m_s"));
         }
-        let alone = crate::desk::parse(&alone);
+        let alone = crate::integration::desk::parse(&alone);
         let sum = |list: &str, key: &str| {
             let count = |link: &serde_json::Value| key.split('.').fold(link, |value, key| &value[key]).as_u64().unwrap();
             alone[list].as_array().unwrap().iter().map(count).sum::<u64>().to_string()
@@ -210,8 +210,8 @@ pub(crate) mod interrupted {
     use std::time::Duration;
 
     use super::*;
-    use crate::desk::Outcome;
-    use crate::interrupt::interrupted;
+    use crate::integration::desk::Outcome;
+    use crate::integration::interrupt::interrupted;
 
     /// About two seconds of work for one thread, in 40 parts.
     const LONG: &str = "campaign two.toml --vary link.delay=8ms..24ms/4 --runs 5000 --part 500 --threads 1 --set link.jitter=1ms";

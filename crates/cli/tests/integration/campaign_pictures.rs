@@ -2,9 +2,9 @@
 
 use cohaptic_picture::testing::{faults, in_browser};
 
-use crate::desk::Desk;
-use crate::scenes::{PAPER, RANDOM, TWO};
-use crate::svg::words;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{PAPER, RANDOM, TWO};
+use crate::integration::svg::words;
 
 const STRATEGIES: &str = "--vary coordination.strategy=average-position,proportional-derivative";
 const UNFOLLOWED: &str = "link.outage={random={up=\"5s\",down=\"50ms\"}}";

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::PAPER;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::PAPER;
 
 /// Loss does nothing to the first stiffness, and takes the second beyond its limit: only the mean square sees that.
 const LOSSY: &str = "campaign paper.toml --set scene.count=2 --vary coordination.stiffness=1000,1400 --vary link.loss=0%,30% --verdicts";
@@ -131,7 +131,7 @@ fn threads_change_nothing() {
 #[cfg(unix)]
 #[test]
 fn verdicts_that_were_interrupted_are_kept_and_end_with_the_same_bytes() {
-    use crate::interrupt::interrupted;
+    use crate::integration::interrupt::interrupted;
     let desk = desk();
     let line = format!("campaign paper.toml --set scene.duration=50ms --set {BURSTS} --vary object.mass=0.3..0.9/30 --verdicts --format csv");
     let lines = || std::fs::read_to_string(desk.path("out/verdicts.part.csv")).unwrap_or_default().lines().count();

@@ -4,7 +4,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// Whether there is a Python that can check; says so if there is none.
 pub(crate) fn can_check() -> bool {

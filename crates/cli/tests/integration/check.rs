@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::desk::{Desk, parse};
-use crate::scenes::TWO;
+use crate::integration::desk::{Desk, parse};
+use crate::integration::scenes::TWO;
 
 fn scene(expect: &str) -> String {
     format!("{TWO}\n[expect]\n{expect}\n")
@@ -151,7 +151,7 @@ fn a_scene_whose_hand_is_missing_is_an_input_error() {
 #[test]
 fn a_second_moment_that_takes_long_is_told_by_a_simulation_and_that_is_said() {
     let desk = Desk::new();
-    let scene = crate::desk::shipped("network/clock-offset-and-drift.toml");
+    let scene = crate::integration::desk::shipped("network/clock-offset-and-drift.toml");
     let line = format!("check {} --set link.loss=5%", scene.display());
     let outcome = desk.cohaptic_within(std::time::Duration::from_secs(240), &format!("{line} --json"));
     assert!(matches!(outcome.status, Some(0 | 1)), "{outcome:?}");

@@ -3,8 +3,8 @@
 use cohaptic_picture::testing::{page_faults, page_in_browser};
 use serde_json::{Value, json};
 
-use crate::desk::{Desk, parse};
-use crate::scenes::TWO;
+use crate::integration::desk::{Desk, parse};
+use crate::integration::scenes::TWO;
 
 /// The expectations of a scene, by the document.
 fn outcomes(desk: &Desk) -> Vec<Value> {

@@ -6,8 +6,8 @@ use std::fs;
 use cohaptic_picture::testing::page_faults;
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::{RANDOM, TWO};
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{RANDOM, TWO};
 
 const SIX: &str = "compare random.toml --strategies average-position,extrapolated --vary link.loss=0%,20%,40% --runs 6";
 
@@ -194,6 +194,7 @@ fn people_are_told_what_came_out() {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn the_field_preset_compares_every_strategy() {
     let desk = desk();
     let document = desk.json("compare random.toml --preset field --runs 1 --set scene.duration=40ms --out out --json");

@@ -4,8 +4,8 @@ use std::process::Stdio;
 
 use serde_json::json;
 
-use crate::desk::{Desk, Outcome, parse};
-use crate::scenes::TWO;
+use crate::integration::desk::{Desk, Outcome, parse};
+use crate::integration::scenes::TWO;
 
 #[test]
 fn a_document_names_its_schema_and_version_before_all_else() {

@@ -1,7 +1,7 @@
 //! Scenes and files that cannot be used: the message says where, and nothing is run or written.
 
-use crate::desk::Desk;
-use crate::scenes::{PLANE, TWO};
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{PLANE, TWO};
 
 /// A scene of which one piece is replaced, and what the message must say: the place, the key, and the line with a caret below.
 struct Mistake {

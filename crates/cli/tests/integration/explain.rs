@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::{PLANE, RANDOM, TWO};
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{PLANE, RANDOM, TWO};
 
 fn left_out(document: &Value) -> Vec<&str> {
     document["left_out"].as_array().unwrap().iter().map(|what| what.as_str().unwrap()).collect()
@@ -131,4 +131,52 @@ fn nothing_is_run() {
     // 584 years are all there is.
     desk.json("explain two.toml --json --set scene.duration=5000000h");
     assert_eq!(desk.files(""), ["two.toml"]);
+}
+
+#[test]
+fn costs_are_measured_for_each_kind_and_engines_have_one_answer() {
+    let desk = Desk::with("two.toml", TWO);
+    let document = desk.json("explain two.toml --cost --json");
+    assert_eq!(document["interrupted"], false);
+    assert!(document["cost_span_s"].as_f64().unwrap() > 0.0 && document["models"].is_array());
+    let methods = document["cost_measured"].as_array().unwrap();
+    for kind in ["engine", "axes", "integrator", "analysis"] {
+        let of_kind: Vec<&Value> = methods.iter().filter(|method| method["kind"] == kind).collect();
+        assert_eq!(of_kind.iter().filter(|method| method["chosen"] == true).count(), 1, "{of_kind:#?}");
+        for method in of_kind {
+            assert!(method["cost_ms"].as_f64().is_some_and(|cost| cost > 0.0), "{method}");
+            assert!(method["error"].as_f64().is_some_and(|error| error >= 0.0) && method["reference"].is_string(), "{method}");
+            assert!(kind != "engine" || method["error"] == 0.0, "{method}");
+        }
+    }
+    // Without the option the document is as before.
+    assert!(desk.json("explain two.toml --json").get("cost_measured").is_none());
+}
+
+#[test]
+fn people_get_a_table_and_a_picture_of_the_costs() {
+    let desk = Desk::with("three.toml", RANDOM);
+    let text = desk.text("explain three.toml --cost --out out --size one-column");
+    for part in ["\nMeasured on this machine, over ", "  engine of runs", "exact propagator *", "ms a simulated second", "--method full", "error [m]"]
+    {
+        assert!(text.contains(part), "no {part:?} in {text}");
+    }
+    assert_eq!(desk.files("out"), ["cost.svg"]);
+    let svg = desk.read("out/cost.svg");
+    assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
+    assert!(svg.contains(" width=\"85mm\"") && svg.contains("exact propagator (chosen)"));
+    desk.cohaptic("explain three.toml --out out").assert_refused(2, &["--cost"]);
+    desk.write("taken", "");
+    desk.cohaptic("explain three.toml --cost --out taken").assert_refused(3, &["cannot create taken"]);
+}
+
+#[test]
+fn standard_input_is_read_once_for_all_methods() {
+    let desk = Desk::new();
+    let mut command = assert_cmd::Command::from_std(desk.command("explain - --cost --json"));
+    let outcome = crate::integration::desk::Outcome::of(command.write_stdin(TWO).output().unwrap());
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    let axes: Vec<Value> =
+        crate::integration::desk::parse(&outcome.stdout)["cost_measured"].as_array().unwrap().iter().filter(|method| method["kind"] == "axes").cloned().collect();
+    assert!(axes.len() == 2 && axes.iter().all(|method| method["error"] == 0.0), "{axes:#?}");
 }

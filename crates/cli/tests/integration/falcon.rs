@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use cohaptic_falcon::usb;
 use serde_json::Value;
 
-use crate::desk::{Desk, Outcome, parse};
+use crate::integration::desk::{Desk, Outcome, parse};
 #[cfg(unix)]
-use crate::interrupt::interrupted;
+use crate::integration::interrupt::interrupted;
 
 const VIRTUAL: &str = "--simulated --virtual-time";
 

@@ -1,7 +1,7 @@
 //! `--help` and wrong usage.
 
-use crate::desk::Desk;
-use crate::scenes::TWO;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
 
 #[test]
 fn help_names_the_commands() {
@@ -21,7 +21,6 @@ fn help_names_the_commands() {
             "link",
             "fit",
             "paper",
-            "accuracy",
             "init",
             "schema",
             "completions",
@@ -41,7 +40,7 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
     for (command, options) in [
         ("run", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--against <KEY=VALUE>", "--out <DIR>", "--no-plot", "--general"][..]),
         ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--threads <N>", "--jobs", "--general"]),
-        ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
+        ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--cost", "--out <DIR>"]),
         (
             "campaign",
             &[
@@ -104,7 +103,6 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
             ],
         ),
         ("paper", &["--out <DIR>", "--quick", "--json"]),
-        ("accuracy", &["--out <DIR>", "--quick", "--only <SUBJECT>", "--json"]),
     ] {
         let text = Desk::new().text(&format!("{command} --help"));
         for part in options.iter().chain(&["Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output"]) {
@@ -120,6 +118,7 @@ fn wrong_usage_is_refused() {
     for (line, part) in [
         ("", "Usage"),
         ("fly two.toml", "'fly'"),
+        ("accuracy --quick", "cargo run --release -p cohaptic-accuracy"),
         ("run", "<SCENE>"),
         ("run two.toml another.toml", "another.toml"),
         ("run two.toml --set", "--set"),

@@ -4,8 +4,8 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::desk::{Desk, Outcome, parse};
-use crate::scenes::TWO;
+use crate::integration::desk::{Desk, Outcome, parse};
+use crate::integration::scenes::TWO;
 
 /// Interrupts a command once the process of this id has begun.
 pub(crate) fn interrupted(desk: &Desk, line: &str, begun: impl Fn(u32) -> bool) -> Outcome {

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::desk::{Desk, parse};
+use crate::integration::desk::{Desk, parse};
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
@@ -154,7 +154,7 @@ fn what_cannot_be_read_is_shown_with_the_word() {
 fn an_interrupted_stream_reports_what_was_measured() {
     let desk = Desk::new();
     let begun = |_| desk.path("f.csv.partial").metadata().is_ok_and(|metadata| metadata.len() > 0);
-    let outcome = crate::interrupt::interrupted(&desk, "link delay 20ms --json --packets 100000000 --fates f.csv", begun);
+    let outcome = crate::integration::interrupt::interrupted(&desk, "link delay 20ms --json --packets 100000000 --fates f.csv", begun);
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(130), ""));
     let document = parse(&outcome.stdout);
     let offered = document["fates"]["offered"].as_u64().unwrap();

@@ -10,8 +10,8 @@ use cohaptic_harness::record::{InputRecorder, Recorder};
 use cohaptic_scene::{Scene, link_keys, scene_content};
 use serde_json::Value;
 
-use crate::desk::{Desk, parse, shipped};
-use crate::interrupt::interrupted;
+use crate::integration::desk::{Desk, parse, shipped};
+use crate::integration::interrupt::interrupted;
 
 const NAMES: [&str; 3] = ["left", "right", "third"];
 /// KC and KT of the scene, and the stiffness of the arms \[N/m\].

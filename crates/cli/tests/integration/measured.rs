@@ -1,10 +1,11 @@
-//! Every `cohaptic …` command on `docs/measured.md` runs as it stands there, with less work. Its other commands are those of `benches/tests/integration`.
+//! Every `cohaptic …` command on `docs/measured.md` runs as it stands there, with less work. Its other commands are those of `benches/tests/integration`
+//! and of `crates/accuracy/tests/integration/program.rs`.
 
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 
-use crate::desk::{Desk, Outcome, parse};
+use crate::integration::desk::{Desk, Outcome, parse};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -46,19 +47,9 @@ fn the_commands_of_the_page_of_measured_figures_run() {
                 assert_eq!((document["runs"].as_u64(), document["runs_computed"].as_u64()), (Some(9), Some(9)), "{words:?}");
                 assert_eq!(desk.files(&folder), ["campaign.json", "runs.parquet"]);
             }
-            "accuracy" => {
-                words.retain(|word| word != "--quick");
-                words.extend(["--quick", "--only", "motion"].map(str::to_owned));
-                assert_eq!(parse(&text(&words))["interrupted"], false);
-                // The plots of this subject that the page shows.
-                let page = std::fs::read_to_string(root().join("docs/measured.md")).unwrap();
-                let shown: Vec<&str> = page.split("](images/measured/").skip(1).filter_map(|rest| Some(rest.split_once(')')?.0)).collect();
-                let of_motion: Vec<&&str> = shown.iter().filter(|plot| plot.starts_with("motion-")).collect();
-                assert!(!of_motion.is_empty() && of_motion.iter().all(|plot| desk.path(&format!("{folder}/{plot}")).is_file()), "{of_motion:?}");
-            }
             _ => panic!("docs/measured.md: this test does not know how to run cohaptic {}", words.join(" ")),
         }
         seen.push(kind);
     }
-    assert!(["campaign", "accuracy"].iter().all(|kind| seen.iter().any(|found| found == kind)), "{seen:?}");
+    assert!(seen.contains(&"campaign".to_owned()), "{seen:?}");
 }

@@ -1,7 +1,7 @@
 //! Bad inputs and the message to each: the place, the fault, the expectation, and the way out.
 
-use crate::desk::Desk;
-use crate::scenes::TWO;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
 
 /// What stands below every refusal of an argument.
 const HELP: &str = "\n\nFor more information, try '--help'.";

@@ -2,8 +2,8 @@
 
 use std::process::Stdio;
 
-use crate::desk::{Desk, Outcome, parse};
-use crate::scenes::TWO;
+use crate::integration::desk::{Desk, Outcome, parse};
+use crate::integration::scenes::TWO;
 
 const COMMANDS: [&str; 5] = ["run two.toml", "run two.toml --json", "explain two.toml", "check two.toml", "check two.toml --json"];
 

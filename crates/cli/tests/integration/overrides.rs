@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::TWO;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
 
 /// The mean delay of a link of the document.
 fn delay(document: &Value, from: &str, to: &str) -> f64 {

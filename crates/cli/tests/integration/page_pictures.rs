@@ -2,7 +2,7 @@
 
 use cohaptic_picture::testing::faults;
 
-use crate::desk::{Desk, shipped};
+use crate::integration::desk::{Desk, shipped};
 
 /// Compares a picture with the file that a page shows; with `COHAPTIC_UPDATE_PAGES` the file is written anew.
 fn assert_shown(name: &str, drawn: &str) {

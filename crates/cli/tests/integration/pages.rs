@@ -1,7 +1,7 @@
 //! `init`, `schema`, `completions` and `man`.
 
-use crate::desk::{Desk, parse};
-use crate::scenes::TWO;
+use crate::integration::desk::{Desk, parse};
+use crate::integration::scenes::TWO;
 
 #[test]
 fn a_scene_to_begin_with_passes_its_own_check() {

@@ -1,6 +1,6 @@
 //! `cohaptic paper`: the paper again.
 
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 #[test]
 fn a_file_in_place_of_the_folder_is_refused_before_anything_is_computed() {
@@ -19,6 +19,7 @@ fn it_takes_no_scene() {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn the_page_the_figures_and_the_data_lie_in_the_folder() {
     let desk = Desk::new();
     let document = desk.json("paper --quick --json --out again --size two-columns");

@@ -5,10 +5,10 @@ use std::str::FromStr;
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::run::dropped;
-use crate::scenes::{PLANE, RANDOM, TWO};
-use crate::svg;
+use crate::integration::desk::Desk;
+use crate::integration::run::dropped;
+use crate::integration::scenes::{PLANE, RANDOM, TWO};
+use crate::integration::svg;
 
 const FILES: [&str; 7] = ["forces.svg", "links.csv", "network.svg", "packets.csv", "positions.svg", "run.html", "trajectory.csv"];
 

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::desk::{Desk, parse};
-use crate::running::{Client, PATIENCE, Running, TOKEN};
+use crate::integration::desk::{Desk, parse};
+use crate::integration::running::{Client, PATIENCE, Running, TOKEN};
 
 fn millis(millis: u64) -> Duration {
     Duration::from_millis(millis)

@@ -1,7 +1,7 @@
 //! A replay of a live session with a scene that is not that of the session.
 
-use crate::desk::Desk;
-use crate::scenes::TWO;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
 
 /// A hand whose force stands in a file.
 fn with_hand() -> String {
@@ -117,7 +117,7 @@ fn force_replays_it_and_says_what_differs() {
                    link.delay: \"24ms\" in the record, \"8ms\" now\n";
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), warning));
     assert!(outcome.stdout.contains("40ms simulated, 40 ticks"), "{}", outcome.stdout);
-    let document = crate::desk::parse(&desk.cohaptic(&format!("{line} --json")).stdout);
+    let document = crate::integration::desk::parse(&desk.cohaptic(&format!("{line} --json")).stdout);
     assert_eq!(document["replayed_otherwise"], serde_json::json!(["link.delay: \"24ms\" in the record, \"8ms\" now"]));
     // The same scene says nothing.
     let document = desk.json(&format!("run two.toml {SET} --inputs out/inputs.csv --json --force"));

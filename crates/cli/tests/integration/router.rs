@@ -10,8 +10,8 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::desk::{Desk, Outcome, parse};
-use crate::running::{Client, PATIENCE, Running, TOKEN};
+use crate::integration::desk::{Desk, Outcome, parse};
+use crate::integration::running::{Client, PATIENCE, Running, TOKEN};
 
 /// Set in a process that is in namespaces of its own.
 const INSIDE: &str = "COHAPTIC_CLI_TEST_INSIDE";
@@ -47,6 +47,8 @@ fn is_inside(name: &str) -> bool {
     // Each of its own waits ends after a minute.
     let outcome = Running::begin(command).end_within(5 * PATIENCE);
     assert_eq!(outcome.status, Some(0), "{}\n{}", outcome.stdout, outcome.stderr);
+    // A wrong name would select no test, which succeeds.
+    assert!(outcome.stdout.contains("1 passed"), "{name}: {}", outcome.stdout);
     false
 }
 
@@ -60,7 +62,7 @@ struct Host {
 impl Host {
     fn new() -> Self {
         let mut command = Command::new("unshare");
-        command.args(["-n", "--"]).arg(env::current_exe().unwrap()).args(["router::be_a_host", "--exact", "--nocapture"]).env(HOST, "1");
+        command.args(["-n", "--"]).arg(env::current_exe().unwrap()).args(["integration::router::be_a_host", "--exact", "--nocapture"]).env(HOST, "1");
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         let (orders, answers) = (child.stdin.take().unwrap(), BufReader::new(child.stdout.take().unwrap()));
         let mut host = Self { child, orders, answers };
@@ -140,7 +142,7 @@ fn be_a_host() {
 
 #[test]
 fn packets_cross_the_link_and_one_direction_is_changed_while_it_runs() {
-    if !is_inside("router::packets_cross_the_link_and_one_direction_is_changed_while_it_runs") {
+    if !is_inside("integration::router::packets_cross_the_link_and_one_direction_is_changed_while_it_runs") {
         return;
     }
     // Live control is reached over the loopback interface, which is down in a network that is new.
@@ -201,7 +203,7 @@ fn packets_cross_the_link_and_one_direction_is_changed_while_it_runs() {
 
 #[test]
 fn it_ends_by_itself_and_says_what_it_did_in_words() {
-    if !is_inside("router::it_ends_by_itself_and_says_what_it_did_in_words") {
+    if !is_inside("integration::router::it_ends_by_itself_and_says_what_it_did_in_words") {
         return;
     }
     let desk = Desk::with("lab.toml", &file("", ""));

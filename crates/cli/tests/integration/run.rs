@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::desk::{Desk, shipped, timeless};
-use crate::scenes::{PLANE, RANDOM, TWO};
+use crate::integration::desk::{Desk, shipped, timeless};
+use crate::integration::scenes::{PLANE, RANDOM, TWO};
 
 /// Dropped packets of a link or access line, whatever the cause.
 pub(crate) fn dropped(link: &Value) -> u64 {

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::desk::Outcome;
+use crate::integration::desk::Outcome;
 
 /// What is waited for takes milliseconds; this is how long a machine may be busy with something else.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);

@@ -5,10 +5,10 @@ use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use crate::campaign::interrupted::cramped;
-use crate::desk::{Desk, Outcome, parse};
-use crate::interrupt::interrupted;
-use crate::scenes::{RANDOM, TWO};
+use crate::integration::campaign::interrupted::cramped;
+use crate::integration::desk::{Desk, Outcome, parse};
+use crate::integration::interrupt::interrupted;
+use crate::integration::scenes::{RANDOM, TWO};
 
 /// 24 runs in eight parts of three.
 const CAMPAIGN: &str = "campaign random.toml --vary coordination.stiffness=500..1500/2 --runs 12 --part 3 --format csv";

@@ -3,9 +3,9 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::{PAPER, TWO};
-use crate::svg::words;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{PAPER, TWO};
+use crate::integration::svg::words;
 
 const ALONG: &str = "stability boundary paper.toml --along coordination.stiffness=100..8000";
 
@@ -120,11 +120,12 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
 
 #[cfg(unix)]
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn an_interrupted_search_goes_on_and_ends_with_the_same_bytes() {
     let desk = Desk::with("paper.toml", PAPER);
     // A delay is read anew for each value: a second or two of work.
     let line = "stability boundary paper.toml --along link.delay=1ms..40ms --samples 20000 --tolerance 0.0001 --out out";
-    let outcome = crate::interrupt::interrupted(&desk, line, |_| desk.path("out/boundary.rows.partial").exists());
+    let outcome = crate::integration::interrupt::interrupted(&desk, line, |_| desk.path("out/boundary.rows.partial").exists());
     assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(130), ""));
     assert!(outcome.stderr.contains("interrupted: ") && outcome.stderr.contains("kept in out/boundary.rows.partial"), "{}", outcome.stderr);
     desk.cohaptic(&line.replace("40ms", "41ms")).assert_refused(2, &["boundary.rows.partial keeps the rows of something else"]);

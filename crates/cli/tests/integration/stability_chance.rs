@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::PAPER;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::PAPER;
 
 const LOSSY: &str = "--set scene.count=2 --set coordination.stiffness=1400";
 

@@ -3,9 +3,9 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::{PAPER, TWO};
-use crate::svg::words;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{PAPER, TWO};
+use crate::integration::svg::words;
 
 const MAP: &str = "stability map paper.toml --x coordination.stiffness=200..5000 --y coordination.damping=1..31";
 
@@ -198,7 +198,7 @@ fn a_cell_that_makes_no_sense_leaves_nothing_behind() {
 #[cfg(unix)]
 mod interrupted {
     use super::*;
-    use crate::interrupt::interrupted;
+    use crate::integration::interrupt::interrupted;
 
     const ROWS: &str = "out/map.rows.partial";
     /// About two seconds of work: every row is a delay of its own, for which the scene is read anew.
@@ -209,6 +209,7 @@ mod interrupted {
     }
 
     #[test]
+    #[ignore = ".ci/nightly runs it: it takes long"]
     fn the_same_command_goes_on_and_ends_with_the_same_bytes() {
         let desk = Desk::with("paper.toml", PAPER);
         let line = format!("stability map paper.toml {LONG} --out out");

@@ -3,8 +3,8 @@
 
 use serde_json::Value;
 
-use crate::desk::Desk;
-use crate::scenes::{PAPER, PLANE, TWO};
+use crate::integration::desk::Desk;
+use crate::integration::scenes::{PAPER, PLANE, TWO};
 
 fn number(document: &Value, key: &str) -> f64 {
     document[key].as_f64().unwrap_or_else(|| panic!("no {key} in {document:#}"))
@@ -63,7 +63,7 @@ fn the_verdicts_of_the_paper_come_out() {
     for (name, verdict, word) in
         [("ap-2100", "stable", "STABLE"), ("pd-2100", "unstable", "UNSTABLE"), ("ap-1000", "stable", "STABLE"), ("pd-1000", "stable", "STABLE")]
     {
-        let scene = crate::desk::shipped(&format!("paper/5-1-{name}.toml"));
+        let scene = crate::integration::desk::shipped(&format!("paper/5-1-{name}.toml"));
         let document = desk.json(&format!("stability point {} --json", scene.display()));
         assert_eq!(document["verdict"], verdict, "{name}");
         assert_eq!(number(&document, "spectral_radius") < 1.0, verdict == "stable");

@@ -1,7 +1,7 @@
 //! `cohaptic stability point --every-number` and `cohaptic stability map --prove`: verdicts on sets of scenes, beside those on single ones.
 
-use crate::desk::Desk;
-use crate::scenes::TWO;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
 
 const EQUAL: &str = r#"
 scene = { title = "Equal peers", duration = "1s", count = 3 }

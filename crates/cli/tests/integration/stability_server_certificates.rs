@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::certificate_checker::{accepts, assert_shares, can_check, other_scene, refuses};
-use crate::desk::Desk;
+use crate::integration::certificate_checker::{accepts, assert_shares, can_check, other_scene, refuses};
+use crate::integration::desk::Desk;
 
 const SERVER: &str = r#"
 scene = { title = "A server", duration = "1s", count = 3 }
@@ -21,6 +21,7 @@ const KINDS: &str =
 const FAR: &str = "--set 'links=[{ from = \"peer1\", to = \"peer3\", delay = \"21ms\" }]'";
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn certificates_of_servers_hold_for_a_checker_that_shares_no_code() {
     if !can_check() {
         return;
@@ -55,6 +56,7 @@ fn certificates_of_servers_hold_for_a_checker_that_shares_no_code() {
 
 /// What a certificate says must be what its numbers show, for the scene that it holds.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_of_a_server_that_says_more_than_it_shows_is_refused() {
     if !can_check() {
         return;

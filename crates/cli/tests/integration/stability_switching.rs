@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 const PUSHED: &str = r#"
 [scene]

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::certificate_checker::{accepts, can_check, other_scene, refuses};
-use crate::desk::Desk;
+use crate::integration::certificate_checker::{accepts, can_check, other_scene, refuses};
+use crate::integration::desk::Desk;
 
 const HELD: &str = r#"
 scene = { title = "Between walls", duration = "1s", count = 3 }
@@ -26,6 +26,7 @@ const ARM: &str = "--set 'peers=[{ name = \"peer1\", hand = { arm = { mass = 0.3
 const PUSH: &str = "--set 'peers=[{ name = \"peer1\", contact = { push = \"+x\" } }, { name = \"peer2\", contact = \"none\" }]'";
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn certificates_of_walls_hold_for_a_checker_that_shares_no_code() {
     if !can_check() {
         return;
@@ -54,6 +55,7 @@ fn certificates_of_walls_hold_for_a_checker_that_shares_no_code() {
 
 /// Forms and multipliers that show something else, or of another scene.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_of_walls_that_says_more_than_it_shows_is_refused() {
     if !can_check() {
         return;

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::certificate_checker::{accepts, assert_shares, can_check, other_scene, refuses};
-use crate::desk::Desk;
+use crate::integration::certificate_checker::{accepts, assert_shares, can_check, other_scene, refuses};
+use crate::integration::desk::Desk;
 
 const WAVES: &str = r#"
 scene = { title = "Waves", duration = "1s", count = 3 }
@@ -18,6 +18,7 @@ const ARM: &str = "--set scene.count=4 --set 'peers=[{ name = \"peer2\", hand = 
 const LOOSE: &str = "--set 'peers=[{ name = \"peer1\", contact = \"none\" }]'";
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn certificates_of_waves_hold_for_a_checker_that_shares_no_code() {
     if !can_check() {
         return;
@@ -56,6 +57,7 @@ fn certificates_of_waves_hold_for_a_checker_that_shares_no_code() {
 
 /// What a certificate says must be what its numbers show, for the scene that it holds.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_of_waves_that_says_more_than_it_shows_is_refused() {
     if !can_check() {
         return;

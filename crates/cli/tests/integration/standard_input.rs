@@ -1,7 +1,7 @@
 //! `-` reads a scene from standard input.
 
-use crate::desk::{Desk, Outcome, parse, timeless};
-use crate::scenes::TWO;
+use crate::integration::desk::{Desk, Outcome, parse, timeless};
+use crate::integration::scenes::TWO;
 
 fn piped(desk: &Desk, line: &str, text: &str) -> Outcome {
     Outcome::of(assert_cmd::Command::from_std(desk.command(line)).write_stdin(text).output().unwrap())

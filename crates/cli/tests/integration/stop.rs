@@ -7,8 +7,8 @@ use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::desk::{Desk, Outcome, parse};
-use crate::scenes::TWO;
+use crate::integration::desk::{Desk, Outcome, parse};
+use crate::integration::scenes::TWO;
 
 /// After this time a command is held for one that does not end.
 const NEVER: Duration = Duration::from_secs(60);
@@ -43,7 +43,7 @@ fn stopped_after(worked: u64, desk: &Desk, line: &str, signal: &str) -> Outcome 
 
 /// Whether a process listens to signals, and has computed that long [1/100 s].
 fn has_worked(worked: u64, id: u32) -> bool {
-    crate::interrupt::listens(id) && computed(id).is_some_and(|computed| computed >= worked)
+    crate::integration::interrupt::listens(id) && computed(id).is_some_and(|computed| computed >= worked)
 }
 
 /// The processor time of a process [1/100 s]; `None` if it has ended.
@@ -86,6 +86,7 @@ fn many() -> String {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn an_analysis_ends_while_it_works_out_the_eigenvalues_of_a_large_matrix() {
     let desk = Desk::with("many.toml", &many());
     for signal in ["-INT", "-TERM"] {

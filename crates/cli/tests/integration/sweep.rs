@@ -1,7 +1,7 @@
 //! Every option that takes a number, a time, a size or an address, with values that it does not take: the answer is in words, and never what Rust says.
 
-use crate::desk::Desk;
-use crate::scenes::TWO;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
 
 /// What the standard library says of texts that it does not read.
 const RAW: &str = include_str!("../../../scene/tests/integration/raw_texts.txt");
@@ -73,6 +73,7 @@ fn assert_in_words(desk: &Desk, line: &str) {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn a_wrong_value_of_any_option_is_refused_in_words() {
     let desk = Desk::with("two.toml", TWO);
     for option in INTEGERS {

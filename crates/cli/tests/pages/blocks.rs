@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::notes::Notes;
+use crate::pages::notes::Notes;
 
 /// A part of a page.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! What a command printed beside what a page shows.
 
-use crate::notes::Vary;
+use crate::pages::notes::Vary;
 
 /// Stands for any lines that the page leaves out.
 pub(crate) const LEFT_OUT: &str = "…";

@@ -8,7 +8,7 @@ use std::time::Duration;
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-use crate::root;
+use crate::pages::root;
 
 /// A command of a page that takes longer hangs.
 const AT_MOST: Duration = Duration::from_secs(300);

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use crate::prose::{anchors, links};
-use crate::{markdown, root};
+use crate::pages::prose::{anchors, links};
+use crate::pages::{markdown, root};
 
 /// The table of contents of the book.
 const SUMMARY: &str = "docs/SUMMARY.md";

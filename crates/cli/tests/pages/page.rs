@@ -5,15 +5,15 @@ use std::ops::Range;
 
 use cohaptic_picture::testing::faults;
 
-use crate::blocks::{Block, Kind, Shown};
-use crate::compare::same;
-use crate::figures;
-use crate::folder::{Folder, Outcome};
-use crate::notes::Notes;
-use crate::pictures::{Drawn, drawn};
-use crate::script::{commands, without_cargo};
-use crate::update::{replaced, shown_anew};
-use crate::{root, usage};
+use crate::pages::blocks::{Block, Kind, Shown};
+use crate::pages::compare::same;
+use crate::pages::figures;
+use crate::pages::folder::{Folder, Outcome};
+use crate::pages::notes::Notes;
+use crate::pages::pictures::{Drawn, drawn};
+use crate::pages::script::{commands, without_cargo};
+use crate::pages::update::{replaced, shown_anew};
+use crate::pages::{root, usage};
 
 /// Names the variable that lets the pages be written.
 pub(crate) const UPDATE: &str = "COHAPTIC_UPDATE_PAGES";

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::prose::links;
-use crate::{PAGES, markdown, root};
+use crate::pages::prose::links;
+use crate::pages::{PAGES, markdown, root};
 
 /// Pictures that no page draws, and what does. A name that ends in `/` is that of a folder.
 const DRAWN_ELSEWHERE: [(&str, &str); 4] = [

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use crate::compare::{LEFT_OUT, same_line, words};
-use crate::notes::Vary;
+use crate::pages::compare::{LEFT_OUT, same_line, words};
+use crate::pages::notes::Vary;
 
 /// What the page shows in place of what it shows now: as much of it, if the same places can be found, and all of it otherwise. Lines that only differ in
 /// the parts that are not compared stay as they are.

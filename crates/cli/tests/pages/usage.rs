@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Mutex;
 
-use crate::root;
+use crate::pages::root;
 
 /// What `--help` of a command names.
 #[derive(Clone, Default)]
@@ -122,6 +122,6 @@ fn what_is_no_option_is_found() {
     }
     assert_eq!((of_some_command("--losses-in-a-row 2"), of_some_command("--losses").is_err()), (Ok(()), true));
     let cargo = |line: &str| of_cargo(&line.split(' ').map(str::to_owned).collect::<Vec<_>>());
-    assert_eq!(cargo("cargo test -p cohaptic-tests --test hard"), Ok(()));
+    assert_eq!(cargo("cargo test -p cohaptic-tests --test tests hard"), Ok(()));
     assert!(cargo("cargo test -p cohaptic-tests --test soft").is_err());
 }

@@ -67,8 +67,7 @@ fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; 
     match scenes[0].axes {
         Axes::Three if scenes[0].rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, L>::new(scenes, shape, laws, None).run(watch),
         Axes::One => Arrays::<Translations<1>, 1, 1, L>::new(scenes, shape, laws, None).run(watch),
-        Axes::Two => Arrays::<Translations<2>, 2, 2, L>::new(scenes, shape, laws, None).run(watch),
-        Axes::Three => Arrays::<Translations<3>, 3, 3, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::Two | Axes::Three => Arrays::<Translations<3>, 3, 3, L>::new(scenes, shape, laws, None).run(watch),
     }
 }
 
@@ -78,8 +77,7 @@ pub(crate) fn run_watched(scene: &Scene, (shape, law): (Shape, BuiltIn), plan: &
     let [summary] = match scene.axes {
         Axes::Three if scene.rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, 1>::new(scenes, shape, laws, devices).run(watch),
         Axes::One => Arrays::<Translations<1>, 1, 1, 1>::new(scenes, shape, laws, devices).run(watch),
-        Axes::Two => Arrays::<Translations<2>, 2, 2, 1>::new(scenes, shape, laws, devices).run(watch),
-        Axes::Three => Arrays::<Translations<3>, 3, 3, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::Two | Axes::Three => Arrays::<Translations<3>, 3, 3, 1>::new(scenes, shape, laws, devices).run(watch),
     };
     summary
 }
@@ -94,8 +92,7 @@ pub(crate) fn run_on_threads(
 ) -> Option<Summary> {
     match scene.axes {
         Axes::One => threads::run::<Translations<1>, 1, 1>(scene, shape, law, threads, keep_going),
-        Axes::Two => threads::run::<Translations<2>, 2, 2>(scene, shape, law, threads, keep_going),
-        Axes::Three => threads::run::<Translations<3>, 3, 3>(scene, shape, law, threads, keep_going),
+        Axes::Two | Axes::Three => threads::run::<Translations<3>, 3, 3>(scene, shape, law, threads, keep_going),
     }
 }
 

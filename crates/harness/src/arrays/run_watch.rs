@@ -62,11 +62,13 @@ pub(super) struct WatchedTicks<'a> {
     onlooker: &'a mut dyn Onlooker,
     /// By how much the law damps each peer [N·s/m], and its turn about each axis [N·m·s/rad].
     damping: Vec<(f64, Triple)>,
+    /// Number of axes of the scene, which rows have. The run may simulate more.
+    shown: usize,
 }
 
 impl<'a> WatchedTicks<'a> {
     pub(super) fn new(scene: &Scene, onlooker: &'a mut dyn Onlooker) -> Self {
-        Self { onlooker, damping: damping(scene) }
+        Self { onlooker, damping: damping(scene), shown: scene.axes.count() }
     }
 }
 
@@ -86,7 +88,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize> RunWatch<B, A, P> for Watc
 
     #[inline(always)]
     fn before_motion(&mut self, now: Instant, bodies: &B, law: &BuiltIn<Lanes>) {
-        let source = Peers { at: now, bodies, law, damping: &self.damping };
+        let source = Peers { at: now, bodies, law, damping: &self.damping, shown: self.shown };
         self.onlooker.on_ticks(&Ticks::new(now, self.damping.len(), bodies.blocks().of_all(), &source));
     }
 
@@ -117,8 +119,8 @@ impl WindowWatch<'_> {
     pub(super) fn on_tick<const A: usize>(&mut self, (at, peer): (Instant, usize), seen: &SeenPlace<A>) -> bool {
         match self {
             Self::Unwatched(_) => true,
-            Self::Watched(WatchedTicks { onlooker, damping }) => {
-                let place = Place { at, peer, damping: &damping[peer], attitude: None, device: None };
+            Self::Watched(WatchedTicks { onlooker, damping, shown }) => {
+                let place = Place { at, peer, damping: &damping[peer], shown: *shown, attitude: None, device: None };
                 place.hand_on(seen, &mut |row| onlooker.on_tick(row))
             }
         }
@@ -159,6 +161,8 @@ struct Place<'a> {
     peer: usize,
     /// By how much the law damps it, and its turn.
     damping: &'a (f64, Triple),
+    /// Number of axes that rows have.
+    shown: usize,
     /// How its copy and its device are turned, if they are.
     attitude: Option<Attitude>,
     device: Option<Attitude>,
@@ -181,11 +185,11 @@ impl Place<'_> {
         on(&TickRow {
             at: self.at,
             peer: self.peer,
-            device: StateOfLane::of(axes.each_ref().map(|seen| &seen.device), lane).row(),
-            object: object.row(),
-            target: StateOfLane::of(axes.each_ref().map(|seen| &seen.target), lane).row(),
-            coupling_force: &axes.each_ref().map(|seen| seen.coupling.0[lane]),
-            coordination_force: &std::array::from_fn::<f64, A, _>(recorded),
+            device: StateOfLane::of(axes.each_ref().map(|seen| &seen.device), lane).row(self.shown),
+            object: object.row(self.shown),
+            target: StateOfLane::of(axes.each_ref().map(|seen| &seen.target), lane).row(self.shown),
+            coupling_force: &axes.each_ref().map(|seen| seen.coupling.0[lane])[..self.shown],
+            coordination_force: &std::array::from_fn::<f64, A, _>(recorded)[..self.shown],
             turn: turned.as_ref().map(|(object, coupling_torque, coordination_torque)| TurnRow {
                 object,
                 device: self.device.as_ref(),
@@ -202,6 +206,8 @@ struct Peers<'a, B, const A: usize, const P: usize> {
     bodies: &'a B,
     law: &'a BuiltIn<Lanes>,
     damping: &'a [(f64, Triple)],
+    /// Number of axes that rows have.
+    shown: usize,
 }
 
 /// Position and velocity of a lane along each axis.
@@ -218,8 +224,8 @@ impl<const A: usize> StateOfLane<A> {
     }
 
     #[inline(always)]
-    fn row(&self) -> StateRow<'_> {
-        StateRow { position: &self.position, velocity: &self.velocity }
+    fn row(&self, shown: usize) -> StateRow<'_> {
+        StateRow { position: &self.position[..shown], velocity: &self.velocity[..shown] }
     }
 }
 
@@ -234,7 +240,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize> Source for Peers<'_, B, A,
             let seen = self.bodies.seen(place, self.law);
             for (peer, damping) in (place * WIDTH..).zip(damping) {
                 let (attitude, device) = (self.bodies.attitude(peer, 0), self.bodies.device_attitude(peer, 0));
-                if !(Place { at: self.at, peer, damping, attitude, device }).hand_on(&seen, on) {
+                if !(Place { at: self.at, peer, damping, shown: self.shown, attitude, device }).hand_on(&seen, on) {
                     return;
                 }
             }

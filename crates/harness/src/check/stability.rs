@@ -69,8 +69,7 @@ pub fn stability(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) 
     let plan = Plan::new(scene, model, false);
     match plan.axes {
         Axes::One => follow(pair::<1>(scene, model, &plan), scene, keep_going),
-        Axes::Two => follow(pair::<2>(scene, model, &plan), scene, keep_going),
-        Axes::Three => follow(pair::<3>(scene, model, &plan), scene, keep_going),
+        Axes::Two | Axes::Three => follow(pair::<3>(scene, model, &plan), scene, keep_going),
     }
 }
 

@@ -41,10 +41,9 @@ pub struct LiveScene {
     ended: Option<Ending>,
 }
 
-/// A world with as many axes as the scene has.
+/// A world with one axis, or with three, which also simulates scenes of two.
 enum AnyWorld {
     One(Box<World<1, BuiltInStrategy<1>, RemotePeers<1>>>),
-    Two(Box<World<2, BuiltInStrategy<2>, RemotePeers<2>>>),
     Three(Box<World<3, BuiltInStrategy<3>, RemotePeers<3>>>),
 }
 
@@ -52,7 +51,6 @@ macro_rules! each {
     ($any:expr, $world:ident => $what:expr) => {
         match $any {
             AnyWorld::One($world) => $what,
-            AnyWorld::Two($world) => $what,
             AnyWorld::Three($world) => $what,
         }
     };
@@ -95,8 +93,7 @@ impl LiveScene {
         let simulation = Simulation::new(scene, Model::Least);
         let world = match plan.axes {
             Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
-            Axes::Two => AnyWorld::Two(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
-            Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
+            Axes::Two | Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
         };
         // The session that peers of the scene have: see `Scene::peer_config`.
         Self { world, session: scene.seed, others: scene.peers.len() as u64 - 1, open: Instant::ZERO, ended: None }

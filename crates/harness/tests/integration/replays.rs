@@ -127,6 +127,7 @@ proptest! {
 
     /// Jitter, loss, queues, damage, changes of links in the timeline and by hand, rejoining, busy drivers, devices that come and go.
     #[test]
+    #[ignore = ".ci/nightly runs it: it takes long"]
     fn a_session_is_the_same_again(
         text in scene(&["simulated", "udp", "falcon"]), events in events(), step in 1..5_000_000_u64, gone in option::of(0..40_u64), stops in any::<bool>(),
     ) {
@@ -145,6 +146,7 @@ proptest! {
 
     /// A driver that is never late sees the same session however often it comes.
     #[test]
+    #[ignore = ".ci/nightly runs it: it takes long"]
     fn the_steps_of_a_punctual_driver_do_not_show(
         text in scene(&["simulated", "udp", "udp", "falcon"]), events in events(), steps in (1..300_000_u64, 1..80_000_000_u64), gone in option::of(0..40_u64),
     ) {

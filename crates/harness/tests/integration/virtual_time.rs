@@ -69,6 +69,7 @@ proptest! {
 
 /// Every shipped scene that can be cut to a tenth of a second and in which everybody lives here.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn the_shipped_scenes_are_the_same_live() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let mut compared = 0;

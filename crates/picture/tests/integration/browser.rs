@@ -6,6 +6,7 @@ use cohaptic_picture::testing::{Scheme, computed_colours, faults, in_browser, pa
 use crate::gallery::gallery;
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_browser_shows_every_text_of_every_kind_of_picture_inside_and_apart() {
     let pictures: Vec<(String, String)> = gallery().into_iter().map(|(name, picture)| (name, picture.svg())).collect();
     let found: Vec<String> = pictures.iter().flat_map(|(name, svg)| faults(svg).into_iter().map(move |fault| format!("{name}: {fault}"))).collect();
@@ -32,6 +33,7 @@ fn page() -> String {
 
 /// What a reader sees, not what the style sheet says: a rule that no browser reads would change nothing.
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_browser_draws_other_colours_for_readers_who_prefer_dark() {
     let folder = tempfile::tempdir().unwrap();
     let colours = |scheme| computed_colours(folder.path(), &page(), scheme);
@@ -68,6 +70,7 @@ fn a_browser_draws_other_colours_for_readers_who_prefer_dark() {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_browser_shows_pages_without_scrolling_sideways_and_texts_apart() {
     let folder = tempfile::tempdir().unwrap();
     let Some(found) = page_in_browser(folder.path(), &page()) else {

@@ -175,6 +175,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
+    #[ignore = ".ci/nightly runs it: it takes long"]
     fn a_scene_that_something_happened_to_is_read_or_refused(edits in prop::collection::vec(edit(), 1..6)) {
         let original = std::fs::read_to_string(path()).unwrap();
         let text = edits.iter().fold(original, |text, edit| apply(&text, edit));
@@ -182,6 +183,7 @@ proptest! {
     }
 
     #[test]
+    #[ignore = ".ci/nightly runs it: it takes long"]
     fn a_shipped_scene_that_something_happened_to_is_read_or_refused(
         scene in any::<prop::sample::Index>(),
         edits in prop::collection::vec(edit(), 1..6),
@@ -193,6 +195,7 @@ proptest! {
     }
 
     #[test]
+    #[ignore = ".ci/nightly runs it: it takes long"]
     fn any_override_is_taken_or_refused(
         key in "(scene|peer|peers|modulators|link|links|timeline|expect|coordination)(\\.(left|right|0|9|hand|delay|jitter|loss|queue|netem|trace|modulated|device|mass|at|set|count|x|\"|)){0,5}",
         value in prop_oneof!["\\PC{0,12}", prop::sample::select(&NUMBERS[..]).prop_map(str::to_owned), prop::sample::select(&TEXTS[..]).prop_map(str::to_owned)],

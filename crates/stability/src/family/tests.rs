@@ -241,6 +241,7 @@ fn a_scene_whose_second_moment_cannot_be_followed_is_nominal() {
 
 /// Scenes whose second moment grows but a little faster than the square of the mean motion: by a share of 1.1·10⁻⁷ and of 2·10⁻⁹.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn noise_that_adds_next_to_nothing_to_the_mean_motion_is_counted() {
     let first = [
         "scene.count=4",
@@ -274,6 +275,7 @@ proptest! {
 
     /// The noise of losses against the second moment with its bound: equal peers of any kind.
     #[test]
+    #[ignore = ".ci/nightly runs it: it takes long"]
     fn equal_peers_that_lose_have_the_radius_of_their_second_moment(
         peers in prop_oneof![2..6_usize, 2..200_usize],
         delay in 0..30_000_u32,

@@ -91,6 +91,7 @@ fn by_noise(overrides: &[&str]) -> f64 {
 
 /// The second moment itself, with its bound, and the mean motion with its noise share neither a matrix nor a formula.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn the_noise_of_losses_makes_the_radius_of_the_second_moment() {
     let links = [
         &["link.loss=0.1"][..],
@@ -338,6 +339,7 @@ fn loss_may_stabilise_and_may_destabilise() {
 
 /// Both the common motion and the differences tend to limits as N grows, with distances of order 1/N, at one cost and with the same bounds.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn a_hundred_thousand_peers_cost_what_ten_do() {
     let of = |peers: usize, more: &[&str]| found(&[&[format!("scene.count={peers}").as_str(), "object.split-mass=false"], more].concat());
     for more in [&["link.loss=0.1"][..], &["link.jitter={ sd = '1ms', distribution = 'uniform' }", "link.delay=12.2ms", "link.loss=0.3"]] {

@@ -129,7 +129,7 @@ fn no_box_holds_a_point_of_the_other_kind() {
 }
 
 #[test]
-#[ignore = "takes half a minute of processor time"]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn no_box_holds_one_of_a_hundred_thousand_points_of_the_other_kind() {
     let (judged, points) = judged(&cases());
     assert!(points > 100_000 && judged > points / 2, "{judged} of {points}");
@@ -156,6 +156,7 @@ fn structures(followed: &mut Followed<'_>, change: impl Fn(&mut crate::structure
 
 /// Each fault makes a box that holds a point of the other kind, or leaves more than half of the points undecided, which the test without faults refuses too.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn faults_of_the_prover_are_seen() {
     let cases = cases();
     for (what, mutation, change) in FAULTS {

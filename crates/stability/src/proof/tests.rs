@@ -291,6 +291,7 @@ fn a_proof_that_is_ended_keeps_what_it_has() {
 
 /// In the mean square too: at the ends of spans, in between and at random, the second moments of single scenes, which have bounds of their own, say the same.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn every_number_is_judged_in_the_mean_square_as_single_scenes_are() {
     for (set, has_end) in [
         (&["object.split-mass=false", "link.loss=20%"][..], true),
@@ -335,6 +336,7 @@ const GAINS: [&str; 2] = ["coordination.stiffness=100..6000", "coordination.damp
 
 /// No box that is proven has a point of the other kind: at thousands of points within proven boxes, their corners among them, single radii with their own bounds agree.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn no_box_holds_a_point_that_contradicts_it() {
     for (set, [x, y]) in [
         (&["scene.count=3"][..], GAINS),

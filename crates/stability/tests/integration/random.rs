@@ -44,6 +44,7 @@ fn cases() -> Vec<Case> {
 
 /// A bound is one: of all these scenes none may be outside. The reference is a double, half a unit in the last place from the truth.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn no_spectral_radius_is_farther_off_than_it_says() {
     for method in [Method::Reduced, Method::Determinant, Method::Full] {
         let mut wide = Vec::new();
@@ -65,6 +66,7 @@ fn no_spectral_radius_is_farther_off_than_it_says() {
 /// Whatever the gains, from nothing to 10¹⁴ N/m: what the two methods for every scene say is true, and where one is sure the other is too. The determinant,
 /// which is chosen for long delays only, is never sure of a wrong verdict.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn the_verdicts_of_all_gains_are_true() {
     for case in cases() {
         let [reduced, full, determinant] =
@@ -139,6 +141,7 @@ fn a_boundary_is_where_the_radius_is_one() {
 /// With nothing lost and no delay that varies there is one frame, and the growth a period lies between the bounds: it is the radius over a frame of one
 /// period, known to fifty digits.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn the_worst_case_is_nominal_where_nothing_is_left_to_choose() {
     let mut compared = 0;
     for case in cases().iter().filter(|case| case.felt.is_some()) {

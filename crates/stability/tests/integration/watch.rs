@@ -74,6 +74,7 @@ fn whoever_watches_ends_an_analysis_and_is_not_asked_again() {
 
 /// The operations done are of the order of those expected, and a watch does not change the analysis.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn operations_are_about_those_that_are_expected() {
     let scene = three(&[]);
     let (full, mean_square) = (Ends::at(usize::MAX), Ends::at(usize::MAX));

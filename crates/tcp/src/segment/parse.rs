@@ -1,6 +1,7 @@
 //! From the octets of an IP packet to a segment.
 
 use alloc::borrow::Cow;
+use core::fmt;
 use core::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use super::checksum::Sum;
@@ -8,28 +9,37 @@ use super::encode::{IPV4_HEADER, IPV6_HEADER, TCP, TCP_HEADER, pseudo};
 use super::{Ecn, Flags, Options, Segment};
 
 /// Why octets are not a segment.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[non_exhaustive]
 pub enum ParseError {
     /// Fewer octets than the headers say.
-    #[error("the packet is cut off")]
     Truncated,
     /// Neither IPv4 nor IPv6.
-    #[error("the packet is neither IPv4 nor IPv6")]
     Version,
     /// A length in a header is impossible.
-    #[error("a length in a header is impossible")]
     Length,
     /// Another protocol, or behind extension headers.
-    #[error("the packet does not carry TCP")]
     Protocol,
     /// A fragment of a packet.
-    #[error("the packet is a fragment")]
     Fragment,
     /// The checksum of the IPv4 header or of the segment is wrong.
-    #[error("a checksum is wrong")]
     Checksum,
 }
+
+impl fmt::Display for ParseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated => f.write_str("the packet is cut off"),
+            Self::Version => f.write_str("the packet is neither IPv4 nor IPv6"),
+            Self::Length => f.write_str("a length in a header is impossible"),
+            Self::Protocol => f.write_str("the packet does not carry TCP"),
+            Self::Fragment => f.write_str("the packet is a fragment"),
+            Self::Checksum => f.write_str("a checksum is wrong"),
+        }
+    }
+}
+
+impl core::error::Error for ParseError {}
 
 impl<'a> Segment<'a> {
     /// Reads an IP packet, checks both checksums, and borrows the data.

@@ -74,12 +74,18 @@ fn counts(log: &cohaptic_wan::FateLog) -> String {
 
 #[cfg(feature = "pcapng")]
 fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> Vec<u8> {
+    #[cfg(feature = "tcp")]
     let segments = segments(record, path);
     let write = || -> std::io::Result<Vec<u8>> {
-        let mut capture = cohaptic_measure::pcapng::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
+        let mut capture = cohaptic_capture::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
         for seen in record.packets_of(path) {
             let packet = seen.without_path();
-            if segments.contains(&packet.sequence) { capture.write_packet(&packet, &seen.payload)? } else { capture.write(&packet, &seen.payload)? }
+            #[cfg(feature = "tcp")]
+            if segments.contains(&packet.sequence) {
+                capture.write_packet(&packet, &seen.payload)?;
+                continue;
+            }
+            capture.write(&packet, &seen.payload)?;
         }
         capture.finish()
     };
@@ -87,11 +93,10 @@ fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> V
     write().unwrap_or_default()
 }
 
-/// The numbers of the packets of a path that are whole IP packets, as those of TCP are.
-#[cfg(feature = "pcapng")]
+/// The numbers of the packets of a path that are whole IP packets: those of TCP.
+#[cfg(all(feature = "pcapng", feature = "tcp"))]
 fn segments(record: &Record, path: cohaptic_wan::Path) -> std::collections::BTreeSet<u64> {
     let number = |event: &crate::TraceEvent| match event.what {
-        #[cfg(feature = "tcp")]
         crate::Happening::Segment { packet, .. } if packet.path == path => Some(packet.sequence),
         _ => None,
     };

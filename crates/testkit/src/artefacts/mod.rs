@@ -4,6 +4,7 @@ mod contents;
 mod folder;
 
 use std::ffi::OsStr;
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -15,29 +16,47 @@ use crate::wire::HitCount;
 pub const ARTEFACTS_VARIABLE: &str = "COHAPTIC_TEST_ARTEFACTS";
 
 /// Why what happened is not in its folder.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 #[non_exhaustive]
 pub enum WriteError {
     /// The folder holds something else.
-    #[error("{} is there already and was not written by a test bed; expected a folder of its own", folder.display())]
     NotOurs {
         /// The folder.
         folder: PathBuf,
     },
     /// The path ends with `..`, or is empty.
-    #[error("`{}` names no folder of its own; expected a path that ends with a name", folder.display())]
     NoName {
         /// The path.
         folder: PathBuf,
     },
     /// The system refuses.
-    #[error("{}: {source}", path.display())]
     Io {
         /// What could not be written.
         path: PathBuf,
         /// What the system says.
         source: io::Error,
     },
+}
+
+impl fmt::Display for WriteError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotOurs { folder } => {
+                write!(f, "{} is there already and was not written by a test bed; expected a folder of its own", folder.display())
+            }
+            Self::NoName { folder } => write!(f, "`{}` names no folder of its own; expected a path that ends with a name", folder.display()),
+            Self::Io { path, source } => write!(f, "{}: {source}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for WriteError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Io { source, .. } => Some(source),
+            Self::NotOurs { .. } | Self::NoName { .. } => None,
+        }
+    }
 }
 
 impl Record {

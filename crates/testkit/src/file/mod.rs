@@ -6,6 +6,7 @@ mod documents;
 mod scene;
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -63,11 +64,10 @@ pub(crate) struct LinkChange {
 }
 
 /// Why a file says no links.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 #[non_exhaustive]
 pub enum LinkFileError {
     /// It cannot be read.
-    #[error("{}: cannot be read: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -75,7 +75,6 @@ pub enum LinkFileError {
         source: io::Error,
     },
     /// Its words make no sense.
-    #[error("{}:{error}", path.display())]
     Words {
         /// The file.
         path: PathBuf,
@@ -83,23 +82,55 @@ pub enum LinkFileError {
         error: WordsError,
     },
     /// It is a scene file or a relay file, and this crate was built without them.
-    #[error("{}: a relay file is read with the feature `files` of cohaptic-testkit only, a scene file with `scenes`; expected it, or a file of plain words", path.display())]
     NoDocuments {
         /// The file.
         path: PathBuf,
     },
     /// It makes no sense as a scene file or a relay file.
     #[cfg(feature = "files")]
-    #[error(transparent)]
-    Document(#[from] cohaptic_linkfile::FileError),
+    Document(cohaptic_linkfile::FileError),
     /// A scene has what links between hosts cannot stand for.
-    #[error("{}: {what}", path.display())]
     NotLinks {
         /// The file.
         path: PathBuf,
         /// What, and what was expected.
         what: String,
     },
+}
+
+impl fmt::Display for LinkFileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io { path, source } => write!(f, "{}: cannot be read: {source}", path.display()),
+            Self::Words { path, error } => write!(f, "{}:{error}", path.display()),
+            Self::NoDocuments { path } => write!(
+                f,
+                "{}: a relay file is read with the feature `files` of cohaptic-testkit only, a scene file with `scenes`; expected it, or a file of plain words",
+                path.display()
+            ),
+            #[cfg(feature = "files")]
+            Self::Document(error) => fmt::Display::fmt(error, f),
+            Self::NotLinks { path, what } => write!(f, "{}: {what}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for LinkFileError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Io { source, .. } => Some(source),
+            #[cfg(feature = "files")]
+            Self::Document(error) => std::error::Error::source(error),
+            Self::Words { .. } | Self::NoDocuments { .. } | Self::NotLinks { .. } => None,
+        }
+    }
+}
+
+#[cfg(feature = "files")]
+impl From<cohaptic_linkfile::FileError> for LinkFileError {
+    fn from(error: cohaptic_linkfile::FileError) -> Self {
+        Self::Document(error)
+    }
 }
 
 impl LinkFile {

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::words::Hit;
 use crate::words::{WordsError, hits_of};
 
-/// Which packets are hit between hosts, by their names, and how: what [`Testbed::hits`](crate::Testbed::hits) takes and [`any_hits`](crate::strategies::any_hits) draws.
+/// Which packets are hit between hosts, by their names, and how: what [`Testbed::hits`](crate::Testbed::hits) takes and `strategies::any_hits` draws (feature `strategies`).
 ///
 /// It is a line for each path, with [words](crate::hit) after a colon. `Debug` is Rust that makes the same value.
 ///

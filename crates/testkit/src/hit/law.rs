@@ -50,8 +50,10 @@ impl PacketLaw for WordsLaw {
 fn is_of(packet: &SentPacket<'_>, kind: Kind) -> bool {
     match kind {
         Kind::Packet => true,
+        #[cfg(feature = "tcp")]
         Kind::Segment => packet.tcp().is_some_and(|segment| !segment.payload.is_empty()),
         Kind::Retransmission => packet.is_retransmission,
+        #[cfg(feature = "tcp")]
         Kind::Flag(flag) => packet.tcp().is_some_and(|segment| segment.flags.has(flag)),
     }
 }

@@ -28,7 +28,7 @@
 //!
 //! The verdict falls when the packet is offered. One that is to be dropped goes no further: its fate is [`DropCause::Filter`](cohaptic_wan::DropCause::Filter). All others
 //! pass the link first, which may lose them, and are delayed, copied, damaged or held where they come out. So the link draws the same for every other packet, whatever is
-//! hit: to hit one packet more or less changes nothing else, which is why sets of hits [shrink](crate::strategies::any_hits). Copies that a link makes of a packet are not
+//! hit: to hit one packet more or less changes nothing else, which is why sets of hits shrink (`strategies::any_hits`, feature `strategies`). Copies that a link makes of a packet are not
 //! hit. Where several laws are for one path, all are asked, and the first verdict other than [`Verdict::Pass`] is the packet's.
 //!
 //! The fates of a [`Record`](crate::Record) have what hits did, so that its `links.txt` does it again without the laws; only damaged bits are not replayed. The trace has
@@ -57,7 +57,7 @@
 //! | `every` *kind* | all of a kind |
 //!
 //! Kinds are `packet`, `segment` (of TCP, with data), `SYN`, `FIN` and `RST` (TCP with this flag, whatever else is set), and `retransmission`: a segment of TCP of which
-//! something was sent before, or another packet with the same bytes as one before. `with` and a text in quotes, or bytes as `0x` and two digits each, narrows them to packets
+//! something was sent before, or another packet with the same bytes as one before. Packets of TCP, and the words for them, need the feature `tcp`. `with` and a text in quotes, or bytes as `0x` and two digits each, narrows them to packets
 //! in whose bytes it stands.
 
 mod hits;
@@ -69,6 +69,7 @@ mod words;
 
 use std::time::Duration;
 
+#[cfg(feature = "tcp")]
 pub use cohaptic_tcp::{Flags, Segment};
 pub use cohaptic_wan::random::Draws;
 pub use hits::Hits;

@@ -1,5 +1,6 @@
 //! A packet as a law sees it.
 
+#[cfg(feature = "tcp")]
 use cohaptic_tcp::Segment;
 use cohaptic_units::Instant;
 use cohaptic_wan::Path;
@@ -22,9 +23,11 @@ pub struct SentPacket<'a> {
     pub bytes: &'a [u8],
     /// Whether it was sent before: a segment of TCP some of whose sequence numbers were, or another packet with the same bytes as one before on this path.
     pub is_retransmission: bool,
+    #[cfg(feature = "tcp")]
     pub(crate) segment: Option<&'a Segment<'a>>,
 }
 
+#[cfg(feature = "tcp")]
 impl<'a> SentPacket<'a> {
     /// The segment of TCP, if that is what the bytes are: an IP packet with right lengths and checksums.
     #[must_use]

@@ -1,8 +1,12 @@
 //! What was sent on a path before: so that retransmissions are known.
 
-use std::collections::{BTreeMap, BTreeSet};
+#[cfg(feature = "tcp")]
+use std::collections::BTreeMap;
+use std::collections::BTreeSet;
+#[cfg(feature = "tcp")]
 use std::net::SocketAddr;
 
+#[cfg(feature = "tcp")]
 use cohaptic_tcp::{Flags, Segment};
 
 use crate::seed::hash;
@@ -10,16 +14,22 @@ use crate::seed::hash;
 /// The packets of a path so far.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// By both ends: the first sequence number that was never sent.
+    /// The first sequence number that was never sent, by both ends of a connection.
+    #[cfg(feature = "tcp")]
     next: BTreeMap<(SocketAddr, SocketAddr), u32>,
-    /// Those that are not of TCP.
+    /// Digests of the packets that are not of TCP.
     digests: BTreeSet<u64>,
 }
 
 impl Seen {
-    /// Notes a packet, and says whether it, or a part of it, was sent before.
-    pub(crate) fn note(&mut self, bytes: &[u8], segment: Option<&Segment<'_>>) -> bool {
-        let Some(segment) = segment else { return !self.digests.insert(hash(bytes)) };
+    /// Notes a packet that is not of TCP, and says whether a packet with the same bytes was sent before.
+    pub(crate) fn note(&mut self, bytes: &[u8]) -> bool {
+        !self.digests.insert(hash(bytes))
+    }
+
+    /// Notes a segment of TCP, and says whether one of its sequence numbers was sent before.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn note_segment(&mut self, segment: &Segment<'_>) -> bool {
         let length = segment.sequence_length();
         if length == 0 {
             return false;
@@ -43,10 +53,12 @@ impl Seen {
 
 #[cfg(test)]
 mod tests {
+    #[cfg(feature = "tcp")]
     use cohaptic_tcp::{Ecn, Options};
 
     use super::*;
 
+    #[cfg(feature = "tcp")]
     fn segment(sequence: u32, flags: Flags, len: usize) -> Segment<'static> {
         Segment {
             source: "10.0.0.1:1".parse().unwrap(),
@@ -62,6 +74,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "tcp")]
     #[test]
     fn what_begins_before_the_end_of_what_was_sent_is_sent_again() {
         let mut seen = Seen::default();
@@ -82,7 +95,7 @@ mod tests {
             (segment(start.wrapping_add(90_001), Flags::ACK, 5), false),
         ];
         for (place, (segment, expected)) in sent.iter().enumerate() {
-            assert_eq!(seen.note(&[], Some(segment)), *expected, "{place}");
+            assert_eq!(seen.note_segment(segment), *expected, "{place}");
         }
     }
 
@@ -90,6 +103,6 @@ mod tests {
     fn a_datagram_is_sent_again_if_its_bytes_are() {
         let mut seen = Seen::default();
         let sent = [&b"a"[..], b"b", b"a", b"", b"", b"ab"];
-        assert_eq!(sent.map(|bytes| seen.note(bytes, None)), [false, false, true, false, true, false]);
+        assert_eq!(sent.map(|bytes| seen.note(bytes)), [false, false, true, false, true, false]);
     }
 }

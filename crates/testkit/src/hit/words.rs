@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
+#[cfg(feature = "tcp")]
 use cohaptic_tcp::Flags;
 use cohaptic_units::{parse, print};
 
@@ -40,19 +41,32 @@ pub(crate) enum Which {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
     Packet,
+    #[cfg(feature = "tcp")]
     Segment,
     Retransmission,
+    #[cfg(feature = "tcp")]
     Flag(Flags),
 }
 
-const KINDS: [(&str, Kind); 6] = [
+const KINDS: &[(&str, Kind)] = &[
     ("packet", Kind::Packet),
+    #[cfg(feature = "tcp")]
     ("segment", Kind::Segment),
     ("retransmission", Kind::Retransmission),
+    #[cfg(feature = "tcp")]
     ("SYN", Kind::Flag(Flags::SYN)),
+    #[cfg(feature = "tcp")]
     ("FIN", Kind::Flag(Flags::FIN)),
+    #[cfg(feature = "tcp")]
     ("RST", Kind::Flag(Flags::RST)),
 ];
+
+/// The words of [`KINDS`] in messages.
+const EXPECTED_KINDS: &str = if cfg!(feature = "tcp") {
+    "packet, segment, retransmission, SYN, FIN or RST"
+} else {
+    "packet or retransmission (segment, SYN, FIN and RST need the feature `tcp` of cohaptic-testkit)"
+};
 
 /// Reads a part of a line: at least one hit, parted by semicolons.
 pub(crate) fn parse(line: &str, part: Range<usize>) -> Result<Vec<Hit>, Fault> {
@@ -149,10 +163,9 @@ impl<'a> Reader<'a> {
             "first" => Some(1),
             _ => Some(ordinal(word).ok_or_else(|| (span, format!("unknown word \"{word}\": expected {WHICH}")))?),
         };
-        const EXPECTED: &str = "packet, segment, retransmission, SYN, FIN or RST";
-        let (word, span) = self.expect(EXPECTED)?;
-        let kind = KINDS.into_iter().find(|(name, _)| name.eq_ignore_ascii_case(word));
-        let (_, kind) = kind.ok_or_else(|| (span, format!("unknown word \"{word}\": expected {EXPECTED}")))?;
+        let (word, span) = self.expect(EXPECTED_KINDS)?;
+        let kind = KINDS.iter().find(|(name, _)| name.eq_ignore_ascii_case(word));
+        let &(_, kind) = kind.ok_or_else(|| (span, format!("unknown word \"{word}\": expected {EXPECTED_KINDS}")))?;
         let mut with = Vec::new();
         if self.peek().is_some_and(|(word, _)| word == "with") {
             self.next += 1;

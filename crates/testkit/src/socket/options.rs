@@ -202,7 +202,7 @@ impl UdpSocket {
     /// # Errors
     ///
     /// None: an error of the socket is given by the next call.
-    #[cfg(feature = "tokio")]
+    #[cfg(feature = "tokio-net")]
     pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         use tokio::io::Ready;
         if interest.is_readable() && !interest.is_writable() {
@@ -218,7 +218,7 @@ impl UdpSocket {
     /// # Errors
     ///
     /// Those of the operation; [`io::ErrorKind::WouldBlock`] if it is to read and there is nothing.
-    #[cfg(feature = "tokio")]
+    #[cfg(feature = "tokio-net")]
     pub fn try_io<R>(&self, interest: tokio::io::Interest, operation: impl FnOnce() -> io::Result<R>) -> io::Result<R> {
         if !interest.is_writable() && !self.shared.lock().is_readable(self.id) {
             return Err(io::ErrorKind::WouldBlock.into());
@@ -231,7 +231,7 @@ impl UdpSocket {
     /// # Errors
     ///
     /// Those of the operation, but for [`io::ErrorKind::WouldBlock`].
-    #[cfg(feature = "tokio")]
+    #[cfg(feature = "tokio-net")]
     pub async fn async_io<R>(&self, interest: tokio::io::Interest, mut operation: impl FnMut() -> io::Result<R>) -> io::Result<R> {
         loop {
             self.ready(interest).await?;

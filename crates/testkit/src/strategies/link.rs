@@ -33,11 +33,10 @@ pub struct ImpairedLink {
 }
 
 /// Why words are no link.
-#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum LinkError {
     /// They are no words of netem. The message has the line, and a mark under the word to blame.
-    #[error("{excerpt}")]
     Words {
         /// The words and the mark.
         excerpt: String,
@@ -45,8 +44,24 @@ pub enum LinkError {
         reason: NetemError,
     },
     /// They ask for what cannot be. Tables of distributions are not read from files here.
-    #[error(transparent)]
-    Exact(#[from] ExactError),
+    Exact(ExactError),
+}
+
+impl fmt::Display for LinkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Words { excerpt, .. } => write!(f, "{excerpt}"),
+            Self::Exact(error) => fmt::Display::fmt(error, f),
+        }
+    }
+}
+
+impl std::error::Error for LinkError {}
+
+impl From<ExactError> for LinkError {
+    fn from(error: ExactError) -> Self {
+        Self::Exact(error)
+    }
 }
 
 impl ImpairedLink {

@@ -37,23 +37,20 @@ pub struct ImpairedNetwork {
 }
 
 /// Why a text is no network.
-#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum NetworkTextError {
     /// The first line does not count hosts.
-    #[error("\"{found}\" does not count hosts: expected a first line such as \"3 hosts\", with 1 to {MOST}")]
     Hosts {
         /// The line.
         found: String,
     },
     /// A line is no link.
-    #[error("\"{found}\" is no link: expected a line such as \"a -> b: delay 24ms\"")]
     Line {
         /// The line.
         found: String,
     },
     /// There is no such host, or it would send to itself.
-    #[error("\"{found}\" is no link between two of the hosts {first} to {last}")]
     NoLink {
         /// The line.
         found: String,
@@ -63,7 +60,6 @@ pub enum NetworkTextError {
         last: String,
     },
     /// A link is said twice.
-    #[error("the link {from} -> {to} is said twice: expected it once")]
     Repeated {
         /// The sender.
         from: String,
@@ -71,7 +67,6 @@ pub enum NetworkTextError {
         to: String,
     },
     /// The words of a link are refused.
-    #[error("{from} -> {to}:\n{reason}")]
     Link {
         /// The sender.
         from: String,
@@ -81,6 +76,20 @@ pub enum NetworkTextError {
         reason: LinkError,
     },
 }
+
+impl fmt::Display for NetworkTextError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Hosts { found } => write!(f, "\"{found}\" does not count hosts: expected a first line such as \"3 hosts\", with 1 to {MOST}"),
+            Self::Line { found } => write!(f, "\"{found}\" is no link: expected a line such as \"a -> b: delay 24ms\""),
+            Self::NoLink { found, first, last } => write!(f, "\"{found}\" is no link between two of the hosts {first} to {last}"),
+            Self::Repeated { from, to } => write!(f, "the link {from} -> {to} is said twice: expected it once"),
+            Self::Link { from, to, reason } => write!(f, "{from} -> {to}:\n{reason}"),
+        }
+    }
+}
+
+impl std::error::Error for NetworkTextError {}
 
 impl ImpairedNetwork {
     /// Hosts whose links are all ideal.

@@ -16,9 +16,16 @@ pub struct JoinHandle<T> {
 }
 
 /// The task was stopped before it was over: by [`JoinHandle::abort`], or because its host crashed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("the task was stopped before it was over: it was aborted, or its host crashed")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TaskStopped;
+
+impl fmt::Display for TaskStopped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the task was stopped before it was over: it was aborted, or its host crashed")
+    }
+}
+
+impl std::error::Error for TaskStopped {}
 
 #[derive(Debug)]
 pub(crate) struct State<T> {

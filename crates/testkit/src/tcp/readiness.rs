@@ -110,7 +110,7 @@ impl TcpStream {
     /// # Errors
     ///
     /// None: an error of the connection is given by the next call.
-    #[cfg(feature = "tokio")]
+    #[cfg(feature = "tokio-net")]
     pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         poll_fn(|cx| {
             let ready = self.readiness(interest);
@@ -130,7 +130,7 @@ impl TcpStream {
     }
 
     /// What of these it can do now.
-    #[cfg(feature = "tokio")]
+    #[cfg(feature = "tokio-net")]
     fn readiness(&self, interest: tokio::io::Interest) -> tokio::io::Ready {
         use tokio::io::Ready;
         let core = self.shared.lock();
@@ -147,7 +147,7 @@ impl TcpStream {
     /// # Errors
     ///
     /// Those of the operation; [`io::ErrorKind::WouldBlock`] if it can do none of these now.
-    #[cfg(feature = "tokio")]
+    #[cfg(feature = "tokio-net")]
     pub fn try_io<R>(&self, interest: tokio::io::Interest, operation: impl FnOnce() -> io::Result<R>) -> io::Result<R> {
         if self.readiness(interest).is_empty() {
             return Err(io::ErrorKind::WouldBlock.into());
@@ -160,7 +160,7 @@ impl TcpStream {
     /// # Errors
     ///
     /// Those of the operation, but for [`io::ErrorKind::WouldBlock`].
-    #[cfg(feature = "tokio")]
+    #[cfg(feature = "tokio-net")]
     pub async fn async_io<R>(&self, interest: tokio::io::Interest, mut operation: impl FnMut() -> io::Result<R>) -> io::Result<R> {
         loop {
             self.ready(interest).await?;

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 
 use bytes::BufMut;
-use tokio::io::{Interest, ReadBuf, Ready};
+use tokio::io::ReadBuf;
 
 use super::TcpStream;
 
@@ -108,7 +108,8 @@ macro_rules! both {
         /// # Errors
         ///
         /// As there.
-        pub async fn ready(&self, interest: Interest) -> io::Result<Ready> {
+        #[cfg(feature = "tokio-net")]
+        pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
             self.stream().ready(interest).await
         }
 

@@ -12,7 +12,9 @@ use cohaptic_wan::{Network, Path};
 
 use super::Parcel;
 use super::exits::Exits;
-use crate::hit::{Laws, PacketLaw, Seen, Segment, SentPacket, Verdict};
+#[cfg(feature = "tcp")]
+use crate::hit::Segment;
+use crate::hit::{Laws, PacketLaw, Seen, SentPacket, Verdict};
 use crate::trace::PacketName;
 
 /// The laws of a run, and what they do.
@@ -91,7 +93,15 @@ impl<A: Clone> Hitting<A> {
     /// Asks the laws about a packet before it is offered to its link.
     pub(super) fn judge(&mut self, packet: PacketName, at: Instant, bytes: &[u8]) -> Verdict {
         let Some(on_path) = self.paths.get_mut(&packet.path) else { return Verdict::Pass };
+        #[cfg(feature = "tcp")]
         let segment = Segment::parse(bytes).ok();
+        #[cfg(feature = "tcp")]
+        let is_retransmission = match &segment {
+            Some(segment) => on_path.seen.note_segment(segment),
+            None => on_path.seen.note(bytes),
+        };
+        #[cfg(not(feature = "tcp"))]
+        let is_retransmission = on_path.seen.note(bytes);
         let sent = SentPacket {
             path: packet.path,
             from: &on_path.from,
@@ -99,7 +109,8 @@ impl<A: Clone> Hitting<A> {
             number: packet.sequence,
             at,
             bytes,
-            is_retransmission: on_path.seen.note(bytes, segment.as_ref()),
+            is_retransmission,
+            #[cfg(feature = "tcp")]
             segment: segment.as_ref(),
         };
         let mut verdict = Verdict::Pass;

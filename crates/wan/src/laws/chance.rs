@@ -4,6 +4,7 @@ use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
 use alloc::format;
 use alloc::string::String;
 use cohaptic_units::Probability;
+use core::fmt;
 
 /// A yes or no for every packet: the probability of yes, and how much it depends on the answer before.
 ///
@@ -16,10 +17,7 @@ pub struct Chance {
 }
 
 /// Why a chance is refused.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[error(
-    "events of probability {probability} cannot have the correlation {correlation} from one packet to the next: expected {least:.6} or more, and less than 1"
-)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChanceError {
     /// The probability.
     pub probability: Probability,
@@ -28,6 +26,18 @@ pub struct ChanceError {
     /// The least that such events can have.
     pub least: f64,
 }
+
+impl fmt::Display for ChanceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { probability, correlation, least } = self;
+        write!(
+            f,
+            "events of probability {probability} cannot have the correlation {correlation} from one packet to the next: expected {least:.6} or more, and less than 1"
+        )
+    }
+}
+
+impl core::error::Error for ChanceError {}
 
 impl Chance {
     /// Each packet for itself.

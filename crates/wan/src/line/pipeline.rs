@@ -7,6 +7,7 @@
 //! | anything else | an engine that keeps packets, copies them and asks to be woken |
 
 use alloc::boxed::Box;
+use core::fmt;
 
 use cohaptic_units::Instant;
 
@@ -26,14 +27,22 @@ use crate::stages::order::{Order, OrderStage};
 use crate::stages::queue::BottleneckStage;
 
 /// Time was given that is earlier than a time given before. Nothing was changed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("time went back to {now} after {was}")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TimeWentBack {
     /// The time given.
     pub now: Instant,
     /// The latest time given before.
     pub was: Instant,
 }
+
+impl fmt::Display for TimeWentBack {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { now, was } = self;
+        write!(f, "time went back to {now} after {was}")
+    }
+}
+
+impl core::error::Error for TimeWentBack {}
 
 /// Checks that time does not go back, and remembers it.
 pub(crate) fn check_time(clock: &mut Instant, now: Instant) -> Result<(), TimeWentBack> {

@@ -2,6 +2,7 @@
 
 use alloc::format;
 use alloc::string::{String, ToString};
+use core::fmt;
 use core::ops::Range;
 
 use cohaptic_units::Spot;
@@ -9,8 +10,7 @@ use cohaptic_units::Spot;
 use super::Contradiction;
 
 /// Why the words are no netem, and which of them is to blame.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("{kind}")]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct NetemError {
     /// The fault.
     pub kind: NetemErrorKind,
@@ -18,17 +18,24 @@ pub struct NetemError {
     pub span: Range<usize>,
 }
 
+impl fmt::Display for NetemError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, .. } = self;
+        write!(f, "{kind}")
+    }
+}
+
+impl core::error::Error for NetemError {}
+
 /// A fault in the words of a netem.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum NetemErrorKind {
     /// A word where an option was expected.
-    #[error("unknown word \"{word}\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, slot, seed or the end")]
     UnknownWord {
         /// The word.
         word: String,
     },
     /// A word that is not what its option takes.
-    #[error("\"{word}\" is not what {option} takes here: expected {expected}")]
     Value {
         /// The option.
         option: &'static str,
@@ -38,7 +45,6 @@ pub enum NetemErrorKind {
         expected: &'static str,
     },
     /// The end, where an option lacks a value.
-    #[error("{option} ends too early: expected {expected} after it")]
     Missing {
         /// The option.
         option: &'static str,
@@ -46,14 +52,35 @@ pub enum NetemErrorKind {
         expected: &'static str,
     },
     /// An option said before. `tc` would take the last, mixed with what it leaves out.
-    #[error("{option} is said twice: expected it once")]
     Repeated {
         /// The option.
         option: &'static str,
     },
     /// Options that do not go together.
-    #[error(transparent)]
-    Contradiction(#[from] Contradiction),
+    Contradiction(Contradiction),
+}
+
+impl fmt::Display for NetemErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownWord { word } => write!(
+                f,
+                "unknown word \"{word}\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, slot, seed or the end"
+            ),
+            Self::Value { option, word, expected } => write!(f, "\"{word}\" is not what {option} takes here: expected {expected}"),
+            Self::Missing { option, expected } => write!(f, "{option} ends too early: expected {expected} after it"),
+            Self::Repeated { option } => write!(f, "{option} is said twice: expected it once"),
+            Self::Contradiction(error) => fmt::Display::fmt(error, f),
+        }
+    }
+}
+
+impl core::error::Error for NetemErrorKind {}
+
+impl From<Contradiction> for NetemErrorKind {
+    fn from(error: Contradiction) -> Self {
+        Self::Contradiction(error)
+    }
 }
 
 impl NetemError {

@@ -4,6 +4,7 @@
 //! `docs/netem.md` says the meaning word by word, and what the kernel does instead.
 
 use alloc::sync::Arc;
+use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::print::Span;
@@ -21,15 +22,11 @@ use crate::stages::reorder::{Displacement, Reorder};
 use crate::stages::slots::Slots;
 
 /// Why words that `tc` accepts ask for what cannot be.
-#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Debug)]
 pub enum ExactError {
     /// Options that do not go together.
-    #[error(transparent)]
-    Contradiction(#[from] Contradiction),
+    Contradiction(Contradiction),
     /// A law with a least value that would begin below zero. netem sends at once what should leave before it came, which is another law with another mean.
-    #[error(
-        "{option}: {law} jitter of {} around {} begins below zero: expected a jitter of at most {}", Span(*jitter), Span(*mean), Span(*largest)
-    )]
     BelowZero {
         /// The option.
         option: &'static str,
@@ -43,7 +40,6 @@ pub enum ExactError {
         largest: Duration,
     },
     /// A delay or a gap between slots that no law has.
-    #[error("{option}: {reason}")]
     Delay {
         /// The option.
         option: &'static str,
@@ -51,7 +47,6 @@ pub enum ExactError {
         reason: DelayError,
     },
     /// A correlation that such events cannot have.
-    #[error("{option}: {reason}")]
     Chance {
         /// The option.
         option: &'static str,
@@ -59,23 +54,54 @@ pub enum ExactError {
         reason: ChanceError,
     },
     /// A four-state chain that cannot be.
-    #[error("loss state: {0}")]
     State(FourStateError),
     /// A table that nobody has.
-    #[error("distribution {}: there is no such table: expected uniform, normal, pareto, paretonormal or a file {}.dist", .0.as_str(), .0.as_str())]
     NoTable(TableName),
     /// A rate that cannot be counted in bits.
-    #[error("rate: {bytes_per_sec} bytes/s are more bits than can be counted: expected at most {} bytes/s", u64::MAX / 8)]
     Rate {
         /// The rate.
         bytes_per_sec: u64,
     },
     /// A cell that is smaller on the line than what it carries.
-    #[error("rate: a cell overhead of {found} bytes: expected zero or more")]
     CellOverhead {
         /// What was said.
         found: i32,
     },
+}
+
+impl fmt::Display for ExactError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Contradiction(error) => fmt::Display::fmt(error, f),
+            Self::BelowZero { option, law, mean, jitter, largest } => write!(
+                f,
+                "{option}: {law} jitter of {} around {} begins below zero: expected a jitter of at most {}",
+                Span(*jitter),
+                Span(*mean),
+                Span(*largest)
+            ),
+            Self::Delay { option, reason } => write!(f, "{option}: {reason}"),
+            Self::Chance { option, reason } => write!(f, "{option}: {reason}"),
+            Self::State(error) => write!(f, "loss state: {error}"),
+            Self::NoTable(name) => write!(
+                f,
+                "distribution {0}: there is no such table: expected uniform, normal, pareto, paretonormal or a file {0}.dist",
+                name.as_str()
+            ),
+            Self::Rate { bytes_per_sec } => {
+                write!(f, "rate: {bytes_per_sec} bytes/s are more bits than can be counted: expected at most {} bytes/s", u64::MAX / 8)
+            }
+            Self::CellOverhead { found } => write!(f, "rate: a cell overhead of {found} bytes: expected zero or more"),
+        }
+    }
+}
+
+impl core::error::Error for ExactError {}
+
+impl From<Contradiction> for ExactError {
+    fn from(error: Contradiction) -> Self {
+        Self::Contradiction(error)
+    }
 }
 
 impl ExactError {

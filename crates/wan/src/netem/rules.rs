@@ -1,46 +1,58 @@
 //! Which options contradict each other.
 
+use core::fmt;
 use core::time::Duration;
 
 use super::{DelaySpec, GemodelSpec, LossSpec, Netem, Percent, SlotGap, SlotSpec, StateSpec};
 
 /// Two options that cannot both be meant, or one that lacks another.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Contradiction {
     /// There is nothing to overtake.
-    #[error("reorder sends packets before those that wait: expected a delay above zero beside it")]
     ReorderWithoutDelay,
     /// A gap says which packets may be reordered.
-    #[error("gap says which packets are reordered: expected reorder above 0 % beside it")]
     GapWithoutReorder,
     /// A mark stands for a loss.
-    #[error("ecn marks packets that would be lost: expected a loss above 0 % beside it")]
     EcnWithoutLoss,
     /// A distribution has something to distribute.
-    #[error("a distribution is that of the jitter: expected delay TIME JITTER, both above zero, beside it")]
     DistributionWithoutJitter,
     /// p13 + p14 is above 1.
-    #[error("p13 and p14 are the ways out of state 1: expected a sum of at most 100 %")]
     WaysOutOfState1,
     /// p31 + p32 is above 1.
-    #[error("p31 and p32 are the ways out of state 3: expected a sum of at most 100 %")]
     WaysOutOfState3,
     /// A model's probability was given without one that has to be said before it.
-    #[error("a loss model's probabilities can only be said in order: expected those before it too")]
     ProbabilitySkipped,
     /// The longest is shorter than the shortest.
-    #[error("the longest gap between slots is shorter than the shortest: expected at least the shortest")]
     SlotRange,
     /// A slot distribution without deviation.
-    #[error("a slot distribution without deviation: expected a jitter above zero")]
     SlotWithoutJitter,
     /// More than the kernel's signed 32 bits count.
-    #[error("expected at most 2147483647 packets and bytes in a slot")]
     SlotTooLarge,
     /// Longer than the kernel's 64 bits count.
-    #[error("expected times below 292 years")]
     TimeTooLong,
 }
+
+impl fmt::Display for Contradiction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ReorderWithoutDelay => f.write_str("reorder sends packets before those that wait: expected a delay above zero beside it"),
+            Self::GapWithoutReorder => f.write_str("gap says which packets are reordered: expected reorder above 0 % beside it"),
+            Self::EcnWithoutLoss => f.write_str("ecn marks packets that would be lost: expected a loss above 0 % beside it"),
+            Self::DistributionWithoutJitter => {
+                f.write_str("a distribution is that of the jitter: expected delay TIME JITTER, both above zero, beside it")
+            }
+            Self::WaysOutOfState1 => f.write_str("p13 and p14 are the ways out of state 1: expected a sum of at most 100 %"),
+            Self::WaysOutOfState3 => f.write_str("p31 and p32 are the ways out of state 3: expected a sum of at most 100 %"),
+            Self::ProbabilitySkipped => f.write_str("a loss model's probabilities can only be said in order: expected those before it too"),
+            Self::SlotRange => f.write_str("the longest gap between slots is shorter than the shortest: expected at least the shortest"),
+            Self::SlotWithoutJitter => f.write_str("a slot distribution without deviation: expected a jitter above zero"),
+            Self::SlotTooLarge => f.write_str("expected at most 2147483647 packets and bytes in a slot"),
+            Self::TimeTooLong => f.write_str("expected times below 292 years"),
+        }
+    }
+}
+
+impl core::error::Error for Contradiction {}
 
 impl Contradiction {
     /// The option that should be said otherwise.

@@ -2,6 +2,7 @@
 
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::fmt;
 
 use super::id::NodeId;
 use crate::line::pipeline::TimeWentBack;
@@ -66,13 +67,11 @@ pub struct NetworkConfig {
 }
 
 /// Why a call failed. Nothing was changed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum NetworkError {
     /// An earlier call had a later instant.
-    #[error(transparent)]
-    TimeWentBack(#[from] TimeWentBack),
+    TimeWentBack(TimeWentBack),
     /// There is no such node, or sender and receiver are the same.
-    #[error("there is no link from node {} to node {}", from.0, to.0)]
     NoLink {
         /// The sender.
         from: NodeId,
@@ -80,6 +79,23 @@ pub enum NetworkError {
         to: NodeId,
     },
     /// There is no such access line.
-    #[error("there is no {0:?}")]
     NoLine(AccessLine),
+}
+
+impl fmt::Display for NetworkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TimeWentBack(error) => fmt::Display::fmt(error, f),
+            Self::NoLink { from, to } => write!(f, "there is no link from node {} to node {}", from.0, to.0),
+            Self::NoLine(line) => write!(f, "there is no {line:?}"),
+        }
+    }
+}
+
+impl core::error::Error for NetworkError {}
+
+impl From<TimeWentBack> for NetworkError {
+    fn from(error: TimeWentBack) -> Self {
+        Self::TimeWentBack(error)
+    }
 }

@@ -5,6 +5,7 @@ use alloc::format;
 use alloc::string::String;
 use alloc::string::ToString as _;
 use alloc::sync::Arc;
+use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
@@ -73,13 +74,9 @@ enum Memory {
 }
 
 /// Why a delay is refused.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub enum DelayError {
     /// A law with a least value would begin below the floor, where it could not be kept, or its deviation is too large for its mean.
-    #[error(
-        "{law} jitter with a standard deviation of {} around {} does not stay above the least delay of {}: expected a deviation of at most {}",
-        Span(*sd), Span(*mean), Span(*floor), Span(*largest)
-    )]
     ReachesBelowFloor {
         /// The name of the law.
         law: &'static str,
@@ -93,7 +90,6 @@ pub enum DelayError {
         largest: Duration,
     },
     /// The floor lies above the mean.
-    #[error("the mean delay of {} is below the least delay of {}: expected a mean at or above it", Span(*mean), Span(*floor))]
     FloorAboveMean {
         /// The mean delay.
         mean: Duration,
@@ -101,7 +97,6 @@ pub enum DelayError {
         floor: Duration,
     },
     /// No delays with this law have this correlation.
-    #[error("delays with this law cannot have the correlation {asked} from one packet to the next: expected {least:.6} or more, and less than 1")]
     Correlation {
         /// What was asked for.
         asked: f64,
@@ -109,12 +104,36 @@ pub enum DelayError {
         least: f64,
     },
     /// A correlation time of zero.
-    #[error("a correlation time of 0s: expected a time above zero, or no correlation")]
     NoTime,
     /// More than 292 years, which cannot be counted with a sign.
-    #[error("a delay and its deviation must be below 292 years")]
     TooLong,
 }
+
+impl fmt::Display for DelayError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ReachesBelowFloor { law, mean, sd, floor, largest } => write!(
+                f,
+                "{law} jitter with a standard deviation of {} around {} does not stay above the least delay of {}: expected a deviation of at most {}",
+                Span(*sd),
+                Span(*mean),
+                Span(*floor),
+                Span(*largest)
+            ),
+            Self::FloorAboveMean { mean, floor } => {
+                write!(f, "the mean delay of {} is below the least delay of {}: expected a mean at or above it", Span(*mean), Span(*floor))
+            }
+            Self::Correlation { asked, least } => write!(
+                f,
+                "delays with this law cannot have the correlation {asked} from one packet to the next: expected {least:.6} or more, and less than 1"
+            ),
+            Self::NoTime => f.write_str("a correlation time of 0s: expected a time above zero, or no correlation"),
+            Self::TooLong => f.write_str("a delay and its deviation must be below 292 years"),
+        }
+    }
+}
+
+impl core::error::Error for DelayError {}
 
 /// The longest delay and deviation: what an `i64` of nanoseconds holds.
 const LONGEST: Duration = Duration::from_nanos(i64::MAX.unsigned_abs());

@@ -6,6 +6,7 @@
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::fmt;
 
 use cohaptic_units::Instant;
 
@@ -32,13 +33,11 @@ pub struct ModulatorState {
 }
 
 /// Why a modulator is refused. States count from 0.
-#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Debug)]
 pub enum ModulatorError {
     /// There is no state.
-    #[error("a modulator without states: expected at least one")]
     NoStates,
     /// A state names more or fewer states than there are.
-    #[error("state {state} says how likely {found} states come next: expected {expected}, one for each")]
     Size {
         /// Which state.
         state: usize,
@@ -48,7 +47,6 @@ pub enum ModulatorError {
         expected: usize,
     },
     /// A likelihood or a rate is negative or no number, or a state follows itself.
-    #[error("state {state} cannot be followed by state {next} with {value}: expected a finite number, not negative, and 0 for the state itself")]
     Weight {
         /// Which state.
         state: usize,
@@ -58,16 +56,13 @@ pub enum ModulatorError {
         value: f64,
     },
     /// A state ends and nothing follows, or its time is no time.
-    #[error("state {state} ends, but no state follows it, or it lasts no time: expected a next state and a time above zero")]
     Ends {
         /// Which state.
         state: usize,
     },
     /// The configurations have their stages in different orders.
-    #[error("configurations with their stages in different orders: expected one order for all states")]
     Layouts,
     /// There are more or fewer configurations than states.
-    #[error("{configs} configurations for {states} states: expected one for each")]
     Configs {
         /// How many configurations.
         configs: usize,
@@ -75,6 +70,28 @@ pub enum ModulatorError {
         states: usize,
     },
 }
+
+impl fmt::Display for ModulatorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoStates => f.write_str("a modulator without states: expected at least one"),
+            Self::Size { state, found, expected } => {
+                write!(f, "state {state} says how likely {found} states come next: expected {expected}, one for each")
+            }
+            Self::Weight { state, next, value } => write!(
+                f,
+                "state {state} cannot be followed by state {next} with {value}: expected a finite number, not negative, and 0 for the state itself"
+            ),
+            Self::Ends { state } => {
+                write!(f, "state {state} ends, but no state follows it, or it lasts no time: expected a next state and a time above zero")
+            }
+            Self::Layouts => f.write_str("configurations with their stages in different orders: expected one order for all states"),
+            Self::Configs { configs, states } => write!(f, "{configs} configurations for {states} states: expected one for each"),
+        }
+    }
+}
+
+impl core::error::Error for ModulatorError {}
 
 impl Modulator {
     /// A chain with these states.

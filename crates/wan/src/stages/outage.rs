@@ -5,6 +5,7 @@ use alloc::string::String;
 use alloc::string::ToString as _;
 use alloc::vec::Vec;
 use cohaptic_units::print::{Counted, Span};
+use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
@@ -51,10 +52,9 @@ pub struct IdleOutages {
 }
 
 /// Why a list of outages is refused. The index counts from zero in the order given.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OutagesError {
     /// The outage ends before it begins, or when it begins.
-    #[error("outage {index} ends at {to}, which is not after {from} when it begins")]
     Empty {
         /// Which outage.
         index: usize,
@@ -64,7 +64,6 @@ pub enum OutagesError {
         to: Instant,
     },
     /// The outage begins before the one listed before it has ended.
-    #[error("outage {index} begins at {from}, before the one listed before it has ended at {ended}")]
     Overlap {
         /// Which outage.
         index: usize,
@@ -74,9 +73,22 @@ pub enum OutagesError {
         ended: Instant,
     },
     /// A span that never ends, or has no law.
-    #[error("a link must be up and down for some time: expected spans above zero, the longest not below the shortest")]
     NoTime,
 }
+
+impl fmt::Display for OutagesError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty { index, from, to } => write!(f, "outage {index} ends at {to}, which is not after {from} when it begins"),
+            Self::Overlap { index, from, ended } => {
+                write!(f, "outage {index} begins at {from}, before the one listed before it has ended at {ended}")
+            }
+            Self::NoTime => f.write_str("a link must be up and down for some time: expected spans above zero, the longest not below the shortest"),
+        }
+    }
+}
+
+impl core::error::Error for OutagesError {}
 
 impl Outages {
     /// Checks the list.

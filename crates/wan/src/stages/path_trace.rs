@@ -2,6 +2,7 @@
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::fmt;
 use core::time::Duration;
 
 use crate::parameters::{Form, Key, Table, required, usual};
@@ -37,13 +38,11 @@ struct Row {
 }
 
 /// Why a recording is refused. Lines count from 1.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum PathTraceError {
     /// The first line names no such columns.
-    #[error("line 1: expected the columns t,delay or t,delay,loss")]
     Header,
     /// A row has another number of columns.
-    #[error("line {line}: expected {expected} columns")]
     Columns {
         /// Which line.
         line: usize,
@@ -51,7 +50,6 @@ pub enum PathTraceError {
         expected: usize,
     },
     /// A value is no number, or not one that it can be.
-    #[error("line {line}, column {column}: expected {expected}")]
     Value {
         /// Which line.
         line: usize,
@@ -61,18 +59,30 @@ pub enum PathTraceError {
         expected: &'static str,
     },
     /// A row is not later than the one above.
-    #[error("line {line}: expected a time later than that of the row above")]
     Order {
         /// Which line.
         line: usize,
     },
     /// There is no row.
-    #[error("no row below the columns: expected at least one")]
     Empty,
     /// It cannot be repeated, because it takes no time.
-    #[error("a recording that repeats needs a last row later than 0 s")]
     NoLength,
 }
+
+impl fmt::Display for PathTraceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Header => f.write_str("line 1: expected the columns t,delay or t,delay,loss"),
+            Self::Columns { line, expected } => write!(f, "line {line}: expected {expected} columns"),
+            Self::Value { line, column, expected } => write!(f, "line {line}, column {column}: expected {expected}"),
+            Self::Order { line } => write!(f, "line {line}: expected a time later than that of the row above"),
+            Self::Empty => f.write_str("no row below the columns: expected at least one"),
+            Self::NoLength => f.write_str("a recording that repeats needs a last row later than 0 s"),
+        }
+    }
+}
+
+impl core::error::Error for PathTraceError {}
 
 impl PathTrace {
     /// Reads a CSV: a line with the columns `t,delay` or `t,delay,loss`, then one row a line, times in seconds, loss as a probability from 0 to 1. An empty

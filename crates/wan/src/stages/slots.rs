@@ -6,6 +6,7 @@ use alloc::string::String;
 use alloc::string::ToString as _;
 use alloc::vec::Vec;
 use cohaptic_units::print::{Counted, Span};
+use core::fmt;
 use core::num::NonZeroU64;
 use core::time::Duration;
 
@@ -45,14 +46,22 @@ pub enum SlotGap {
 }
 
 /// The longest gap is shorter than the shortest.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("gaps between slots of {} to {}: expected the longest not below the shortest", cohaptic_units::print::Span(*min), cohaptic_units::print::Span(*max))]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SlotsError {
     /// The shortest.
     pub min: Duration,
     /// The longest.
     pub max: Duration,
 }
+
+impl fmt::Display for SlotsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { min, max } = self;
+        write!(f, "gaps between slots of {} to {}: expected the longest not below the shortest", Span(*min), Span(*max))
+    }
+}
+
+impl core::error::Error for SlotsError {}
 
 impl Slots {
     /// Slots whose gaps are uniform between two spans, and that take anything.

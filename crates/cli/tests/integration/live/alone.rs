@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 use super::records::{assert_replays, assert_same, inputs, trajectory};
 use super::session::Session;
 use super::{PATIENCE, wait_for};
-use crate::desk::{Desk, parse};
-use crate::scenes::{RANDOM, TWO};
+use crate::integration::desk::{Desk, parse};
+use crate::integration::scenes::{RANDOM, TWO};
 
 /// Everything that can happen to a scene without anybody outside: chance, queues, outages, and a timeline that changes all there is to change.
 fn eventful() -> String {

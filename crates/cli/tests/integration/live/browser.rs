@@ -10,7 +10,7 @@ use serde_json::json;
 use super::peer::Peer;
 use super::peer_elsewhere::{SCENE, keyless};
 use super::session::Session;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// Waits until the picture of the copies changes, again and again: they move.
 fn wait_moving(browser: &mut Browser) {
@@ -22,6 +22,7 @@ fn wait_moving(browser: &mut Browser) {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_person_moves_the_slider_of_a_session_and_sees_the_delay_change() {
     let Some(mut browser) = Browser::start() else { return };
     let scene = SCENE.replace("duration = \"1h\"", "title = \"Lifting a box together\", duration = \"1h\"");

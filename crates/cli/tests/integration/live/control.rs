@@ -8,8 +8,8 @@ use super::http::Control;
 use super::records::{assert_replays, inputs, packets};
 use super::session::Session;
 use super::wait_for;
-use crate::desk::Desk;
-use crate::scenes::TWO;
+use crate::integration::desk::Desk;
+use crate::integration::scenes::TWO;
 
 fn milliseconds(count: u64) -> u64 {
     count * 1_000_000

@@ -11,7 +11,7 @@ use super::http::Control;
 use super::peer::SESSION;
 use super::session::Session;
 use super::wait_for;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// Somebody who holds on to 0, the programs, and perhaps a third user who lets the object go where it will. All but the damping is what the programs take unless told.
 fn scene(programs: usize) -> String {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::records::{Packet, Tick, trajectory};
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// Of the scene: KT [N/m], BT [N·s/m], and the share of `fade` that a tick is.
 const STIFFNESS: f64 = 600.0;

@@ -17,7 +17,7 @@ use super::peer::{Account, Peer, SESSION};
 use super::records::{Input, Packet, assert_counted, assert_replays, inputs, packets, releases};
 use super::session::Session;
 use super::wait_for;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// A user who moves, a program, and a user who holds on to a place; each pair sees each other through chance.
 pub(super) const SCENE: &str = r#"

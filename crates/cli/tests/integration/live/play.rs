@@ -11,7 +11,7 @@ use tungstenite::{Message, WebSocket};
 use super::http::Control;
 use super::session::Session;
 use super::{PATIENCE, wait_for};
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// A page that has a hand.
 pub(super) struct Page(WebSocket<TcpStream>);

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::browser::chromium::Browser;
 use super::play_page::{cube, end, millimetres, open, release};
 use super::session::Session;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 fn key(browser: &mut Browser, kind: &str, key: &str, code: u32) {
     browser.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code }));
@@ -45,6 +45,7 @@ fn swing(browser: &mut Browser, arrow: &str, code: u32) {
 
 /// The first minute of somebody who has no mouse: the three steps, and a comparison.
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn three_steps_and_a_comparison_by_keys_alone() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
@@ -86,6 +87,7 @@ fn three_steps_and_a_comparison_by_keys_alone() {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_finger_on_a_phone_will_do_and_every_control_has_a_name() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
@@ -162,6 +164,7 @@ const CONTRAST: &str = "(() => {
 })()";
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn texts_have_contrast_on_light_and_on_dark_ground() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
@@ -199,6 +202,7 @@ fn moves(browser: &mut Browser) -> bool {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn with_reduced_motion_nothing_flies_and_the_hand_still_moves() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
@@ -228,6 +232,7 @@ const FAKED: &str = "
 
 /// No gamepad was at hand, so that the page meets one that is faked: it is read by the rules of the Gamepad API, and its motors are driven by them.
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_stick_moves_the_hand_and_motors_give_its_force() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
@@ -279,10 +284,11 @@ fn a_stick_moves_the_hand_and_motors_give_its_force() {
 
 /// A tray that turns, from a scene without a pointer: the visitor gets the hand of the first peer, and lifts a corner.
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn an_object_that_turns_is_held_by_its_corner() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
-    let mut session = Session::play(&desk, &crate::desk::shipped("rigid/tray.toml").display().to_string());
+    let mut session = Session::play(&desk, &crate::integration::desk::shipped("rigid/tray.toml").display().to_string());
     let url = session.told("open ");
     assert!(session.told("the pointer of the page ").contains("hand of north-east"));
     let control = super::http::Control::at(&url);

@@ -6,7 +6,7 @@ use super::browser::chromium::Browser;
 use super::http::Control;
 use super::records::trajectory;
 use super::session::Session;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// The middle of the own room, where the cube is.
 pub(super) fn cube(browser: &mut Browser) -> [f64; 2] {
@@ -42,6 +42,7 @@ pub(super) fn millimetres(browser: &mut Browser, peer: usize) -> f64 {
 
 /// The first minute of somebody who has read nothing: drags, raises the delay, changes to PD, and compares.
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn somebody_drags_takes_three_steps_and_compares() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
@@ -90,6 +91,7 @@ fn somebody_drags_takes_three_steps_and_compares() {
 /// The other copies begin to move when the first sample with a motion in it has arrived: one delay after the own copy, and at most a period of sending and a
 /// tick later.
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn the_copies_follow_with_the_delay_that_was_set() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
@@ -121,6 +123,7 @@ fn the_copies_follow_with_the_delay_that_was_set() {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_lost_connection_is_shown_and_comes_back() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// A row of `packets.csv`; times in nanoseconds.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::http::Control;
 use super::{PATIENCE, wait_for};
-use crate::desk::{Desk, Outcome, parse};
+use crate::integration::desk::{Desk, Outcome, parse};
 
 /// `cohaptic live`, which ends with the test.
 pub(super) struct Session {

@@ -13,7 +13,7 @@ use super::peer_elsewhere::{SCENE, assert_sent_by, keyless};
 use super::records::{assert_counted, assert_replays, inputs, trajectory};
 use super::session::Session;
 use super::wait_for;
-use crate::desk::Desk;
+use crate::integration::desk::Desk;
 
 /// How many of each kind he sends.
 const ROUNDS: u64 = 250;

@@ -10,8 +10,8 @@ mod keys;
 
 use std::fs;
 
-use crate::page::UPDATE;
-use crate::root;
+use crate::pages::page::UPDATE;
+use crate::pages::root;
 
 /// Of a page that is written here.
 const WRITTEN: &str = "<!-- Written by the tests in crates/cli/tests/pages/reference from what the program says of itself. Do not edit. -->";

@@ -53,6 +53,7 @@ fn in_dark(browser: &mut Browser, dark: bool) {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_person_sees_the_run_and_changes_it() {
     let Some(mut browser) = Browser::start() else { return };
     let run = Run::moving(6, 3, 1, 0);
@@ -165,6 +166,7 @@ fn survives_the_server(mut browser: Browser, run: Run) {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_hundred_links_are_as_good_as_six() {
     let Some(mut browser) = Browser::start() else { return };
     let run = Run::moving(100, 4, 2, 0);
@@ -217,6 +219,7 @@ fn look_from(browser: &mut Browser, slider: &str, degrees: i64) {
 /// A plate of 0.4 m × 0.3 m from above, from the front and from the side, as it is and after a quarter turn about z. A line is 1.8 px wide, and colours fade at its
 /// borders; the depth of the plate (3 % of its length, so that it is seen from the side) changes the scale of the nearer face by 0.4 %.
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn an_object_that_turns_is_drawn_in_depth() {
     let Some(mut browser) = Browser::start() else { return };
     let half = core::f64::consts::FRAC_1_SQRT_2;
@@ -263,6 +266,7 @@ fn enters_the_token(browser: &mut Browser, run: &Run) {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
 fn one_link_without_peers_is_enough() {
     let Some(mut browser) = Browser::start() else { return };
     let run = Run::moving(1, 0, 0, 0);

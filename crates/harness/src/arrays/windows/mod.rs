@@ -44,8 +44,7 @@ pub(crate) fn run_in_watched_windows(scene: &Scene, law: (Shape, BuiltIn), plan:
 fn run(scene: &Scene, law: (Shape, BuiltIn), devices: Option<&[DeviceChoice]>, watch: WindowWatch<'_>) -> Option<Summary> {
     match scene.axes {
         Axes::One => Windows::<1>::new(scene, law, devices).run(watch),
-        Axes::Two => Windows::<2>::new(scene, law, devices).run(watch),
-        Axes::Three => Windows::<3>::new(scene, law, devices).run(watch),
+        Axes::Two | Axes::Three => Windows::<3>::new(scene, law, devices).run(watch),
     }
 }
 

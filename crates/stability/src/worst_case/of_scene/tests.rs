@@ -168,6 +168,7 @@ fn a_delay_that_does_not_change_has_the_nominal_radius() {
 }
 
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn losing_together_the_parts_are_the_whole() {
     for overrides in
         [&["scene.count=3"][..], &["scene.count=3", "link.delay=24ms"], &["scene.count=3", "peers=[{ name = \"peer1\", contact = \"none\" }]"]]
@@ -212,6 +213,7 @@ fn losing_together_any_number_of_equal_peers_costs_the_same() {
 
 /// For three peers, each kind of frame by itself says how near the bound for equal peers is.
 #[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
 fn each_link_on_its_own_is_bounded_as_by_all_kinds_of_frame() {
     for (overrides, patterns, most) in [
         (&["scene.count=3"][..], patterns(1, None, Links::Each), 0.06),

@@ -18,7 +18,7 @@ const CODE: [&str; 6] = [
     include_str!("nodes.rs"),
     include_str!("../../programs/phone/each_part.rs"),
     include_str!("../../programs/phone/whole_photo.rs"),
-    include_str!("../../../../../tests/tests/testkit/chapter.rs"),
+    include_str!("../../../../../tests/testkit/chapter.rs"),
 ];
 
 /// The test that the page begins with.
@@ -59,7 +59,7 @@ fn the_page_begins_with_a_service_and_its_test_in_ten_lines() {
 #[test]
 fn the_files_that_are_shown_are_there() {
     assert!(blocks("text").contains(&include_str!("../../home.links")));
-    assert_eq!(blocks("toml"), [include_str!("../../../../../tests/tests/testkit/room.toml")]);
+    assert_eq!(blocks("toml"), [include_str!("../../../../../tests/testkit/room.toml")]);
 }
 
 /// What a program panics with.

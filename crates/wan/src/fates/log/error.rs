@@ -9,16 +9,14 @@ use super::row::FateRow;
 use crate::fates::fate::DropCause;
 
 /// Why a text or a list of records is no complete fate log. Lines are counted from 1, the header being line 1.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum FateLogError {
     /// The first line is not the header.
-    #[error("line 1: found \"{found}\", expected the header \"{}\"", FateRow::HEADER)]
     Header {
         /// The first line.
         found: String,
     },
     /// A row does not have eight cells.
-    #[error("line {line}: found {found} cells, expected {} ({})", FateRow::COLUMNS.len(), FateRow::HEADER)]
     Cells {
         /// The line.
         line: u64,
@@ -26,7 +24,6 @@ pub enum FateLogError {
         found: usize,
     },
     /// A cell cannot be read.
-    #[error("line {line}, column {column}: found \"{found}\", expected {expected}")]
     Cell {
         /// The line.
         line: u64,
@@ -38,7 +35,6 @@ pub enum FateLogError {
         expected: &'static str,
     },
     /// The fate has no such name.
-    #[error("line {line}, column fate: found \"{found}\", expected {FateNames}")]
     UnknownFate {
         /// The line.
         line: u64,
@@ -46,7 +42,6 @@ pub enum FateLogError {
         found: String,
     },
     /// A packet has no row, though a later one has.
-    #[error("packet {sequence} has no row, though line {line} has packet {later}: expected every packet from 0")]
     Missing {
         /// The packet without a row.
         sequence: u64,
@@ -56,7 +51,6 @@ pub enum FateLogError {
         later: u64,
     },
     /// A packet was offered before the one before it.
-    #[error("line {line}: offered at {offered}, expected not before the packet before it (line {earlier_line}: {earlier})")]
     OfferedBefore {
         /// The line.
         line: u64,
@@ -68,7 +62,6 @@ pub enum FateLogError {
         earlier: Instant,
     },
     /// Something happened to a packet before it was offered, or its arrival has two instants.
-    #[error("line {line}: offered at {offered} and done with at {at}: expected an instant not before it was offered, and the same in the fate")]
     ImpossibleTime {
         /// The line.
         line: u64,
@@ -78,7 +71,6 @@ pub enum FateLogError {
         at: Instant,
     },
     /// Two rows of a packet differ in when it was offered or in its size.
-    #[error("line {line}: packet {sequence} has another size or offering instant than on line {other_line}")]
     Contradiction {
         /// The packet.
         sequence: u64,
@@ -88,7 +80,6 @@ pub enum FateLogError {
         other_line: u64,
     },
     /// A packet or copy ends twice.
-    #[error("line {line}: copy {copy} of packet {sequence} has a second end: expected one row `delivered` or with a drop cause")]
     TwoEnds {
         /// The packet.
         sequence: u64,
@@ -98,7 +89,6 @@ pub enum FateLogError {
         line: u64,
     },
     /// A packet or copy never ends.
-    #[error("copy {copy} of packet {sequence} has no end: expected a row `delivered` or with a drop cause (was the log cut off?)")]
     NoEnd {
         /// The packet.
         sequence: u64,
@@ -106,7 +96,6 @@ pub enum FateLogError {
         copy: u64,
     },
     /// There are more copies than were made.
-    #[error("packet {sequence} has {copies} copies beyond itself and {made} rows `duplicated`: expected as many of one as of the other")]
     CopyFromNowhere {
         /// The packet.
         sequence: u64,
@@ -116,6 +105,41 @@ pub enum FateLogError {
         made: u64,
     },
 }
+
+impl fmt::Display for FateLogError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Header { found } => write!(f, "line 1: found \"{found}\", expected the header \"{}\"", FateRow::HEADER),
+            Self::Cells { line, found } => write!(f, "line {line}: found {found} cells, expected {} ({})", FateRow::COLUMNS.len(), FateRow::HEADER),
+            Self::Cell { line, column, found, expected } => write!(f, "line {line}, column {column}: found \"{found}\", expected {expected}"),
+            Self::UnknownFate { line, found } => write!(f, "line {line}, column fate: found \"{found}\", expected {FateNames}"),
+            Self::Missing { sequence, line, later } => {
+                write!(f, "packet {sequence} has no row, though line {line} has packet {later}: expected every packet from 0")
+            }
+            Self::OfferedBefore { line, offered, earlier_line, earlier } => {
+                write!(f, "line {line}: offered at {offered}, expected not before the packet before it (line {earlier_line}: {earlier})")
+            }
+            Self::ImpossibleTime { line, offered, at } => write!(
+                f,
+                "line {line}: offered at {offered} and done with at {at}: expected an instant not before it was offered, and the same in the fate"
+            ),
+            Self::Contradiction { sequence, line, other_line } => {
+                write!(f, "line {line}: packet {sequence} has another size or offering instant than on line {other_line}")
+            }
+            Self::TwoEnds { sequence, copy, line } => {
+                write!(f, "line {line}: copy {copy} of packet {sequence} has a second end: expected one row `delivered` or with a drop cause")
+            }
+            Self::NoEnd { sequence, copy } => {
+                write!(f, "copy {copy} of packet {sequence} has no end: expected a row `delivered` or with a drop cause (was the log cut off?)")
+            }
+            Self::CopyFromNowhere { sequence, copies, made } => {
+                write!(f, "packet {sequence} has {copies} copies beyond itself and {made} rows `duplicated`: expected as many of one as of the other")
+            }
+        }
+    }
+}
+
+impl core::error::Error for FateLogError {}
 
 /// All that the column `fate` may hold.
 struct FateNames;

@@ -18,10 +18,9 @@ pub struct DistTable {
 }
 
 /// Why a text is no table. Lines and columns count from 1, columns in characters.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum DistTableError {
     /// A word that is no integer.
-    #[error("line {line}, column {column}: `{word}` is no integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal")]
     NotAnInteger {
         /// The line of the word.
         line: usize,
@@ -31,7 +30,6 @@ pub enum DistTableError {
         word: Box<str>,
     },
     /// An integer that an entry cannot hold.
-    #[error("line {line}, column {column}: `{word}` is out of range: expected an integer from -32768 to 32767")]
     OutOfRange {
         /// The line of the word.
         line: usize,
@@ -41,7 +39,6 @@ pub enum DistTableError {
         word: Box<str>,
     },
     /// An entry too many.
-    #[error("line {line}, column {column}: entry {} begins here: expected at most {}", DistTable::MOST + 1, DistTable::MOST)]
     TooMany {
         /// The line of the entry.
         line: usize,
@@ -49,9 +46,27 @@ pub enum DistTableError {
         column: usize,
     },
     /// No entries.
-    #[error("a table without entries: expected 1 to {}", DistTable::MOST)]
     Empty,
 }
+
+impl fmt::Display for DistTableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotAnInteger { line, column, word } => {
+                write!(f, "line {line}, column {column}: `{word}` is no integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal")
+            }
+            Self::OutOfRange { line, column, word } => {
+                write!(f, "line {line}, column {column}: `{word}` is out of range: expected an integer from -32768 to 32767")
+            }
+            Self::TooMany { line, column } => {
+                write!(f, "line {line}, column {column}: entry {} begins here: expected at most {}", DistTable::MOST + 1, DistTable::MOST)
+            }
+            Self::Empty => write!(f, "a table without entries: expected 1 to {}", DistTable::MOST),
+        }
+    }
+}
+
+impl core::error::Error for DistTableError {}
 
 impl DistTable {
     /// The most entries that `tc` accepts.

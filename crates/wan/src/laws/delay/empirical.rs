@@ -1,6 +1,7 @@
 //! A law given by values: measured delays, or quantiles.
 
 use alloc::vec::Vec;
+use core::fmt;
 
 use super::tail::Tail;
 
@@ -17,16 +18,14 @@ pub struct Empirical {
 }
 
 /// Why values are no law.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub enum EmpiricalError {
     /// Fewer than two values, or more than [`Empirical::MOST`].
-    #[error("an empirical law has {found} values: expected 2 to {}", Empirical::MOST)]
     Count {
         /// How many.
         found: usize,
     },
     /// NaN, an infinity, or a number whose square is none.
-    #[error("value {} of an empirical law is {found}: expected a number of size below 1e150", index + 1)]
     NotANumber {
         /// Which one, from zero.
         index: usize,
@@ -34,12 +33,25 @@ pub enum EmpiricalError {
         found: f64,
     },
     /// All values are equal: there is nothing to stretch to a deviation.
-    #[error("all values of an empirical law are {value}: expected two different ones")]
     Constant {
         /// The value.
         value: f64,
     },
 }
+
+impl fmt::Display for EmpiricalError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count { found } => write!(f, "an empirical law has {found} values: expected 2 to {}", Empirical::MOST),
+            Self::NotANumber { index, found } => {
+                write!(f, "value {} of an empirical law is {found}: expected a number of size below 1e150", index + 1)
+            }
+            Self::Constant { value } => write!(f, "all values of an empirical law are {value}: expected two different ones"),
+        }
+    }
+}
+
+impl core::error::Error for EmpiricalError {}
 
 impl Empirical {
     /// The most values that are accepted.

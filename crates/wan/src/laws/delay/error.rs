@@ -1,10 +1,11 @@
 //! Why a law is refused.
 
+use core::fmt;
+
 /// Why a law, or a correlation of one, is refused. Numbers are in the caller's unit.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub enum LawError {
     /// NaN or an infinity.
-    #[error("the {quantity} is {found}: expected a finite number")]
     NotFinite {
         /// Which number.
         quantity: &'static str,
@@ -12,13 +13,11 @@ pub enum LawError {
         found: f64,
     },
     /// A standard deviation below zero.
-    #[error("the standard deviation is {sd}: expected zero or more")]
     NegativeDeviation {
         /// What it was.
         sd: f64,
     },
     /// No delay can be below the floor, so the mean cannot.
-    #[error("the mean is {mean}, below the floor of {floor}: expected a mean at or above it")]
     FloorAboveMean {
         /// The mean asked for.
         mean: f64,
@@ -26,9 +25,6 @@ pub enum LawError {
         floor: f64,
     },
     /// A law with a least value (uniform, Pareto, empirical) would begin below the floor, where it could not be kept.
-    #[error(
-        "the {law} law with mean {mean} and standard deviation {sd} begins at {least}, below the floor of {floor}: the deviation can be at most {largest_sd}"
-    )]
     ReachesBelowFloor {
         /// The name of the law.
         law: &'static str,
@@ -45,7 +41,6 @@ pub enum LawError {
     },
     /// A law on the half-line above the floor whose deviation is too large for its mean: nearly every draw would be the floor, and no run would be
     /// long enough to meet the mean.
-    #[error("the {law} law has its mean {above_floor} above the floor and a standard deviation of {sd}: the deviation can be at most {largest_sd}")]
     TooVaried {
         /// The name of the law.
         law: &'static str,
@@ -57,13 +52,11 @@ pub enum LawError {
         largest_sd: f64,
     },
     /// A correlation is a number from −1 to 1.
-    #[error("the correlation is {found}: expected a number from -1 to 1")]
     NotACorrelation {
         /// What it was.
         found: f64,
     },
     /// Two variables with this law cannot be so negatively correlated: unless the law is symmetric, the least correlation is above −1.
-    #[error("two delays with this law cannot have the correlation {asked}: expected at least {least}")]
     TooNegative {
         /// The correlation asked for.
         asked: f64,
@@ -71,3 +64,27 @@ pub enum LawError {
         least: f64,
     },
 }
+
+impl fmt::Display for LawError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { quantity, found } => write!(f, "the {quantity} is {found}: expected a finite number"),
+            Self::NegativeDeviation { sd } => write!(f, "the standard deviation is {sd}: expected zero or more"),
+            Self::FloorAboveMean { mean, floor } => write!(f, "the mean is {mean}, below the floor of {floor}: expected a mean at or above it"),
+            Self::ReachesBelowFloor { law, mean, sd, least, floor, largest_sd } => write!(
+                f,
+                "the {law} law with mean {mean} and standard deviation {sd} begins at {least}, below the floor of {floor}: the deviation can be at most {largest_sd}"
+            ),
+            Self::TooVaried { law, above_floor, sd, largest_sd } => write!(
+                f,
+                "the {law} law has its mean {above_floor} above the floor and a standard deviation of {sd}: the deviation can be at most {largest_sd}"
+            ),
+            Self::NotACorrelation { found } => write!(f, "the correlation is {found}: expected a number from -1 to 1"),
+            Self::TooNegative { asked, least } => {
+                write!(f, "two delays with this law cannot have the correlation {asked}: expected at least {least}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for LawError {}

@@ -1,6 +1,7 @@
 //! The queueing discipline.
 
 use alloc::vec::Vec;
+use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
@@ -49,23 +50,44 @@ struct Packet<T> {
 }
 
 /// Why a netem has no qdisc.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum QdiscError {
     /// The options contradict each other.
-    #[error(transparent)]
-    Contradiction(#[from] Contradiction),
+    Contradiction(Contradiction),
     /// There is no table of that name.
-    #[error("no table for the distribution \"{}\": expected uniform, normal, pareto, paretonormal or a table that was given", name.as_str())]
     UnknownTable {
         /// The name.
         name: TableName,
     },
     /// `tc` counts delays in 2³² ticks of 64 ns.
-    #[error("a delay of {}: expected less than 274.877907s, which is what 32 bits of ticks hold", cohaptic_units::print::Span(*delay))]
     DelayTooLong {
         /// The delay, or the jitter.
         delay: Duration,
     },
+}
+
+impl fmt::Display for QdiscError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Contradiction(error) => fmt::Display::fmt(error, f),
+            Self::UnknownTable { name } => write!(
+                f,
+                "no table for the distribution \"{}\": expected uniform, normal, pareto, paretonormal or a table that was given",
+                name.as_str()
+            ),
+            Self::DelayTooLong { delay } => {
+                write!(f, "a delay of {}: expected less than 274.877907s, which is what 32 bits of ticks hold", cohaptic_units::print::Span(*delay))
+            }
+        }
+    }
+}
+
+impl core::error::Error for QdiscError {}
+
+impl From<Contradiction> for QdiscError {
+    fn from(error: Contradiction) -> Self {
+        Self::Contradiction(error)
+    }
 }
 
 /// What happens to a packet as it is offered.

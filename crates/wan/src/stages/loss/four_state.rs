@@ -12,6 +12,8 @@
 //!
 //! Each packet moves the chain and is lost if the *new* state is 3 or 4.
 
+use core::fmt;
+
 use cohaptic_units::Probability;
 
 /// The parameters of the chain.
@@ -25,10 +27,9 @@ pub struct FourState {
 }
 
 /// Why a four-state model is refused.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub enum FourStateError {
     /// The gap would be left with more than certainty.
-    #[error("p13 = {p13} and p14 = {p14} are more than 1 together: expected a sum of at most 1")]
     Gap {
         /// To the burst.
         p13: Probability,
@@ -36,7 +37,6 @@ pub enum FourStateError {
         p14: Probability,
     },
     /// The burst's loss would be left with more than certainty.
-    #[error("p31 = {p31} and p32 = {p32} are more than 1 together: expected a sum of at most 1")]
     Burst {
         /// To the gap.
         p31: Probability,
@@ -44,9 +44,20 @@ pub enum FourStateError {
         p32: Probability,
     },
     /// Parameters of the second kind that no chain has.
-    #[error("{0}")]
     Bursts(&'static str),
 }
+
+impl fmt::Display for FourStateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Gap { p13, p14 } => write!(f, "p13 = {p13} and p14 = {p14} are more than 1 together: expected a sum of at most 1"),
+            Self::Burst { p31, p32 } => write!(f, "p31 = {p31} and p32 = {p32} are more than 1 together: expected a sum of at most 1"),
+            Self::Bursts(error) => fmt::Display::fmt(error, f),
+        }
+    }
+}
+
+impl core::error::Error for FourStateError {}
 
 /// The four-state model by quantities that can be observed: the parameters of Salsano et al., which tc calls GI.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -4,6 +4,7 @@
 //! πB + (1−πB)·e^(−(α+β)Δ) from the bad one, and πB·(1−e^(−(α+β)Δ)) from the good one, where α and β are the rates of leaving good and bad and
 //! πB = α/(α+β). So the law at the packets is exact for any gaps.
 
+use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::{Instant, Probability};
@@ -20,9 +21,16 @@ pub struct GilbertElliottInTime {
 }
 
 /// A time in a state is zero.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("a link cannot be good or bad for no time at all: expected mean times above zero")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NoTime;
+
+impl fmt::Display for NoTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a link cannot be good or bad for no time at all: expected mean times above zero")
+    }
+}
+
+impl core::error::Error for NoTime {}
 
 /// Where the chain was, and when.
 #[derive(Clone, Copy, PartialEq, Debug)]

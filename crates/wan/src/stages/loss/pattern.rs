@@ -2,6 +2,7 @@
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::fmt;
 use core::ops::Range;
 use core::time::Duration;
 
@@ -25,22 +26,19 @@ pub enum Counts {
 }
 
 /// Why a pattern is refused.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum PatternError {
     /// A span ends before it begins, or when it begins.
-    #[error("span {index} is empty: expected an end after its begin")]
     Empty {
         /// Which, from 0.
         index: usize,
     },
     /// A span begins before the one listed before it has ended.
-    #[error("span {index} begins before the one listed before it has ended: expected spans in order")]
     Order {
         /// Which, from 0.
         index: usize,
     },
     /// A span ends after the period.
-    #[error("the pattern begins anew after {period}, before its last span has ended at {end}: expected a period that holds all spans")]
     Period {
         /// The period.
         period: u64,
@@ -48,6 +46,20 @@ pub enum PatternError {
         end: u64,
     },
 }
+
+impl fmt::Display for PatternError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty { index } => write!(f, "span {index} is empty: expected an end after its begin"),
+            Self::Order { index } => write!(f, "span {index} begins before the one listed before it has ended: expected spans in order"),
+            Self::Period { period, end } => {
+                write!(f, "the pattern begins anew after {period}, before its last span has ended at {end}: expected a period that holds all spans")
+            }
+        }
+    }
+}
+
+impl core::error::Error for PatternError {}
 
 impl Pattern {
     /// These packets, counted from 0, and again after every `every` packets.

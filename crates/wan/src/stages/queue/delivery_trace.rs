@@ -2,6 +2,7 @@
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::fmt;
 
 use cohaptic_units::{Bytes, Instant};
 
@@ -19,16 +20,14 @@ pub struct DeliveryTrace {
 }
 
 /// Why a recording is refused. Lines count from 1.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum DeliveryTraceError {
     /// A line is no whole number of milliseconds.
-    #[error("line {line}: expected a whole number of milliseconds")]
     Number {
         /// Which line.
         line: usize,
     },
     /// A line lies before the one above it.
-    #[error("line {line}: {found} ms comes after {before} ms: expected times in order")]
     Order {
         /// Which line.
         line: usize,
@@ -38,15 +37,26 @@ pub enum DeliveryTraceError {
         before: u64,
     },
     /// The recording has no length, so that it cannot be repeated.
-    #[error("the recording ends at 0 ms: expected a last line above 0")]
     NoLength,
     /// There is no line.
-    #[error("an empty recording: expected a whole number of milliseconds on each line")]
     Empty,
     /// No byte could ever leave.
-    #[error("an opportunity to deliver 0 bytes: expected some")]
     NoBytes,
 }
+
+impl fmt::Display for DeliveryTraceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number { line } => write!(f, "line {line}: expected a whole number of milliseconds"),
+            Self::Order { line, found, before } => write!(f, "line {line}: {found} ms comes after {before} ms: expected times in order"),
+            Self::NoLength => f.write_str("the recording ends at 0 ms: expected a last line above 0"),
+            Self::Empty => f.write_str("an empty recording: expected a whole number of milliseconds on each line"),
+            Self::NoBytes => f.write_str("an opportunity to deliver 0 bytes: expected some"),
+        }
+    }
+}
+
+impl core::error::Error for DeliveryTraceError {}
 
 /// The bytes that mahimahi lets leave at each opportunity. (Its manual says 1500; a tunnel's header makes it 1504.)
 pub const MAHIMAHI_BYTES: Bytes = Bytes::new(1504);

@@ -2,6 +2,7 @@
 
 use crate::parameters::{FRACTION, Form, Table, number, required, usual};
 use cohaptic_units::{Bytes, Probability};
+use core::fmt;
 
 /// The parameters of RED. The average queue decides about a packet that is offered: below `min` it passes, above `max` it is dropped, and in between it is
 /// dropped with a probability that rises from nothing to `max_probability`, spread evenly over the packets.
@@ -16,10 +17,9 @@ pub struct Red {
 }
 
 /// Why parameters of RED are refused.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub enum RedError {
     /// The thresholds are not in order.
-    #[error("RED begins to drop at {min} and drops all at {max}: expected the first below the second")]
     Thresholds {
         /// The lower one.
         min: Bytes,
@@ -27,12 +27,22 @@ pub enum RedError {
         max: Bytes,
     },
     /// The average would never move, or would overshoot.
-    #[error("the weight {0} of the newest queue length in its average: expected a number above 0, at most 1")]
     Weight(f64),
     /// A mean packet of no bytes.
-    #[error("a mean packet of 0 bytes: expected some")]
     MeanPacket,
 }
+
+impl fmt::Display for RedError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Thresholds { min, max } => write!(f, "RED begins to drop at {min} and drops all at {max}: expected the first below the second"),
+            Self::Weight(weight) => write!(f, "the weight {weight} of the newest queue length in its average: expected a number above 0, at most 1"),
+            Self::MeanPacket => f.write_str("a mean packet of 0 bytes: expected some"),
+        }
+    }
+}
+
+impl core::error::Error for RedError {}
 
 impl Red {
     /// Checks the parameters. `weight`: of the newest queue length in the average, 0.002 by custom. `mean_packet`: how fast the average decays while

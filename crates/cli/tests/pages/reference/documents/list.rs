@@ -11,7 +11,7 @@ pub(super) struct Document {
 /// What the router needs: two devices in namespaces.
 pub(super) const NAMESPACES: &str = "unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V";
 
-pub(super) const DOCUMENTS: [Document; 25] = [
+pub(super) const DOCUMENTS: [Document; 24] = [
     Document {
         command: "run",
         lines: &[
@@ -79,7 +79,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
     },
     Document {
         command: "explain",
-        lines: &["cohaptic explain scenarios/network/ideal.toml --json"],
+        lines: &["cohaptic explain scenarios/network/ideal.toml --json", "cohaptic explain scenarios/network/ideal.toml --cost --json"],
         rows: &[
             ("title", "of the scene"),
             ("models[].part, models[].model, models[].reason", "a part of the scene, its model, and the reason"),
@@ -90,6 +90,22 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("cost.peer_ticks_per_s, cost.packets_per_s", "in a simulated second"),
             ("cost.realtime_factor", "estimated simulated seconds per second with nothing recorded"),
             ("cost.record_bytes_per_s", "what `--out` writes in a simulated second, about"),
+            ("cost_measured[].kind", "with `--cost`: `engine`, `axes`, `integrator`, `sampling` or `analysis`; methods of one kind do the same work"),
+            (
+                "cost_measured[].method, cost_measured[].option, cost_measured[].chosen",
+                "its name, the words that choose it, and whether the scene does",
+            ),
+            (
+                "cost_measured[].cost_ms, cost_measured[].cost_of",
+                "processor time in milliseconds, and what it is for; `null` if the method does not apply",
+            ),
+            (
+                "cost_measured[].error, cost_measured[].error_of, cost_measured[].error_unit",
+                "the largest difference from the reference, of what, and its unit",
+            ),
+            ("cost_measured[].reference, cost_measured[].note", "the method that the error is against; why a number is `null`, or a remark"),
+            ("cost_span_s", "the simulated time of the runs measured"),
+            ("interrupted", "whether kinds are missing"),
         ],
     },
     Document {
@@ -473,16 +489,6 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("claims[].scene, claims[].how", "text of its scene, or `null`; how it was computed"),
             ("figures[].id, figures[].file, figures[].title", "`file` is `null` without `--out`"),
             ("wall_s", "the time it took"),
-        ],
-    },
-    Document {
-        command: "accuracy",
-        lines: &["cohaptic accuracy --quick --only motion --json"],
-        rows: &[
-            ("rows[].subject, rows[].case, rows[].method, rows[].setting", "what was measured"),
-            ("rows[].cost, rows[].cost_unit, rows[].error, rows[].error_unit", "`null` where there is no such number"),
-            ("rows[].reference, rows[].note", "what the error is against; remarks"),
-            ("interrupted, wall_s", "whether cut short; the time"),
         ],
     },
     Document {

@@ -1,0 +1,14 @@
+//! `cohaptic-accuracy`: measures what every method of this project costs and how wrong it is, and shows the rows of the library as tables, plots, a page, or JSON.
+//!
+//! Results go to standard output, everything else to standard error. Exit status: 0 done, 2 a bad argument, 3 an input or output error, 130 interrupted,
+//! 141 standard output was closed.
+
+mod program;
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+fn main() -> ExitCode {
+    program::run(&program::Arguments::parse())
+}

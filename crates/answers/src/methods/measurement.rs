@@ -1,0 +1,229 @@
+//! The measurement of methods: what each costs and how wrong it is.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use cohaptic_stability::{AnalysisError, Radius, Watch, analyse_watched};
+
+use super::runs::{Trajectory, unwatched};
+use super::{Kind, Method, Work};
+use crate::quick_verdict::OPERATIONS_A_SECOND;
+
+/// Time spent on the cost of one method, at least one round of it.
+const BUDGET: Duration = Duration::from_millis(50);
+/// The most rounds of one method, whose median is steady.
+const MOST_ROUNDS: usize = 31;
+/// After this time the methods that are left are listed without figures: in scenes of thousands of peers one run takes seconds.
+const MOST_TIME: Duration = Duration::from_secs(6);
+/// An analysis that takes more operations than this, by its own estimate, is not measured: about a second.
+const MOST_OPERATIONS: f64 = OPERATIONS_A_SECOND;
+
+/// Sees how far a measurement is, and may end it.
+pub trait MeasurementWatch: Sync {
+    /// This method is measured next.
+    fn begins(&self, _method: &Method) {}
+
+    /// Whether the measurement is to be given up; asked often.
+    fn stops(&self) -> bool {
+        false
+    }
+}
+
+/// What was measured.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Measured {
+    /// The simulated time of the runs.
+    pub span: Duration,
+    /// The methods, kind by kind.
+    pub methods: Vec<MeasuredMethod>,
+    /// Whether the watch ended the measurement: kinds are missing then.
+    pub interrupted: bool,
+}
+
+/// A method with its cost and its error on the scene.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MeasuredMethod {
+    /// What the method is for.
+    pub kind: Kind,
+    /// What it is called, among those of its kind.
+    pub name: String,
+    /// The words that choose it on the command line; empty for the default.
+    pub option: String,
+    /// Whether the scene as it stands is computed this way.
+    pub chosen: bool,
+    /// Processor time for one [`Kind::cost_of`] \[ms\]: measured, the median of some rounds. `None` if the method does not apply, and then the note says why.
+    pub cost_ms: Option<f64>,
+    /// The largest difference from the reference in [`Kind::error_unit`]: computed, the same every time. `None` if there is no such number, and then the note
+    /// says why.
+    pub error: Option<f64>,
+    /// The name of the method that the error is against; `None` if there is no error.
+    pub reference: Option<String>,
+    /// What a reader should know besides; empty if nothing.
+    pub note: String,
+}
+
+/// Measures the methods, kind by kind. `clock` tells the processor time used so far.
+pub fn measure(methods: &[Method], clock: &dyn Fn() -> Duration, watch: &dyn MeasurementWatch) -> Measured {
+    let span = methods.iter().find_map(|method| match &method.work {
+        Ok(Work::Run(run)) => Some(run.span()),
+        Ok(Work::Analysis { .. }) | Err(_) => None,
+    });
+    let mut measured = Measured { span: span.unwrap_or_default(), methods: Vec::new(), interrupted: false };
+    let begin = clock();
+    for kind in Kind::ALL {
+        let of_kind: Vec<&Method> = methods.iter().filter(|method| method.kind == kind).collect();
+        let Some(rows) = of_one_kind(&of_kind, begin, clock, watch) else {
+            measured.interrupted = true;
+            break;
+        };
+        measured.methods.extend(rows);
+    }
+    measured
+}
+
+/// The result of a method, which others are compared with.
+enum Outcome {
+    Trajectory(Trajectory),
+    Radius(Radius),
+}
+
+/// Returns the rows of one kind; `None` if the watch ended the measurement.
+fn of_one_kind(methods: &[&Method], begin: Duration, clock: &dyn Fn() -> Duration, watch: &dyn MeasurementWatch) -> Option<Vec<MeasuredMethod>> {
+    let mut outcomes = Vec::new();
+    for method in methods {
+        watch.begins(method);
+        outcomes.push(match &method.work {
+            // Analyses have a limit of their own.
+            Ok(Work::Run(_)) if clock().saturating_sub(begin) > MOST_TIME => Err("not measured: the methods before took too long".to_owned()),
+            Ok(work) => outcome(work, watch)?,
+            Err(why) => Err(why.clone()),
+        });
+    }
+    let costs = costs(methods, &outcomes, clock, watch)?;
+    let is_had = |place: &usize| outcomes[*place].is_ok();
+    let named = (0..methods.len()).find(|place| methods[*place].is_reference).filter(is_had);
+    // Where the reference does not apply, the first method of the kind that does takes its place. Kinds without a reference have no error.
+    let reference = named.or_else(|| methods.iter().any(|method| method.is_reference).then(|| (0..methods.len()).find(is_had)).flatten());
+    let row = |(place, method): (usize, &&Method)| {
+        let (error, note) = match (&outcomes[place], reference.map(|place| &outcomes[place])) {
+            (Err(why), _) => (None, why.clone()),
+            (Ok(_), None) => (None, "other random numbers, so that positions differ by chance".to_owned()),
+            (Ok(own), Some(Ok(other))) => error(own, other, method.turns()),
+            (Ok(_), Some(Err(why))) => (None, why.clone()),
+        };
+        MeasuredMethod {
+            kind: method.kind,
+            name: method.name.clone(),
+            option: method.option.clone(),
+            chosen: method.chosen,
+            cost_ms: costs[place],
+            error,
+            reference: error.and(reference).map(|place| methods[place].name.clone()),
+            note,
+        }
+    };
+    Some(methods.iter().enumerate().map(row).collect())
+}
+
+/// Does the work of a method once and keeps what comes of it, or why nothing does; `None` if the watch ended it.
+fn outcome(work: &Work, watch: &dyn MeasurementWatch) -> Option<Result<Outcome, String>> {
+    match work {
+        Work::Run(run) => Trajectory::of(run, &|| watch.stops()).map(|trajectory| Ok(Outcome::Trajectory(trajectory))),
+        Work::Analysis { scene, method } => {
+            let limited = Limited { watch, expected: Mutex::new(0.0) };
+            match analyse_watched(scene, *method, &limited) {
+                Ok(analysis) => Some(Ok(Outcome::Radius(analysis.radius))),
+                Err(AnalysisError::Stopped) if watch.stops() => None,
+                Err(AnalysisError::Stopped) => {
+                    let seconds = limited.expected() / OPERATIONS_A_SECOND;
+                    Some(Err(format!("takes about {seconds:.0} s, too long to be measured here")))
+                }
+                Err(error) => Some(Err(error.to_string())),
+            }
+        }
+    }
+}
+
+/// Returns the error of an outcome, and a note on it.
+fn error(own: &Outcome, reference: &Outcome, turns: bool) -> (Option<f64>, String) {
+    match (own, reference) {
+        (Outcome::Trajectory(own), Outcome::Trajectory(reference)) => match own.difference(reference) {
+            Ok(difference) => (Some(difference), if turns { "of positions alone: turns are not compared" } else { "" }.to_owned()),
+            Err(why) => (None, why),
+        },
+        (Outcome::Radius(own), Outcome::Radius(reference)) => {
+            let error = Some((own.value - reference.value).abs()).filter(|error| error.is_finite());
+            (error, format!("radius {:.12} +- {:.1e}", own.value, own.error))
+        }
+        (Outcome::Trajectory(_), Outcome::Radius(_)) | (Outcome::Radius(_), Outcome::Trajectory(_)) => {
+            unreachable!("methods of one kind do the same work")
+        }
+    }
+}
+
+/// Returns the cost of each method \[ms\]; `None` for methods without an outcome, and for all if the watch ended the measurement.
+///
+/// Methods take turns, so that a disturbance of the machine hits all of them. The first time, which fills caches, was that of the outcome.
+fn costs(
+    methods: &[&Method],
+    outcomes: &[Result<Outcome, String>],
+    clock: &dyn Fn() -> Duration,
+    watch: &dyn MeasurementWatch,
+) -> Option<Vec<Option<f64>>> {
+    let mut times = vec![Vec::new(); methods.len()];
+    for _ in 0..MOST_ROUNDS {
+        for ((method, outcome), times) in methods.iter().zip(outcomes).zip(&mut times) {
+            let (Ok(work), Ok(_)) = (&method.work, outcome) else { continue };
+            if times.iter().sum::<Duration>() < BUDGET {
+                let start = clock();
+                once(work, watch)?;
+                times.push(clock().saturating_sub(start));
+            }
+        }
+    }
+    let cost = |(method, mut times): (&&Method, Vec<Duration>)| {
+        times.sort();
+        let median = times.get(times.len() / 2)?.as_secs_f64();
+        let units = match &method.work {
+            Ok(Work::Run(run)) => run.span().as_secs_f64(),
+            Ok(Work::Analysis { .. }) | Err(_) => 1.0,
+        };
+        Some(1e3 * median / units)
+    };
+    Some(methods.iter().zip(times).map(cost).collect())
+}
+
+/// Does the work of a method once, as a user has it done; `None` if the watch ended it.
+fn once(work: &Work, watch: &dyn MeasurementWatch) -> Option<()> {
+    match work {
+        Work::Run(run) => drop(std::hint::black_box(unwatched(run, &|| watch.stops())?)),
+        Work::Analysis { scene, method } => {
+            let limited = Limited { watch, expected: Mutex::new(0.0) };
+            // Its outcome was had before, so an error is the end that the watch asked for.
+            drop(std::hint::black_box(analyse_watched(scene, *method, &limited).ok()?));
+        }
+    }
+    if watch.stops() { None } else { Some(()) }
+}
+
+/// Ends an analysis that is too long by its estimate, and any if the watch asks for it.
+struct Limited<'a> {
+    watch: &'a dyn MeasurementWatch,
+    expected: Mutex<f64>,
+}
+
+impl Limited<'_> {
+    fn expected(&self) -> f64 {
+        *self.expected.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Watch for Limited<'_> {
+    fn expects(&self, operations: f64) {
+        *self.expected.lock().unwrap_or_else(PoisonError::into_inner) += operations;
+    }
+
+    fn stops(&self) -> bool {
+        self.expected() > MOST_OPERATIONS || self.watch.stops()
+    }
+}

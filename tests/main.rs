@@ -1,0 +1,19 @@
+//! Tests that need more than one crate. They are one program, so that what they share is compiled once.
+//!
+//! | module | tests |
+//! | --- | --- |
+//! | [`claims`] | claims about coordination over links |
+//! | [`determinism`] | same scene, same seed, same bytes, by every way to run it |
+//! | [`hard`] | hard cases of the numerics, of time and of size |
+//! | [`house`] | rules that the project keeps to |
+//! | [`properties`] | properties of runs, tried on scenes drawn at random |
+//! | [`scenarios`] | the expectations of the shipped scenes |
+//! | [`testkit`] | the test kit with its feature `scenes` |
+
+mod claims;
+mod determinism;
+mod hard;
+mod house;
+mod properties;
+mod scenarios;
+mod testkit;
