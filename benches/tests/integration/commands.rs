@@ -8,6 +8,7 @@
 //! | `cohaptic-accuracy` | run by `crates/accuracy/tests/integration/program.rs`, which is where that program can be had. Its whole line is known |
 //! | of `benches/realtime` | not run here: they wait by the wall clock, for an hour even. Package, program and arguments are looked up |
 //! | the ignored test of `crates/cli/tests/cluster` | not run here: it takes minutes, and schedulers. Its text is known |
+//! | `benches/first-result` | not run here: it compiles the project several times, and downloads. Its rows are looked up |
 //! | of `benches/peers` | not run here: a workspace of its own with the crates of others, which CI does not build. Folder, programs and scripts are looked up |
 
 use std::process::Command;
@@ -31,6 +32,8 @@ enum Kind {
     Accuracy,
     /// Programs of another package, by folder and name.
     Elsewhere(&'static str, Vec<String>),
+    /// The script that measures how long a new user waits.
+    FirstResult,
     /// An ignored test of the command line, which is where the program and schedulers can be had.
     IgnoredTest,
 }
@@ -39,6 +42,9 @@ enum Kind {
 fn kind(command: &str) -> Option<Kind> {
     if command == "benches/measure" {
         return Some(Kind::Script);
+    }
+    if command == "benches/first-result > docs/measured-first.md" {
+        return Some(Kind::FirstResult);
     }
     if command.starts_with("cohaptic ") {
         return Some(Kind::Cohaptic);
@@ -137,7 +143,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
                 // That the script starts this program is tested in script.rs.
                 Kind::Script => program == "measured-page",
                 Kind::Elsewhere(of, others) => *of == folder && others.contains(&program),
-                Kind::Cohaptic | Kind::Accuracy | Kind::IgnoredTest => false,
+                Kind::Cohaptic | Kind::Accuracy | Kind::FirstResult | Kind::IgnoredTest => false,
             });
             assert!(found, "{program} of {name} is on no page");
         }
@@ -146,9 +152,27 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
         let (folder, used) = match kind {
             Kind::Table { program, .. } => ("benches", std::slice::from_ref(program)),
             Kind::Elsewhere(folder, used) => (*folder, &used[..]),
-            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::IgnoredTest => continue,
+            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::FirstResult | Kind::IgnoredTest => continue,
         };
         assert!(used.iter().all(|program| programs(folder).contains(program)), "{command}");
+    }
+}
+
+/// The script has a row for each user of the page, and refuses other names before anything is built.
+#[test]
+fn the_rows_of_first_result_are_those_of_its_page() {
+    let script = root().join("benches/first-result");
+    let output = Command::new(&script).arg("another").output().unwrap();
+    // `env` ends with this status where there is no Python.
+    if output.status.code() == Some(127) {
+        return;
+    }
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && output.stdout.is_empty() && said.contains("there is no row another"), "{said}");
+    let help = String::from_utf8(Command::new(&script).arg("--help").output().unwrap().stdout).unwrap();
+    let shipped = std::fs::read_to_string(root().join("docs/measured-first.md")).unwrap();
+    for user in ["programmer", "researcher", "laboratory"] {
+        assert!(help.contains(user) && shipped.contains(&format!("\n| {user} | ")), "{user}: {help}\n{shipped}");
     }
 }
 
@@ -160,6 +184,7 @@ fn what_is_not_a_command_of_ours_is_not_known() {
         "cargo run --release -p cohaptic-wan --bin x > docs/x.md",
         "cd benches/peers && cargo test > ../../docs/x.md",
         "cargo run --release -p cohaptic-benches-realtime --bin soak -- 2h --out docs/measured-soak.md",
+        "benches/first-result programmer > docs/measured-first.md",
         "cargo run --release -p cohaptic-accuracy -- --json --out elsewhere",
         "rm -r docs",
     ] {
@@ -172,7 +197,7 @@ pub(crate) fn prints_its_page(path: &str, program: &str) {
     let all = all();
     let of_program = all.iter().find_map(|(_, _, kind)| match kind {
         Kind::Table { program: of, page, .. } if of == program => Some(page.clone()),
-        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Elsewhere(..) | Kind::IgnoredTest => None,
+        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Elsewhere(..) | Kind::FirstResult | Kind::IgnoredTest => None,
     });
     let page = of_program.unwrap_or_else(|| panic!("{program} is on no page"));
     let output = Command::new(path).arg("--smoke").output().unwrap();

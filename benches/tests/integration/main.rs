@@ -14,7 +14,7 @@ fn root() -> PathBuf {
 }
 
 /// The pages whose every command is looked at.
-const PAGES: [&str; 12] = [
+const PAGES: [&str; 13] = [
     "measured.md",
     "measured-speed.md",
     "measured-cluster.md",
@@ -27,6 +27,7 @@ const PAGES: [&str; 12] = [
     "measured-live.md",
     "measured-tcp.md",
     "measured-soak.md",
+    "measured-first.md",
 ];
 
 /// Name and text of each.

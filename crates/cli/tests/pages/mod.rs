@@ -72,6 +72,7 @@ macro_rules! pages {
 pages! {
     readme: "README.md",
     contributing: "CONTRIBUTING.md",
+    releasing: "RELEASING.md",
     security: "SECURITY.md",
     accuracy: "docs/accuracy.md",
     architecture: "docs/architecture.md",
@@ -141,6 +142,7 @@ fn markdown(folder: &Path, found: &mut Vec<PathBuf>) {
 fn written_by_a_benchmark(text: &str) -> bool {
     text.contains("written by\n\n    cargo run --release")
         || text.contains("written by\n\n    cd benches/")
+        || text.contains("written by\n\n    benches/first-result")
         || text.contains("\n\n    benches/measure\n")
 }
 
