@@ -176,7 +176,12 @@ fn standard_input_is_read_once_for_all_methods() {
     let mut command = assert_cmd::Command::from_std(desk.command("explain - --cost --json"));
     let outcome = crate::integration::desk::Outcome::of(command.write_stdin(TWO).output().unwrap());
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
-    let axes: Vec<Value> =
-        crate::integration::desk::parse(&outcome.stdout)["cost_measured"].as_array().unwrap().iter().filter(|method| method["kind"] == "axes").cloned().collect();
+    let axes: Vec<Value> = crate::integration::desk::parse(&outcome.stdout)["cost_measured"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|method| method["kind"] == "axes")
+        .cloned()
+        .collect();
     assert!(axes.len() == 2 && axes.iter().all(|method| method["error"] == 0.0), "{axes:#?}");
 }
