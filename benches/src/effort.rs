@@ -58,7 +58,7 @@ impl Effort {
     /// The command that makes a program of this package print its page with this effort.
     #[must_use]
     pub fn command(self, program: &str) -> String {
-        let mut command = format!("cargo run --release -p cohaptic-benches --bin {program}");
+        let mut command = format!("cargo run --profile dist -p cohaptic-benches --bin {program}");
         if self != Self::Full {
             let _ = write!(command, " -- {}", self.option());
         }
@@ -81,7 +81,7 @@ mod tests {
     fn the_option_that_asks_for_an_effort_stands_in_the_command() {
         let parse = |words: &[&str]| Effort::parse(words.iter().map(|&word| word.to_owned()));
         assert_eq!(parse(&[]), Ok(Effort::Full));
-        assert_eq!(Effort::Full.command("a-table"), "cargo run --release -p cohaptic-benches --bin a-table");
+        assert_eq!(Effort::Full.command("a-table"), "cargo run --profile dist -p cohaptic-benches --bin a-table");
         for effort in [Effort::Smoke, Effort::Quick] {
             assert_eq!(parse(&[effort.option()]), Ok(effort));
             assert!(effort.command("a-table").ends_with(&format!("--bin a-table -- {}", effort.option())));

@@ -1,4 +1,4 @@
-//! Writes `docs/measured-link.md`: `cargo run --release -p cohaptic-benches --bin link-table > docs/measured-link.md`. Takes about a minute; `--quick` less.
+//! Writes `docs/measured-link.md`: `cargo run --profile dist -p cohaptic-benches --bin link-table > docs/measured-link.md`. Takes about a minute; `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of packets")]
 

@@ -1,4 +1,4 @@
-//! Writes `docs/measured-samplers.md`: `cargo run --release -p cohaptic-benches --bin samplers-table > docs/measured-samplers.md`. Takes about a minute; `--quick`
+//! Writes `docs/measured-samplers.md`: `cargo run --profile dist -p cohaptic-benches --bin samplers-table > docs/measured-samplers.md`. Takes about a minute; `--quick`
 //! less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 

@@ -1,4 +1,4 @@
-//! Writes `docs/measured-speed.md`: `cargo run --release -p cohaptic-benches --bin speed-table > docs/measured-speed.md`. Takes some minutes; `--quick` less.
+//! Writes `docs/measured-speed.md`: `cargo run --profile dist -p cohaptic-benches --bin speed-table > docs/measured-speed.md`. Takes some minutes; `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "seconds and rounds are small")]
 

@@ -1,4 +1,4 @@
-//! Writes `docs/measured-stability.md`: `cargo run --release -p cohaptic-benches --bin stability-table > docs/measured-stability.md`. Takes some minutes;
+//! Writes `docs/measured-stability.md`: `cargo run --profile dist -p cohaptic-benches --bin stability-table > docs/measured-stability.md`. Takes some minutes;
 //! `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of verdicts")]

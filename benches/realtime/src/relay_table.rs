@@ -1,4 +1,4 @@
-//! Writes `docs/measured-relay.md`: `cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md`. Takes about two minutes; a
+//! Writes `docs/measured-relay.md`: `cargo run --profile dist -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md`. Takes about two minutes; a
 //! number of seconds as argument replaces the ten of each run.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of packets")]
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let span = Duration::from_secs(seconds);
     println!("# The relay: how late and how fast\n");
     println!("Lateness and speed of [`cohaptic relay`](relay.md) on loopback. This page is written by\n");
-    println!("    cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md\n");
+    println!("    cargo run --profile dist -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md\n");
     println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process, with the", machine::name());
     println!("generator and the sink in it, on the same cores. Datagrams carry {} bytes.\n", traffic::SIZE);
     release_error(span)?;

@@ -1,4 +1,4 @@
-//! The soak: `cargo run --release -p cohaptic-benches-realtime --bin soak -- [DURATION] [--every SPAN] [--out FILE.md]`. An hour, unless told otherwise; Ctrl-C ends it early, with
+//! The soak: `cargo run --profile dist -p cohaptic-benches-realtime --bin soak -- [DURATION] [--every SPAN] [--out FILE.md]`. An hour, unless told otherwise; Ctrl-C ends it early, with
 //! what was seen until then.
 #![allow(clippy::print_stdout, reason = "printing the table is what this program is for")]
 
@@ -88,7 +88,7 @@ fn page(plan: &SoakPlan, outcome: &Outcome, judgements: &[Judgement], command: &
     let span = |span: Duration| cohaptic_units::print::Span(span).to_string();
     writeln!(page, "# A soak\n")?;
     writeln!(page, "A live session and a relay beside each other in one process, for {}. This page is written by\n", span(plan.duration))?;
-    writeln!(page, "    cargo run --release -p cohaptic-benches-realtime --bin soak -- {command}\n")?;
+    writeln!(page, "    cargo run --profile dist -p cohaptic-benches-realtime --bin soak -- {command}\n")?;
     writeln!(page, "and measured on: {}; {}.\n", machine::name(), today())?;
     writeln!(
         page,

@@ -73,7 +73,7 @@ fn arguments(effort: Effort) -> String {
 
 /// The command that a reader can type.
 pub(crate) fn command(effort: Effort) -> String {
-    format!("cargo run --release -p cohaptic-accuracy -- {}", arguments(effort))
+    format!("cargo run --profile dist -p cohaptic-accuracy -- {}", arguments(effort))
 }
 
 pub(crate) fn measure(programs: &Programs) -> Result<Measured, String> {

@@ -15,8 +15,8 @@ How fast, how exact, on which machine, by which command. This page is written by
     benches/measure
 
 which also writes the pages of single parts that it names. With the name of a section it does only that one (`benches/measure speed accuracy`) and leaves the
-others as they are, so every section has its own date and machine. Commands are typed in the folder of the project; `cohaptic` stands for `target/release/cohaptic`, which
-`cargo build --release` makes. Tests run each of them in its smallest form, so that none is here that no longer runs; of those that need the crates of others, or
+others as they are, so every section has its own date and machine. Commands are typed in the folder of the project; `cohaptic` stands for `target/dist/cohaptic`, which
+`cargo build --profile dist` makes. Tests run each of them in its smallest form, so that none is here that no longer runs; of those that need the crates of others, or
 wait by the wall clock, they look the programs up (`benches/tests/integration/commands.rs`).
 
 Nothing here is typed by hand. Where a figure was asked for, it stands beside the one measured, whether it is met or not.
@@ -31,28 +31,29 @@ const ALONE: [(&str, &str, &str); 6] = [
     (
         "measured-relay.md",
         "how late the relay and how fast",
-        "cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md",
+        "cargo run --profile dist -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md",
     ),
     (
         "measured-live.md",
         "how late the ticks of a live session, and what they cost",
-        "cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md",
+        "cargo run --profile dist -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md",
     ),
     (
         "measured-tcp.md",
         "how far the TCP of the test kit and that of Linux are apart, over the same links",
-        "cargo run --release -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md",
+        "cargo run --profile dist -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md",
     ),
     (
         "measured-soak.md",
         "an hour of both: memory, drift, lateness",
-        "cargo run --release -p cohaptic-benches-realtime --bin soak -- 1h --out docs/measured-soak.md",
+        "cargo run --profile dist -p cohaptic-benches-realtime --bin soak -- 1h --out docs/measured-soak.md",
     ),
     (
         "measured-cluster.md",
         "the same campaign by shards, by GNU parallel, by Dask and by Slurm, and the merge",
-        "cargo build --release && COHAPTIC_PROGRAM=target/release/cohaptic cargo test --workspace --test cluster -- --ignored",
+        "cargo build --profile dist && COHAPTIC_PROGRAM=target/dist/cohaptic cargo test --workspace --test cluster -- --ignored",
     ),
+    ("measured-build.md", "how long a first build and the tests take", "benches/build-times > docs/measured-build.md"),
     ("measured-first.md", "how long a new user waits for the first result, with and without Rust", "benches/first-result > docs/measured-first.md"),
 ];
 

@@ -32,8 +32,8 @@ enum Kind {
     Accuracy,
     /// Programs of another package, by folder and name.
     Elsewhere(&'static str, Vec<String>),
-    /// The script that measures how long a new user waits.
-    FirstResult,
+    /// A script that measures how long users wait, for a first result or for a build.
+    Waiting,
     /// An ignored test of the command line, which is where the program and schedulers can be had.
     IgnoredTest,
 }
@@ -43,22 +43,22 @@ fn kind(command: &str) -> Option<Kind> {
     if command == "benches/measure" {
         return Some(Kind::Script);
     }
-    if command == "benches/first-result > docs/measured-first.md" {
-        return Some(Kind::FirstResult);
+    if ["benches/first-result > docs/measured-first.md", "benches/build-times > docs/measured-build.md"].contains(&command) {
+        return Some(Kind::Waiting);
     }
     if command.starts_with("cohaptic ") {
         return Some(Kind::Cohaptic);
     }
-    if command == "cargo run --release -p cohaptic-accuracy -- --json --out out/measured/accuracy" {
+    if command == "cargo run --profile dist -p cohaptic-accuracy -- --json --out out/measured/accuracy" {
         return Some(Kind::Accuracy);
     }
-    if command == "cargo build --release && COHAPTIC_PROGRAM=target/release/cohaptic cargo test --workspace --test cluster -- --ignored" {
+    if command == "cargo build --profile dist && COHAPTIC_PROGRAM=target/dist/cohaptic cargo test --workspace --test cluster -- --ignored" {
         return Some(Kind::IgnoredTest);
     }
     if let Some(inside) = command.strip_prefix("cd benches/peers && ") {
         return peers(inside);
     }
-    let (what, rest) = command.strip_prefix("cargo run --release -p ")?.split_once(" --bin ")?;
+    let (what, rest) = command.strip_prefix("cargo run --profile dist -p ")?.split_once(" --bin ")?;
     match what {
         "cohaptic-benches" => {
             let (run, page) = rest.split_once(" > docs/")?;
@@ -143,7 +143,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
                 // That the script starts this program is tested in script.rs.
                 Kind::Script => program == "measured-page",
                 Kind::Elsewhere(of, others) => *of == folder && others.contains(&program),
-                Kind::Cohaptic | Kind::Accuracy | Kind::FirstResult | Kind::IgnoredTest => false,
+                Kind::Cohaptic | Kind::Accuracy | Kind::Waiting | Kind::IgnoredTest => false,
             });
             assert!(found, "{program} of {name} is on no page");
         }
@@ -152,7 +152,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
         let (folder, used) = match kind {
             Kind::Table { program, .. } => ("benches", std::slice::from_ref(program)),
             Kind::Elsewhere(folder, used) => (*folder, &used[..]),
-            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::FirstResult | Kind::IgnoredTest => continue,
+            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Waiting | Kind::IgnoredTest => continue,
         };
         assert!(used.iter().all(|program| programs(folder).contains(program)), "{command}");
     }
@@ -179,13 +179,13 @@ fn the_rows_of_first_result_are_those_of_its_page() {
 #[test]
 fn what_is_not_a_command_of_ours_is_not_known() {
     for command in [
-        "cargo run --release -p cohaptic-benches --bin speed-table -- --fast > docs/measured-speed.md",
-        "cargo run --release -p cohaptic-benches --bin speed-table",
-        "cargo run --release -p cohaptic-wan --bin x > docs/x.md",
+        "cargo run --profile dist -p cohaptic-benches --bin speed-table -- --fast > docs/measured-speed.md",
+        "cargo run --profile dist -p cohaptic-benches --bin speed-table",
+        "cargo run --profile dist -p cohaptic-wan --bin x > docs/x.md",
         "cd benches/peers && cargo test > ../../docs/x.md",
-        "cargo run --release -p cohaptic-benches-realtime --bin soak -- 2h --out docs/measured-soak.md",
+        "cargo run --profile dist -p cohaptic-benches-realtime --bin soak -- 2h --out docs/measured-soak.md",
         "benches/first-result programmer > docs/measured-first.md",
-        "cargo run --release -p cohaptic-accuracy -- --json --out elsewhere",
+        "cargo run --profile dist -p cohaptic-accuracy -- --json --out elsewhere",
         "rm -r docs",
     ] {
         assert_eq!(kind(command), None, "{command}");
@@ -197,7 +197,7 @@ pub(crate) fn prints_its_page(path: &str, program: &str) {
     let all = all();
     let of_program = all.iter().find_map(|(_, _, kind)| match kind {
         Kind::Table { program: of, page, .. } if of == program => Some(page.clone()),
-        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Elsewhere(..) | Kind::FirstResult | Kind::IgnoredTest => None,
+        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Elsewhere(..) | Kind::Waiting | Kind::IgnoredTest => None,
     });
     let page = of_program.unwrap_or_else(|| panic!("{program} is on no page"));
     let output = Command::new(path).arg("--smoke").output().unwrap();

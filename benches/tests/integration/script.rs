@@ -23,7 +23,7 @@ fn without_dates(section: &str) -> String {
 #[test]
 fn the_script_starts_the_program_that_is_tested_here() {
     let script = fs::read_to_string(root().join("benches/measure")).unwrap();
-    assert!(script.ends_with("cargo run --release --quiet -p cohaptic-benches --bin measured-page -- \"$@\"\n"), "{script}");
+    assert!(script.ends_with("cargo run --profile dist --quiet -p cohaptic-benches --bin measured-page -- \"$@\"\n"), "{script}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Writes `docs/measured-live.md`: `cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md`. Takes about four minutes; a number of seconds as
+//! Writes `docs/measured-live.md`: `cargo run --profile dist -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md`. Takes about four minutes; a number of seconds as
 //! argument replaces the ten of each run.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 
@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let span = Duration::from_secs(seconds);
     println!("# Live sessions: how late\n");
     println!("Lateness of the 1 kHz loop of [`cohaptic live`](live.md), and its cost. This page is written by\n");
-    println!("    cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md\n");
+    println!("    cargo run --profile dist -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md\n");
     println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process.\n", machine::name());
     loops(span)?;
     at_the_door()

@@ -1,4 +1,4 @@
-//! Writes `docs/measured-tcp.md`: `cargo run --release -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md`. Takes about nine minutes, and makes network
+//! Writes `docs/measured-tcp.md`: `cargo run --profile dist -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md`. Takes about nine minutes, and makes network
 //! namespaces: it needs root, or `unshare -Urn` before the program. A number as argument replaces the 101 connections of a row.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of octets and connections")]
@@ -72,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let system = fs::read_to_string("/proc/sys/kernel/osrelease")?;
     println!("# TCP: the kernel's and the test kit's\n");
     println!("How far the TCP of [the test kit](testing.md#tcp) and that of Linux are apart. This page is written by\n");
-    println!("    cargo run --release -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md\n");
+    println!("    cargo run --profile dist -p cohaptic-benches-realtime --bin tcp-table > docs/measured-tcp.md\n");
     println!("and measured on: {}. Linux here is {}, as it comes: CUBIC, SACK, RACK.\n", machine::name(), system.trim());
     println!("Linux runs in two network namespaces with [`cohaptic router`](router.md) between them, whose two links have the words of the row. The");
     println!(

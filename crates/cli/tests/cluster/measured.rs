@@ -16,7 +16,7 @@ const HEAD: &str = "# Shards: how fast
 
 What do shards cost, and how fast are they merged? How they are done: [cluster.md](cluster.md). This page is written by
 
-    cargo build --release && COHAPTIC_PROGRAM=target/release/cohaptic cargo test --workspace --test cluster -- --ignored
+    cargo build --profile dist && COHAPTIC_PROGRAM=target/dist/cohaptic cargo test --workspace --test cluster -- --ignored
 
 ";
 

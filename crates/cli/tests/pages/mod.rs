@@ -140,8 +140,9 @@ fn markdown(folder: &Path, found: &mut Vec<PathBuf>) {
 /// Pages that programs of `benches` write have their commands run there: `benches/tests/integration/commands.rs`; for the lines `cohaptic …` of
 /// `docs/measured.md` that is `measured.rs`, beside this folder.
 fn written_by_a_benchmark(text: &str) -> bool {
-    text.contains("written by\n\n    cargo run --release")
+    text.contains("written by\n\n    cargo run --profile dist")
         || text.contains("written by\n\n    cd benches/")
+        || text.contains("written by\n\n    benches/build-times")
         || text.contains("written by\n\n    benches/first-result")
         || text.contains("\n\n    benches/measure\n")
 }

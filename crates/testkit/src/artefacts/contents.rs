@@ -96,9 +96,9 @@ fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> V
 /// The numbers of the packets of a path that are whole IP packets: those of TCP.
 #[cfg(all(feature = "pcapng", feature = "tcp"))]
 fn segments(record: &Record, path: cohaptic_wan::Path) -> std::collections::BTreeSet<u64> {
-    let number = |event: &crate::TraceEvent| match event.what {
-        crate::Happening::Segment { packet, .. } if packet.path == path => Some(packet.sequence),
-        _ => None,
+    let number = |event: &crate::TraceEvent| {
+        let crate::Happening::Segment { packet, .. } = event.what else { return None };
+        (packet.path == path).then_some(packet.sequence)
     };
     record.trace().events().iter().filter_map(number).collect()
 }

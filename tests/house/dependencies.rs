@@ -1,4 +1,4 @@
-//! The test kit is a small dependency: which crates a build of it compiles.
+//! The crates that a build of the test kit and of the program compiles: each is a decision, because every user waits for it.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -24,18 +24,21 @@ const DEFAULT: [&str; 12] = [
     "tokio",
 ];
 
-/// Names of the crates that a build of the test kit compiles on Linux: libraries, their build scripts and macros; without those of its own tests.
-fn compiled(features: &[&str]) -> BTreeSet<String> {
+/// The crates that the program compiles on Linux, one name a line.
+const PROGRAM: &str = include_str!("crates-of-the-program.txt");
+
+/// Names of the crates that a build of a package compiles on Linux: libraries, their build scripts and macros; without those of its own tests.
+fn compiled(package: &str, features: &[&str]) -> BTreeSet<String> {
     let tree = |mode: &[&str]| {
         let mut command = Command::new(env!("CARGO"));
-        command.current_dir(root()).args(["tree", "--package", "cohaptic-testkit", "--edges", "normal,build", "--prefix", "none", "--no-dedupe"]);
+        command.current_dir(root()).args(["tree", "--package", package, "--edges", "normal,build", "--prefix", "none", "--no-dedupe"]);
         command.args(["--format", "{p}", "--target", "x86_64-unknown-linux-gnu", "--locked"]).args(mode).args(features).output().unwrap()
     };
     let mut output = tree(&["--offline"]);
     if !output.status.success() {
         output = tree(&[]);
     }
-    assert!(output.status.success(), "cargo tree {features:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "cargo tree {package} {features:?}: {}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     text.lines().filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect()
 }
@@ -43,18 +46,27 @@ fn compiled(features: &[&str]) -> BTreeSet<String> {
 /// A crate more costs every user of the test kit, so that each is named here.
 #[test]
 fn the_default_features_compile_few_crates() {
-    let crates = compiled(&[]);
+    let crates = compiled("cohaptic-testkit", &[]);
     assert!(crates.len() <= MOST, "{} crates of at most {MOST}: {crates:?}", crates.len());
     assert_eq!(crates, DEFAULT.map(str::to_owned).into());
 }
 
+/// A crate that comes or goes is added to or removed from `tests/house/crates-of-the-program.txt`, and the commit says why.
+#[test]
+fn the_program_compiles_the_crates_of_its_list() {
+    let listed: BTreeSet<String> = PROGRAM.lines().map(str::to_owned).collect();
+    let crates = compiled("cohaptic-cli", &[]);
+    let (new, gone): (Vec<_>, Vec<_>) = (crates.difference(&listed).collect(), listed.difference(&crates).collect());
+    assert!(new.is_empty() && gone.is_empty(), "not in tests/house/crates-of-the-program.txt: {new:?}; no longer compiled: {gone:?}");
+}
+
 #[test]
 fn a_feature_that_is_off_compiles_nothing() {
-    let crates = compiled(&["--no-default-features"]);
+    let crates = compiled("cohaptic-testkit", &["--no-default-features"]);
     let expected = ["bytes", "cohaptic-files", "cohaptic-testkit", "cohaptic-units", "cohaptic-wan", "libm", "rand", "rand_core"];
     assert_eq!(crates, expected.map(str::to_owned).into());
     let added = |feature: &str| -> Vec<String> {
-        let with = compiled(&["--no-default-features", "--features", feature]);
+        let with = compiled("cohaptic-testkit", &["--no-default-features", "--features", feature]);
         with.difference(&crates).cloned().collect()
     };
     assert_eq!(added("tcp"), ["cohaptic-tcp"]);
