@@ -7,12 +7,12 @@ use cohaptic_testkit::{Instant, Testbed, check_scene, time};
 
 #[test]
 fn the_room_is_stable() {
-    check_scene("tests/testkit/room.toml");
+    check_scene("testkit/room.toml");
 }
 
 #[test]
 fn programs_meet_in_the_room() {
-    Testbed::from_file("tests/testkit/room.toml").run(|bed| async move {
+    Testbed::from_file("testkit/room.toml").run(|bed| async move {
         let left = bed.host("left").bind("0.0.0.0:0").unwrap();
         let right = bed.host("right").bind("0.0.0.0:7").unwrap();
         for (sent, arrives) in [(0, 24_000_000), (1_000_000_000, 1_005_000_000)] {

@@ -378,7 +378,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// What came out for a peer.
     fn peer_summary(&self, peer: usize, run: usize) -> PeerSummary {
-        let (position, velocity) = (0..A).map(|axis| self.bodies.blocks().object(axis, peer, run)).unzip();
+        let (position, velocity) = (0..self.scenes[run].axes.count()).map(|axis| self.bodies.blocks().object(axis, peer, run)).unzip();
         let stale_samples = match &self.samples {
             Samples::Broadcast(_) => 0,
             Samples::PerPacket(samples) => samples.stale_samples(peer, run),
