@@ -1,11 +1,10 @@
-//! Rules that the project keeps to: its packages and their licences, the systems they build on, and the length and language of its texts.
+//! Rules that the project keeps to: its packages and their licences, the systems they build on, and the language of its texts.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 
 mod dependencies;
 mod language;
 mod metadata;
 mod packages;
-mod size;
 mod systems;
 mod terms;
 

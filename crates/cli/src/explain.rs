@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use cohaptic_answers::{Kind, Measured, MeasuredMethod, MeasurementWatch, Method, cost_picture, error_in_words};
 use cohaptic_harness::explain::{self as harness, Explanation};
@@ -48,19 +49,32 @@ fn read(arguments: &ExplainArguments, more: &[&str]) -> Result<Scene, SceneError
 fn measured(arguments: &ExplainArguments, scene: &Scene, explanation: &Explanation) -> Measured {
     let refusal = |error: &SceneError| error.diagnostic().map_or_else(|| error.to_string(), |diagnostic| Diagnostic::message(diagnostic).to_owned());
     let methods = cohaptic_answers::methods(scene, explanation, &|more| read(arguments, more).map_err(|error| refusal(&error)));
-    let shown = Shown(Progress::new(methods.len() as u64, "{bar:30} {pos}/{len} methods, {elapsed} passed: {msg}"));
+    let bar = Progress::new(methods.len() as u64, "{bar:30} {pos}/{len} methods, {elapsed} passed: {msg}");
+    let shown = Shown { bar, begun: Mutex::new(Instant::now()) };
     let measured = cohaptic_answers::measure(&methods, &processor_time, &shown);
-    shown.0.clear();
+    shown.bar.clear();
     measured
 }
 
+/// An analysis that takes longer is not measured. Frames of clocks that drift are minutes long, and no estimate tells of them.
+const LONG: Duration = Duration::from_secs(1);
+
 /// Shows which method is measured, and ends the measurement when the user asks for it.
-struct Shown(Progress);
+struct Shown {
+    bar: Progress,
+    /// When the last method began.
+    begun: Mutex<Instant>,
+}
 
 impl MeasurementWatch for Shown {
     fn begins(&self, method: &Method) {
-        self.0.one_more();
-        self.0.note(method.name.clone());
+        self.bar.one_more();
+        self.bar.note(method.name.clone());
+        *self.begun.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+    }
+
+    fn is_late(&self) -> bool {
+        self.begun.lock().unwrap_or_else(PoisonError::into_inner).elapsed() > LONG
     }
 
     fn stops(&self) -> bool {
@@ -77,8 +91,8 @@ fn processor_time() -> Duration {
 /// The wall time since the first call, which is at least the processor time of one thread.
 #[cfg(not(target_os = "linux"))]
 fn processor_time() -> Duration {
-    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    START.get_or_init(std::time::Instant::now).elapsed()
+    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+    START.get_or_init(Instant::now).elapsed()
 }
 
 fn draw(folder: &Path, arguments: &ExplainArguments, scene: &Scene, measured: &Measured) -> Result<String, Failure> {

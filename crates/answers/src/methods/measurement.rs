@@ -23,6 +23,11 @@ pub trait MeasurementWatch: Sync {
     /// This method is measured next.
     fn begins(&self, _method: &Method) {}
 
+    /// Whether the method that began last takes too long for its analysis to be waited for; asked often.
+    fn is_late(&self) -> bool {
+        false
+    }
+
     /// Whether the measurement is to be given up; asked often.
     fn stops(&self) -> bool {
         false
@@ -130,10 +135,11 @@ fn outcome(work: &Work, watch: &dyn MeasurementWatch) -> Option<Result<Outcome, 
     match work {
         Work::Run(run) => Trajectory::of(run, &|| watch.stops()).map(|trajectory| Ok(Outcome::Trajectory(trajectory))),
         Work::Analysis { scene, method } => {
-            let limited = Limited { watch, expected: Mutex::new(0.0) };
+            let limited = Limited { watch, expected: Mutex::new(0.0), is_first: true };
             match analyse_watched(scene, *method, &limited) {
                 Ok(analysis) => Some(Ok(Outcome::Radius(analysis.radius))),
                 Err(AnalysisError::Stopped) if watch.stops() => None,
+                Err(AnalysisError::Stopped) if limited.expected() <= MOST_OPERATIONS => Some(Err("too long to be measured here".to_owned())),
                 Err(AnalysisError::Stopped) => {
                     let seconds = limited.expected() / OPERATIONS_A_SECOND;
                     Some(Err(format!("takes about {seconds:.0} s, too long to be measured here")))
@@ -198,7 +204,7 @@ fn once(work: &Work, watch: &dyn MeasurementWatch) -> Option<()> {
     match work {
         Work::Run(run) => drop(std::hint::black_box(unwatched(run, &|| watch.stops())?)),
         Work::Analysis { scene, method } => {
-            let limited = Limited { watch, expected: Mutex::new(0.0) };
+            let limited = Limited { watch, expected: Mutex::new(0.0), is_first: false };
             // Its outcome was had before, so an error is the end that the watch asked for.
             drop(std::hint::black_box(analyse_watched(scene, *method, &limited).ok()?));
         }
@@ -210,6 +216,8 @@ fn once(work: &Work, watch: &dyn MeasurementWatch) -> Option<()> {
 struct Limited<'a> {
     watch: &'a dyn MeasurementWatch,
     expected: Mutex<f64>,
+    /// Whether the analysis is done for the first time: whether it is late is asked then alone.
+    is_first: bool,
 }
 
 impl Limited<'_> {
@@ -224,6 +232,6 @@ impl Watch for Limited<'_> {
     }
 
     fn stops(&self) -> bool {
-        self.expected() > MOST_OPERATIONS || self.watch.stops()
+        self.expected() > MOST_OPERATIONS || self.is_first && self.watch.is_late() || self.watch.stops()
     }
 }

@@ -126,7 +126,7 @@ impl Method {
     }
 }
 
-/// What is done to measure a method.
+/// Work that shows the cost and the error of a method.
 #[derive(Clone, Debug)]
 pub(crate) enum Work {
     Run(Run),
