@@ -162,7 +162,7 @@ impl Rows {
         let axes = scene.axes.count();
         let reason = match scene.axes {
             Axes::One => "scene.axes = 1; the other axes do not exist",
-            Axes::Two => "scene.axes = 2; a third axis is simulated too and rests, because two alone would save a quarter of the time at most",
+            Axes::Two => "scene.axes = 2; a third axis is simulated too and rests, because two alone would save about a quarter of the time",
             Axes::Three => "scene.axes = 3",
         };
         self.model("axes", format!("{axes}"), reason);
