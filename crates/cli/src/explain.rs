@@ -62,7 +62,7 @@ const LONG: Duration = Duration::from_secs(1);
 /// Shows which method is measured, and ends the measurement when the user asks for it.
 struct Shown {
     bar: Progress,
-    /// When the last method began.
+    /// Instant at which the last method began.
     begun: Mutex<Instant>,
 }
 

@@ -76,7 +76,7 @@ struct Document<'a> {
     schema: &'static str,
     version: u32,
     rows: Vec<RowDocument<'a>>,
-    /// Whether the rows are only those measured until Ctrl-C, or until a fault.
+    /// `true` if the rows are only those measured until Ctrl-C or until a fault.
     interrupted: bool,
     wall_s: f64,
 }

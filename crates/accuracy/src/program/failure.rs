@@ -15,7 +15,7 @@ const CLOSED: u8 = 141;
 #[derive(Debug)]
 pub(crate) enum Failure {
     File {
-        /// What cannot be done to the file: "create".
+        /// Verb that failed, such as "create".
         verb: &'static str,
         path: PathBuf,
         error: io::Error,

@@ -1,6 +1,6 @@
 //! The program: measures on a thread of its own, while this one waits for rows and for Ctrl-C.
 //!
-//! One row can take many seconds and asks nobody whether it may go on. Rows and signals therefore come through one channel: at a signal the rows received so
+//! A row can take many seconds, during which no thread asks whether to go on. Rows and signals therefore come through one channel: at a signal the rows received so
 //! far are written at once, and the end of the process ends the measurement.
 
 mod about;
@@ -22,7 +22,7 @@ pub(crate) use self::arguments::Arguments;
 use self::conclusion::Conclusion;
 use self::failure::{Failure, INTERRUPTED};
 
-/// What the waiting thread is told.
+/// Message to the waiting thread.
 enum Event {
     Row(Box<Row>),
     /// The measurement has ended by itself.
@@ -31,7 +31,7 @@ enum Event {
     Interrupted,
 }
 
-/// How a measurement ended.
+/// End of a measurement.
 enum Ending {
     Whole,
     Interrupted,

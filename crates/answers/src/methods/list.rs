@@ -28,7 +28,7 @@ const INTEGRATORS: [(&str, &str, u32); 6] = [
     ("RK4, 4 steps a tick", "rk4", 4),
 ];
 
-/// What the words of netem mean. The exact meaning comes first.
+/// Meanings of the words of netem. The exact meaning comes first.
 const PROFILES: [(&str, &str); 2] = [("exact laws", "exact"), ("tables and generator of Linux 6.6", "kernel-6.6")];
 
 /// The methods of analysis. The last one, which shares least with the others, is the reference.

@@ -23,38 +23,38 @@ pub trait MeasurementWatch: Sync {
     /// This method is measured next.
     fn begins(&self, _method: &Method) {}
 
-    /// Whether the method that began last takes too long for its analysis to be waited for; asked often.
+    /// Returns `true` if the method that began last takes too long to wait for. Called often.
     fn is_late(&self) -> bool {
         false
     }
 
-    /// Whether the measurement is to be given up; asked often.
+    /// Returns `true` if the measurement is to be given up. Called often.
     fn stops(&self) -> bool {
         false
     }
 }
 
-/// What was measured.
+/// Methods with their measured costs and errors.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Measured {
     /// The simulated time of the runs.
     pub span: Duration,
     /// The methods, kind by kind.
     pub methods: Vec<MeasuredMethod>,
-    /// Whether the watch ended the measurement: kinds are missing then.
+    /// `true` if the watch ended the measurement. Kinds are missing then.
     pub interrupted: bool,
 }
 
 /// A method with its cost and its error on the scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeasuredMethod {
-    /// What the method is for.
+    /// Purpose of the method.
     pub kind: Kind,
-    /// What it is called, among those of its kind.
+    /// Name of the method, unique within its kind.
     pub name: String,
     /// The words that choose it on the command line; empty for the default.
     pub option: String,
-    /// Whether the scene as it stands is computed this way.
+    /// `true` if the scene as it stands is computed by this method.
     pub chosen: bool,
     /// Processor time for one [`Kind::cost_of`] \[ms\]: measured, the median of some rounds. `None` if the method does not apply, and then the note says why.
     pub cost_ms: Option<f64>,
@@ -63,7 +63,7 @@ pub struct MeasuredMethod {
     pub error: Option<f64>,
     /// The name of the method that the error is against; `None` if there is no error.
     pub reference: Option<String>,
-    /// What a reader should know besides; empty if nothing.
+    /// Remark for the reader; empty if there is none.
     pub note: String,
 }
 
@@ -216,7 +216,7 @@ fn once(work: &Work, watch: &dyn MeasurementWatch) -> Option<()> {
 struct Limited<'a> {
     watch: &'a dyn MeasurementWatch,
     expected: Mutex<f64>,
-    /// Whether the analysis is done for the first time: whether it is late is asked then alone.
+    /// `true` for the first analysis of a method, which alone may be late.
     is_first: bool,
 }
 

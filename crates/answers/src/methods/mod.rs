@@ -22,18 +22,18 @@ use std::time::Duration;
 use cohaptic_harness::Model;
 use cohaptic_scene::Scene;
 
-/// What a method is for.
+/// Purpose of a method.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Kind {
-    /// How much of the machinery a run uses. All engines have the same answer, to the bit.
+    /// Engine of runs. All engines have the same answer, to the bit.
     Engine,
-    /// How many axes are simulated.
+    /// Number of simulated axes.
     Axes,
-    /// How bodies move from tick to tick.
+    /// Motion of bodies from tick to tick.
     Integrator,
-    /// How random delays and losses are drawn.
+    /// Source of random delays and losses.
     Sampling,
-    /// How the verdict on stability is reached.
+    /// Analysis that decides on stability.
     Analysis,
 }
 
@@ -74,7 +74,7 @@ impl Kind {
         }
     }
 
-    /// What the cost is for one of.
+    /// Unit of work that the cost is for.
     #[must_use]
     pub const fn cost_of(self) -> &'static str {
         match self {
@@ -83,7 +83,7 @@ impl Kind {
         }
     }
 
-    /// What the error is of.
+    /// Quantity that the error is of.
     #[must_use]
     pub const fn error_of(self) -> &'static str {
         match self {
@@ -105,15 +105,15 @@ impl Kind {
 /// A method that the scene could choose.
 #[derive(Clone, Debug)]
 pub struct Method {
-    /// What it is for.
+    /// Purpose of the method.
     pub kind: Kind,
-    /// What it is called, among those of its kind.
+    /// Name of the method, unique within its kind.
     pub name: String,
     /// The words that choose it on the command line; empty for the default.
     pub option: String,
-    /// Whether the scene as it stands is computed this way.
+    /// `true` if the scene as it stands is computed by this method.
     pub chosen: bool,
-    /// Its error is against the method of its kind that has this mark.
+    /// `true` for the reference of its kind, which the errors of the other methods are against.
     pub(crate) is_reference: bool,
     /// The work that shows its cost and its error, or why it does not apply to the scene.
     pub(crate) work: Result<Work, String>,
@@ -139,7 +139,7 @@ pub(crate) struct Run {
     /// The scene, no longer than the span that is simulated.
     pub(crate) scene: Box<Scene>,
     pub(crate) model: Model,
-    /// Whether packets are watched, for which a run has events.
+    /// `true` if packets are watched, for which a run has events.
     pub(crate) watches_packets: bool,
     /// The axes whose positions are compared: those of the scene as it stands.
     pub(crate) compared_axes: usize,

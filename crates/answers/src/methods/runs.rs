@@ -7,7 +7,7 @@ use cohaptic_units::{Instant, print::Span};
 
 use super::Run;
 
-/// Where the copies are in one run.
+/// Positions of the copies in one run.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Trajectory {
     /// Positions along the compared axes \[m\]: in the order of the ticks, then those at the end, then those at the end of a run of which no tick is watched,

@@ -8,10 +8,10 @@ use tokio::io::Interest;
 
 /// What a program saw, in words. Ports are free ones, so they are left out.
 #[derive(Default)]
-struct Log(Vec<String>);
+pub(crate) struct Log(pub(crate) Vec<String>);
 
 impl Log {
-    fn see<T: Debug>(&mut self, what: &str, seen: io::Result<T>) {
+    pub(crate) fn see<T: Debug>(&mut self, what: &str, seen: io::Result<T>) {
         let seen = match seen {
             Ok(value) => format!("{value:?}"),
             Err(error) => format!("{:?}", error.kind()),

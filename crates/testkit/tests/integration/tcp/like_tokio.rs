@@ -1,23 +1,6 @@
 //! The same program on tokio's streams, on the loopback interface of this machine, and on virtual ones: it sees the same.
 
-use std::fmt::Debug;
-use std::io;
-
 use cohaptic_testkit::Testbed;
-
-/// What a program saw, in words. Ports are free ones, so they are left out.
-#[derive(Default)]
-struct Log(Vec<String>);
-
-impl Log {
-    fn see<T: Debug>(&mut self, what: &str, seen: io::Result<T>) {
-        let seen = match seen {
-            Ok(value) => format!("{value:?}"),
-            Err(error) => format!("{:?}", error.kind()),
-        };
-        self.0.push(format!("{what}: {seen}"));
-    }
-}
 
 macro_rules! program {
     ($name:ident, $net:path) => {
@@ -32,7 +15,7 @@ macro_rules! program {
             use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, Interest, ReadBuf};
             use $net as net;
 
-            use super::Log;
+            use crate::like_tokio::Log;
 
             async fn pair(listener: &TcpListener) -> (TcpStream, TcpStream) {
                 let client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
