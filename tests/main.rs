@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`claims`] | claims about coordination over links |
 //! | [`determinism`] | same scene, same seed, same bytes, by every way to run it |
+//! | [`eigenvectors`] | no tests: what some of the others share |
 //! | [`hard`] | hard cases of the numerics, of time and of size |
 //! | [`house`] | rules that the project keeps to |
 //! | [`properties`] | properties of runs, tried on scenes drawn at random |
@@ -12,6 +13,7 @@
 
 mod claims;
 mod determinism;
+mod eigenvectors;
 mod hard;
 mod house;
 mod properties;

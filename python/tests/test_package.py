@@ -56,4 +56,4 @@ def test_what_computes_has_the_versions_of_the_program() -> None:
     program, package = locked(ROOT / "Cargo.lock"), locked(ROOT / "python" / "Cargo.lock")
     different = {name for name in package.keys() & program.keys() if not package[name] <= program[name]}
     assert different == set()
-    assert {"faer", "libm", "pulp", "cohaptic-wan"} <= package.keys() & program.keys()
+    assert {"libm", "num-complex", "pulp", "cohaptic-wan"} <= package.keys() & program.keys()

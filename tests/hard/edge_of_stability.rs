@@ -18,6 +18,7 @@ use cohaptic_peer::{Contact, Gains};
 use cohaptic_stability::{Boundary, BoundaryOptions, Cell, KeyRange, Method, Monodromy, StateKind, Verdict, analyse, monodromy};
 use cohaptic_tests::Draft;
 
+use crate::eigenvectors::{LeftEigenvector, left_eigenvectors};
 use crate::hard::ROUNDING;
 use crate::hard::watch::OnTick;
 
@@ -103,23 +104,12 @@ fn state(monodromy: &Monodromy, rows: &[Row], tick: usize) -> Vec<f64> {
 
 /// An eigenvalue of largest modulus among those that the mirrored state excites, with a left eigenvector and the sum of the sizes of its residual.
 fn dominant(monodromy: &Monodromy, excited: &[f64]) -> (f64, Vec<(f64, f64)>, f64) {
-    let size = monodromy.matrix.rows();
-    let transposed = monodromy.matrix.transposed();
-    let decomposition = faer::Mat::from_fn(size, size, |row, column| transposed[(row, column)]).eigen().unwrap();
-    let vector = |place: usize| (0..size).map(|row| decomposition.U()[(row, place)]).map(|entry| (entry.re, entry.im)).collect::<Vec<_>>();
     let scale = excited.iter().fold(0.0, |scale: f64, entry| scale.max(entry.abs()));
-    let place = (0..size)
-        .filter(|place| component(&vector(*place), excited) > 1e-6 * scale)
-        .max_by(|one, other| decomposition.S()[*one].norm().total_cmp(&decomposition.S()[*other].norm()))
-        .unwrap();
-    let (value, left) = (decomposition.S()[place], vector(place));
-    let (real, imaginary): (Vec<f64>, Vec<f64>) = left.iter().copied().unzip();
-    let (reached, other) = (transposed.times_column(&real), transposed.times_column(&imaginary));
-    let residual = |row: usize| {
-        let apart = (reached[row] - value.re * real[row] + value.im * imaginary[row], other[row] - value.re * imaginary[row] - value.im * real[row]);
-        apart.0.hypot(apart.1)
-    };
-    (value.norm(), left, (0..size).map(residual).sum())
+    let parts = |vector: &LeftEigenvector| vector.entries.iter().map(|entry| (entry.re, entry.im)).collect::<Vec<_>>();
+    let vectors = left_eigenvectors(&monodromy.matrix);
+    let is_excited = |vector: &&LeftEigenvector| component(&parts(vector), excited) > 1e-6 * scale;
+    let found = vectors.iter().filter(is_excited).max_by(|one, other| one.value.norm().total_cmp(&other.value.norm())).unwrap();
+    (found.value.norm(), parts(found), found.residual.iter().sum())
 }
 
 /// |w·s|.

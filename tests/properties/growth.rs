@@ -10,6 +10,8 @@ use cohaptic_tests::{Draft, DraftHand, DraftLink, Log, Tick, cases, drafts, run}
 use proptest::prelude::*;
 use proptest::sample::select;
 
+use crate::eigenvectors::{LeftEigenvector, left_eigenvectors};
+
 /// Frames that are compared.
 const FRAMES: usize = 200;
 
@@ -89,27 +91,13 @@ proptest! {
 
 /// The largest modulus of an eigenvalue, and a left eigenvector as (real, imaginary) parts.
 fn dominant(monodromy: &Monodromy) -> (f64, Vec<(f64, f64)>) {
-    let size = monodromy.states.len();
-    let transposed = monodromy.matrix.transposed();
-    let decomposition = faer::Mat::from_fn(size, size, |row, column| transposed[(row, column)]).eigen().unwrap();
-    let largest = (0..size).map(|place| decomposition.S()[place].norm()).fold(0.0, f64::max);
-    // Equal eigenvalues, one for each axis, come with vectors of which not all are good: the first that is one.
-    let vectors = (0..size).filter(|place| decomposition.S()[*place].norm() > largest * (1.0 - 1e-12)).map(|place| {
-        let (value, vector) = (decomposition.S()[place], decomposition.U().col(place));
-        let part = |part: fn(&faer::c64) -> f64| (0..size).map(|row| part(&vector[row])).collect::<Vec<f64>>();
-        (value, part(|entry| entry.re), part(|entry| entry.im))
-    });
-    let residual = |(value, real, imaginary): &(faer::c64, Vec<f64>, Vec<f64>)| {
-        let (reached, other) = (transposed.times_column(real), transposed.times_column(imaginary));
-        let entry = |row: usize| {
-            let apart =
-                (reached[row] - value.re * real[row] + value.im * imaginary[row], other[row] - value.re * imaginary[row] - value.im * real[row]);
-            apart.0.hypot(apart.1)
-        };
-        (0..size).map(entry).fold(0.0, f64::max)
-    };
-    let (_, real, imaginary) = vectors.min_by(|one, other| residual(one).total_cmp(&residual(other))).unwrap();
-    (largest, real.into_iter().zip(imaginary).collect())
+    let vectors = left_eigenvectors(&monodromy.matrix);
+    let largest = vectors.iter().map(|vector| vector.value.norm()).fold(0.0, f64::max);
+    // Equal eigenvalues, one for each axis, come with vectors of which not all are good: the best one.
+    let residual = |vector: &LeftEigenvector| vector.residual.iter().copied().fold(0.0, f64::max);
+    let of_largest = vectors.iter().filter(|vector| vector.value.norm() > largest * (1.0 - 1e-12));
+    let best = of_largest.min_by(|one, other| residual(one).total_cmp(&residual(other))).unwrap();
+    (largest, best.entries.iter().map(|entry| (entry.re, entry.im)).collect())
 }
 
 fn age(kind: StateKind) -> usize {

@@ -28,6 +28,6 @@ mod waves;
 const ROUNDING: f64 = f64::EPSILON / 2.0;
 
 /// A count as a number.
-fn count(items: usize) -> f64 {
+pub(crate) fn count(items: usize) -> f64 {
     items as f64
 }

@@ -239,8 +239,8 @@ fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>
     if let Some(peer) = degrees.iter().position(|degree| *degree <= 0.0) {
         return Err(GraphError::Alone { peer: scene.peers[peer].name.clone() });
     }
-    let symmetric = faer::Mat::from_fn(peers, peers, |row, column| at(row, column) / (degrees[row] * degrees[column]).sqrt());
-    let mut eigenvalues = symmetric.self_adjoint_eigenvalues(faer::Side::Lower).unwrap_or_default();
+    let symmetric = Matrix::from_fn(peers, peers, |row, column| at(row, column) / (degrees[row] * degrees[column]).sqrt());
+    let mut eigenvalues: Vec<f64> = crate::eigenvalues(&symmetric).iter().map(|value| value.re).collect();
     eigenvalues.sort_by(f64::total_cmp);
     // As many of them are 1 as there are connected parts: these are the largest.
     let ones = components(weights);

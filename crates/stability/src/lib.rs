@@ -31,6 +31,7 @@ mod boundary;
 mod cost;
 mod determinant;
 mod error;
+mod factorisation;
 mod family;
 mod full;
 mod graph;
@@ -72,7 +73,7 @@ pub use family::{Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange, 
 pub use graph::{Graph, GraphError, analyse_on, analyse_on_watched};
 pub use judgement::{Judgement, NOMINAL, has_chance, judge, judge_watched};
 pub use map::{Grid, Map, MapError, MapRow, Polyline};
-pub use matrix::Matrix;
+pub use matrix::{Dense, Matrix};
 pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square, mean_square_watched, mean_square_within};
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};

@@ -1,40 +1,33 @@
-//! A dense real matrix, row by row.
+//! Dense matrices, row by row.
 
-use std::ops::{Index, IndexMut, Range};
+use std::ops::{Add, Index, IndexMut, Mul, Range};
 
-/// A dense real matrix, stored row by row.
-///
-/// It holds what the analysis works on. Factorisations of large matrices are left to `faer`.
+use num_complex::Complex64;
+
+/// A dense real matrix, stored row by row: what the analysis works on.
+pub type Matrix = Dense<f64>;
+
+/// A dense complex matrix, stored row by row.
+pub(crate) type ComplexMatrix = Dense<Complex64>;
+
+/// A dense matrix of numbers `T`, stored row by row. Users see real ones: [`Matrix`].
 #[derive(Clone, PartialEq, Debug, Default)]
-pub struct Matrix {
+pub struct Dense<T> {
     rows: usize,
     columns: usize,
-    entries: Vec<f64>,
+    entries: Vec<T>,
 }
 
-impl Matrix {
+impl<T: Copy + Default + Add<Output = T> + Mul<Output = T>> Dense<T> {
     /// All entries zero.
     #[must_use]
     pub fn zeros(rows: usize, columns: usize) -> Self {
-        Self { rows, columns, entries: vec![0.0; rows * columns] }
-    }
-
-    /// Becomes a matrix of that shape, all entries zero, in the memory that it has.
-    pub(crate) fn reset(&mut self, rows: usize, columns: usize) {
-        self.entries.clear();
-        self.entries.resize(rows * columns, 0.0);
-        (self.rows, self.columns) = (rows, columns);
-    }
-
-    /// Ones on the diagonal.
-    #[must_use]
-    pub fn identity(size: usize) -> Self {
-        Self::from_fn(size, size, |row, column| if row == column { 1.0 } else { 0.0 })
+        Self { rows, columns, entries: vec![T::default(); rows * columns] }
     }
 
     /// Each entry from its row and column.
     #[must_use]
-    pub fn from_fn(rows: usize, columns: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
+    pub fn from_fn(rows: usize, columns: usize, mut entry: impl FnMut(usize, usize) -> T) -> Self {
         let entries = (0..rows * columns).map(|place| entry(place / columns, place % columns)).collect();
         Self { rows, columns, entries }
     }
@@ -58,7 +51,7 @@ impl Matrix {
     /// If there is no such row.
     #[must_use]
     #[inline]
-    pub fn row(&self, row: usize) -> &[f64] {
+    pub fn row(&self, row: usize) -> &[T] {
         &self.entries[row * self.columns..(row + 1) * self.columns]
     }
 
@@ -68,8 +61,59 @@ impl Matrix {
     ///
     /// If there is no such row.
     #[inline]
-    pub fn row_mut(&mut self, row: usize) -> &mut [f64] {
+    pub fn row_mut(&mut self, row: usize) -> &mut [T] {
         &mut self.entries[row * self.columns..(row + 1) * self.columns]
+    }
+
+    /// All entries, row by row.
+    #[must_use]
+    pub fn entries(&self) -> &[T] {
+        &self.entries
+    }
+
+    /// Rows and columns exchanged.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        Self::from_fn(self.columns, self.rows, |row, column| self[(column, row)])
+    }
+
+    /// The product of the two.
+    ///
+    /// # Panics
+    ///
+    /// If this matrix has not as many columns as the other has rows.
+    #[must_use]
+    pub fn times(&self, other: &Self) -> Self {
+        assert_eq!(self.columns, other.rows, "the shapes of a product fit");
+        let mut product = Self::zeros(self.rows, other.columns);
+        for row in 0..self.rows {
+            for (inner, factor) in self.row(row).iter().enumerate() {
+                for (sum, entry) in product.row_mut(row).iter_mut().zip(other.row(inner)) {
+                    *sum = *sum + *factor * *entry;
+                }
+            }
+        }
+        product
+    }
+}
+
+impl Matrix {
+    /// Becomes a matrix of that shape, all entries zero, in the memory that it has.
+    pub(crate) fn reset(&mut self, rows: usize, columns: usize) {
+        self.entries.clear();
+        self.entries.resize(rows * columns, 0.0);
+        (self.rows, self.columns) = (rows, columns);
+    }
+
+    /// Ones on the diagonal.
+    #[must_use]
+    pub fn identity(size: usize) -> Self {
+        Self::from_fn(size, size, |row, column| if row == column { 1.0 } else { 0.0 })
+    }
+
+    /// All entries, row by row, to be changed.
+    pub(crate) fn entries_mut(&mut self) -> &mut [f64] {
+        &mut self.entries
     }
 
     /// A row and the one after it, to be changed together.
@@ -93,37 +137,6 @@ impl Matrix {
     /// If there are no such rows.
     pub(crate) fn move_rows(&mut self, rows: Range<usize>, to: usize) {
         self.entries.copy_within(rows.start * self.columns..rows.end * self.columns, to * self.columns);
-    }
-
-    /// All entries, row by row.
-    #[must_use]
-    pub fn entries(&self) -> &[f64] {
-        &self.entries
-    }
-
-    /// Rows and columns exchanged.
-    #[must_use]
-    pub fn transposed(&self) -> Self {
-        Self::from_fn(self.columns, self.rows, |row, column| self[(column, row)])
-    }
-
-    /// The product of the two.
-    ///
-    /// # Panics
-    ///
-    /// If this matrix has not as many columns as the other has rows.
-    #[must_use]
-    pub fn times(&self, other: &Self) -> Self {
-        assert_eq!(self.columns, other.rows, "the shapes of a product fit");
-        let mut product = Self::zeros(self.rows, other.columns);
-        for row in 0..self.rows {
-            for (inner, factor) in self.row(row).iter().enumerate() {
-                for (sum, entry) in product.row_mut(row).iter_mut().zip(other.row(inner)) {
-                    *sum += factor * entry;
-                }
-            }
-        }
-        product
     }
 
     /// The product with a column.
@@ -167,18 +180,18 @@ impl Matrix {
     }
 }
 
-impl Index<(usize, usize)> for Matrix {
-    type Output = f64;
+impl<T> Index<(usize, usize)> for Dense<T> {
+    type Output = T;
 
     #[inline]
-    fn index(&self, (row, column): (usize, usize)) -> &f64 {
+    fn index(&self, (row, column): (usize, usize)) -> &T {
         &self.entries[row * self.columns + column]
     }
 }
 
-impl IndexMut<(usize, usize)> for Matrix {
+impl<T> IndexMut<(usize, usize)> for Dense<T> {
     #[inline]
-    fn index_mut(&mut self, (row, column): (usize, usize)) -> &mut f64 {
+    fn index_mut(&mut self, (row, column): (usize, usize)) -> &mut T {
         &mut self.entries[row * self.columns + column]
     }
 }

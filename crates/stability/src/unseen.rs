@@ -4,12 +4,11 @@
 //! Such a motion of the waves lasts forever over links that lose nothing, no body feels it, and from waves at zero none arises. So it is no part of how
 //! the scene moves, and its eigenvalues, of modulus 1, say nothing of stability. The analysis keeps the largest quotient in which every state is felt.
 
-use faer::{Mat, MatRef};
-
+use crate::factorisation::orthogonal_complement;
 use crate::{Matrix, StateKind, StateName};
 
-/// Below this, relative to the largest entry, a singular value counts as zero: far above rounding, and far below the share of one tick in a
-/// wave. The error covers values that are taken for zero.
+/// Below this, relative to the largest entry, what is left of a row counts as zero: far above rounding, and far below the share of one tick in a
+/// wave. The error covers what is taken for zero.
 const NOTHING: f64 = 1e-9;
 
 /// The part of a matrix in which every state is felt by a body, and what this adds to the error of its entries. `forces`: what the states add to the
@@ -20,28 +19,28 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
     if !matrix.is_finite() || !forces.is_finite() {
         return (matrix.clone(), 0.0);
     }
-    let whole = Mat::from_fn(size, size, |row, column| matrix[(row, column)]);
-    let chosen = |of: &Matrix| Mat::from_fn(of.rows(), hidden.len(), |row, column| of[(row, hidden[column])]);
-    let scale = chosen(matrix).norm_max();
+    let chosen = |of: &Matrix| Matrix::from_fn(of.rows(), hidden.len(), |row, column| of[(row, hidden[column])]);
+    let scale = chosen(matrix).largest();
     // The largest subspace without a force that a frame leads into itself (Wonham 1985, Section 4.3), smaller and smaller.
     let forces = chosen(forces);
-    let silent = null_space(forces.as_ref(), forces.norm_max());
-    let mut unfelt = Mat::from_fn(size, hidden.len(), |row, column| if hidden[column] == row { 1.0 } else { 0.0 }) * silent;
+    let silent = null_space(&forces, forces.largest());
+    let mut unfelt = Matrix::from_fn(size, hidden.len(), |row, column| if hidden[column] == row { 1.0 } else { 0.0 }).times(&silent);
     loop {
-        if unfelt.ncols() == 0 {
+        if unfelt.columns() == 0 {
             return (matrix.clone(), 0.0);
         }
-        let reached = &whole * &unfelt;
-        let outside = &reached - &unfelt * (unfelt.transpose() * &reached);
-        let inside = null_space(outside.as_ref(), scale);
-        if inside.ncols() == unfelt.ncols() {
-            let other = null_space(unfelt.transpose(), 1.0);
-            let quotient = other.transpose() * &whole * &other;
+        let reached = matrix.times(&unfelt);
+        let within = unfelt.times(&unfelt.transposed().times(&reached));
+        let outside = Matrix::from_fn(size, unfelt.columns(), |row, column| reached[(row, column)] - within[(row, column)]);
+        let inside = null_space(&outside, scale);
+        if inside.columns() == unfelt.columns() {
+            let other = null_space(&unfelt.transposed(), 1.0);
+            let quotient = other.transposed().times(&matrix.times(&other));
             // The rounding of the products, and the part of the subspace that a frame leads out of it.
-            let error = f64::EPSILON * crate::structure::count(size) * matrix.frobenius_norm() + outside.norm_l2();
-            return (Matrix::from_fn(quotient.nrows(), quotient.ncols(), |row, column| quotient[(row, column)]), error);
+            let error = f64::EPSILON * crate::structure::count(size) * matrix.frobenius_norm() + outside.frobenius_norm();
+            return (quotient, error);
         }
-        unfelt = &unfelt * inside;
+        unfelt = unfelt.times(&inside);
     }
 }
 
@@ -62,14 +61,10 @@ const fn is_hidden(kind: StateKind) -> bool {
     }
 }
 
-/// An orthonormal basis of the vectors that a matrix makes nothing of.
-fn null_space(matrix: MatRef<'_, f64>, scale: f64) -> Mat<f64> {
-    let columns = matrix.ncols();
-    let svd = if matrix.nrows() < columns { matrix.svd() } else { matrix.thin_svd() };
-    let Ok(svd) = svd else { return Mat::zeros(columns, 0) };
-    let values = svd.S().column_vector();
-    let rank = (0..values.nrows()).filter(|place| values[*place] > NOTHING * scale).count();
-    svd.V().subcols(rank, columns - rank).to_owned()
+/// An orthonormal basis, as columns, of the vectors of which a matrix makes nothing: those orthogonal to its rows.
+fn null_space(matrix: &Matrix, scale: f64) -> Matrix {
+    let rows = (0..matrix.rows()).map(|row| matrix.row(row).to_vec()).collect();
+    orthogonal_complement(rows, matrix.columns(), NOTHING * scale)
 }
 
 #[cfg(test)]

@@ -7,11 +7,12 @@
 
 use std::f64::consts::TAU;
 
-use faer::linalg::solvers::Solve as _;
 use num_complex::Complex64;
 
 use super::response::AdmittancePoint;
+use crate::factorisation::Lu;
 use crate::lifted::{FrameMap, Instrument, Lifted};
+use crate::matrix::ComplexMatrix;
 use crate::structure::count;
 
 /// e^{jωt} after that number of periods, whole ones left out first.
@@ -76,8 +77,8 @@ pub(super) struct Harmonic {
     periods: f64,
     /// What the mean velocity over the push is multiplied by [1/(N·s)].
     unit: f64,
-    matrix: faer::Mat<Complex64>,
-    right: faer::Mat<Complex64>,
+    matrix: ComplexMatrix,
+    right: Vec<Complex64>,
 }
 
 impl Harmonic {
@@ -88,7 +89,7 @@ impl Harmonic {
         let map = lifted.frame(&mut sine);
         let periods = hz * lifted.timetable.frame.as_secs_f64();
         let size = map.state_unknowns() + map.used.len();
-        let (matrix, right) = (faer::Mat::zeros(size, size), faer::Mat::zeros(size, 1));
+        let (matrix, right) = (ComplexMatrix::zeros(size, size), vec![Complex64::ZERO; size]);
         let unit = compliance / (count(sine.ticks) * lifted.time);
         let mut harmonic = Self { hz, map, sine, back: turn(-periods), periods, unit, matrix, right };
         harmonic.write_states();
@@ -137,11 +138,11 @@ impl Harmonic {
             Source::State(row) => self.map.states.row(row),
             Source::Sent(row) => self.map.sent.row(row),
         };
-        let size = self.matrix.ncols();
+        let size = self.matrix.columns();
         for (column, entry) in row.iter().enumerate().take(size) {
             self.matrix[(equation, column)] -= factor * entry;
         }
-        self.right[(equation, 0)] += factor * Complex64::new(row[size], row[size + 1]);
+        self.right[equation] += factor * Complex64::new(row[size], row[size + 1]);
     }
 
     fn subtract_reference(&mut self, equation: usize, factor: Complex64) {
@@ -152,7 +153,7 @@ impl Harmonic {
 
     /// Solves them, and says how exact the answer is.
     pub(super) fn point(&self) -> AdmittancePoint {
-        let size = self.matrix.ncols();
+        let size = self.matrix.columns();
         let seen = Seen {
             states: &self.sine.seen[..size],
             push: self.sine.seen[size] + Complex64::I * self.sine.seen[size + 1],
@@ -174,16 +175,14 @@ pub(super) struct Seen<'a> {
 }
 
 /// Solves the equations of a steady state, of whose coefficients `error` bounds the rounding, and says how exact the answer is.
-pub(super) fn solved(hz: f64, matrix: &faer::Mat<Complex64>, right: &faer::Mat<Complex64>, seen: &Seen<'_>, error: f64) -> AdmittancePoint {
-    let size = matrix.ncols();
-    let decomposed = matrix.partial_piv_lu();
-    let solution = decomposed.solve(right);
-    let looked = faer::Mat::from_fn(size, 1, |row, _| seen.states[row]);
-    let of_states: Complex64 = (0..size).map(|row| seen.states[row] * solution[(row, 0)]).sum();
+pub(super) fn solved(hz: f64, matrix: &ComplexMatrix, right: &[Complex64], seen: &Seen<'_>, error: f64) -> AdmittancePoint {
+    let size = matrix.columns();
+    let factors = Lu::of(matrix);
+    let solution = factors.solve(right);
+    let of_states: Complex64 = seen.states.iter().zip(&solution).map(|(state, value)| state * value).sum();
     // A change δM of the equations changes the answer by yᵀ·δM·u, where Mᵀ·y picks the output.
-    let adjoint = decomposed.solve_transpose(&looked);
-    let weight: f64 = (0..size).map(|row| adjoint[(row, 0)].norm()).sum();
-    let largest = (0..size).map(|row| solution[(row, 0)].norm()).fold(1.0, f64::max);
+    let weight: f64 = factors.solve_transposed(seen.states).iter().map(|entry| entry.norm()).sum();
+    let largest = solution.iter().map(|value| value.norm()).fold(1.0, f64::max);
     let row_sum = |row: usize| (0..size).map(|column| matrix[(row, column)].norm()).sum::<f64>();
     let norm = (0..size).map(row_sum).fold(0.0, f64::max);
     let change = 4.0 * error + f64::EPSILON * count(size) * norm;

@@ -10,6 +10,7 @@ use num_complex::Complex64;
 
 use super::harmonic::{Seen, phase, solved, turn};
 use super::response::AdmittancePoint;
+use crate::matrix::ComplexMatrix;
 use crate::network::NominalNetwork;
 use crate::structure::count;
 use crate::timetable::{Instants, Timetable};
@@ -77,8 +78,8 @@ impl Turned {
         let (cosine, sine) = (under(|phase| phase.re, Complex64::ONE), under(|phase| phase.im, Complex64::I));
         let size = frame.rows();
         let ahead = turn(hz * together.structure.timetable.frame.as_secs_f64());
-        let matrix = faer::Mat::from_fn(size, size, |row, column| if row == column { ahead } else { Complex64::ZERO } - frame[(row, column)]);
-        let right = faer::Mat::from_fn(size, 1, |row, _| Complex64::new(cosine[row], sine[row]));
+        let matrix = ComplexMatrix::from_fn(size, size, |row, column| if row == column { ahead } else { Complex64::ZERO } - frame[(row, column)]);
+        let right: Vec<Complex64> = cosine.iter().zip(&sine).map(|(cosine, sine)| Complex64::new(*cosine, *sine)).collect();
         let back: Vec<Complex64> = ticks.iter().map(|at| phase(hz, *at).conj()).collect();
         let states: Vec<Complex64> = (0..size).map(|state| velocities.row(state).iter().zip(&back).map(|(v, back)| back * v).sum()).collect();
         let lengths: f64 = components.iter().map(|component| if *component > 2 { node.length } else { 1.0 }).product();

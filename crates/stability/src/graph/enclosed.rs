@@ -4,6 +4,7 @@ use cohaptic_scene::Scene;
 
 use super::{Eigenvalue, Graph, GraphError};
 use crate::Matrix;
+use crate::factorisation::eigen;
 use crate::structure::count;
 
 /// The eigenvalues of an averaging matrix but for 1, which each connected part has once.
@@ -66,10 +67,11 @@ fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     let size = weights.rows();
     let unknown = || vec![[-1.0, 1.0]; usize::from(size > ones)];
     let Some((a, _)) = symmetric(weights) else { return unknown() };
-    let Ok(found) = a.self_adjoint_eigen(faer::Side::Lower) else { return unknown() };
-    let (u, values) = (found.U(), found.S().column_vector());
-    let residual = frobenius(&(&a * u - faer::Mat::from_fn(size, size, |row, column| u[(row, column)] * values[column])));
-    let skew = frobenius(&(u.transpose() * u - faer::Mat::<f64>::identity(size, size)));
+    let (values, rows) = eigen(&a);
+    let u = rows.transposed();
+    let (reached, unit) = (a.times(&u), rows.times(&u));
+    let residual = frobenius(&Matrix::from_fn(size, size, |row, column| reached[(row, column)] - u[(row, column)] * values[column]));
+    let skew = frobenius(&Matrix::from_fn(size, size, |row, column| unit[(row, column)] - if row == column { 1.0 } else { 0.0 }));
     let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
     // Written so that NaN fails.
     if !(skew < 0.1 && largest < 1.1 && residual < 1.0) {
@@ -79,14 +81,14 @@ fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     // Frobenius norm within 4·(n + 2)·√n·u·(1 + ε) and n²·u·(1 + ε)². All together is less than half of this, which has room for the sums of squares.
     let rounding = 8.0 * (count(size) + 8.0).powi(2) * f64::EPSILON;
     let error = residual + skew * (1.0 + largest) + rounding;
-    let mut sorted: Vec<f64> = values.iter().copied().collect();
+    let mut sorted = values;
     sorted.sort_by(f64::total_cmp);
     sorted.truncate(size - ones);
     sorted.into_iter().map(|value| within_unit(value, error)).collect()
 }
 
 /// D^−½·W·D^−½ and the row sums D; `None` if a sum is beyond all numbers.
-fn symmetric(weights: &Matrix) -> Option<(faer::Mat<f64>, Vec<f64>)> {
+fn symmetric(weights: &Matrix) -> Option<(Matrix, Vec<f64>)> {
     let size = weights.rows();
     let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
     if degrees.iter().any(|degree| !degree.is_finite()) {
@@ -94,25 +96,23 @@ fn symmetric(weights: &Matrix) -> Option<(faer::Mat<f64>, Vec<f64>)> {
     }
     // Divided one by one, nothing leaves the range of numbers: no weight is above its degree.
     let entry = |row: usize, column: usize| weights[(row, column)] / degrees[row].sqrt() / degrees[column].sqrt();
-    let a = faer::Mat::from_fn(size, size, entry);
-    Some((a, degrees))
+    Some((Matrix::from_fn(size, size, entry), degrees))
 }
 
 /// The eigenvectors of D⁻¹W, nearly: columns x with xᵀDx = 1 for a connected graph, but for that of the eigenvalue 1. `None` if they were not found.
 pub(crate) fn eigenvectors(weights: &Matrix) -> Option<Matrix> {
     let (a, degrees) = symmetric(weights)?;
-    let found = a.self_adjoint_eigen(faer::Side::Lower).ok()?;
-    let (u, values) = (found.U(), found.S().column_vector());
-    let mut order: Vec<usize> = (0..values.nrows()).collect();
+    let (values, rows) = eigen(&a);
+    let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|one, other| values[*one].total_cmp(&values[*other]));
     // The largest is 1.
     order.pop();
-    let vectors = Matrix::from_fn(degrees.len(), order.len(), |row, column| u[(row, order[column])] / degrees[row].sqrt());
+    let vectors = Matrix::from_fn(degrees.len(), order.len(), |row, column| rows[(order[column], row)] / degrees[row].sqrt());
     vectors.is_finite().then_some(vectors)
 }
 
-fn frobenius(matrix: &faer::Mat<f64>) -> f64 {
-    matrix.col_iter().flat_map(|column| column.iter().copied()).map(|entry| entry * entry).sum::<f64>().sqrt()
+fn frobenius(matrix: &Matrix) -> f64 {
+    matrix.entries().iter().map(|entry| entry * entry).sum::<f64>().sqrt()
 }
 
 /// Whether all rows add up to exactly the same number.

@@ -258,8 +258,7 @@ impl Krylov {
         if self.columns.iter().flatten().any(|entry| !entry.is_finite()) {
             return None;
         }
-        let matrix = faer::Mat::<f64>::from_fn(size, size, |row, column| self.columns[column].get(row).copied().unwrap_or(0.0));
-        let values = matrix.eigenvalues().ok()?;
+        let values = crate::eigenvalues(&Matrix::from_fn(size, size, |row, column| self.columns[column].get(row).copied().unwrap_or(0.0)));
         let scale = values.iter().map(|value| libm::hypot(value.re, value.im)).fold(0.0, f64::max);
         let real = values.iter().filter(|value| value.im.abs() <= 1e-9 * scale).map(|value| value.re).fold(0.0, f64::max);
         Some(if real > 0.0 { real } else { scale })

@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use cohaptic_peer::{Integrator, Plant};
 use cohaptic_scene::Scene;
-use faer::Mat;
 
 use super::*;
 use crate::paper_scene::PAPER;
@@ -182,9 +181,9 @@ impl Explicit {
         z
     }
 
-    fn matrix(&self, lost: &dyn Fn(usize, usize) -> bool) -> Mat<f64> {
+    fn matrix(&self, lost: &dyn Fn(usize, usize) -> bool) -> Matrix {
         let kept: Vec<usize> = (0..self.size()).filter(|state| *state != 2).collect();
-        let mut matrix = Mat::zeros(kept.len(), kept.len());
+        let mut matrix = Matrix::zeros(kept.len(), kept.len());
         for (column, state) in kept.iter().enumerate() {
             let mut unit = vec![0.0; self.size()];
             unit[*state] = 1.0;
@@ -199,16 +198,16 @@ impl Explicit {
     }
 
     /// The matrices and probabilities of all combinations of lost and delivered, bit by bit (receiver by receiver, sender by sender).
-    fn all(&self) -> Vec<Mat<f64>> {
+    fn all(&self) -> Vec<Matrix> {
         let links = self.peers * (self.peers - 1);
         (0..1_u32 << links).map(|bits| self.matrix(&|to, from| bits >> ((self.held(to, from) - self.held(0, 1)) / 2) & 1 == 1)).collect()
     }
 }
 
 /// The spectral radius of Σ w·A ⊗ A over blocks (row, column, w, A), all of them n² × n².
-fn radius_of(blocks: usize, terms: &[(usize, usize, f64, &Mat<f64>)]) -> f64 {
-    let n = terms[0].3.nrows();
-    let mut whole = Mat::<f64>::zeros(blocks * n * n, blocks * n * n);
+fn radius_of(blocks: usize, terms: &[(usize, usize, f64, &Matrix)]) -> f64 {
+    let n = terms[0].3.rows();
+    let mut whole = Matrix::zeros(blocks * n * n, blocks * n * n);
     for (row, column, weight, a) in terms {
         for (i, j) in (0..n * n).map(|place| (place / n, place % n)) {
             for (k, l) in (0..n * n).map(|place| (place / n, place % n)) {
@@ -216,7 +215,7 @@ fn radius_of(blocks: usize, terms: &[(usize, usize, f64, &Mat<f64>)]) -> f64 {
             }
         }
     }
-    whole.eigenvalues().unwrap().iter().map(|value| value.re.hypot(value.im)).fold(0.0, f64::max)
+    crate::radius(&whole)
 }
 
 #[test]

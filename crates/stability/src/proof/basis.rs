@@ -3,11 +3,12 @@
 //! Eigenvectors of the large eigenvalues, one column each. All others, of samples on their way for the most part, are small eigenvalues that are often defective: their invariant subspace gets coordinates
 //! y = R·x of a quadratic form xᵀRᵀRx that falls as fast as those eigenvalues nearly do, in which every entry of it is small.
 
-use faer::c64;
-use faer::linalg::solvers::{DenseSolveCore, Solve};
+use num_complex::Complex64;
 
-use crate::Matrix;
-use crate::worst_case::symmetric::{cholesky, triangle_inverse};
+use crate::factorisation::{Lu, cholesky, orthogonal_complement, triangle_inverse};
+use crate::matrix::ComplexMatrix;
+use crate::spectrum::eigenvector;
+use crate::{Matrix, eigenvalues};
 
 /// Eigenvalues of at least this share of the largest have eigenvectors of their own.
 const LARGE: f64 = 0.4;
@@ -21,8 +22,8 @@ const HUGE: f64 = 1e30;
 
 /// Coordinates: columns that are nearly eigenvectors, and the inverse of that matrix.
 pub(super) struct Basis {
-    pub(super) right: faer::Mat<c64>,
-    pub(super) left: faer::Mat<c64>,
+    pub(super) right: ComplexMatrix,
+    pub(super) left: ComplexMatrix,
 }
 
 impl Basis {
@@ -35,43 +36,48 @@ impl Basis {
         let largest = matrix.largest();
         let scaled = matrix.scaled(if largest > HUGE { 1.0 / largest } else { 1.0 });
         let (matrix, size) = (&scaled, matrix.rows());
-        let decomposition = dense(matrix).eigen().ok()?;
-        let (values, vectors) = (decomposition.S(), decomposition.U());
-        let modulus = |place: usize| libm::hypot(values[place].re, values[place].im);
-        let largest = (0..size).map(modulus).fold(0.0, f64::max);
+        let values = eigenvalues(matrix);
+        let modulus = |value: &Complex64| libm::hypot(value.re, value.im);
+        let largest = values.iter().map(modulus).fold(0.0, f64::max);
         let least = (LARGE * largest).max(SMALL);
-        let large: Vec<usize> = (0..size).filter(|place| modulus(*place) >= least).collect();
-        let small = (0..size).map(modulus).filter(|modulus| *modulus < least).fold(0.0, f64::max);
+        // Of two that are conjugate, the upper one: they have conjugate eigenvectors.
+        let upper: Vec<Complex64> = values.iter().copied().filter(|value| modulus(value) >= least && value.im >= 0.0).collect();
+        let small = values.iter().map(modulus).filter(|modulus| *modulus < least).fold(0.0, f64::max);
         let fall = (FASTER * small + LEAST * largest).max(SMALL);
-        let rest = if large.len() == size { Matrix::zeros(size, 0) } else { rest(matrix, least, fall, size - large.len())? };
-        let right = faer::Mat::from_fn(size, size, |row, column| match large.get(column) {
-            Some(place) => vectors[(row, *place)],
-            None => c64::new(rest[(row, column - large.len())], 0.0),
+        let mut columns = Vec::new();
+        for (place, value) in upper.iter().enumerate() {
+            let vector = eigenvector(matrix, *value, place)?;
+            let conjugate = (value.im > 0.0).then(|| vector.iter().map(Complex64::conj).collect::<Vec<_>>());
+            columns.push(vector);
+            columns.extend(conjugate);
+        }
+        let rest = if columns.len() == size { Matrix::zeros(size, 0) } else { rest(matrix, &upper, fall, size - columns.len())? };
+        let right = ComplexMatrix::from_fn(size, size, |row, column| match columns.get(column) {
+            Some(vector) => vector[row],
+            None => Complex64::from(rest[(row, column - columns.len())]),
         });
-        let left = right.partial_piv_lu().inverse();
-        let finite = (0..size).all(|row| (0..size).all(|column| left[(row, column)].re.is_finite() && left[(row, column)].im.is_finite()));
-        finite.then_some(Self { right, left })
+        let left = Lu::of(&right).inverse();
+        left.entries().iter().all(|entry| entry.is_finite()).then_some(Self { right, left })
     }
 }
 
-/// The subspace of the eigenvalues below `large`, of that dimension, as columns in which the matrix shrinks it by `fall`.
-fn rest(matrix: &Matrix, large: f64, fall: f64, dimension: usize) -> Option<Matrix> {
+/// The subspace, of that dimension, of all eigenvalues but some and their conjugates, as columns in which the matrix shrinks it by `fall`.
+fn rest(matrix: &Matrix, others: &[Complex64], fall: f64, dimension: usize) -> Option<Matrix> {
     let size = matrix.rows();
     // It is orthogonal to the left eigenvectors of the others.
-    let decomposition = dense(&matrix.transposed()).eigen().ok()?;
-    let (values, vectors) = (decomposition.S(), decomposition.U());
-    let mut others: Vec<Vec<f64>> = Vec::new();
-    for place in (0..size).filter(|place| values[*place].im >= 0.0 && libm::hypot(values[*place].re, values[*place].im) >= large) {
-        others.push((0..size).map(|row| vectors[(row, place)].re).collect());
-        if values[place].im > 0.0 {
-            others.push((0..size).map(|row| vectors[(row, place)].im).collect());
+    let transposed = matrix.transposed();
+    let mut left = Vec::new();
+    for (place, value) in others.iter().enumerate() {
+        let vector = eigenvector(&transposed, *value, place)?;
+        left.push(vector.iter().map(|entry| entry.re).collect());
+        if value.im > 0.0 {
+            left.push(vector.iter().map(|entry| entry.im).collect());
         }
     }
-    if others.len() + dimension != size {
+    let basis = orthogonal_complement(left, size, 0.0);
+    if basis.columns() != dimension {
         return None;
     }
-    let orthogonal = faer::Mat::from_fn(size, others.len(), |row, column| others[column][row]).qr().compute_Q();
-    let basis = Matrix::from_fn(size, dimension, |row, column| orthogonal[(row, others.len() + column)]);
     let within = basis.transposed().times(&matrix.times(&basis));
     let form = series(within.scaled(1.0 / fall), Matrix::identity(dimension))?;
     Some(basis.times(&triangle_inverse(&cholesky(&form)?)))
@@ -94,13 +100,8 @@ fn series(mut factor: Matrix, mut sum: Matrix) -> Option<Matrix> {
     None
 }
 
-fn dense(of: &Matrix) -> faer::Mat<f64> {
-    faer::Mat::from_fn(of.rows(), of.columns(), |row, column| of[(row, column)])
-}
-
 /// X with A·X = B, nearly.
 pub(super) fn solved(matrix: &Matrix, right: &Matrix) -> Option<Matrix> {
-    let solution = dense(matrix).partial_piv_lu().solve(dense(right));
-    let solution = Matrix::from_fn(solution.nrows(), solution.ncols(), |row, column| solution[(row, column)]);
+    let solution = Lu::of(matrix).solve_all(right);
     solution.is_finite().then_some(solution)
 }

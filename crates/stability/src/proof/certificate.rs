@@ -146,7 +146,7 @@ pub struct PartCertificate {
 impl PartCertificate {
     pub(super) fn new(members: Vec<Vec<usize>>, is_difference: bool, states: States, time: f64, witness: &Witness) -> Self {
         let v = &witness.coordinates;
-        let entries = (0..v.ncols()).flat_map(|column| (0..v.nrows()).map(move |row| v[(row, column)]));
+        let entries = (0..v.columns()).flat_map(|column| (0..v.rows()).map(move |row| v[(row, column)]));
         let coordinates = digits(entries.flat_map(|entry| [entry.re, entry.im]));
         let weights = digits(witness.weights.iter().copied());
         let (states, heard, circle) = (states.names, states.heard, witness.circle);

@@ -12,12 +12,13 @@
 //!
 //! cᵢ(s) = (WMV)ᵢᵢ goes linearly with s but for a radius, so that how near it comes to the circle is known to first order; entries off the diagonal are of first order and count by the products of two. For the dᵢ are chosen as well as can be: those for which the comparison matrix of (1) times d is 1.
 
-use faer::c64;
+use num_complex::Complex64;
 
 use super::Proven;
 use super::basis::{Basis, solved};
 use super::span::{StepSpan, absolute};
 use crate::Matrix;
+use crate::matrix::ComplexMatrix;
 use crate::worst_case::rounding::{gamma, outward, real};
 
 /// A verdict on all matrices of a box, and the numbers by which anybody can check it.
@@ -30,7 +31,7 @@ pub(super) struct Decision {
 #[derive(Clone, Debug)]
 pub(super) struct Witness {
     /// V.
-    pub(super) coordinates: faer::Mat<c64>,
+    pub(super) coordinates: ComplexMatrix,
     /// d.
     pub(super) weights: Vec<f64>,
     pub(super) circle: FreeCircle,
@@ -65,9 +66,9 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
 /// W·M·V over a box, nearly diagonal, and W·V, nearly 1.
 pub(super) struct NearlyDiagonal {
     /// V.
-    coordinates: faer::Mat<c64>,
-    mean: faer::Mat<c64>,
-    pub(super) slopes: Vec<faer::Mat<c64>>,
+    coordinates: ComplexMatrix,
+    mean: ComplexMatrix,
+    pub(super) slopes: Vec<ComplexMatrix>,
     /// How far an entry of W·M·V may be from its mean and slopes.
     pub(super) wide: Matrix,
     /// How far an entry of W·V may be from that of 1.
@@ -78,16 +79,17 @@ impl NearlyDiagonal {
     fn of(span: &StepSpan) -> Option<Self> {
         let Basis { right: v, left: w } = Basis::of(&span.mean)?;
         let size = span.mean.rows();
-        let sizes = |of: &faer::Mat<c64>| Matrix::from_fn(size, size, |i, j| modulus(of[(i, j)]));
+        let sizes = |of: &ComplexMatrix| Matrix::from_fn(size, size, |i, j| modulus(of[(i, j)]));
         let (v_size, w_size) = (sizes(&v), sizes(&w));
-        let through = |matrix: &Matrix| -> faer::Mat<c64> { &w * faer::Mat::from_fn(size, size, |i, j| c64::new(matrix[(i, j)], 0.0)) * &v };
-        let (mean, unit) = (through(&span.mean), &w * &v);
-        let slopes: Vec<faer::Mat<c64>> = span.slopes.iter().map(through).collect();
+        let through =
+            |matrix: &Matrix| -> ComplexMatrix { w.times(&ComplexMatrix::from_fn(size, size, |i, j| Complex64::from(matrix[(i, j)]))).times(&v) };
+        let (mean, unit) = (through(&span.mean), w.times(&v));
+        let slopes: Vec<ComplexMatrix> = span.slopes.iter().map(through).collect();
         // Two complex products each of mean and slopes, and W·V: eight roundings a term and those of the sums.
         let rounding = gamma(8 * size + 32) * real(2 + span.slopes.len());
         let (radius, whole) = (w_size.times(&span.radius).times(&v_size), w_size.times(&span.largest()).times(&v_size));
         let unit_sizes = w_size.times(&v_size);
-        let one = |i: usize, j: usize| c64::new(if i == j { 1.0 } else { 0.0 }, 0.0);
+        let one = |i: usize, j: usize| Complex64::new(if i == j { 1.0 } else { 0.0 }, 0.0);
         Some(Self {
             mean,
             slopes,
@@ -98,13 +100,13 @@ impl NearlyDiagonal {
     }
 
     fn size(&self) -> usize {
-        self.mean.nrows()
+        self.mean.rows()
     }
 
     /// Between which sizes a number stays that is `centre` in the mean, moves with the slopes and is within `wide` of that.
-    fn reach(&self, centre: c64, slope: impl Fn(&faer::Mat<c64>) -> c64, wide: f64) -> (f64, f64) {
+    fn reach(&self, centre: Complex64, slope: impl Fn(&ComplexMatrix) -> Complex64, wide: f64) -> (f64, f64) {
         let size = modulus(centre);
-        let direction = if size > 0.0 { c64::new(centre.re / size, -centre.im / size) } else { c64::new(1.0, 0.0) };
+        let direction = if size > 0.0 { Complex64::new(centre.re / size, -centre.im / size) } else { Complex64::new(1.0, 0.0) };
         let (mut along, mut across) = (0.0, 0.0);
         for matrix in &self.slopes {
             let turned = slope(matrix) * direction;
@@ -158,7 +160,7 @@ impl NearlyDiagonal {
 /// How many diagonal entries outside of the unit circle are tried.
 const MOST_TRIED: usize = 3;
 
-fn modulus(value: c64) -> f64 {
+fn modulus(value: Complex64) -> f64 {
     libm::hypot(value.re, value.im) * (1.0 + 4.0 * f64::EPSILON)
 }
 

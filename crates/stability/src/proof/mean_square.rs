@@ -23,6 +23,7 @@ use super::growing::{ENDLESS, Growing, Motion, WIDER, nu};
 use super::span::StepSpan;
 use super::steps::{StepMatrix, error};
 use super::{ProofError, Proven};
+use crate::factorisation::{cholesky, triangle_inverse};
 use crate::lifted::node::{External, Scale, Scratch};
 use crate::lifted::{Lifted, Node, Sampling};
 use crate::mean_square::Independent;
@@ -31,7 +32,6 @@ use crate::mean_square::symmetric::Symmetric;
 use crate::network::NominalNetwork;
 use crate::timetable::Event;
 use crate::worst_case::rounding::{UNIT, gamma, real};
-use crate::worst_case::symmetric::{cholesky, triangle_inverse};
 use crate::worst_case::verified::is_positive;
 use crate::{Matrix, Unwatched, Verdict};
 

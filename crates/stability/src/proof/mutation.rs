@@ -2,11 +2,12 @@
 
 use std::cell::Cell;
 
-use faer::c64;
+use num_complex::Complex64;
 
 use super::discs::NearlyDiagonal;
 use super::span::StepSpan;
 use crate::Matrix;
+use crate::matrix::ComplexMatrix;
 
 /// A fault in a prover. Those of the structure of a scene are in [`super::points`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -49,8 +50,8 @@ pub(super) fn of_steps(mut steps: Vec<StepSpan>) -> Vec<StepSpan> {
 
 /// A frame over a box in coordinates in which it is nearly diagonal.
 pub(super) fn of_discs(mut near: NearlyDiagonal) -> NearlyDiagonal {
-    let kept = |keep: &dyn Fn(usize, usize) -> bool, slope: &faer::Mat<c64>| {
-        faer::Mat::from_fn(slope.nrows(), slope.ncols(), |i, j| if keep(i, j) { slope[(i, j)] } else { c64::new(0.0, 0.0) })
+    let kept = |keep: &dyn Fn(usize, usize) -> bool, slope: &ComplexMatrix| {
+        ComplexMatrix::from_fn(slope.rows(), slope.columns(), |i, j| if keep(i, j) { slope[(i, j)] } else { Complex64::ZERO })
     };
     match NOW.get() {
         Some(Mutation::FirstOrder) => near.wide = Matrix::zeros(near.wide.rows(), near.wide.columns()),

@@ -56,8 +56,9 @@ impl Enclosure {
         let interval = self.around(triangle, epsilon);
         let top = self.order[0];
         let first = epsilon * triangle.amplification[triangle.block_of(top)];
-        // What a well-conditioned eigenvalue comes to; infinite where none can be hoped for.
-        let enough = if first.is_finite() { 6.0 * first } else { 0.0 };
+        // What a well-conditioned eigenvalue comes to. A bound beyond the radius itself says nothing: eigenvalues that are equal but for rounding have one, which
+        // clusters may better.
+        let enough = if first <= self.moduli[top] { 6.0 * first } else { 0.0 };
         if interval.width() <= enough {
             return interval;
         }

@@ -31,28 +31,7 @@ pub(super) fn reduce<S: Square>(matrix: &mut S) {
             matrix.put(row, column, matrix.at(row, column) * inverse);
         }
         matrix.put(pivot, column, -norm);
-        for other in pivot..size {
-            let mut sum = matrix.at(pivot, other);
-            for row in pivot + 1..size {
-                sum += matrix.at(row, column) * matrix.at(row, other);
-            }
-            sum *= factor;
-            matrix.put(pivot, other, matrix.at(pivot, other) - sum);
-            for row in pivot + 1..size {
-                matrix.put(row, other, matrix.at(row, other) - sum * matrix.at(row, column));
-            }
-        }
-        for row in 0..size {
-            let mut sum = matrix.at(row, pivot);
-            for other in pivot + 1..size {
-                sum += matrix.at(row, other) * matrix.at(other, column);
-            }
-            sum *= factor;
-            matrix.put(row, pivot, matrix.at(row, pivot) - sum);
-            for other in pivot + 1..size {
-                matrix.put(row, other, matrix.at(row, other) - sum * matrix.at(other, column));
-            }
-        }
+        matrix.reflect_below(column, factor);
         for row in pivot + 1..size {
             matrix.put(row, column, 0.0);
         }

@@ -1,16 +1,16 @@
 //! Eigenvalues of real matrices, and spectral radii that say how sure they are.
 //!
-//! Small matrices are reduced to Hessenberg form and then iterated here ([`radius_small`], on the stack, without an allocation); large ones go to
-//! `faer`. Both are backward stable: the eigenvalues found are exactly those of a matrix that differs from the given one by a small multiple of
-//! n·ε·|A|. What that does to the radius is computed, not assumed: see [`bounded_radius`].
+//! Matrices are reduced to Hessenberg form and then iterated, small ones on the stack without an allocation ([`radius_small`]). Both steps are backward
+//! stable: the eigenvalues found are exactly those of a matrix that differs from the given one by a small multiple of n·ε·|A|. What that does to the radius
+//! is computed, not assumed: see [`bounded_radius`].
 
 mod enclosure;
 mod francis;
 mod hessenberg;
-mod large;
 mod schur;
 mod square;
 mod triangle;
+mod vectors;
 
 #[cfg(test)]
 mod tests;
@@ -19,13 +19,10 @@ use num_complex::Complex64;
 
 use crate::{Matrix, Radius};
 use enclosure::{Enclosure, Interval};
-use large::Large;
 pub(crate) use schur::Schur;
 use square::{balance, exponent_of, power_of_two};
 use triangle::{Triangle, precise};
-
-/// The largest size that is iterated here. Measured: at 64 rows still 2.5 times as fast as `faer` on one thread; sizes up to 16 are also on the stack.
-const OWN: usize = 64;
+pub(crate) use vectors::eigenvector;
 
 /// The backward error of reduction and iteration as a multiple of n·ε·|A|, |A| Frobenius'. The proven constants are larger (Higham 2002, Section 19.3,
 /// gives a multiple of n² for n reflections of length n, all errors pointing the same way); errors that were seen are below 1.
@@ -57,7 +54,6 @@ macro_rules! on_the_stack {
 pub struct Workspace {
     eigenvalues: Vec<Complex64>,
     scratch: Matrix,
-    large: Option<Large>,
     triangle: Triangle,
     enclosure: Enclosure,
 }
@@ -106,18 +102,16 @@ pub fn bounded_radius(matrix: &Matrix, perturbation: f64) -> Radius {
     Workspace::default().bounded_radius(matrix, perturbation)
 }
 
-/// [`radius`] of an array, which is overwritten: the fastest way for sizes up to about 12.
+/// [`radius`] of an array, which is overwritten: the fastest way for sizes up to about 12. NaN if the iteration does not converge, which was never seen.
 #[must_use]
 pub fn radius_small<const N: usize>(matrix: &mut [[f64; N]; N]) -> f64 {
-    let Some(exponent) = normalise(matrix) else {
+    let Some(exponent) = normalise(matrix.as_flattened_mut()) else {
         return unusual(matrix);
     };
-    let original = *matrix;
     balance(matrix, |_, _| {});
     hessenberg::reduce(matrix);
     if !francis::iterate::<false, _>(matrix) {
-        let original = Matrix::from_fn(N, N, |row, column| original[row][column]);
-        return Workspace::default().large_radius(&original) * power_of_two(exponent);
+        return f64::NAN;
     }
     let mut square: f64 = 0.0;
     francis::each(matrix, |value| square = square.max(value.norm_sqr()));
@@ -138,16 +132,16 @@ impl Workspace {
         }
         let list = &mut self.eigenvalues;
         let converged = on_the_stack!(matrix, array => {
-            let scale = power_of_two(normalise(&mut array).unwrap_or(0));
+            let scale = power_of_two(normalise(array.as_flattened_mut()).unwrap_or(0));
             balance(&mut array, |_, _| {});
             hessenberg::reduce(&mut array);
             let converged = francis::iterate::<false, _>(&mut array);
             francis::each(&array, |value| list.push(value * scale));
             converged
         });
-        if converged != Some(true) {
-            self.eigenvalues.clear();
-            self.large_eigenvalues(matrix);
+        let converged = converged.unwrap_or_else(|| self.large_eigenvalues(matrix));
+        if !converged {
+            self.give_up(matrix.rows());
         }
         self.eigenvalues.sort_by(|a, b| {
             let modulus = b.norm().total_cmp(&a.norm());
@@ -235,8 +229,17 @@ impl Workspace {
             }
             converged
         });
-        if done != Some(true) {
-            self.triangle.load(&large::quasi_triangular(matrix)?);
+        let done = done.unwrap_or_else(|| {
+            self.scratch.clone_from(matrix);
+            hessenberg::reduce(&mut self.scratch);
+            let converged = francis::iterate::<true, _>(&mut self.scratch);
+            if converged {
+                self.triangle.load(&self.scratch);
+            }
+            converged
+        });
+        if !done {
+            return None;
         }
         let interval = self.enclosure.enclose(&mut self.triangle, epsilon);
         let value = (0..self.triangle.size()).fold(0.0, |largest: f64, place| largest.max(self.triangle.eigenvalue(place).norm()));
@@ -248,49 +251,44 @@ impl Workspace {
             return if matrix.largest().is_nan() { f64::NAN } else { f64::INFINITY };
         }
         self.eigenvalues.clear();
-        self.large_eigenvalues(matrix);
+        if !self.large_eigenvalues(matrix) {
+            self.give_up(matrix.rows());
+        }
         let larger = |largest: f64, value: &Complex64| if value.norm() > largest || value.is_nan() { value.norm() } else { largest };
         self.eigenvalues.iter().fold(0.0, larger)
     }
 
-    /// Appends them in any order.
-    fn large_eigenvalues(&mut self, matrix: &Matrix) {
-        let size = matrix.rows();
-        if size == 0 {
-            return;
-        }
+    /// Appends them in any order. False if the iteration did not converge.
+    fn large_eigenvalues(&mut self, matrix: &Matrix) -> bool {
+        self.scratch.clone_from(matrix);
+        let scale = power_of_two(normalise(self.scratch.entries_mut()).unwrap_or(0));
+        balance(&mut self.scratch, |_, _| {});
+        hessenberg::reduce(&mut self.scratch);
+        let converged = francis::iterate::<false, _>(&mut self.scratch);
         let list = &mut self.eigenvalues;
-        if size <= OWN && (1e-60..1e60).contains(&matrix.largest()) {
-            self.scratch.clone_from(matrix);
-            balance(&mut self.scratch, |_, _| {});
-            hessenberg::reduce(&mut self.scratch);
-            if francis::iterate::<false, _>(&mut self.scratch) {
-                francis::each(&self.scratch, |value| list.push(value));
-                return;
-            }
-        }
-        let mut large = self.large.take().filter(|large| large.size() == size).unwrap_or_else(|| Large::new(size));
-        if !large.eigenvalues(matrix, |value| list.push(value)) {
-            // Neither iteration has converged, which was never seen. An unknown value is not a number.
-            list.clear();
-            list.resize(size, Complex64::new(f64::NAN, f64::NAN));
-        }
-        self.large = Some(large);
+        francis::each(&self.scratch, |value| list.push(value * scale));
+        converged
+    }
+
+    /// The iteration has not converged, which was never seen. An unknown value is not a number.
+    fn give_up(&mut self, size: usize) {
+        self.eigenvalues.clear();
+        self.eigenvalues.resize(size, Complex64::new(f64::NAN, f64::NAN));
     }
 }
 
-/// Scales a matrix whose entries are so large or small that squares would leave the range of numbers, and gives the exponent that undoes it; `None` if
+/// Scales the entries of a matrix if they are so large or small that squares would leave the range of numbers, and gives the exponent that undoes it; `None` if
 /// an entry is infinite or NaN.
 #[inline]
-fn normalise<const N: usize>(matrix: &mut [[f64; N]; N]) -> Option<i32> {
+fn normalise(entries: &mut [f64]) -> Option<i32> {
     let mut sum = 0.0;
-    for entry in matrix.as_flattened() {
+    for entry in &*entries {
         sum += entry.abs();
     }
     if sum > 1e-60 && sum < 1e60 {
         return Some(0);
     }
-    let largest = matrix.as_flattened().iter().fold(0.0, |largest: f64, entry| largest.max(entry.abs()));
+    let largest = entries.iter().fold(0.0, |largest: f64, entry| largest.max(entry.abs()));
     if sum == 0.0 {
         return Some(0);
     }
@@ -298,7 +296,7 @@ fn normalise<const N: usize>(matrix: &mut [[f64; N]; N]) -> Option<i32> {
         return None;
     }
     let exponent = exponent_of(largest).clamp(-1000, 1000);
-    for entry in matrix.as_flattened_mut() {
+    for entry in entries {
         *entry *= power_of_two(-exponent);
     }
     Some(exponent)

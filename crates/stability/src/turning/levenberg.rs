@@ -1,6 +1,7 @@
 //! Zeros of forces: the method of Levenberg (1944).
 
 use crate::Matrix;
+use crate::factorisation::Lu;
 
 /// Some ten steps lead from near a zero to it.
 const MOST_STEPS: usize = 200;
@@ -16,13 +17,12 @@ pub(super) fn zero<P>(start: P, size: usize, residual: impl Fn(&P) -> Vec<f64>, 
             break;
         }
         let slope = slope(&place, size, left.len(), &residual, &moved);
-        let normal = faer::Mat::from_fn(size, size, |row, column| {
+        let normal = Matrix::from_fn(size, size, |row, column| {
             let product: f64 = (0..left.len()).map(|entry| slope[(entry, row)] * slope[(entry, column)]).sum();
             product + if row == column { damping } else { 0.0 }
         });
-        let right = faer::Mat::from_fn(size, 1, |row, _| -left.iter().enumerate().map(|(entry, left)| slope[(entry, row)] * left).sum::<f64>());
-        let solution = faer::linalg::solvers::Solve::solve(&normal.partial_piv_lu(), &right);
-        let step: Vec<f64> = (0..size).map(|row| solution[(row, 0)]).collect();
+        let right: Vec<f64> = (0..size).map(|row| -left.iter().enumerate().map(|(entry, left)| slope[(entry, row)] * left).sum::<f64>()).collect();
+        let step = Lu::of(&normal).solve(&right);
         let next = moved(&place, &step);
         let reached = residual(&next);
         if norm(&reached) < norm(&left) {

@@ -17,7 +17,7 @@
 use super::lyapunov::{Component, Factors, largest_square};
 use super::norm::mirror;
 use super::rounding::real;
-use super::symmetric::{cholesky, solve, triangle_inverse};
+use crate::factorisation::{cholesky, solve, triangle_inverse};
 use crate::{Matrix, Watch};
 
 /// How much of the distance between λ and the centre's own is kept.

@@ -28,8 +28,8 @@ use super::growth::{Approximate, radius_below};
 use super::norm::{Norms, Sharpness, frobenius_norm, norm_above};
 use super::pattern::Edge;
 use super::rounding::{gamma, outward, real, root_above};
-use super::symmetric::{cholesky, triangle_inverse};
 use super::verified::Certificate;
+use crate::factorisation::{cholesky, triangle_inverse};
 use crate::{Matrix, Unwatched, Watch};
 
 /// How long to search.

@@ -7,7 +7,7 @@
 
 use super::lyapunov::{Component, Factors, largest_square};
 use super::norm::gram;
-use super::symmetric::{cholesky, eigen, triangle_inverse};
+use crate::factorisation::{cholesky, eigen, triangle_inverse};
 use crate::{Matrix, Watch};
 
 /// What a round keeps at least of a shape in directions in which nothing asks for it, so that shapes stay positive definite.

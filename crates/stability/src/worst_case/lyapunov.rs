@@ -10,8 +10,8 @@
 use super::automaton::Automaton;
 use super::norm::gram;
 use super::rounding::real;
-use super::symmetric::{eigen, triangle_inverse};
 use super::{barrier, join};
+use crate::factorisation::{eigen, triangle_inverse};
 use crate::{Matrix, Watch};
 
 /// The most unknowns for which a barrier's Hessian, whose factorisation costs their third power, is worth it.

@@ -27,7 +27,6 @@ mod norm;
 mod of_scene;
 mod pattern;
 pub(crate) mod rounding;
-pub(crate) mod symmetric;
 #[cfg(test)]
 mod tests;
 pub(crate) mod verified;

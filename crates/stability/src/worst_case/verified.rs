@@ -16,7 +16,7 @@ use super::automaton::Automaton;
 use super::lyapunov;
 use super::norm::mirror;
 use super::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
-use super::symmetric::cholesky;
+use crate::factorisation::cholesky;
 use crate::{Matrix, Unwatched, Watch};
 
 /// A proof that no allowed product grows faster than a rate. It exists only if it was checked.

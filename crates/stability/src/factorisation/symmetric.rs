@@ -1,4 +1,4 @@
-//! Factorisations of small matrices that are the same to the bit everywhere.
+//! Symmetric matrices: Cholesky's factors and Jacobi's eigenvectors.
 
 use crate::Matrix;
 
@@ -67,7 +67,7 @@ pub(crate) fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
 }
 
 /// Eigenvalues and, as rows, eigenvectors of a symmetric matrix by Jacobi's rotations, in no order.
-pub(super) fn eigen(symmetric: &Matrix) -> (Vec<f64>, Matrix) {
+pub(crate) fn eigen(symmetric: &Matrix) -> (Vec<f64>, Matrix) {
     const SWEEPS: u32 = 30;
     let size = symmetric.rows();
     let mut a = symmetric.clone();
@@ -114,7 +114,6 @@ fn rotate_rows(a: &mut Matrix, p: usize, q: usize, cosine: f64, sine: f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::norm::gram;
     use super::*;
 
     /// Some matrix without structure.
@@ -129,7 +128,7 @@ mod tests {
     #[test]
     fn factors_multiply_back() {
         for size in [1, 2, 5, 9] {
-            let positive = gram(&some(size));
+            let positive = some(size).transposed().times(&some(size));
             let factor = cholesky(&positive).unwrap();
             close(&factor.transposed().times(&factor), &positive, 1e-13);
             close(&factor.times(&triangle_inverse(&factor)), &Matrix::identity(size), 1e-7);

@@ -1,0 +1,184 @@
+//! Systems of linear equations: Gaussian elimination with the largest pivot of each column (Higham 2002, Section 9.1).
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use num_complex::Complex64;
+
+use crate::matrix::Dense;
+
+/// A number in a matrix that is factorised.
+pub(crate) trait Entry:
+    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self> + From<f64>
+{
+    /// How large it is: the sum of the sizes of its parts, within √2 of its modulus.
+    fn size(self) -> f64;
+}
+
+impl Entry for f64 {
+    fn size(self) -> f64 {
+        self.abs()
+    }
+}
+
+impl Entry for Complex64 {
+    fn size(self) -> f64 {
+        self.l1_norm()
+    }
+}
+
+/// P·A = L·U of a square matrix A: L is lower triangular with ones on the diagonal, U is upper triangular, P exchanges rows.
+///
+/// Solutions are those of a matrix that differs from A by a small multiple of n·ε·|L|·|U| (Higham 2002, Theorem 9.4). Of a singular matrix they are not finite, or very large.
+#[derive(Clone, Debug)]
+pub(crate) struct Lu<T> {
+    /// L below the diagonal, U on and above it.
+    factors: Dense<T>,
+    /// For each row of the factors, that of A.
+    rows: Vec<usize>,
+}
+
+impl<T: Entry> Lu<T> {
+    /// Factorises a square matrix.
+    pub(crate) fn of(matrix: &Dense<T>) -> Self {
+        Self::with_least_pivot(matrix, T::default())
+    }
+
+    /// [`Lu::of`] with `least` in the place of pivots that are zero: of a singular matrix the factors are those of a regular one nearby.
+    pub(crate) fn with_least_pivot(matrix: &Dense<T>, least: T) -> Self {
+        let size = matrix.rows();
+        let (mut factors, mut rows) = (matrix.clone(), (0..size).collect::<Vec<_>>());
+        for pivot in 0..size {
+            let larger = |largest: usize, row: usize| if factors[(row, pivot)].size() > factors[(largest, pivot)].size() { row } else { largest };
+            let largest = (pivot + 1..size).fold(pivot, larger);
+            rows.swap(pivot, largest);
+            for column in 0..size {
+                let entry = factors[(pivot, column)];
+                factors[(pivot, column)] = factors[(largest, column)];
+                factors[(largest, column)] = entry;
+            }
+            if factors[(pivot, pivot)].size() <= 0.0 {
+                factors[(pivot, pivot)] = least;
+            }
+            let row = factors.row(pivot)[pivot..].to_vec();
+            for below in pivot + 1..size {
+                let entries = &mut factors.row_mut(below)[pivot..];
+                let factor = entries[0] / row[0];
+                entries[0] = factor;
+                for (entry, above) in entries[1..].iter_mut().zip(&row[1..]) {
+                    *entry = *entry - factor * *above;
+                }
+            }
+        }
+        Self { factors, rows }
+    }
+
+    /// x with A·x = b.
+    pub(crate) fn solve(&self, right: &[T]) -> Vec<T> {
+        let size = self.rows.len();
+        let mut x: Vec<T> = self.rows.iter().map(|row| right[*row]).collect();
+        for row in 1..size {
+            x[row] = x[row] - sum(&self.factors.row(row)[..row], &x[..row]);
+        }
+        for row in (0..size).rev() {
+            x[row] = (x[row] - sum(&self.factors.row(row)[row + 1..], &x[row + 1..])) / self.factors[(row, row)];
+        }
+        x
+    }
+
+    /// x with Aᵀ·x = b.
+    pub(crate) fn solve_transposed(&self, right: &[T]) -> Vec<T> {
+        let size = self.rows.len();
+        let mut y = right.to_vec();
+        for row in 0..size {
+            y[row] = y[row] / self.factors[(row, row)];
+            let value = y[row];
+            subtract(&mut y[row + 1..], value, &self.factors.row(row)[row + 1..]);
+        }
+        for row in (1..size).rev() {
+            let value = y[row];
+            subtract(&mut y[..row], value, &self.factors.row(row)[..row]);
+        }
+        let mut x = vec![T::default(); size];
+        for (value, row) in y.into_iter().zip(&self.rows) {
+            x[*row] = value;
+        }
+        x
+    }
+
+    /// X with A·X = B.
+    pub(crate) fn solve_all(&self, right: &Dense<T>) -> Dense<T> {
+        let mut solutions = Dense::zeros(right.rows(), right.columns());
+        for column in 0..right.columns() {
+            let entries: Vec<T> = (0..right.rows()).map(|row| right[(row, column)]).collect();
+            for (row, value) in self.solve(&entries).into_iter().enumerate() {
+                solutions[(row, column)] = value;
+            }
+        }
+        solutions
+    }
+
+    /// A⁻¹.
+    pub(crate) fn inverse(&self) -> Dense<T> {
+        let size = self.rows.len();
+        self.solve_all(&Dense::from_fn(size, size, |row, column| T::from(if row == column { 1.0 } else { 0.0 })))
+    }
+}
+
+/// Σ a·b.
+fn sum<T: Entry>(a: &[T], b: &[T]) -> T {
+    a.iter().zip(b).fold(T::default(), |sum, (a, b)| sum + *a * *b)
+}
+
+/// Takes a multiple of some numbers away from others.
+fn subtract<T: Entry>(from: &mut [T], factor: T, numbers: &[T]) {
+    for (entry, number) in from.iter_mut().zip(numbers) {
+        *entry = *entry - factor * *number;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Matrix;
+    use crate::matrix::ComplexMatrix;
+
+    /// Hilbert's matrix of three rows times 60, and its inverse times 60 (both of whole numbers).
+    const HILBERT: [[f64; 3]; 3] = [[60.0, 30.0, 20.0], [30.0, 20.0, 15.0], [20.0, 15.0, 12.0]];
+    const INVERSE: [[f64; 3]; 3] = [[9.0, -36.0, 30.0], [-36.0, 192.0, -180.0], [30.0, -180.0, 180.0]];
+
+    #[test]
+    fn an_inverse_in_whole_numbers_is_found() {
+        let found = Lu::of(&Matrix::from_fn(3, 3, |row, column| HILBERT[row][column])).inverse();
+        for (place, found) in found.entries().iter().enumerate() {
+            let expected = INVERSE[place / 3][place % 3] / 60.0;
+            // The condition number is 524: some roundings of a thousandth of 10⁻¹² each.
+            assert!((found - expected).abs() < 1e-12, "{place}: {found} for {expected}");
+        }
+    }
+
+    #[test]
+    fn both_ways_to_solve_undo_the_product() {
+        // The first pivot is zero, so that rows are exchanged; (1 + i)·x is undone by complex divisions.
+        let a = ComplexMatrix::from_fn(4, 4, |row, column| {
+            let (row, column) = (f64::from(u32::try_from(row).unwrap()), f64::from(u32::try_from(column).unwrap()));
+            Complex64::new(libm::sin(3.0 * row * column + row - column), row - 2.0 * column)
+        });
+        let x = [Complex64::new(1.0, 1.0), Complex64::new(-2.0, 0.5), Complex64::new(0.0, 3.0), Complex64::new(0.25, 0.0)];
+        let lu = Lu::of(&a);
+        let product = |of: &dyn Fn(usize, usize) -> Complex64| (0..4).map(|i| (0..4).map(|j| of(i, j) * x[j]).sum()).collect::<Vec<Complex64>>();
+        for (name, found) in [("A", lu.solve(&product(&|i, j| a[(i, j)]))), ("its transpose", lu.solve_transposed(&product(&|i, j| a[(j, i)])))] {
+            for (found, expected) in found.iter().zip(x) {
+                assert!((found - expected).norm() < 1e-13, "{name}: {found} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn of_a_singular_matrix_nothing_finite_comes_out_unless_asked_for() {
+        let singular = Matrix::from_fn(2, 2, |row, column| [[1.0, 2.0], [2.0, 4.0]][row][column]);
+        assert!(!Lu::of(&singular).inverse().is_finite());
+        // The null vector (2, −1) grows by the inverse of the pivot.
+        let grown = Lu::with_least_pivot(&singular, 1e-16).solve(&[1.0, 1.0]);
+        assert!((grown[0] / grown[1] + 2.0).abs() < 1e-15 && grown[1].abs() > 1e15, "{grown:?}");
+    }
+}
