@@ -377,7 +377,8 @@ where
     let _here = shared.stay();
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let outcome = Rc::new(RefCell::new(None));
-    let (future, slot) = (program(Bed::new(Arc::clone(&shared))), Rc::clone(&outcome));
+    // In a box: a program may hold arrays, and without optimisation each call that a future is handed to has a copy of it on the stack.
+    let (future, slot) = (Box::pin(program(Bed::new(Arc::clone(&shared)))), Rc::clone(&outcome));
     let _main = tasks.spawn(None, origin, async move {
         let came_out = future.await;
         *slot.borrow_mut() = Some(came_out);

@@ -214,7 +214,7 @@ where
         let _local = set.enter();
         let _here = shared.stay();
         let outcome = Rc::new(RefCell::new(None));
-        let (future, slot) = (program(Bed::new(Arc::clone(&shared))), Rc::clone(&outcome));
+        let (future, slot) = (Box::pin(program(Bed::new(Arc::clone(&shared)))), Rc::clone(&outcome));
         let mut main = pin!(tasks.spawn(None, origin, async move {
             let came_out = future.await;
             *slot.borrow_mut() = Some(came_out);

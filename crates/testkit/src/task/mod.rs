@@ -141,7 +141,8 @@ impl Tasks {
         F: Future + 'static,
         F::Output: 'static,
     {
-        let (program, state) = joined(future);
+        // The future in a box of its own: without optimisation the program around it would be copied on the stack as well.
+        let (program, state) = joined(Box::pin(future));
         let task = self.start(host, origin, Box::pin(program));
         JoinHandle::new(state, Rc::downgrade(&task))
     }
