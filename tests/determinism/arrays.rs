@@ -203,45 +203,6 @@ fn threads_come_to_what_one_comes_to() {
     }
 }
 
-/// Packets of several peers wait in one access line, links count packets inside, and a log has the fate of each packet: alone, interrupted and diverging.
-#[test]
-fn what_a_network_carries_comes_to_the_same() {
-    let folder = tempfile::tempdir().unwrap();
-    let row =
-        |packet: u64| format!("{packet},0,{},64,{},delivered,0,0\n", packet * 8_000_000, packet * 8_000_000 + 3_000_000 + packet % 7 * 2_900_000);
-    let log = "sequence,copy,offered_ns,size,at_ns,fate,marked,damaged\n".to_owned() + &(0..120).map(row).collect::<String>();
-    std::fs::write(folder.path().join("fates.csv"), log).unwrap();
-    let jitter = "delay = \"9ms\", jitter = \"2ms\", loss = \"2%\"";
-    let scenes = [
-        (jitter, "peer.uplink={ rate = \"400kbit\", queue = { limit = \"5 packets\" } }", true),
-        (jitter, "peer.downlink={ delay = \"2ms\", jitter = \"1ms\", loss = \"3%\", rate = \"300kbit\" }", true),
-        ("delay = \"5ms\"", "peer.uplink={ delay = \"1ms\" }", true),
-        (
-            jitter,
-            "peer.uplink={ rate = \"90kbit\", delay = \"4ms\", jitter = \"1ms\", duplicate = \"10%\" }|topology={ kind = \"star\", role = \"relay\" }",
-            true,
-        ),
-        ("delay = \"0s\"", "peer.downlink={ duplicate = \"10%\" }", true),
-        ("delay = \"24ms\", jitter = \"3ms\", limit = \"2 packets\"", "", false),
-        ("replay = \"fates.csv\"", "", false),
-    ];
-    for (link, line, shares) in scenes {
-        let settings: Vec<String> = line.split_terminator('|').map(str::to_owned).collect();
-        let mut scene = Scene::parse(&mesh_text(9, link), &folder.path().join("mesh.toml"), &settings).unwrap();
-        scene.duration = Duration::from_millis(1100);
-        scene.peers.iter_mut().zip(0..).for_each(|(peer, place)| peer.phase = place % 3);
-        let mut diverges = scene.clone();
-        diverges.coordination.gains = diverges.coordination.gains.scaled(3e4);
-        for scene in [&scene, &diverges] {
-            assert!(same_shape(scene, scene), "{link}, {line}: it is run in arrays");
-            let general = run(scene, Model::General);
-            assert_eq!(difference(&run(scene, Model::Least), &general), None, "{link}, {line}");
-            assert_eq!(general.access_lines.len(), if shares { 9 } else { 0 });
-        }
-        assert_eq!(difference(&run_interrupted(&scene, Model::Least, 1), &run_interrupted(&scene, Model::General, 1)), None, "{link}, {line}");
-    }
-}
-
 /// Of 257 peers on the means are exact, whether samples travel together or each by itself.
 #[test]
 fn many_peers_come_to_the_same() {

@@ -36,9 +36,9 @@ proptest! {
     #![proptest_config(cases(1500))]
 
     #[test]
-    fn clocks_of_their_own_come_to_the_same(mut drafts in prop_oneof![drafts::alike(Just(1)), drafts::changing(Just(1))], clocks in clocks(), relay: bool) {
-        with_clocks(&mut drafts[0], &clocks);
-        let scene = Scene { relay, ..drafts[0].scene() };
+    fn clocks_of_their_own_come_to_the_same(mut draft in drafts::direct(), clocks in clocks(), relay: bool) {
+        with_clocks(&mut draft, &clocks);
+        let scene = Scene { relay, ..draft.scene() };
         prop_assert!(in_arrays(&scene), "it is run in arrays");
         let difference = difference(&run(&scene, Model::Least), &run(&scene, Model::General));
         prop_assert!(difference.is_none(), "{}", difference.unwrap());
@@ -50,13 +50,10 @@ proptest! {
 
     /// Samples that travel together, are sent as often as peers tick, and arrive with and without delay.
     #[test]
-    fn samples_that_travel_together_come_to_the_same(mut drafts in drafts::changing(Just(1)), clocks in clocks(), delay in 0..40_000_u32) {
-        let draft = &mut drafts[0];
-        with_clocks(draft, &clocks);
+    fn samples_that_travel_together_come_to_the_same(mut draft in drafts::direct(), clocks in clocks(), delay in 0..40_000_u32) {
+        with_clocks(&mut draft, &clocks);
         draft.link = format!("delay = \"{}us\", jitter = \"0s\"", delay.saturating_sub(2000));
         draft.links.clear();
-        draft.timeline.retain(|entry| !entry.contains("link ="));
-        draft.peers.iter_mut().for_each(|peer| (peer.uplink, peer.downlink) = (None, None));
         if delay % 2 == 0 {
             (draft.update, draft.gains) = (draft.peers[0].tick, draft.gains.scaled(0.05));
             draft.peers.iter_mut().for_each(|peer| peer.phase = 0);
@@ -69,9 +66,8 @@ proptest! {
 
     /// Samples that overtake each other within a tick and over ticks.
     #[test]
-    fn samples_that_overtake_come_to_the_same(mut drafts in drafts::alike(Just(1)), clocks in clocks(), delay in 1..400_u32, part in 1..57_u32) {
-        let draft = &mut drafts[0];
-        with_clocks(draft, &clocks);
+    fn samples_that_overtake_come_to_the_same(mut draft in drafts::direct(), clocks in clocks(), delay in 1..400_u32, part in 1..57_u32) {
+        with_clocks(&mut draft, &clocks);
         let jitter = format!("jitter = {{ sd = \"{}us\", distribution = \"uniform\" }}", 10 * delay * part);
         draft.link = format!("delay = \"{delay}ms\", {jitter}, order = \"allow-reordering\", loss = 0.1");
         (draft.update, draft.gains) = (draft.peers[0].tick, draft.gains.scaled(0.05));
@@ -84,16 +80,15 @@ proptest! {
 
     /// What an observer sees of ticks and instants, row by row.
     #[test]
-    fn rows_of_clocks_of_their_own_are_those_of_their_events(mut drafts in drafts::changing(Just(1)), clocks in clocks()) {
-        with_clocks(&mut drafts[0], &clocks);
-        let found = found(&drafts[0].scene(), |_| ());
+    fn rows_of_clocks_of_their_own_are_those_of_their_events(mut draft in drafts::direct(), clocks in clocks()) {
+        with_clocks(&mut draft, &clocks);
+        let found = found(&draft.scene(), |_| ());
         prop_assert!(found.is_none(), "{}", found.unwrap());
     }
 
     #[test]
-    fn a_run_of_clocks_that_is_interrupted_comes_to_the_same(mut drafts in drafts::changing(Just(1)), clocks in clocks(), breaths in 1..3_usize) {
-        let draft = &mut drafts[0];
-        with_clocks(draft, &clocks);
+    fn a_run_of_clocks_that_is_interrupted_comes_to_the_same(mut draft in drafts::direct(), clocks in clocks(), breaths in 1..3_usize) {
+        with_clocks(&mut draft, &clocks);
         draft.duration = 1500;
         draft.gains = draft.gains.scaled(0.2);
         let interrupted = |model| run_interrupted(&draft.scene(), model, breaths);
@@ -108,12 +103,12 @@ proptest! {
     /// An observer that ends a run, or fails, has seen what it would have seen of events.
     #[test]
     fn who_has_had_enough_of_clocks_has_seen_the_same(
-        mut drafts in drafts::changing(Just(1)), clocks in clocks(), millis in 0..900_u64, most_rows in prop_oneof![1..200_usize, Just(usize::MAX)],
+        mut draft in drafts::direct(), clocks in clocks(), millis in 0..900_u64, most_rows in prop_oneof![1..200_usize, Just(usize::MAX)],
     ) {
-        with_clocks(&mut drafts[0], &clocks);
-        drafts[0].duration = 1500;
+        with_clocks(&mut draft, &clocks);
+        draft.duration = 1500;
         let until = Instant::from_nanos(millis * 1_000_000);
-        let found = found(&drafts[0].scene(), |keeper| (keeper.until, keeper.most_rows) = (until, most_rows));
+        let found = found(&draft.scene(), |keeper| (keeper.until, keeper.most_rows) = (until, most_rows));
         prop_assert!(found.is_none(), "{}", found.unwrap());
     }
 }

@@ -74,7 +74,7 @@ const BASE: &str = r#"
 "#;
 
 /// One thing more than the base has, as keys of the scene. The least model has a part of its own for most of them.
-const ADDITIONS: [&[&str]; 23] = [
+const ADDITIONS: [&[&str]; 26] = [
     &[],
     &["scene.axes=2", "peers.peer1.hand.sine.amplitude=[1.5, 1.0]"],
     &["scene.axes=3", "peers.peer1.hand.sine.amplitude=[1.5, 1.0, 0.5]"],
@@ -91,6 +91,12 @@ const ADDITIONS: [&[&str]; 23] = [
     &["link.rate=1Mbit", "link.queue={ limit = \"100 packets\" }"],
     &["link.token-bucket={ rate = \"1Mbit\", burst = \"10kB\" }"],
     &["link={ netem = \"delay 24ms\", netem-profile = \"kernel-6.6\" }"],
+    &["link.limit=2 packets"],
+    &[
+        "peer.uplink={ rate = \"90kbit\", delay = \"4ms\", queue = { limit = \"5 packets\" } }",
+        "peer.downlink={ jitter = \"1ms\", duplicate = \"10%\" }",
+    ],
+    &["peer.uplink={ rate = \"90kbit\", jitter = \"1ms\" }", "topology={ kind = \"star\", role = \"relay\" }"],
     &["peer.contact={ push = \"+x\" }"],
     &["peer.compute-delay=1"],
     &["peer.clock={ drift = \"20ppm\" }"],

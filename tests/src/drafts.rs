@@ -5,7 +5,6 @@ use std::time::Duration;
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, SendWhen};
-use proptest::bool::weighted;
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
@@ -134,22 +133,35 @@ pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Valu
     })
 }
 
-/// Scenes of one shape that need no events, if nobody watches: this number of them, with equal peers, ticks and durations. Everything else may differ, in half of
-/// the cases even the links.
+/// Scenes of one shape that need no events, if nobody watches: this number of them, with equal peers, ticks and durations, without access lines. Everything else
+/// may differ, in half of the cases even the links.
 pub fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Draft>> {
-    of_one_shape(scenes, false)
+    of_one_shape(scenes, link_or_delay(), false)
 }
 
 /// [`alike`], with one timeline.
 pub fn changing(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Draft>> {
-    of_one_shape(scenes, true)
+    of_one_shape(scenes, link_or_delay(), true)
 }
 
-fn of_one_shape(scenes: impl Strategy<Value = usize>, with_timeline: bool) -> impl Strategy<Value = Vec<Draft>> {
+/// One scene of [`alike`] or of [`changing`] that needs no events with any clocks: over [direct links](direct_link), which the timeline does not change.
+pub fn direct() -> impl Strategy<Value = Draft> {
+    (of_one_shape(Just(1), direct_link(), true), any::<bool>()).prop_map(|(mut drafts, changes)| {
+        let mut draft = drafts.remove(0);
+        draft.timeline.retain(|entry| changes && !entry.contains("link ="));
+        draft
+    })
+}
+
+fn of_one_shape(
+    scenes: impl Strategy<Value = usize>,
+    link: impl Strategy<Value = String> + Clone + 'static,
+    with_timeline: bool,
+) -> impl Strategy<Value = Vec<Draft>> {
     let counts = prop_oneof![3 => 2..=5_usize, 1 => 6..=11_usize];
     (scenes, counts).prop_flat_map(move |(scenes, count)| {
-        let drafts = vec((anything_among(Just(count)), direct_link(), vec((0..count, 1..count, direct_link()), 0..3)), scenes);
-        (drafts, any::<bool>(), weighted(0.3), 0.9..2.0).prop_map(move |(mut drafts, same_links, with_lines, stiffer)| {
+        let drafts = vec((anything_among(Just(count)), link.clone(), vec((0..count, 1..count, link.clone()), 0..3)), scenes);
+        (drafts, any::<bool>(), 0.9..2.0).prop_map(move |(mut drafts, same_links, stiffer)| {
             let has_arms = drafts.iter().any(|(draft, ..)| draft.peers.iter().any(|peer| matches!(peer.hand, DraftHand::Arm { .. })));
             let mut timeline = std::mem::take(&mut drafts[0].0.timeline);
             timeline.retain(|entry| with_timeline && !(has_arms && entry.contains("hand =")));
@@ -179,9 +191,7 @@ fn of_one_shape(scenes: impl Strategy<Value = usize>, with_timeline: bool) -> im
                 }
                 for (peer, like) in draft.peers.iter_mut().zip(&first.peers) {
                     (peer.tick, peer.offset, peer.drift, peer.phase) = (first.peers[0].tick, 0, 0, like.phase % (first.update / first.peers[0].tick));
-                    if !with_lines {
-                        (peer.uplink, peer.downlink) = (None, None);
-                    }
+                    (peer.uplink, peer.downlink) = (None, None);
                     if let Contact::Push(direction) = &mut peer.contact {
                         direction.axis %= first.axes;
                     }
@@ -223,13 +233,27 @@ pub fn fixed_link() -> impl Strategy<Value = String> + Clone {
     prop_oneof![Just(String::new()), (0..6000_u32).prop_map(|us| format!("delay = \"{us}us\""))]
 }
 
-/// Keys of a link that knows at once when a packet arrives: in half of the cases of nothing but a constant delay.
-pub fn direct_link() -> impl Strategy<Value = String> + Clone {
-    prop_oneof![link(), (0..40_000_u32).prop_map(|us| format!("delay = \"{us}us\", jitter = \"0s\""))]
+/// Keys of a [`link`], in half of the cases of nothing but a constant delay.
+fn link_or_delay() -> impl Strategy<Value = String> + Clone {
+    prop_oneof![link(), constant_delay()]
+}
+
+/// Keys of a link for which the arrival of a packet is known as the packet is sent: in half of the cases of nothing but a constant delay.
+fn direct_link() -> impl Strategy<Value = String> + Clone {
+    prop_oneof![link_with(&["tail-drop"], Just(None)), constant_delay()]
+}
+
+fn constant_delay() -> impl Strategy<Value = String> + Clone {
+    (0..40_000_u32).prop_map(|us| format!("delay = \"{us}us\", jitter = \"0s\""))
 }
 
 /// Keys of a link of any kind.
 pub fn link() -> impl Strategy<Value = String> + Clone {
+    link_with(&["tail-drop", "tail-drop", "head-drop", "codel"], option::weighted(0.2, 0.01..0.3))
+}
+
+/// Keys of a link whose queue, if there is one, has one of these disciplines, with that probability of a copy.
+fn link_with(disciplines: &'static [&'static str], copies: impl Strategy<Value = Option<f64>> + Clone) -> impl Strategy<Value = String> + Clone {
     let delay = prop_oneof![Just(None), (0..40_000_u32).prop_map(Some)];
     // In parts per thousand of the delay: a uniform law reaches √3 of it.
     let jitter = option::of((1..550_u32, any::<bool>(), any::<bool>(), option::of(0.1..0.9)));
@@ -240,9 +264,8 @@ pub fn link() -> impl Strategy<Value = String> + Clone {
             Some(format!("loss = {{ gilbert-elliott = {{ p = {p:?}, r = {r:?}, h = {h:?}, k = {k:?} }} }}"))
         }),
     ];
-    let rate = option::of((30..1000_u32, 0..60_u32, option::of((1..6_u32, 0..3_usize, 0..4_usize))));
+    let rate = option::of((30..1000_u32, 0..60_u32, option::of((1..6_u32, 0..3_usize, select(disciplines)))));
     let outage = option::weighted(0.3, (0..60_u32, 1..60_u32));
-    let copies = option::weighted(0.2, 0.01..0.3);
     (delay, jitter, loss, rate, outage, copies).prop_map(|(delay, jitter, loss, rate, outage, copies)| {
         let mut keys = Vec::new();
         if let Some(us) = delay {
@@ -262,7 +285,6 @@ pub fn link() -> impl Strategy<Value = String> + Clone {
             keys.push(format!("rate = \"{kbit}kbit\", overhead = \"{overhead}B\""));
             if let Some((limit, unit, discipline)) = queue {
                 let limit = [format!("{limit} packets"), format!("{}B", 150 * limit), format!("{}us", 1700 * limit)][unit].clone();
-                let discipline = ["tail-drop", "tail-drop", "head-drop", "codel"][discipline];
                 keys.push(format!("queue = {{ limit = \"{limit}\", discipline = \"{discipline}\" }}"));
             }
         }

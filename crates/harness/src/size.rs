@@ -67,7 +67,7 @@ fn too_large_for(scene: &Scene, way: Way, free: Option<u64>) -> Option<TooLarge>
         let needed = Megabytes(least.bytes(peers, links));
         format!("to look at nothing but counters, without plot, records and measures, which takes {needed} or a little more")
     } else {
-        "one constant delay for all links at all times and one tick for all peers, without plot, records and measures".to_owned()
+        "one constant delay for all links at all times, one tick for all peers and no access lines, without plot, records and measures".to_owned()
     };
     Some(TooLarge { peer, reason: format!("{peers} peers with {links} links between them are {what}: expected fewer peers, or {cure}") })
 }
@@ -79,8 +79,8 @@ impl Way {
             // A run in windows that diverges is run again with events.
             Some((shape, _)) if shape.has_windows() => Self::Events,
             Some((shape, _)) if shape.is_broadcast() => Self::Broadcast,
-            Some((shape, _)) if !shape.is_carried() => Self::Packets,
-            Some(_) | None => Self::Events,
+            Some(_) => Self::Packets,
+            None => Self::Events,
         }
     }
 
@@ -149,6 +149,10 @@ mod tests {
         let mut drifting = constant.clone();
         drifting.peers.iter_mut().for_each(|peer| peer.clock.drift = Drift::from_fraction(1e-5).unwrap());
         assert_eq!(refused(&drifting, false, u64::MAX).map(|(peer, _)| peer), Some(23_170));
+        // Packets that share an access line need events.
+        let mut sharing = constant.clone();
+        sharing.peers[0].uplink = Some(Arc::clone(&sharing.links.configs()[0]));
+        assert_eq!(refused(&sharing, false, u64::MAX).map(|(peer, _)| peer), Some(23_170));
         let ring = Scene { topology: Topology::ring(70_000, 2).map(Arc::new), ..scene(70_000, "delay = \"24ms\"") };
         assert!(
             refused(&ring, true, u64::MAX).unwrap().1.contains("70000 peers with 140000 links between them are too many to be simulated with events")

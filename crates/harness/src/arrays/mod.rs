@@ -244,7 +244,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     fn go_on(&mut self, now: Instant, tick: u64, watch: &mut impl RunWatch<B, A, P>) -> [f64; L] {
         match &mut self.samples {
             Samples::Broadcast(samples) => samples.deliver(tick),
-            Samples::PerPacket(samples) => samples.deliver(tick, now),
+            Samples::PerPacket(samples) => samples.deliver(tick),
         }
         self.bodies.move_hands(now);
         if self.leads.is_some() {
@@ -452,7 +452,8 @@ fn summary<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
         ticks,
         peers: members().map(|(part, peer)| part.peer_summary(peer, run)).collect(),
         links: links(parts, run, ticks, until),
-        access_lines: if let Samples::PerPacket(samples) = &parts[0].samples { samples.access_lines(run) } else { Vec::new() },
+        // The shape of a scene says that it has none.
+        access_lines: Vec::new(),
         max_discrepancy,
         max_rotation_discrepancy: parts[0].bodies.max_rotation_discrepancy(run),
     }

@@ -9,7 +9,7 @@ use cohaptic_peer::{Clock, Coordination, EXACT_FROM, Integrator};
 use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
 use cohaptic_units::print::Span;
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{DirectLinks, LinkConfig, LinkModel, Load, MOST_NODES, SteppedLinks};
+use cohaptic_wan::{DirectLinks, LinkConfig, LinkModel, Load, SteppedLinks};
 
 use super::{nanos, threads};
 use crate::plan::{Plan, Ticking};
@@ -34,7 +34,7 @@ pub(crate) struct Shape {
     pub(super) phases: Vec<u64>,
     /// The samples that a link is offered.
     pub(super) load: Load,
-    /// How the fates of packets become known.
+    /// When the fates of packets become known.
     pub(super) way: Way,
     /// The delay of all links, if they do nothing but delay, all alike, and lead from all to all.
     pub(super) delay: Option<Duration>,
@@ -44,15 +44,13 @@ pub(crate) struct Shape {
     pub(super) clocks: Option<Vec<Clock>>,
 }
 
-/// How the fates of packets become known, if links do more than to delay all by the same span.
+/// When the fates of packets become known, if links do more than delay all packets by the same span.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Way {
-    /// Each as it is sent.
+    /// Fate of each packet known as the packet is sent.
     Direct,
-    /// Each before its sender sends the next one: it may depend on later ones, or on a change of the timeline.
+    /// Fate of each packet known before the sender sends the next one. The fate may depend on later packets, or on a change of the timeline.
     Stepped,
-    /// As time goes: packets of several peers share an access line, or a link counts those inside until they arrive, or replays a log.
-    Carried,
 }
 
 /// A year: far from where instants end, so that sums of a few need no care.
@@ -99,7 +97,6 @@ impl Shape {
                 ("when the sample before left the line", "samples have one size, and the newest is dropped where there is no room".to_owned())
             }
             Way::Stepped => ("from one sample of a link to its next", format!("{}: until then nothing new can be known", apart())),
-            Way::Carried => ("as time goes", "access lines, limits and replays look at packets on the way".to_owned()),
         })
     }
 
@@ -123,11 +120,6 @@ impl Shape {
         self.way == Way::Stepped
     }
 
-    /// Whether a network carries the packets.
-    pub(crate) fn is_carried(&self) -> bool {
-        self.way == Way::Carried
-    }
-
     /// The first tick at or after an instant.
     pub(super) fn tick_at(&self, at: Instant) -> u64 {
         at.as_nanos().div_ceil(nanos(self.tick))
@@ -143,15 +135,8 @@ impl Shape {
         let links = scene.used_links();
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
         let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, load));
-        let lines = || scene.peers.iter().flat_map(|peer| [&peer.uplink, &peer.downlink]).flatten();
-        let has_lines = lines().next().is_some();
-        let delay = one_delay(scene, load).filter(|_| !links_change && !has_lines);
-        let is_stepped = links.iter().all(|(link, _)| SteppedLinks::takes(link)) && models_to_come(scene).all(SteppedLinks::takes);
-        let way = match (are_direct, is_stepped && !has_lines) {
-            (true, true) => Way::Direct,
-            (false, true) if tick_together => Way::Stepped,
-            (false, true) | (_, false) => Way::Carried,
-        };
+        let delay = one_delay(scene, load).filter(|_| !links_change);
+        let late = links.iter().find_map(|(link, _)| why_known_late(link)).or_else(|| models_to_come(scene).find_map(why_known_late));
         let has_past = |law: BuiltIn| Law::<f64>::lag(&law) > 0 || Law::<f64>::memory(&law) > 0;
         let may_have_past = || has_past(law) || !scene.timeline.is_empty() && scene.laws_in_time(0).any(has_past);
         // Of strategies that are not the scene's own nobody knows the law after a change.
@@ -163,8 +148,12 @@ impl Shape {
             (clocks().all(|clock| !clock.spans().0.is_zero()), "two ticks of a peer fall on one instant"),
             (tick_together || scene.rotation.is_none(), "peers tick at instants of their own, and the object turns"),
             (links.iter().all(|(link, _)| !link.may_damage()), "a link damages packets"),
-            (lines().all(|line| !line.may_damage()), "an access line damages packets"),
             (models_to_come(scene).all(|link| !link.may_damage()), "the timeline makes a link damage packets"),
+            (scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()), "packets of several links share an access line"),
+            (late.is_none(), late.unwrap_or_default()),
+            // In windows a packet is put into the wheel as the packet is sent, and the arrival says where.
+            (tick_together || !links_change, "peers tick at instants of their own, and the timeline changes links"),
+            (tick_together || are_direct, "peers tick at instants of their own, and the arrival over some link is not known when a packet is sent"),
             (!sends_by_difference(scene), "there are dead bands"),
             (!scene.has_gains_by_peer(), "the gains follow the weight that a peer hears, so they differ from peer to peer"),
             (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
@@ -172,10 +161,6 @@ impl Shape {
             (scene.rotation.is_none() || !may_have_past(), "the law remembers, and the object turns"),
             // What each packet carries counts them in 16 bits.
             (scene.peers.len() <= usize::from(u16::MAX) || delay.is_some(), "there are more than 65,535 peers, over links that take memory"),
-            (
-                way != Way::Carried || scene.topology.is_some() || scene.peers.len() <= MOST_NODES,
-                "a network with access lines has at most 23,170 peers",
-            ),
             (scene.duration <= LONGEST && clock.tick <= LONGEST, "it lasts longer than a year"),
         ];
         if let Some((_, why)) = fits.into_iter().find(|(fits, _)| !fits) {
@@ -193,7 +178,7 @@ impl Shape {
             send_every: scene.samples_every(0),
             phases: scene.peers.iter().map(|peer| peer.phase).collect(),
             load,
-            way,
+            way: if are_direct { Way::Direct } else { Way::Stepped },
             delay,
             topology: scene.topology.clone(),
             clocks: (!tick_together).then(|| clocks().copied().collect()),
@@ -222,7 +207,19 @@ fn models_to_come(scene: &Scene) -> impl Iterator<Item = &LinkModel> {
     })
 }
 
-/// The samples that each link of a scene is offered, unless they came over an access line.
+/// Returns why the fate of a packet over a link may be unknown when the sender sends the next packet; `None` if the fate is known by then.
+///
+/// Without meaning for a link that damages packets: [`Shape::of`] gives another reason before.
+fn why_known_late(link: &LinkModel) -> Option<&'static str> {
+    (!SteppedLinks::takes(link)).then_some(match link {
+        LinkModel::Replay(_) => "a link replays a log",
+        LinkModel::Kernel(_) => "a link is netem as a kernel computes it",
+        // Besides damage, the limit is the only stage that stepped links refuse.
+        LinkModel::Fixed(_) | LinkModel::Modulated(_) => "a link has a limit, and counts packets until they arrive",
+    })
+}
+
+/// The samples that each link of a scene is offered.
 fn load(scene: &Scene) -> Load {
     let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
     let ticks = |peer: usize| u32::try_from(scene.samples_every(peer)).unwrap_or(u32::MAX);
@@ -249,6 +246,8 @@ mod tests {
     use super::*;
     use crate::plan::Model;
 
+    const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios");
+
     /// Why two peers with these keys besides cannot be run in arrays.
     fn refusal(keys: &str) -> Option<&'static str> {
         let text = r#"
@@ -271,16 +270,24 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             change("link = \"all\", set = { rate = \"1Mbit\" }"),
             change("peer = \"peer1\", set = { hand = { force = 1 } }"),
             change("coordination = { stiffness = 2 }"),
-            "peer.uplink={ rate = \"1Mbit\" }".to_owned(),
-            "link.limit=\"9 packets\"".to_owned(),
             "peer.clock.drift=\"10ppm\"\nlink.loss=0.1".to_owned(),
-            change("link = \"all\", set = { limit = \"9 packets\" }"),
+            "peer.clock.drift=\"10ppm\"\nlink.rate=\"1kbit\"".to_owned(),
         ] {
             assert_eq!(refusal(&fits), None, "{fits}");
         }
         for (keys, expected) in [
             ("peers=[{ name = \"peer1\", tick = \"2ms\" }]".to_owned(), "differ in length"),
-            ("peer.downlink={ corrupt = 0.1 }".to_owned(), "an access line damages"),
+            ("peer.uplink={ rate = \"1Mbit\" }".to_owned(), "share an access line"),
+            ("peer.downlink={ corrupt = 0.1 }".to_owned(), "share an access line"),
+            ("link.limit=\"9 packets\"".to_owned(), "a link has a limit"),
+            (change("link = \"all\", set = { limit = \"9 packets\" }"), "a link has a limit"),
+            (format!("link={{ replay = '{SHIPPED}/network/data/fates.csv' }}"), "a link replays a log"),
+            ("link={ netem = \"delay 20ms\", netem-profile = \"kernel-6.6\" }".to_owned(), "netem as a kernel computes it"),
+            (
+                "peer.clock.drift=\"10ppm\"\nlink.rate=\"1kbit\"\nlink.queue={ limit = \"9 packets\", discipline = \"head-drop\" }".to_owned(),
+                "not known when a packet is sent",
+            ),
+            (change("link = \"all\", set = { delay = \"1ms\" }") + "\npeer.clock.drift=\"10ppm\"", "the timeline changes links"),
             ("link.corrupt=0.1".to_owned(), "a link damages"),
             (change("link = \"all\", set = { corrupt = 0.1 }"), "the timeline makes a link damage"),
             ("coordination.send-when={ position = 0.001 }".to_owned(), "dead bands"),

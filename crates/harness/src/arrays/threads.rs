@@ -48,7 +48,6 @@ fn why_together(shape: &Shape) -> Option<&'static str> {
     let whys = [
         (shape.delay.is_some(), "all samples travel together: a tick takes less time than threads take to meet"),
         (shape.has_windows(), "peers tick at instants of their own: threads would meet in each window"),
-        (shape.is_carried(), "packets of several peers pass one access line, or links know their fates only as time goes"),
         (shape.turns.is_some(), "the object turns: how far copies are turned apart is a matter of all of them"),
     ];
     whys.into_iter().find_map(|(is_so, why)| is_so.then_some(why))

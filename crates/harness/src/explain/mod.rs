@@ -116,8 +116,6 @@ pub fn explain(scene: &Scene) -> Explanation {
             let nanos = if shape.has_windows() { IN_WINDOWS } else { IN_ARRAYS };
             if shape.is_broadcast() {
                 Nanos { an_impaired_packet: nanos.a_packet, ..nanos }
-            } else if shape.is_carried() {
-                Nanos { a_packet: WITH_EVENTS.a_packet, an_impaired_packet: WITH_EVENTS.an_impaired_packet, ..nanos }
             } else {
                 Nanos { a_packet: nanos.an_impaired_packet, ..nanos }
             }
@@ -132,7 +130,7 @@ pub fn explain(scene: &Scene) -> Explanation {
         rows.model(
             "runs of which nobody watches more than ticks",
             format!("in arrays: binary64 in eight lanes, {peers}"),
-            format!("{ticks}, and no line damages packets; a run that is recorded has events, since packets are recorded"),
+            format!("{ticks}, and the fate of each packet is known before the next one comes; a run that is recorded has events, since packets are recorded"),
         );
         if let Some((queues, why)) = shape.queues(&used_links(scene)) {
             rows.model("queues of such a run", queues, why);

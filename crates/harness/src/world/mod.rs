@@ -485,7 +485,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
 }
 
 /// The links and access lines of a scene.
-pub(crate) fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
+fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
     let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: plan.general_links };
     let link = |from: NodeId, to: NodeId| scene.links.between(from.index(), to.index()).clone();
     let mut network = match &scene.topology {

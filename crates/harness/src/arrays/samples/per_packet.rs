@@ -3,7 +3,6 @@
 //! Peers look at what has arrived at their ticks alone, and all tick together. So samples in flight lie in a wheel, by the tick at which it is in force, and
 //! nothing is sorted but the samples that are due together on a link on which one overtook another.
 
-mod carried;
 mod in_turn;
 mod neighbours;
 
@@ -23,8 +22,6 @@ use crate::arrays::bodies::Bodies;
 use crate::arrays::processor::on_widest;
 use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
-use crate::summary::AccessSummary;
-use carried::Carrier;
 pub(in crate::arrays) use in_turn::NextTick;
 
 /// Set in the sequence number of a link on which one of the samples that are due overtakes another.
@@ -64,8 +61,6 @@ enum Links<const P: usize> {
     Direct(DirectLinks),
     /// They are told when each sender sends next.
     Stepped(SteppedLinks<State<P>>),
-    /// They are part of a network, which is asked at each tick.
-    Carried(Carrier<P>),
 }
 
 impl<const P: usize, const L: usize> PerPacket<P, L> {
@@ -76,7 +71,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         let mut links = match shape.way {
             Way::Direct => Links::Direct(DirectLinks::new(shape.end, shape.load)),
             Way::Stepped => Links::Stepped(SteppedLinks::new(shape.end, info)),
-            Way::Carried => Links::Carried(Carrier::new(scenes, info)),
         };
         let rows = Rows::new(peers, shape.topology.as_ref(), receivers.clone());
         for (receiver, to) in receivers.clone().enumerate() {
@@ -89,7 +83,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 match &mut links {
                     Links::Direct(links) => assert!(links.add(scene.seed, &name, model), "the shape of a scene says that its links are direct"),
                     Links::Stepped(links) => links.add(scene.seed, &name, model),
-                    Links::Carried(_) => {}
                 }
             }
         }
@@ -154,7 +147,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                     false => on_widest(processor, ByLink(sending)),
                 }
             }
-            Links::Carried(carrier) => carrier.send(now, senders, sent),
             Links::Stepped(links) => {
                 for ((receiver, peer), sender) in receivers.clone().enumerate().flat_map(|to| senders.iter().map(move |from| (to, *from))) {
                     if sender == peer {
@@ -202,9 +194,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         (from, to): (usize, usize),
         model: &LinkModel,
     ) {
-        if let Links::Carried(carrier) = &mut self.links {
-            return (0..L).for_each(|run| carrier.set_link(at, run, (from, to), model));
-        }
         let Self { rows, receivers, links: Links::Stepped(links), in_flight, .. } = self else { return };
         let receiver = to - receivers.start;
         let Some(column) = rows.column(receiver, from) else { return };
@@ -219,10 +208,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// What has arrived is held from now on.
     #[inline(always)]
-    pub(in crate::arrays) fn deliver(&mut self, tick: u64, now: Instant) {
-        if matches!(self.links, Links::Carried(_)) {
-            return self.deliver_carried(now);
-        }
+    pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         if let Some(bucket) = self.in_flight.due(tick) {
             self.take_in(bucket);
         }
@@ -295,9 +281,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// At the end of the scene, which is at or before the tick after the latest: what has arrived by then.
     pub(in crate::arrays) fn finish(&mut self, latest: (u64, Instant)) {
-        if matches!(self.links, Links::Carried(_)) {
-            return self.deliver_carried(self.end);
-        }
         self.pass(latest, |_| Instant::MAX);
         if let Some(mut bucket) = self.in_flight.due(latest.0 + 1) {
             for packets in [&mut bucket.in_order, &mut bucket.overtaking] {
@@ -436,8 +419,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             match &mut self.links {
                 Links::Direct(links) => links.forget(link, sent, packet.arrival),
                 Links::Stepped(links) => links.forget(link, sent, packet.arrival),
-                // It has counted what has arrived, and nothing lies in the wheel.
-                Links::Carried(_) => {}
             }
         }
     }
@@ -453,13 +434,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         Some(match &self.links {
             Links::Direct(links) => links.stats(link),
             Links::Stepped(links) => links.stats(link),
-            Links::Carried(carrier) => return carrier.stats(run, from, self.receivers.start + receiver),
         })
-    }
-
-    /// What the access lines of a run did, if there are any.
-    pub(in crate::arrays) fn access_lines(&self, run: usize) -> Vec<AccessSummary> {
-        if let Links::Carried(carrier) = &self.links { carrier.access_lines(run) } else { Vec::new() }
     }
 }
 

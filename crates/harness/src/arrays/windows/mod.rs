@@ -250,7 +250,7 @@ impl<'a, const A: usize> Windows<'a, A> {
             }
             Samples::PerPacket(samples) => {
                 let next = *window + u64::from(!timetable.is_cut());
-                samples.deliver_in_turn((*window, next), timetable.latest(), |peer| until[peer]);
+                samples.deliver_in_turn((*window, next), |peer| until[peer]);
                 for (peer, _, tick) in timetable.ticks() {
                     let has_heard = samples.has_changed(peer, 0);
                     lead(peer, tick, has_heard, &|now, horizon| Lead::of(samples.moving((peer, 0), sent), now, horizon), bodies);

@@ -45,12 +45,8 @@ impl<const P: usize> PerPacket<P, 1> {
         next_tick: impl Fn(usize) -> NextTick,
     ) {
         let Self { rows, links, in_flight, receivers, sends, .. } = self;
-        let links = match links {
-            Links::Direct(links) => links,
-            Links::Carried(carrier) => {
-                return senders.iter().for_each(|sender| carrier.send(instant(*sender), &[*sender], sent));
-            }
-            Links::Stepped(..) => unreachable!("the shape of a scene says that no link looks ahead where peers tick at instants of their own"),
+        let Links::Direct(links) = links else {
+            unreachable!("the shape of a scene says that all links are direct where peers tick at instants of their own")
         };
         if senders.is_empty() {
             return;
@@ -62,10 +58,7 @@ impl<const P: usize> PerPacket<P, 1> {
 
     /// In a window, or a part of it, each receiver takes in what arrives before an instant of its own, which lies a nanosecond after its tick; at 0 if it does not
     /// tick. The rest is looked at again in a window, which may be the same one.
-    pub(in crate::arrays) fn deliver_in_turn(&mut self, (window, next): (u64, u64), latest: Instant, until: impl Fn(usize) -> u64) {
-        if matches!(self.links, Links::Carried(_)) {
-            return self.deliver_carried_until(latest, until);
-        }
+    pub(in crate::arrays) fn deliver_in_turn(&mut self, (window, next): (u64, u64), until: impl Fn(usize) -> u64) {
         let Some(mut bucket) = self.in_flight.due(window) else { return };
         let Self { in_flight, .. } = self;
         for packets in [&mut bucket.in_order, &mut bucket.overtaking] {
@@ -83,9 +76,6 @@ impl<const P: usize> PerPacket<P, 1> {
 
     /// The run ends: all take in what has arrived by that instant, and nothing arrives later. `sent` says when a packet of a sender was sent.
     pub(in crate::arrays) fn end_in_turn(&mut self, until: Instant, sent: impl Fn(usize, u64) -> Instant) {
-        if matches!(self.links, Links::Carried(_)) {
-            return self.deliver_carried_until(until, |_| u64::MAX);
-        }
         let arrived = self.in_flight.take_arrived(until);
         self.take_in(Bucket { in_order: Vec::new(), overtaking: arrived });
         if until < self.end {

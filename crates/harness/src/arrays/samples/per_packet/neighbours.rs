@@ -15,9 +15,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         sent: &[Sample<P, L>],
         next: impl Fn(usize) -> Instant,
     ) {
-        if let Links::Carried(carrier) = &mut self.links {
-            return carrier.send(now, senders, sent);
-        }
         let Self { rows, receivers, links, sends, in_flight, .. } = self;
         sends.fill(false);
         senders.iter().for_each(|sender| sends[*sender] = true);
@@ -45,7 +42,6 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                         }
                     }
                 }
-                Links::Carried(_) => {}
                 Links::Stepped(links) => {
                     for number in 0..row {
                         let (column, run) = (number / L, number % L);
