@@ -171,7 +171,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             for column in (0..rows.columns(receiver)).filter(|column| rows.sender(receiver, *column) != peer) {
                 let (next, first) = (next(rows.sender(receiver, column)), rows.link(receiver, column) * L);
                 for run in 0..L {
-                    links.pass(next, LinkId::new(first + run), |arrival, overtakes, sequence, state| {
+                    links.pass(next, LinkId::new(first + run), &mut |arrival, overtakes, sequence, state| {
                         in_flight.push(latest, rows.packet::<P, L>((receiver, column, run), &state, arrival, sequence), overtakes);
                     });
                 }
@@ -200,7 +200,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         for (run, scene) in scenes.iter().enumerate() {
             let link = LinkId::new(rows.link(receiver, column) * L + run);
             let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
-            links.set_model(at, link, (scene.seed, &name), model.clone(), |arrival, overtakes, sequence, state| {
+            links.set_model(at, link, (scene.seed, &name), model.clone(), &mut |arrival, overtakes, sequence, state| {
                 in_flight.push(latest, rows.packet::<P, L>((receiver, column, run), &state, arrival, sequence), overtakes)
             });
         }

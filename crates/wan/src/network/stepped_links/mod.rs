@@ -150,7 +150,7 @@ impl<T: Clone> SteppedLinks<T> {
             Some(Err(cause)) => line.drop(cause),
             None => {
                 line.enter(now, *info, Marks::default(), Sent { at: now, number, item }, outputs, &mut Arriving(arrivals));
-                self.pass(next, link, arrives);
+                self.pass_on_other(next, link, arrives);
             }
         }
     }
@@ -160,14 +160,20 @@ impl<T: Clone> SteppedLinks<T> {
     /// # Panics
     ///
     /// If there is no such link.
-    pub fn pass(&mut self, next: Instant, link: LinkId, mut arrives: impl FnMut(Instant, bool, u64, T)) {
-        let Self { until, links, kinds, outputs, arrivals, .. } = self;
+    pub fn pass(&mut self, next: Instant, link: LinkId, arrives: &mut dyn FnMut(Instant, bool, u64, T)) {
         // What happens after the end is not counted.
-        let next = next.min(*until);
-        let Other { line, latest } = match &mut links[link.index()] {
-            Stepped::Queued(kind, link) => return link.pass((next, *until), &kinds[usize::from(*kind)].1, arrives),
-            Stepped::Other(other) => &mut **other,
-        };
+        let (until, next) = (self.until, next.min(self.until));
+        match &mut self.links[link.index()] {
+            Stepped::Queued(kind, link) => link.pass((next, until), &self.kinds[usize::from(*kind)].1, arrives),
+            Stepped::Other(_) => self.pass_on_other(next, link, arrives),
+        }
+    }
+
+    /// Lets time pass on a link with stages besides a line, until `next` or the end at most. Generic, because most packets over such a link come here.
+    fn pass_on_other(&mut self, next: Instant, link: LinkId, mut arrives: impl FnMut(Instant, bool, u64, T)) {
+        let Self { until, links, outputs, arrivals, .. } = self;
+        let Stepped::Other(other) = &mut links[link.index()] else { return };
+        let Other { line, latest } = &mut **other;
         if line.next_wake().is_some_and(|wake| wake <= next) {
             line.wake(next, outputs, &mut Arriving(arrivals));
         }
@@ -189,15 +195,15 @@ impl<T: Clone> SteppedLinks<T> {
         link: LinkId,
         (seed, name): (u64, &LinkName),
         model: LinkModel,
-        mut arrives: impl FnMut(Instant, bool, u64, T),
+        arrives: &mut dyn FnMut(Instant, bool, u64, T),
     ) {
-        self.pass(now, link, &mut arrives);
+        self.pass(now, link, arrives);
         let (until, info, kind) = (self.until, self.info, self.kind(&model));
         let Self { links, kinds, outputs, arrivals, .. } = self;
         let changed = &mut links[link.index()];
         match (&mut *changed, kind) {
             (Stepped::Queued(place, queued), Some(kind)) => {
-                queued.reconfigure((now, until), (&kinds[usize::from(*place)].1, &kinds[usize::from(kind)].1), &mut arrives);
+                queued.reconfigure((now, until), (&kinds[usize::from(*place)].1, &kinds[usize::from(kind)].1), arrives);
                 *place = kind;
             }
             (Stepped::Queued(place, queued), None) => {

@@ -171,7 +171,7 @@ impl<T> QueuedLink<T> {
     }
 
     #[inline(always)]
-    fn propagate(&mut self, (leaves, until): (Instant, Instant), packet: Offered<T>, arrives: &mut impl FnMut(Instant, bool, u64, T)) {
+    fn propagate(&mut self, (leaves, until): (Instant, Instant), packet: Offered<T>, arrives: &mut (impl FnMut(Instant, bool, u64, T) + ?Sized)) {
         let at = self.direct.arrival(leaves, packet.number, self.direct.words(packet.number));
         self.flow.deliver_by(until, packet.at, at);
         arrives(at, at <= self.latest, packet.number, packet.item);
@@ -188,7 +188,7 @@ impl<T> QueuedLink<T> {
         &mut self,
         (now, until): (Instant, Instant),
         (before, kind): (&QueuedKind, &QueuedKind),
-        mut arrives: impl FnMut(Instant, bool, u64, T),
+        arrives: &mut dyn FnMut(Instant, bool, u64, T),
     ) {
         self.direct.reconfigure(now, &kind.config);
         self.line = match (self.line.take(), &before.line, &kind.line) {
@@ -198,7 +198,7 @@ impl<T> QueuedLink<T> {
             }
             (line, _, kind) => {
                 let given_up = line.into_iter().flat_map(LineState::dismantle);
-                given_up.for_each(|packet| self.propagate((now, until), packet, &mut arrives));
+                given_up.for_each(|packet| self.propagate((now, until), packet, arrives));
                 kind.as_ref().map(LineState::new)
             }
         };

@@ -42,7 +42,7 @@ fn compare(model: &LinkModel, then: &[(usize, &LinkModel)], (instants, until): (
     for (place, now) in instants.iter().enumerate() {
         for (_, model) in then.iter().filter(|(at, _)| *at == place) {
             whole.set_model(*now, (*model).clone()).unwrap();
-            stepped.set_model(*now, LinkId(0), (7, &name), (*model).clone(), |at, _, number, item| arrivals.push((at, number, item)));
+            stepped.set_model(*now, LinkId(0), (7, &name), (*model).clone(), &mut |at, _, number, item| arrivals.push((at, number, item)));
         }
         whole.handle_packet(*now, info, 1000 - place).unwrap();
         let next = instants.get(place + 1).copied().unwrap_or(Instant::MAX);
