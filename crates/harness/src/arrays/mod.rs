@@ -329,7 +329,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     fn pass(&mut self, tick: u64) {
         if let Samples::PerPacket(samples) = &mut self.samples {
             let change = self.changes.next_at();
-            samples.pass(self.shape.before(tick), |sender| until(&self.shape, tick, self.next_send[sender]).min(change));
+            samples.pass(self.shape.before(tick), &|sender| until(&self.shape, tick, self.next_send[sender]).min(change));
         }
     }
 

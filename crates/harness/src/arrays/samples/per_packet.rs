@@ -59,7 +59,7 @@ pub(in crate::arrays) struct PerPacket<const P: usize, const L: usize> {
 #[derive(Clone, Debug)]
 enum Links<const P: usize> {
     Direct(DirectLinks),
-    /// They are told when each sender sends next.
+    /// They are told when each sender sends next. Only in single runs: scenes side by side have direct links, and `const { L > 1 }` spares the compiler the rest.
     Stepped(SteppedLinks<State<P>>),
 }
 
@@ -70,7 +70,10 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         let info = PacketInfo { size: shape.load.size, ecn_capable: true };
         let mut links = match shape.way {
             Way::Direct => Links::Direct(DirectLinks::new(shape.end, shape.load)),
-            Way::Stepped => Links::Stepped(SteppedLinks::new(shape.end, info)),
+            Way::Stepped => {
+                assert!(L == 1, "scenes whose fates are not known as packets are sent run one by one");
+                Links::Stepped(SteppedLinks::new(shape.end, info))
+            }
         };
         let rows = Rows::new(peers, shape.topology.as_ref(), receivers.clone());
         for (receiver, to) in receivers.clone().enumerate() {
@@ -147,6 +150,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                     false => on_widest(processor, ByLink(sending)),
                 }
             }
+            Links::Stepped(_) if const { L > 1 } => {}
             Links::Stepped(links) => {
                 for ((receiver, peer), sender) in receivers.clone().enumerate().flat_map(|to| senders.iter().map(move |from| (to, *from))) {
                     if sender == peer {
@@ -165,7 +169,10 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// Time passes on the links of all senders until `next` of each; until the latest tick, which is this one, it has.
     #[cold]
-    pub(in crate::arrays) fn pass(&mut self, latest: (u64, Instant), next: impl Fn(usize) -> Instant) {
+    pub(in crate::arrays) fn pass(&mut self, latest: (u64, Instant), next: &dyn Fn(usize) -> Instant) {
+        if const { L > 1 } {
+            return;
+        }
         let Self { rows, receivers, links: Links::Stepped(links), in_flight, .. } = self else { return };
         for (receiver, peer) in receivers.clone().enumerate() {
             for column in (0..rows.columns(receiver)).filter(|column| rows.sender(receiver, *column) != peer) {
@@ -194,6 +201,9 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         (from, to): (usize, usize),
         model: &LinkModel,
     ) {
+        if const { L > 1 } {
+            return;
+        }
         let Self { rows, receivers, links: Links::Stepped(links), in_flight, .. } = self else { return };
         let receiver = to - receivers.start;
         let Some(column) = rows.column(receiver, from) else { return };
@@ -281,7 +291,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// At the end of the scene, which is at or before the tick after the latest: what has arrived by then.
     pub(in crate::arrays) fn finish(&mut self, latest: (u64, Instant)) {
-        self.pass(latest, |_| Instant::MAX);
+        self.pass(latest, &|_| Instant::MAX);
         if let Some(mut bucket) = self.in_flight.due(latest.0 + 1) {
             for packets in [&mut bucket.in_order, &mut bucket.overtaking] {
                 packets.retain(|packet| packet.arrival <= self.end);

@@ -8,6 +8,7 @@ use super::{Links, PerPacket};
 
 impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// [`PerPacket::send`] where each receiver has senders of its own.
+    #[inline(never)]
     pub(super) fn send_to_neighbours(
         &mut self,
         (tick, now): (u64, Instant),
@@ -42,6 +43,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                         }
                     }
                 }
+                Links::Stepped(_) if const { L > 1 } => {}
                 Links::Stepped(links) => {
                     for number in 0..row {
                         let (column, run) = (number / L, number % L);
