@@ -11,7 +11,6 @@ use cohaptic_wan::LinkModel;
 
 use super::blocks::law_of_lanes;
 use super::bodies::Bodies;
-use super::run_watch::RunWatch;
 use super::{Arrays, Samples};
 
 /// The changes to come, which are the same in all runs, and what follows from them in each.
@@ -59,9 +58,10 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
         self.shape.tick_at(self.changes.next_at())
     }
 
-    /// At that tick, or at the end of the scene before it: changes up to an instant, those of links each at its own.
+    /// Makes the changes up to an instant, those of links each at an instant of its own, at that tick or at the end of the scene before that tick. Tells `damped` of the
+    /// scene whose damping the copies have from then on.
     #[cold]
-    pub(super) fn change(&mut self, tick: u64, until: Instant, watch: &mut impl RunWatch<B, A, P>) {
+    pub(super) fn change(&mut self, tick: u64, until: Instant, damped: &mut dyn FnMut(&Scene)) {
         while self.changes.next_at() <= until
             && let Some(change) = self.changes.to_come.next()
         {
@@ -94,7 +94,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
                 ChangeKind::RotationalGains(_) => self.change_gains_of_turns(),
                 ChangeKind::Parameters(settings) => {
                     let laws = laws.expect("the shape of a scene says that its own law changes");
-                    self.change_parameters(settings, &laws, watch);
+                    self.change_parameters(settings, &laws, damped);
                 }
                 ChangeKind::SendWhen(_) => unreachable!("the shape of a scene says that it has no dead bands"),
             }
@@ -129,7 +129,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
     }
 
     /// As [`cohaptic_peer::Peer::set_parameters`] does.
-    fn change_parameters(&mut self, settings: &LawSettings, laws: &[BuiltIn; L], watch: &mut impl RunWatch<B, A, P>) {
+    fn change_parameters(&mut self, settings: &LawSettings, laws: &[BuiltIn; L], damped: &mut dyn FnMut(&Scene)) {
         self.law = law_of_lanes(laws);
         if let Some((horizons, leads)) = &mut self.leads {
             for (run, law) in laws.iter().enumerate() {
@@ -142,6 +142,6 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
         self.bodies.blocks_mut().set_lag(Law::<f64>::lag(&laws[0]));
         let then = self.scenes.map(|scene| scene.with_parameters(settings));
         self.bodies.set_damping(&then.each_ref());
-        watch.change_damping(&then[0]);
+        damped(&then[0]);
     }
 }

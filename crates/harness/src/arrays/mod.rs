@@ -183,7 +183,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             if self.end_diverged(tick, now) {
                 break;
             }
-            self.change(tick, now, &mut watch);
+            self.change(tick, now, &mut |scene| watch.change_damping(scene));
         }
         self.summaries.map(|summary| summary.expect("every run has ended"))
     }
@@ -209,7 +209,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     /// The scenes end after that number of ticks.
     fn finish(&mut self, ticks: u64, watch: &mut impl RunWatch<B, A, P>) {
         let end = self.shape.end;
-        self.change(ticks, end, watch);
+        self.change(ticks, end, &mut |scene| watch.change_damping(scene));
         if let Samples::PerPacket(samples) = &mut self.samples {
             samples.finish(self.shape.before(ticks));
         }

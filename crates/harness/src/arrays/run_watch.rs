@@ -141,14 +141,9 @@ impl WindowWatch<'_> {
             Self::Watched(watch) => watch.onlooker.keep_going(now),
         }
     }
-}
 
-impl<B, const A: usize, const P: usize> RunWatch<B, A, P> for WindowWatch<'_> {
-    fn keep_going(&mut self, now: Instant) -> bool {
-        self.goes_on(now)
-    }
-
-    fn change_damping(&mut self, scene: &Scene) {
+    /// The damping of the law from now on is that of this scene.
+    pub(super) fn change_damping(&mut self, scene: &Scene) {
         if let Self::Watched(watch) = self {
             watch.damping = damping(scene);
         }

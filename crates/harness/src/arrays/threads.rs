@@ -151,7 +151,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> Part<'a, '_, '_, B, A,
                 ControlFlow::Continue(()) => tick = until,
             }
             let now = shape.instant(tick).min(shape.end);
-            self.groups.iter_mut().for_each(|group| group.change(tick, now, &mut Unwatched(&mut |_| true)));
+            self.groups.iter_mut().for_each(|group| group.change(tick, now, &mut |_| ()));
             if tick == last {
                 break (Ending::Complete, tick);
             }

@@ -110,11 +110,11 @@ impl<'a, const A: usize> Windows<'a, A> {
         loop {
             let now = self.timetable.next_instant();
             if now >= end {
-                self.arrays.change(0, end, &mut watch);
+                self.arrays.change(0, end, &mut |scene| watch.change_damping(scene));
                 return Some(self.end(Ending::Complete, end));
             }
             if self.arrays.changes.next_at() <= now {
-                self.arrays.change(0, now, &mut watch);
+                self.arrays.change(0, now, &mut |scene| watch.change_damping(scene));
             }
             self.window += u64::from(!self.timetable.is_cut());
             until_asked -= self.timetable.begin(self.arrays.changes.next_at().min(end), until_asked);
