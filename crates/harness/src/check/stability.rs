@@ -65,7 +65,12 @@ const CLEARLY: f64 = 1.1;
 
 /// What becomes of a small disturbance of the scene within its duration.
 #[must_use]
-pub fn stability(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) -> Stability {
+pub fn stability(scene: &Scene, model: Model, mut keep_going: impl FnMut() -> bool) -> Stability {
+    told_by_runs(scene, model, &mut keep_going)
+}
+
+/// [`stability`], compiled here once: for a question of any type, each crate that asks would compile the engine.
+fn told_by_runs(scene: &Scene, model: Model, keep_going: &mut dyn FnMut() -> bool) -> Stability {
     let plan = Plan::new(scene, model, false);
     match plan.axes {
         Axes::One => follow(pair::<1>(scene, model, &plan), scene, keep_going),
@@ -82,7 +87,7 @@ fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A, B
 fn follow<const A: usize>(
     (mut nominal, mut disturbed): (World<A, BuiltInStrategy<A>>, World<A, BuiltInStrategy<A>>),
     scene: &Scene,
-    mut keep_going: impl FnMut() -> bool,
+    keep_going: &mut dyn FnMut() -> bool,
 ) -> Stability {
     let nothing = Watch::NOTHING;
     let duration = scene.duration.as_nanos();

@@ -87,7 +87,12 @@ impl LiveScene {
     ///
     /// If the scene has more than 23,170 peers; see [`crate::too_large`].
     #[must_use]
-    pub fn new(scene: &Scene, devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
+    pub fn new(scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
+        Self::with_devices(scene, &mut devices)
+    }
+
+    /// [`LiveScene::new`], compiled here once: for a function of any type, each crate that begins a session would compile the engine.
+    fn with_devices(scene: &Scene, devices: &mut dyn FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
         // The observer is not known yet, and may change.
         let plan = Plan::new(scene, Model::Least, true);
         let simulation = Simulation::new(scene, Model::Least);
