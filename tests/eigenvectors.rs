@@ -13,8 +13,8 @@ pub(crate) struct LeftEigenvector {
 }
 
 /// One for each eigenvalue of a matrix, by falling modulus. Eigenvalues that are equal have vectors of their own.
-pub(crate) fn left_eigenvectors(matrix: &Matrix) -> Vec<LeftEigenvector> {
-    eigenvalues(matrix).into_iter().enumerate().map(|(place, value)| left_eigenvector(matrix, value, place)).collect()
+pub(crate) fn left_eigenvectors(matrix: &Matrix) -> impl Iterator<Item = LeftEigenvector> {
+    eigenvalues(matrix).into_iter().enumerate().map(|(place, value)| left_eigenvector(matrix, value, place))
 }
 
 fn left_eigenvector(matrix: &Matrix, near: Complex64, place: usize) -> LeftEigenvector {

@@ -106,10 +106,9 @@ fn state(monodromy: &Monodromy, rows: &[Row], tick: usize) -> Vec<f64> {
 fn dominant(monodromy: &Monodromy, excited: &[f64]) -> (f64, Vec<(f64, f64)>, f64) {
     let scale = excited.iter().fold(0.0, |scale: f64, entry| scale.max(entry.abs()));
     let parts = |vector: &LeftEigenvector| vector.entries.iter().map(|entry| (entry.re, entry.im)).collect::<Vec<_>>();
-    let vectors = left_eigenvectors(&monodromy.matrix);
-    let is_excited = |vector: &&LeftEigenvector| component(&parts(vector), excited) > 1e-6 * scale;
-    let found = vectors.iter().filter(is_excited).max_by(|one, other| one.value.norm().total_cmp(&other.value.norm())).unwrap();
-    (found.value.norm(), parts(found), found.residual.iter().sum())
+    let is_excited = |vector: &LeftEigenvector| component(&parts(vector), excited) > 1e-6 * scale;
+    let found = left_eigenvectors(&monodromy.matrix).find(is_excited).unwrap();
+    (found.value.norm(), parts(&found), found.residual.iter().sum())
 }
 
 /// |w·s|.

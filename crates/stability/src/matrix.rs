@@ -18,7 +18,7 @@ pub struct Dense<T> {
     entries: Vec<T>,
 }
 
-impl<T: Copy + Default + Add<Output = T> + Mul<Output = T>> Dense<T> {
+impl<T: Copy + Default> Dense<T> {
     /// All entries zero.
     #[must_use]
     pub fn zeros(rows: usize, columns: usize) -> Self {
@@ -76,25 +76,6 @@ impl<T: Copy + Default + Add<Output = T> + Mul<Output = T>> Dense<T> {
     pub fn transposed(&self) -> Self {
         Self::from_fn(self.columns, self.rows, |row, column| self[(column, row)])
     }
-
-    /// The product of the two.
-    ///
-    /// # Panics
-    ///
-    /// If this matrix has not as many columns as the other has rows.
-    #[must_use]
-    pub fn times(&self, other: &Self) -> Self {
-        assert_eq!(self.columns, other.rows, "the shapes of a product fit");
-        let mut product = Self::zeros(self.rows, other.columns);
-        for row in 0..self.rows {
-            for (inner, factor) in self.row(row).iter().enumerate() {
-                for (sum, entry) in product.row_mut(row).iter_mut().zip(other.row(inner)) {
-                    *sum = *sum + *factor * *entry;
-                }
-            }
-        }
-        product
-    }
 }
 
 impl Matrix {
@@ -139,6 +120,16 @@ impl Matrix {
         self.entries.copy_within(rows.start * self.columns..rows.end * self.columns, to * self.columns);
     }
 
+    /// The product of the two.
+    ///
+    /// # Panics
+    ///
+    /// If this matrix has not as many columns as the other has rows.
+    #[must_use]
+    pub fn times(&self, other: &Self) -> Self {
+        product(self, other)
+    }
+
     /// The product with a column.
     ///
     /// # Panics
@@ -178,6 +169,27 @@ impl Matrix {
     pub fn is_finite(&self) -> bool {
         self.entries.iter().all(|entry| entry.is_finite())
     }
+}
+
+impl ComplexMatrix {
+    /// The product of the two.
+    pub(crate) fn times(&self, other: &Self) -> Self {
+        product(self, other)
+    }
+}
+
+/// The product of two matrices. The methods that call this are not generic, so that users of the crate do not compile it again, perhaps without optimisation.
+fn product<T: Copy + Default + Add<Output = T> + Mul<Output = T>>(one: &Dense<T>, other: &Dense<T>) -> Dense<T> {
+    assert_eq!(one.columns, other.rows, "the shapes of a product fit");
+    let mut product = Dense::zeros(one.rows, other.columns);
+    for row in 0..one.rows {
+        for (inner, factor) in one.row(row).iter().enumerate() {
+            for (sum, entry) in product.row_mut(row).iter_mut().zip(other.row(inner)) {
+                *sum = *sum + *factor * *entry;
+            }
+        }
+    }
+    product
 }
 
 impl<T> Index<(usize, usize)> for Dense<T> {

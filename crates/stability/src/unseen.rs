@@ -7,8 +7,8 @@
 use crate::factorisation::orthogonal_complement;
 use crate::{Matrix, StateKind, StateName};
 
-/// Below this, relative to the largest entry, what is left of a row counts as zero: far above rounding, and far below the share of one tick in a
-/// wave. The error covers what is taken for zero.
+/// A row whose part apart from other rows is shorter than this, relative to the largest entry, counts as spanned by them: far above rounding, and far below the share of
+/// one tick in a wave. The error covers such parts.
 const NOTHING: f64 = 1e-9;
 
 /// The part of a matrix in which every state is felt by a body, and what this adds to the error of its entries. `forces`: what the states add to the

@@ -1,14 +1,14 @@
-//! What is orthogonal to some vectors: reflections with the longest column first (Golub & Van Loan 2013, Algorithm 5.4.1).
+//! The orthogonal complement of some vectors, by reflections with the longest vector first (Golub & Van Loan 2013, Algorithm 5.4.1).
 
 use crate::Matrix;
 
-/// An orthonormal basis, as columns, of the vectors that are orthogonal to each of some others of that size, which may depend on each other: where what is left of all of
-/// them is no longer than `least`, it counts as nothing.
+/// An orthonormal basis, as columns, of the vectors of `size` entries that are orthogonal to all given ones. Given vectors may depend on each other: a part of one that the
+/// others do not span counts as nothing if its length is at most `least`.
 pub(crate) fn orthogonal_complement(mut vectors: Vec<Vec<f64>>, size: usize, least: f64) -> Matrix {
     let mut reflectors: Vec<Vec<f64>> = Vec::new();
     while reflectors.len() < size {
         let done = reflectors.len();
-        // What earlier reflections left of each vector is beyond the first entries.
+        // Earlier reflections have left each vector with entries beyond the first ones.
         let length = |vector: &Vec<f64>| vector[done..].iter().map(|entry| entry * entry).sum::<f64>().sqrt();
         let lengths: Vec<f64> = vectors.iter().map(length).collect();
         let Some(longest) = (0..vectors.len()).max_by(|one, other| lengths[*one].total_cmp(&lengths[*other])) else { break };
@@ -33,7 +33,7 @@ pub(crate) fn orthogonal_complement(mut vectors: Vec<Vec<f64>>, size: usize, lea
     basis
 }
 
-/// Reflects a vector at what is orthogonal to the reflector: x − 2·v·(vᵀx)/(vᵀv).
+/// Reflects a vector x at the plane that is orthogonal to the reflector v: x − 2·v·(vᵀx)/(vᵀv).
 fn reflect(vector: &mut [f64], reflector: &[f64]) {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let factor = 2.0 * dot(vector, reflector) / dot(reflector, reflector);

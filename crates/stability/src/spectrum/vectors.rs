@@ -15,7 +15,7 @@ const STEPS: usize = 2;
 pub(crate) fn eigenvector(matrix: &Matrix, value: Complex64, place: usize) -> Option<Vec<Complex64>> {
     let size = matrix.rows();
     let shifted = ComplexMatrix::from_fn(size, size, |row, column| matrix[(row, column)] - if row == column { value } else { Complex64::ZERO });
-    // A pivot that is zero: the value is an eigenvalue to the last digit, and what is divided by rounding points along its vector all the same.
+    // With a pivot of zero the value is an eigenvalue to the last digit: a division by the size of a rounding error leads to its vector all the same.
     let least = Complex64::from(f64::EPSILON * matrix.largest().max(f64::MIN_POSITIVE));
     let factors = Lu::with_least_pivot(&shifted, least);
     let mut vector = start(size, place);
