@@ -144,7 +144,7 @@ pub fn changing(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = V
     of_one_shape(scenes, link_or_delay(), true)
 }
 
-/// One scene of [`alike`] or of [`changing`] that needs no events with any clocks: over [direct links](direct_link), which the timeline does not change.
+/// One scene of [`alike`] or of [`changing`] that needs no events with any clocks: over direct links, which the timeline does not change.
 pub fn direct() -> impl Strategy<Value = Draft> {
     (of_one_shape(Just(1), direct_link(), true), any::<bool>()).prop_map(|(mut drafts, changes)| {
         let mut draft = drafts.remove(0);

@@ -11,6 +11,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
+use std::time::Duration;
 
 use cohaptic_units::Instant;
 
@@ -164,13 +165,14 @@ impl Shared {
         if self.stays { self.try_home(|core| core.wire.recorded()) } else { Some(Recorded { ended: self.face.now(), ..Recorded::default() }) }
     }
 
-    /// Not held for long: a loop of tokio takes the state again and again, each time for a moment.
+    /// Tries for half a second of the wall clock: a loop of tokio takes the state again and again, each time for a moment, on a thread that may have to wait for a processor.
     fn try_home<T>(&self, look: impl Fn(&Core) -> T) -> Option<T> {
-        for _ in 0..10_000 {
+        for _ in 0..500 {
             if let Some(core) = self.lock_home().as_deref() {
                 return Some(look(core));
             }
-            std::thread::yield_now();
+            // Nobody wakes the thread that watches: it looks again after a millisecond at least.
+            std::thread::park_timeout(Duration::from_millis(1));
         }
         None
     }
