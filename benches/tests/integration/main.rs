@@ -14,7 +14,7 @@ fn root() -> PathBuf {
 }
 
 /// The pages whose every command is looked at.
-const PAGES: [&str; 13] = [
+const PAGES: [&str; 14] = [
     "measured.md",
     "measured-speed.md",
     "measured-cluster.md",
@@ -27,6 +27,7 @@ const PAGES: [&str; 13] = [
     "measured-live.md",
     "measured-tcp.md",
     "measured-soak.md",
+    "measured-build.md",
     "measured-first.md",
 ];
 
