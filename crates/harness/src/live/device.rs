@@ -71,11 +71,11 @@ impl<const A: usize> HandDevice<A> {
         Self { pulled: Some(pulled), ..Self::new(pointer, state) }
     }
 
-    /// Reads the device, and says whether that could be done.
-    pub(crate) fn read(&mut self, now: Instant) -> Option<State<A>> {
-        let State { position, velocity } = self.device.as_mut()?.read(now).filter(State::is_finite)?;
-        let first = |values: [f64; 3]| core::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0));
-        Some(State { position: first(position), velocity: first(velocity) })
+    /// Reads the device along the axes of the scene, and says whether that could be done. A scene of two axes is simulated along three, of which the third rests.
+    pub(crate) fn read(&mut self, now: Instant, axes: usize) -> Option<State<A>> {
+        let State { position, velocity } = self.device.as_mut()?.read(now)?;
+        let first = |values: [f64; 3]| core::array::from_fn(|axis| values.get(axis).copied().filter(|_| axis < axes).unwrap_or(0.0));
+        Some(State { position: first(position), velocity: first(velocity) }).filter(State::is_finite)
     }
 
     /// Takes what was read.
@@ -137,5 +137,32 @@ impl<const A: usize> Device<A> for HandDevice<A> {
 impl<const A: usize> core::fmt::Debug for HandDevice<A> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("HandDevice").field("there", &self.device.is_some()).field("read", &self.read).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// It always shows this.
+    struct Fixed(State<3>);
+
+    impl LiveDevice for Fixed {
+        fn read(&mut self, _now: Instant) -> Option<State<3>> {
+            Some(self.0)
+        }
+
+        fn hold(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; 3]) {}
+    }
+
+    /// A scene of two axes is simulated along three: its record has two, so that a third that moved would make another session of it.
+    #[test]
+    fn components_beyond_the_axes_of_the_scene_are_not_looked_at() {
+        for beyond in [3.0, f64::NAN] {
+            let shown = State { position: [1.0, 2.0, beyond], velocity: [4.0, 5.0, beyond] };
+            let mut device = HandDevice::<3>::new(Some(Box::new(Fixed(shown))), State::REST);
+            assert_eq!(device.read(Instant::ZERO, 2), Some(State { position: [1.0, 2.0, 0.0], velocity: [4.0, 5.0, 0.0] }));
+            assert_eq!(device.read(Instant::ZERO, 3).is_some(), beyond.is_finite());
+        }
     }
 }

@@ -267,7 +267,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
         observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended> {
         if let (Some(device), Some(seat)) = (peer.device_mut().hand_mut(), self.seat_mut(place)) {
-            let read = device.read(now);
+            let read = device.read(now, axes);
             observer.on_input(&InputRow { at: now, what: Input::Device { peer: place, state: read.as_ref().map(|state| row(state, axes)) } })?;
             if let Some(state) = read {
                 let joins = seat.hear(now);
