@@ -122,6 +122,11 @@ fn devices(gone: Option<u64>) -> impl FnMut(usize) -> Option<Box<dyn LiveDevice>
     move |_| Some(Box::new(Moving { gone }) as Box<dyn LiveDevice>)
 }
 
+/// A summary as text: bits that are flipped unseen make some runs diverge, and what is not a number is not equal to itself.
+fn written_out(summary: &cohaptic_harness::Summary) -> String {
+    format!("{summary:?}")
+}
+
 proptest! {
     #![proptest_config(crate::cases(120))]
 
@@ -141,7 +146,7 @@ proptest! {
         let (files, summary) = again(&written, &live);
         let difference = first_difference(&live.files, &files);
         prop_assert!(difference.is_none(), "{difference:?}\n{}", written.text);
-        prop_assert_eq!(summary, live.summary);
+        prop_assert_eq!(written_out(&summary), written_out(&live.summary));
     }
 
     /// A driver that is never late sees the same session however often it comes.
@@ -157,7 +162,7 @@ proptest! {
         let difference = first_difference(&fine.files, &coarse.files);
         prop_assert!(difference.is_none(), "{difference:?}\n{}", written.text);
         prop_assert_eq!(fine.transmits, coarse.transmits);
-        prop_assert_eq!(fine.summary, coarse.summary);
+        prop_assert_eq!(written_out(&fine.summary), written_out(&coarse.summary));
     }
 }
 
