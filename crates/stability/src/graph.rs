@@ -10,6 +10,7 @@ mod enclosed;
 use cohaptic_peer::coordination::Pull;
 use cohaptic_scene::{Scene, Topology, TopologyKind};
 
+use self::enclosed::symmetric;
 pub(crate) use self::enclosed::{EnclosedSpectrum, eigenvectors};
 use crate::analysis::{Analysis, combinations, combine};
 use crate::lifted::{Lifted, Node};
@@ -239,8 +240,9 @@ fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>
     if let Some(peer) = degrees.iter().position(|degree| *degree <= 0.0) {
         return Err(GraphError::Alone { peer: scene.peers[peer].name.clone() });
     }
-    let symmetric = Matrix::from_fn(peers, peers, |row, column| at(row, column) / (degrees[row] * degrees[column]).sqrt());
-    let mut eigenvalues: Vec<f64> = crate::eigenvalues(&symmetric).iter().map(|value| value.re).collect();
+    // Unknown where a sum of weights is beyond all numbers.
+    let found = symmetric(weights).map(|(symmetric, _)| crate::eigenvalues(&symmetric));
+    let mut eigenvalues = found.map_or_else(|| vec![f64::NAN; peers], |found| found.iter().map(|value| value.re).collect());
     eigenvalues.sort_by(f64::total_cmp);
     // As many of them are 1 as there are connected parts: these are the largest.
     let ones = components(weights);

@@ -1,6 +1,6 @@
 //! Systems of linear equations: Gaussian elimination with the largest pivot of each column (Higham 2002, Section 9.1).
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 use num_complex::Complex64;
 
@@ -8,7 +8,7 @@ use crate::matrix::Dense;
 
 /// A number in a matrix that is factorised.
 pub(crate) trait Entry:
-    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self> + From<f64>
+    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + From<f64>
 {
     /// How large it is: the sum of the sizes of its parts, within √2 of its modulus.
     fn size(self) -> f64;

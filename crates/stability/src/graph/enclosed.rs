@@ -88,7 +88,7 @@ fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
 }
 
 /// D^−½·W·D^−½ and the row sums D; `None` if a sum is beyond all numbers.
-fn symmetric(weights: &Matrix) -> Option<(Matrix, Vec<f64>)> {
+pub(super) fn symmetric(weights: &Matrix) -> Option<(Matrix, Vec<f64>)> {
     let size = weights.rows();
     let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
     if degrees.iter().any(|degree| !degree.is_finite()) {

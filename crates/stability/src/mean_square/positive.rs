@@ -259,6 +259,10 @@ impl Krylov {
             return None;
         }
         let values = crate::eigenvalues(&Matrix::from_fn(size, size, |row, column| self.columns[column].get(row).copied().unwrap_or(0.0)));
+        // The iteration has not converged.
+        if values.iter().any(|value| value.is_nan()) {
+            return None;
+        }
         let scale = values.iter().map(|value| libm::hypot(value.re, value.im)).fold(0.0, f64::max);
         let real = values.iter().filter(|value| value.im.abs() <= 1e-9 * scale).map(|value| value.re).fold(0.0, f64::max);
         Some(if real > 0.0 { real } else { scale })

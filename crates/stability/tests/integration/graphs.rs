@@ -85,6 +85,16 @@ fn a_weighted_graph_is_what_the_general_path_says() {
     agree(&["scene.count=5"], &Graph::Weighted(weights.clone()), weights);
 }
 
+/// The same weights in any unit, whose products are no numbers, are the same graph: as exactly as powers of two are.
+#[test]
+fn weights_of_any_size_are_those_of_size_one() {
+    let weights = |unit: f64| Matrix::from_fn(4, 4, |row, column| if row == column { 0.0 } else { unit * (1 + row * column) as f64 });
+    let radius = |unit: f64| analyse_on(&scene(&["scene.count=4"]), &Graph::Weighted(weights(unit))).unwrap().radius;
+    for exponent in [-900, -600, 600, 900] {
+        assert_eq!(radius(2_f64.powi(exponent)), radius(1.0), "2^{exponent}");
+    }
+}
+
 /// Two pairs that do not hear each other can each be displaced as a whole.
 #[test]
 fn parts_that_are_not_connected_are_displaced_one_by_one() {
