@@ -7,8 +7,18 @@ use cohaptic_wan::{PacketRecord, Path};
 use crate::arrays::Ticks;
 use crate::live::InputRow;
 
-/// Instants, or ticks in arrays, between two calls of [`Observer::keep_going`].
-pub(crate) const INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
+/// The most instants, or ticks in arrays, between two calls of [`Observer::keep_going`].
+pub(crate) const MOST_INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
+
+/// Ticks of peers, or packets, between two calls of [`Observer::keep_going`] at most, unless more happen at one instant: a part of a second.
+pub(crate) const MOST_WORK_BETWEEN_QUESTIONS: usize = 1 << 22;
+
+/// Instants, or ticks in arrays, between two calls of [`Observer::keep_going`]: a power of two. `work`: ticks of peers, or packets, at an instant at most.
+pub(crate) fn instants_between_questions(work: usize) -> u32 {
+    let instants = u32::try_from(MOST_WORK_BETWEEN_QUESTIONS / work.max(1)).unwrap_or(u32::MAX);
+    // Rounded down to a power of two, so that no tick of a small scene pays for a division.
+    1 << instants.clamp(1, MOST_INSTANTS_BETWEEN_QUESTIONS).ilog2()
+}
 
 /// Sees what happens in a run, while it happens, in the order in which it happens.
 ///
@@ -154,7 +164,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// Called about every thousand instants, for progress and interruption; `false` ends the run early, in good order.
+    /// Called about every thousand instants, of thousands of peers up to every instant, for progress and interruption; `false` ends the run early, in good order.
     fn keep_going(&mut self, _now: Instant) -> bool {
         true
     }

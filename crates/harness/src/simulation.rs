@@ -8,7 +8,7 @@ use cohaptic_units::Instant;
 use crate::arrays::{self, Onlooker, Shape, Ticks};
 use crate::disturbance::Disturbance;
 use crate::measures::Measures;
-use crate::observer::{AnyObserver, Ended, Erased, INSTANTS_BETWEEN_QUESTIONS, InstantRow, Observer, TickRow};
+use crate::observer::{AnyObserver, Ended, Erased, InstantRow, Observer, TickRow, instants_between_questions};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{NoRemote, Remote, Step, Watch, World};
@@ -140,8 +140,8 @@ impl<'a, S: Strategies> Simulation<'a, S> {
 
     fn run_with_events(&self, plan: &Plan, observer: &mut (impl Observer<Error = Ended> + ?Sized)) -> Result<Summary, Ended> {
         match plan.axes {
-            Axes::One => run_to_end(self.world::<1, _>(plan, NoRemote), observer),
-            Axes::Two | Axes::Three => run_to_end(self.world::<3, _>(plan, NoRemote), observer),
+            Axes::One => run_to_end(self.world::<1, _>(plan, NoRemote), questions_of(self.scene), observer),
+            Axes::Two | Axes::Three => run_to_end(self.world::<3, _>(plan, NoRemote), questions_of(self.scene), observer),
         }
     }
 
@@ -209,13 +209,21 @@ impl Observer for Asked<'_, '_> {
     }
 }
 
+/// Instants between two calls of [`Observer::keep_going`] in a run with events.
+pub(crate) fn questions_of(scene: &Scene) -> u32 {
+    let peers = scene.peers.len();
+    let links = scene.topology.as_ref().map_or_else(|| peers.saturating_mul(peers), |topology| topology.links());
+    instants_between_questions(links.max(peers))
+}
+
 fn run_to_end<const A: usize, S: Strategy<A>>(
     mut world: World<A, S>,
+    between_questions: u32,
     observer: &mut (impl Observer<Error = Ended> + ?Sized),
 ) -> Result<Summary, Ended> {
     let watch = Watch::of(observer);
     loop {
-        for _ in 0..INSTANTS_BETWEEN_QUESTIONS {
+        for _ in 0..between_questions {
             if let Step::Ended(ending) = world.step(observer, watch)? {
                 return Ok(world.summary(ending));
             }

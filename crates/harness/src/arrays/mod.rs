@@ -35,7 +35,6 @@ use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
 use pulp::NullaryFnOnce;
 
-use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::plan::{DeviceChoice, Plan};
 use crate::summary::{Ending, LinkSummaries, PeerSummary, Summary};
 use blocks::{Moved, law_of_lanes};
@@ -198,7 +197,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             }
             let discrepancy = self.step(tick, now, watch);
             let ticks = tick + 1;
-            if !watch.after_motion(now, discrepancy[0]) || is_asked_before(ticks) && !watch.keep_going(now) {
+            if !watch.after_motion(now, discrepancy[0]) || self.shape.is_asked_before(ticks) && !watch.keep_going(now) {
                 self.end_all(ticks, |_| Ending::Interrupted(now));
                 return ControlFlow::Break(());
             }
@@ -229,7 +228,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     /// in the places of those that are here what each of them sends.
     #[inline(always)]
     fn begin(&mut self, tick: u64) -> bool {
-        if self.shape.has_queues() && is_asked_before(tick) {
+        if self.shape.has_queues() && self.shape.is_asked_before(tick) {
             self.pass(tick);
         }
         let sends = tick == self.earliest_send;
@@ -486,15 +485,10 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnO
         }
     }
 }
-/// Whether the observer is asked, before that tick, whether to go on.
-fn is_asked_before(tick: u64) -> bool {
-    tick > 0 && tick.is_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS))
-}
 
 /// Until when a queue may look at this tick: until its sender sends next, and not beyond the latest tick before the run may be interrupted.
 fn until(shape: &Shape, tick: u64, next_send: u64) -> Instant {
-    let asked = (tick + 1).next_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS));
-    Instant::from_nanos(next_send.min(asked - 1) * nanos(shape.tick))
+    Instant::from_nanos(next_send.min(shape.asked_after(tick) - 1) * nanos(shape.tick))
 }
 
 /// A span of at most a year.

@@ -12,6 +12,7 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DirectLinks, LinkConfig, LinkModel, Load, SteppedLinks};
 
 use super::{nanos, threads};
+use crate::observer::instants_between_questions;
 use crate::plan::{Plan, Ticking};
 
 /// What two scenes must have in common to be run side by side.
@@ -42,6 +43,8 @@ pub(crate) struct Shape {
     pub(super) topology: Option<Arc<Topology>>,
     /// The clocks of the peers, if not all tick together: then a run goes window by window.
     pub(super) clocks: Option<Vec<Clock>>,
+    /// Ticks between two calls of [`Observer::keep_going`](crate::Observer::keep_going): a power of two.
+    pub(super) between_questions: u64,
 }
 
 /// When the fates of packets become known, if links do more than delay all packets by the same span.
@@ -61,6 +64,16 @@ impl Shape {
     pub(super) fn before(&self, tick: u64) -> (u64, Instant) {
         let before = tick.saturating_sub(1);
         (before, self.instant(before))
+    }
+
+    /// Whether the observer is asked, before that tick, whether to go on.
+    pub(super) const fn is_asked_before(&self, tick: u64) -> bool {
+        tick > 0 && tick & (self.between_questions - 1) == 0
+    }
+
+    /// The first tick after that one before which the observer is asked.
+    pub(super) const fn asked_after(&self, tick: u64) -> u64 {
+        (tick | (self.between_questions - 1)) + 1
     }
 
     /// When a tick is.
@@ -166,11 +179,18 @@ impl Shape {
         if let Some((_, why)) = fits.into_iter().find(|(fits, _)| !fits) {
             return Err(why);
         }
+        let peers = scene.peers.len();
+        // A sample that reaches all together takes as long as one packet.
+        let packets = match (&scene.topology, delay) {
+            (Some(topology), _) => topology.links(),
+            (None, Some(_)) => peers,
+            (None, None) => peers.saturating_mul(peers),
+        };
         let shape = Self {
             law: scene.coordination.strategy,
             memory: Law::<f64>::memory(&law),
             lag: Law::<f64>::lag(&law),
-            peers: scene.peers.len(),
+            peers,
             axes: plan.axes.count(),
             turns: scene.rotation.as_ref().map(|rotation| (scene.integrator, rotation.steps)),
             tick: clock.tick,
@@ -182,6 +202,7 @@ impl Shape {
             delay,
             topology: scene.topology.clone(),
             clocks: (!tick_together).then(|| clocks().copied().collect()),
+            between_questions: u64::from(instants_between_questions(packets.max(peers))),
         };
         Ok((shape, law))
     }

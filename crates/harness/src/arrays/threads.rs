@@ -22,8 +22,7 @@ use super::lanes::WIDTH;
 use super::run_watch::Unwatched;
 use super::samples::Sample;
 use super::shape::Shape;
-use super::{Arrays, Samples, bodies_of, is_asked_before, summary};
-use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
+use super::{Arrays, Samples, bodies_of, summary};
 use crate::summary::{Ending, Summary};
 
 /// Peers a thread at least: for fewer the threads wait for each other longer than they work.
@@ -185,11 +184,11 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> Part<'a, '_, '_, B, A,
             if sends {
                 self.meet();
             }
-            let asked = (tick + 1).next_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS));
-            let end = self.groups[0].earliest_send.min(asked).min(ticks.end);
+            let end = self.groups[0].earliest_send.min(self.groups[0].shape.asked_after(tick)).min(ticks.end);
             self.go_on(tick..end, sends);
-            let latest = self.groups[0].shape.instant(end - 1);
-            if is_asked_before(end) && !self.goes_on(latest) {
+            let shape = &self.groups[0].shape;
+            let (latest, is_asked) = (shape.instant(end - 1), shape.is_asked_before(end));
+            if is_asked && !self.goes_on(latest) {
                 return ControlFlow::Break(Early::Interrupted(end));
             }
             tick = end;

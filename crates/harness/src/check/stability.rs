@@ -17,7 +17,7 @@ use super::Finding;
 use crate::disturbance::Disturbance;
 use crate::observer::{Erased, NoObserver};
 use crate::plan::{Model, Plan};
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, questions_of};
 use crate::world::{NoRemote, Step, Watch, World};
 
 /// What a disturbance did.
@@ -95,6 +95,7 @@ fn follow<const A: usize>(
     let initial = relative_displacement(&nominal, &disturbed);
     let (mut early, mut late) = (0.0_f64, 0.0_f64);
     let mut steps = 0_u64;
+    let between_questions = u64::from(questions_of(scene));
     loop {
         let Ok((one, other)) = Erased::run(&mut NoObserver, |observer| Ok((nominal.step(observer, nothing)?, disturbed.step(observer, nothing)?)));
         if one == Step::Ticked && other == Step::Ticked {
@@ -114,7 +115,7 @@ fn follow<const A: usize>(
             return verdict(initial, early, late);
         }
         steps += 1;
-        if steps.is_multiple_of(1024) && !keep_going() {
+        if steps.is_multiple_of(between_questions) && !keep_going() {
             return Stability::Interrupted;
         }
     }

@@ -11,6 +11,7 @@ use super::device::LiveDevice;
 use super::inputs::{Inputs, Recorded};
 use super::scene::LiveScene;
 use crate::observer::Observer;
+use crate::simulation::questions_of;
 use crate::summary::Summary;
 
 /// Runs a scene with the inputs of a recorded session, as fast as the processor goes: with the same fates and the same motion, to the bit.
@@ -26,7 +27,15 @@ use crate::summary::Summary;
 /// If the scene needs events and has more than 23,170 peers; see [`crate::too_large`].
 pub fn replay<O: Observer>(scene: &Scene, inputs: &Inputs, observer: &mut O) -> Result<Summary, O::Error> {
     let mut live = LiveScene::new(scene, |place| Some(Box::new(Playback::of(inputs, place))));
+    let mut questions = Questions { between: questions_of(scene), left: questions_of(scene) };
     for (at, what) in &inputs.rows {
+        // The instants up to the row, one by one, so that the observer can end a long span without rows too.
+        while live.poll_timeout().is_some_and(|due| due < *at) {
+            next_instant(&mut live, observer)?;
+            if questions.end(&mut live, observer)? {
+                return Ok(live.summary());
+            }
+        }
         match what {
             Recorded::Sample { peer, datagram } => {
                 // Of a record that somebody has changed a sample may be refused, as it would have been in the session.
@@ -41,11 +50,45 @@ pub fn replay<O: Observer>(scene: &Scene, inputs: &Inputs, observer: &mut O) -> 
         }
         while live.poll_transmit().is_some() {}
     }
-    while let Some(at) = live.poll_timeout() {
-        live.handle_timeout(at, observer)?;
-        while live.poll_transmit().is_some() {}
+    while live.poll_timeout().is_some() {
+        next_instant(&mut live, observer)?;
+        if questions.end(&mut live, observer)? {
+            break;
+        }
     }
     Ok(live.summary())
+}
+
+/// Lets the next instant pass.
+fn next_instant<O: Observer>(live: &mut LiveScene, observer: &mut O) -> Result<(), O::Error> {
+    if let Some(due) = live.poll_timeout() {
+        live.handle_timeout(due, observer)?;
+        while live.poll_transmit().is_some() {}
+    }
+    Ok(())
+}
+
+/// When the observer is asked next whether to go on \[instants\].
+struct Questions {
+    between: u32,
+    left: u32,
+}
+
+impl Questions {
+    /// Counts an instant, and ends the scene if the observer is asked and wants that; says whether it has ended.
+    fn end<O: Observer>(&mut self, live: &mut LiveScene, observer: &mut O) -> Result<bool, O::Error> {
+        self.left -= 1;
+        if self.left > 0 {
+            return Ok(false);
+        }
+        self.left = self.between;
+        let Some(now) = live.open().as_nanos().checked_sub(1).map(Instant::from_nanos) else { return Ok(false) };
+        if observer.keep_going(now) {
+            return Ok(false);
+        }
+        live.stop(now, observer)?;
+        Ok(true)
+    }
 }
 
 /// A device that shows again what it showed.

@@ -6,6 +6,7 @@ mod bands;
 mod hands;
 mod many_peers;
 mod pointers;
+mod questions;
 mod records;
 mod remote;
 mod replays;

@@ -26,7 +26,7 @@ use super::samples::{Broadcast, NextTick, Sample, TOGETHER};
 use super::shape::Shape;
 use super::translations::Translations;
 use super::{Arrays, Means, Samples, bodies_of, nanos, summary};
-use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
+use crate::observer::{MOST_INSTANTS_BETWEEN_QUESTIONS, MOST_WORK_BETWEEN_QUESTIONS};
 use crate::plan::{DeviceChoice, Plan};
 use crate::summary::{Ending, Summary};
 
@@ -106,7 +106,10 @@ impl<'a, const A: usize> Windows<'a, A> {
     /// Runs it to its end; `None` if it diverged.
     fn run(mut self, mut watch: WindowWatch<'_>) -> Option<Summary> {
         let end = self.arrays.shape.end;
-        let mut until_asked = INSTANTS_BETWEEN_QUESTIONS;
+        let mut until_asked = MOST_INSTANTS_BETWEEN_QUESTIONS;
+        // A tick hears of all others, unless a sample reaches all together.
+        let work_of_a_tick = if self.arrays.shape.is_broadcast() { 1 } else { self.arrays.shape.peers };
+        let mut work = 0;
         loop {
             let now = self.timetable.next_instant();
             if now >= end {
@@ -118,7 +121,7 @@ impl<'a, const A: usize> Windows<'a, A> {
             }
             self.window += u64::from(!self.timetable.is_cut());
             until_asked -= self.timetable.begin(self.arrays.changes.next_at().min(end), until_asked);
-            let latest = self.timetable.latest();
+            let (latest, ticked) = (self.timetable.latest(), self.timetable.ticks().len());
             let passed = self.pass(&mut watch);
             self.timetable.end();
             match passed {
@@ -126,8 +129,14 @@ impl<'a, const A: usize> Windows<'a, A> {
                 Passed::Diverged => return None,
                 Passed::Failed => return Some(self.end(Ending::Interrupted(latest), latest)),
             }
-            if until_asked == 0 {
-                until_asked = INSTANTS_BETWEEN_QUESTIONS;
+            work += ticked * work_of_a_tick;
+            let is_due = until_asked == 0;
+            if is_due || work >= MOST_WORK_BETWEEN_QUESTIONS {
+                work = 0;
+                if is_due {
+                    // Windows are cut there, and only there: a run that is asked more often has the same windows.
+                    until_asked = MOST_INSTANTS_BETWEEN_QUESTIONS;
+                }
                 if !watch.goes_on(latest) {
                     return Some(self.end(Ending::Interrupted(latest), latest));
                 }
