@@ -84,7 +84,7 @@ pub(crate) fn relay(pacing: Pacing, rate: u64, span: Duration) -> Done {
     let link = LinkConfig { delay: Delay::constant(DELAY), ..LinkConfig::default() };
     let form = Form::Mesh(Mesh { programs, links: LinkTable::uniform(2, link) });
     let config = RelayConfig { seed: 1, form, limits: Limits::default(), changes: Vec::new() };
-    let relay = Relay::bind(config, EndpointConfig::default())?;
+    let mut relay = Relay::bind(config, EndpointConfig::default())?;
     let to = relay.ports().nth(1).map(|(_, address)| address).ok_or("no port")?;
     let stop = Arc::new(AtomicBool::new(false));
     let is_over = Arc::clone(&stop);

@@ -277,6 +277,7 @@ impl Campaign {
             if kept < self.runs() {
                 return Ok(Outcome::Interrupted { kept });
             }
+            watch.puts_together();
             self.merge()?;
         }
         let report = self.report(computed)?;
@@ -401,6 +402,9 @@ pub trait Watch: Sync {
     fn keep_going(&self) -> bool {
         true
     }
+
+    /// All runs are done, and their table is put together now. [`Watch::keep_going`] is not asked any more.
+    fn puts_together(&self) {}
 
     /// This number of combinations was checked since the last call.
     fn checked(&self, _combinations: u64) {}

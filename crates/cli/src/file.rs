@@ -6,7 +6,7 @@ use std::path::Path;
 use cohaptic_files::write_whole;
 
 use crate::failure::Failure;
-use crate::output;
+use crate::{interrupt, output};
 
 /// The text of a file; bytes that are no text are refused at their line.
 pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
@@ -25,6 +25,7 @@ pub(crate) fn text_of(bytes: Vec<u8>, path: &Path) -> Result<String, Failure> {
 
 /// Writes a whole file. If it cannot be written, on a disk that is full for instance, nothing of it is left: unlike a record, it can be made again.
 pub(crate) fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+    interrupt::has_results();
     write_whole(path, |file| file.write_all(content.as_ref())).map_err(unwritten(path))
 }
 

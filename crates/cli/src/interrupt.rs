@@ -1,13 +1,15 @@
-//! Ctrl-C and SIGTERM: the first asks for an end in good order, which has most of a second; the second ends at once.
+//! Ctrl-C, SIGTERM and SIGHUP: the first asks the command to stop computing, the second ends the program at once.
 //!
-//! A computation that asks often enough ends by itself. One that cannot ask, such as the eigenvalues of a large matrix, is ended when its time is over: nothing is lost
-//! that is whole, because files are written under another name until they are ([`crate::file`]), and a command that has whole results before its
-//! end leaves word of what to do with them ([`keep`]).
+//! A command computes, and then writes its results. The first signal ends the first of these within a second and never the second: once a command has results
+//! ([`has_results`]), it stops computing by itself, because it looks at [`requested`], and writes the results however long that takes. A computation that has
+//! no result yet and cannot look at [`requested`], such as the eigenvalues of a large matrix, is ended when [`TO_STOP`] is over. A command that has whole
+//! results of parts while it computes others leaves word of what to do with these ([`keep`]).
 
 use std::io::Write as _;
+use std::mem;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
-use std::thread;
+use std::thread::{self, ThreadId};
 use std::time::Duration;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
@@ -15,21 +17,31 @@ static ASKED: AtomicBool = AtomicBool::new(false);
 /// What must be done even if the program ends at once.
 static LAST: Mutex<Vec<Box<dyn Fn() + Send>>> = Mutex::new(Vec::new());
 
-/// The use of whole results if the command does not end in time.
-static KEEP: Mutex<Keep> = Mutex::new(Keep { act: None, begun: false });
+static STAGE: Mutex<Stage> = Mutex::new(Stage::Computes);
 
-struct Keep {
-    act: Option<Box<dyn FnOnce() -> String + Send>>,
-    /// Whether its time is over: the command itself must not end any more.
-    begun: bool,
+/// How far the command is.
+enum Stage {
+    /// There is no result yet that could be written.
+    Computes,
+    /// Parts of the result are there, and this function writes them; the command cannot look at [`requested`] often enough to do so itself.
+    Keeps(Box<dyn FnOnce() -> String + Send>),
+    /// There are results, which the command writes itself.
+    HasResults,
+    /// The time of the command is over. Only this thread may still write.
+    Ends(ThreadId),
 }
 
-/// How long after the first signal a command may go on that has something to keep which it has not begun to print.
-const TO_END: Duration = Duration::from_millis(500);
-/// How long it then may take to print that, or what a command prints at its own end.
-const TO_KEEP: Duration = Duration::from_millis(300);
+/// How long after the first signal a command may compute that has no results; a second, less the time that a process takes to end.
+const TO_STOP: Duration = Duration::from_millis(800);
+/// How long results may be written without a word about it.
+const TO_WRITE_SILENTLY: Duration = Duration::from_millis(200);
 /// How long what must be done at last may take.
 const LAST_MOMENT: Duration = Duration::from_millis(50);
+
+/// The line for results that take long to write.
+const WRITES: &str = "what was computed is written before the program ends, however long that takes; a second signal ends the program at once";
+/// The line of a computation that had no results.
+const ENDED: &str = "the computation was ended where it stood; files that are whole are kept";
 
 /// Begins to listen. Where that is impossible, signals end the program as they always do.
 pub(crate) fn listen() {
@@ -48,20 +60,26 @@ pub(crate) fn before_exit(act: impl Fn() + Send + 'static) {
     LAST.lock().unwrap_or_else(PoisonError::into_inner).push(Box::new(act));
 }
 
-/// Has something done with whole results if the command does not end in time after a signal; it says what it did. Until [`kept`] is called.
+/// Has whole results of parts written if the command computes for too long after a signal; the function says what it wrote. Until [`has_results`] is called.
 pub(crate) fn keep(act: impl FnOnce() -> String + Send + 'static) {
-    keeping().act = Some(Box::new(act));
+    *stage() = Stage::Keeps(Box::new(act));
 }
 
-/// The command ends by itself and keeps what it has. Does not return if its time is over, and that is done already.
-pub(crate) fn kept() {
-    let mut keep = keeping();
-    keep.act = None;
-    if keep.begun {
-        drop(keep);
-        loop {
-            // Until the program is ended.
-            thread::park();
+/// The command has results: from now on only a second signal ends the program before the command does. The caller looks at [`requested`] between any two
+/// steps of what it still computes. Everything that is printed or written as a whole file calls this itself.
+///
+/// Does not return if the time of the command is over already.
+pub(crate) fn has_results() {
+    let mut stage = stage();
+    match *stage {
+        Stage::Computes | Stage::Keeps(_) => *stage = Stage::HasResults,
+        Stage::HasResults => {}
+        Stage::Ends(by) => {
+            drop(stage);
+            // Half of a document must not stand before or behind what the other thread prints.
+            while thread::current().id() != by {
+                thread::park();
+            }
         }
     }
 }
@@ -71,24 +89,42 @@ pub(crate) fn requested() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 
-/// Ends the program unless it ends by itself.
+/// Ends the program unless it ends by itself, or has results to write.
 fn end_in_time() {
-    thread::sleep(TO_END);
-    let mut keep = keeping();
-    let act = keep.act.take();
-    keep.begun = act.is_some();
-    drop(keep);
-    let (say, heard) = mpsc::channel();
-    if let Some(act) = act {
-        // On a thread of its own: it may wait for ever, for a pipe that nobody reads.
-        let _ = thread::Builder::new().name("keep".to_owned()).spawn(move || say.send(act()));
-    } else {
-        thread::sleep(TO_KEEP);
+    thread::sleep(TO_STOP);
+    let mut stage = stage();
+    if matches!(*stage, Stage::HasResults) {
+        drop(stage);
+        say(WRITES);
+        return;
     }
-    let said = heard.recv_timeout(TO_KEEP).unwrap_or_else(|_| "the computation was ended where it stood; files that are whole are kept".to_owned());
-    // If standard error cannot be written to either, the exit status is all that is left to say it with.
-    let _ = writeln!(std::io::stderr(), "interrupted: {said}");
+    let before = mem::replace(&mut *stage, Stage::Ends(thread::current().id()));
+    drop(stage);
+    match before {
+        Stage::Keeps(act) => say(&said_of(act)),
+        Stage::Computes | Stage::HasResults | Stage::Ends(_) => say(ENDED),
+    }
     end();
+}
+
+/// Writes the results of parts, and says so if that takes long.
+fn said_of(act: Box<dyn FnOnce() -> String + Send>) -> String {
+    let (done, is_done) = mpsc::channel::<()>();
+    let late = thread::Builder::new().name("late".to_owned()).spawn(move || {
+        if is_done.recv_timeout(TO_WRITE_SILENTLY) == Err(mpsc::RecvTimeoutError::Timeout) {
+            say(WRITES);
+        }
+    });
+    let said = act();
+    drop(done);
+    // Its line comes before the last one.
+    let _ = late.map(thread::JoinHandle::join);
+    said
+}
+
+/// If standard error cannot be written to either, the exit status is all that is left to say it with.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "interrupted: {line}");
 }
 
 /// Ends it at once.
@@ -101,6 +137,6 @@ fn end() -> ! {
     std::process::exit(i32::from(crate::failure::INTERRUPTED));
 }
 
-fn keeping() -> MutexGuard<'static, Keep> {
-    KEEP.lock().unwrap_or_else(PoisonError::into_inner)
+fn stage() -> MutexGuard<'static, Stage> {
+    STAGE.lock().unwrap_or_else(PoisonError::into_inner)
 }

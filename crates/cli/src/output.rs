@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
+use crate::interrupt;
 
 /// Whether the answer is to be a JSON document, also that to a wrong argument.
 static WANTS_JSON: AtomicBool = AtomicBool::new(false);
@@ -34,7 +35,7 @@ pub(crate) fn text(text: &str) -> Result<(), Failure> {
 
 /// Prints one JSON document, which says of which kind and version it is. Numbers that are not finite become `null`.
 pub(crate) fn json(schema: DocumentSchema, document: &impl Serialize) -> Result<(), Failure> {
-    // At once: standard output is written line by line otherwise, and after Ctrl-C nobody waits for a million lines.
+    // As one text: standard output takes many calls of the system otherwise, one a line.
     let mut text = serde_json::to_vec_pretty(&schema.of(document)).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
     text.push(b'\n');
     raw(&text)
@@ -61,6 +62,7 @@ pub(crate) const NO_FILES: [&str; 0] = [];
 
 /// Prints a file as it is: a scene, a schema, a page for another program.
 pub(crate) fn raw(content: &[u8]) -> Result<(), Failure> {
+    interrupt::has_results();
     ANSWERED.store(true, Ordering::Relaxed);
     let mut out = io::stdout().lock();
     out.write_all(content).and_then(|()| out.flush()).map_err(Failure::StandardOutput)

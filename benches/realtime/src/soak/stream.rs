@@ -86,7 +86,7 @@ impl Stream {
         let behind = UdpEndpoint::bind(any, EndpointConfig::default())?;
         let proxy = Proxy { listen: any, to: behind.local_address(), forth: link.clone(), back: link.clone(), most_clients: Proxy::MOST_CLIENTS };
         let config = RelayConfig { seed: 12, form: Form::Proxy(proxy), limits: Limits::default(), changes: Vec::new() };
-        let relay = Relay::bind(config, EndpointConfig::default())?;
+        let mut relay = Relay::bind(config, EndpointConfig::default())?;
         let to = relay.ports().next().map(|(_, address)| address).ok_or("the relay has no port")?;
         let source = Arc::new(UdpSocket::bind(any)?);
         let stop = Arc::new(AtomicBool::new(false));

@@ -237,6 +237,10 @@ impl Watch for Shown {
         !interrupt::requested()
     }
 
+    fn puts_together(&self) {
+        interrupt::has_results();
+    }
+
     fn checked(&self, combinations: u64) {
         self.0.more(combinations);
     }

@@ -77,7 +77,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
         // Without threads it takes longer.
         Err(_) => files.into_iter().enumerate().map(check).collect(),
     };
-    interrupt::kept();
+    interrupt::has_results();
     progress.clear();
     let (status, finished) = (scenes.iter().map(|scene| scene.status).max().unwrap_or(0), finished(&scenes));
     // What was checked is printed even if the disk is full.

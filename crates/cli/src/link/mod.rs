@@ -91,6 +91,7 @@ fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
         },
         |sent| {
             progress.reach_number(sent);
+            interrupt::has_results();
             !interrupt::requested()
         },
     )?;

@@ -116,6 +116,8 @@ fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Resu
 }
 
 fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control: &LiveControl) -> Result<Report, Failure> {
+    // Samples are recorded from the first one on, and the session asks the conductor 50 times a second.
+    interrupt::has_results();
     let progress = Progress::through_scene(&scene.title, scene.duration);
     let report = thread::scope(|scope| {
         let running = thread::Builder::new().name("live".to_owned()).spawn_scoped(scope, move || session.run(&mut host));

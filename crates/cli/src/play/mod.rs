@@ -150,6 +150,8 @@ fn prepare(
 
 /// Runs a part until somebody wants another one.
 fn run_part(session: Session, mut conductor: PartConductor) -> Result<Report, Failure> {
+    // The part is recorded from its first sample on, and the session asks the conductor 50 times a second.
+    interrupt::has_results();
     let running = thread::Builder::new().name("play".to_owned()).spawn(move || session.run(&mut conductor));
     let running = running.map_err(|error| Failure::System(format!("the session gets no thread: {error}")))?;
     running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(crate::live::refused)

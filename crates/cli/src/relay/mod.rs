@@ -28,7 +28,7 @@ use setup::Setup;
 pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let length = some_length(arguments.length)?;
     let mut setup = Setup::new(arguments)?;
-    let relay = Relay::bind(setup.config.clone(), EndpointConfig::default()).map_err(failure)?;
+    let mut relay = Relay::bind(setup.config.clone(), EndpointConfig::default()).map_err(failure)?;
     setup.opened(relay.ports()).iter().for_each(|line| say(line));
     let (changes, wanted) = channel();
     let editor = KeyedLinks { keys: std::mem::take(&mut setup.keys), folder: setup.folder.clone(), changes };
@@ -40,7 +40,7 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
         duration: length,
         ..RunOptions::default()
     };
-    let (report, edits) = conduct(relay, &setup, &options, &control, &wanted)?;
+    let (report, edits) = conduct(&mut relay, &setup, &options, &control, &wanted)?;
     let asked = setup.asked(&edits, report.elapsed);
     let is_interrupted = interrupt::requested();
     if arguments.json {
@@ -56,8 +56,16 @@ fn failure(error: RelayError) -> Failure {
 }
 
 /// Runs until its end, or until the user asks for it. Says too how often each link was changed from outside.
-fn conduct(relay: Relay, setup: &Setup, options: &RunOptions, control: &LiveControl, wanted: &Receiver<Edit>) -> Result<(Report, Vec<u64>), Failure> {
+fn conduct(
+    relay: &mut Relay,
+    setup: &Setup,
+    options: &RunOptions,
+    control: &LiveControl,
+    wanted: &Receiver<Edit>,
+) -> Result<(Report, Vec<u64>), Failure> {
     const GLANCE: Duration = Duration::from_millis(50);
+    // Counters are a report from the first moment on, and the relay looks at `stop` all the time.
+    interrupt::has_results();
     let mut publisher = Publisher::new(control.look(), publish_every(setup.pairs.len()));
     let (say, heard) = channel();
     let stop = AtomicBool::new(false);

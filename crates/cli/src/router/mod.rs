@@ -27,14 +27,14 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     let until = some_length(arguments.length)?.map(|length| Instant::ZERO.saturating_add(length));
     let file = input::with(&arguments.file, |text, file| RouterFile::parse(text, file, &arguments.set))?;
     let real_time = &arguments.real_time;
-    let router = Router::open(&file, real_time.pacing()).map_err(|error| Failure::System(error.to_string()))?;
+    let mut router = Router::open(&file, real_time.pacing()).map_err(|error| Failure::System(error.to_string()))?;
     say(&format!("between {} and {}", attached(&file, Side::Left), attached(&file, Side::Right)));
     let (changes, wanted) = channel();
     // Each direction has keys of its own: it can be changed by itself.
     let keys = file.links.iter().flat_map(|link| [link.keys.clone(), link.keys.clone()]).collect();
     let folder = arguments.file.parent().map(Path::to_path_buf).unwrap_or_default();
     let control = LiveControl::open(real_time, description(&file), Box::new(KeyedLinks { keys, folder, changes }))?;
-    let ran = conduct(router, &file, arguments, until, &control, wanted)?;
+    let ran = conduct(&mut router, &file, arguments, until, &control, wanted)?;
     if arguments.json {
         output::json(DocumentSchema::ROUTER, &answer::document(&file, &ran))?;
     } else {
@@ -84,7 +84,7 @@ enum Ending {
 
 /// Runs until its end, or until the user asks for it.
 fn conduct(
-    router: Router,
+    router: &mut Router,
     file: &RouterFile,
     arguments: &RouterArguments,
     until: Option<Instant>,
@@ -92,6 +92,8 @@ fn conduct(
     wanted: Receiver<Edit>,
 ) -> Result<RouterRun, Failure> {
     const GLANCE: Duration = Duration::from_millis(50);
+    // Counters are a report from the first moment on, and the router looks at `stop` all the time.
+    interrupt::has_results();
     let stop = AtomicBool::new(false);
     let progress = Progress::of_traffic(&input::named(&arguments.file).display().to_string());
     let publisher = Publisher::new(control.look(), Duration::from_millis(100));
@@ -113,7 +115,7 @@ fn conduct(
 
 /// The thread that has to be on time.
 fn route(
-    mut router: Router,
+    router: &mut Router,
     file: &RouterFile,
     arguments: &RouterArguments,
     until: Option<Instant>,

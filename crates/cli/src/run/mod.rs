@@ -179,13 +179,16 @@ fn write_links(path: &Path, summary: &Summary) -> Result<(), Failure> {
 }
 
 fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {
-    match what {
+    let summary = match what {
         What::Simulated => {
             let threads = arguments.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
             Simulation::new(scene, model(arguments)).on_threads(threads).run(observer)
         }
         What::Replayed(inputs) => replay(scene, inputs, observer),
-    }
+    };
+    // A run that is too short for a question of the observer has ended too.
+    interrupt::has_results();
+    summary
 }
 
 /// Twice the columns of the plot in the terminal: two dots a column.
@@ -232,6 +235,8 @@ impl Observer for &mut Watch {
 
     fn keep_going(&mut self, now: Instant) -> bool {
         self.progress.reach(now);
+        // The run up to here is a result, however short it is.
+        interrupt::has_results();
         !interrupt::requested()
     }
 }

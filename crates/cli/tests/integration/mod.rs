@@ -48,6 +48,8 @@ mod running;
 mod scenes;
 #[cfg(unix)]
 mod shards;
+#[cfg(target_os = "linux")]
+mod signals;
 mod stability_boundary;
 mod stability_certificates;
 mod stability_chance;

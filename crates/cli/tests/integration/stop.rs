@@ -42,7 +42,7 @@ fn stopped_after(worked: u64, desk: &Desk, line: &str, signal: &str) -> Outcome 
 }
 
 /// Whether a process listens to signals, and has computed that long [1/100 s].
-fn has_worked(worked: u64, id: u32) -> bool {
+pub(crate) fn has_worked(worked: u64, id: u32) -> bool {
     crate::integration::interrupt::listens(id) && computed(id).is_some_and(|computed| computed >= worked)
 }
 

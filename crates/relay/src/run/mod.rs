@@ -109,14 +109,16 @@ impl Relay {
         self.ports.addresses()
     }
 
-    /// Runs, in this thread, until `stop` is set (which is looked at as often as `look` is called), or until its end. `control` is looked at without
+    /// Runs once, in this thread, until `stop` is set (which is looked at as often as `look` is called), or until its end. `control` is looked at without
     /// waiting; `look` is called from time to time, and what it takes makes releases late.
+    ///
+    /// The sockets stay open until the relay is dropped: to close those of hundreds of clients can take longer than to make the report.
     ///
     /// # Errors
     ///
     /// [`RelayError::System`] if the system refuses to wait or to read.
     pub fn run(
-        mut self,
+        &mut self,
         options: &RunOptions,
         control: &Receiver<Control>,
         stop: &AtomicBool,
@@ -165,7 +167,7 @@ impl Relay {
             without_socket: self.ports.without_socket(),
             refused_changes: self.refused_changes,
             validity: options.tolerance.judge(&self.release),
-            release: self.release,
+            release: self.release.clone(),
         })
     }
 

@@ -33,7 +33,7 @@ fn start(config: RelayConfig, pacing: Pacing) -> Running {
     run(Relay::bind(config, EndpointConfig::default()).unwrap(), pacing)
 }
 
-fn run(relay: Relay, pacing: Pacing) -> Running {
+fn run(mut relay: Relay, pacing: Pacing) -> Running {
     let ports = relay.ports().map(|(_, address)| address).collect();
     let (control, changes) = channel();
     let stop = Arc::new(AtomicBool::new(false));

@@ -55,6 +55,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
         Some(kept) => kept.open(None).map(|(rows, known)| (Some(rows), known))?,
     };
     let found = look(&order, &known);
+    interrupt::has_results();
     let found = match found {
         Ok(found) => found,
         Err(error) => {
