@@ -37,7 +37,7 @@ pub(crate) struct RunArguments {
     /// Replay a live session: its inputs.csv, with its scene and its --set. Fates and motion are the same to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = ["against", "general"])]
     pub(crate) inputs: Option<PathBuf>,
-    /// Replay even if the scene or its --set are not those of the session, and say what differs
+    /// Replay even if the scene or its --set are not those of the session, or the record is cut short, and say what differs
     #[arg(long, requires = "inputs")]
     pub(crate) force: bool,
     /// Do not draw positions in the terminal, and do not write run.html. Without --out nothing is looked at then but counters, which is fastest

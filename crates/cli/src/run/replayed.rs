@@ -14,13 +14,14 @@ use crate::{file, input, output};
 /// The most differences that are listed.
 const MOST: usize = 20;
 
-/// Reads `inputs.csv` of a session, and says in what the scene differs from that of the session; if it does, it is refused without `--force`.
+/// Reads `inputs.csv` of a session, and says in what the scene differs from that of the session and what the record lacks; if anything, it is refused without
+/// `--force`.
 pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrides: &[String]) -> Result<(Inputs, Vec<String>), Failure> {
     let path = &arguments.scene.scene;
     let text = file::read_text(file)?;
     let unreadable = |error: InputsError| Failure::Input(format!("{}: {error}", output::path(file)));
     let of_the_session = RecordedScene::read(&text).map_err(unreadable)?;
-    let differences: Vec<String> = match of_the_session {
+    let mut differences: Vec<String> = match of_the_session {
         Some(recorded) => {
             let now = RecordedScene::of(scene, input::with(path, |text, file| scene_content_of_text(text, file, overrides))?);
             recorded.differences(&now).iter().map(ToString::to_string).collect()
@@ -40,7 +41,16 @@ pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrid
     }
     // Any link will do: all have the modulators of the scene.
     let keys = input::with(path, |text, file| link_keys_of_text(text, file, overrides))?.into_values().next().unwrap_or_default();
-    let inputs = Inputs::read(&text, scene, &keys).map_err(unreadable)?;
+    let (inputs, missing) = Inputs::read_cut(&text, scene, &keys).map_err(unreadable)?;
+    if let Some(missing) = missing {
+        let message = format!("{}: {missing}", output::path(file));
+        if !arguments.force {
+            let as_far = if matches!(missing, InputsError::Rows { .. }) { "the rows that are there" } else { "it up to its last whole line" };
+            return Err(Failure::Input(format!("{message}; --force replays {as_far}")));
+        }
+        let _ = writeln!(io::stderr(), "warning: {}", visible_lines(&message));
+        differences.push(missing.to_string());
+    }
     Ok((inputs, differences))
 }
 

@@ -171,5 +171,7 @@ fn an_interrupted_session_lets_go_of_its_falcons_and_keeps_its_records() {
     assert_eq!(document["ending"], "interrupted");
     let ticks = document["ticks"].as_u64().unwrap();
     assert_eq!(desk.read("out/trajectory.csv").lines().count() as u64, 1 + 3 * ticks);
-    assert!(desk.read("out/inputs.csv").ends_with(",end,,,\n"));
+    let inputs = desk.read("out/inputs.csv");
+    let last: Vec<&str> = inputs.lines().rev().take(2).collect();
+    assert!(last[0].ends_with(&format!(",closed,,,{}", inputs.lines().count() - 2)) && last[1].ends_with(",end,,,"), "{last:?}");
 }

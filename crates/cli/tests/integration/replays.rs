@@ -1,6 +1,8 @@
 //! A replay of a live session with a scene that is not that of the session.
 
-use crate::integration::desk::Desk;
+use serde_json::json;
+
+use crate::integration::desk::{Desk, parse};
 use crate::integration::scenes::TWO;
 
 /// A hand whose force stands in a file.
@@ -117,7 +119,7 @@ fn force_replays_it_and_says_what_differs() {
                    link.delay: \"24ms\" in the record, \"8ms\" now\n";
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), warning));
     assert!(outcome.stdout.contains("40ms simulated, 40 ticks"), "{}", outcome.stdout);
-    let document = crate::integration::desk::parse(&desk.cohaptic(&format!("{line} --json")).stdout);
+    let document = parse(&desk.cohaptic(&format!("{line} --json")).stdout);
     assert_eq!(document["replayed_otherwise"], serde_json::json!(["link.delay: \"24ms\" in the record, \"8ms\" now"]));
     // The same scene says nothing.
     let document = desk.json(&format!("run two.toml {SET} --inputs out/inputs.csv --json --force"));
@@ -132,7 +134,7 @@ fn a_record_that_does_not_know_its_scene_is_refused_without_force() {
         .read("out/inputs.csv")
         .lines()
         .filter(|line| !["0,program", "0,scene", "0,file", "0,key"].iter().any(|row| line.starts_with(row)))
-        .map(|line| format!("{line}\n"))
+        .map(|line| if line.starts_with("0,closed") { "0,closed,,,0\n".to_owned() } else { format!("{line}\n") })
         .collect();
     desk.write("out/inputs.csv", record);
     let line = format!("run two.toml {SET} --inputs out/inputs.csv --no-plot");
@@ -142,6 +144,49 @@ fn a_record_that_does_not_know_its_scene_is_refused_without_force() {
     let outcome = desk.cohaptic(&format!("{line} --force"));
     assert_eq!(outcome.status, Some(0));
     assert!(outcome.stderr.starts_with("warning: ") && outcome.stderr.ends_with(unknown), "{}", outcome.stderr);
+}
+
+/// The record of a session in which somebody changed a link at 9 ms and ended it at 12 ms.
+fn cut_at_12_ms(desk: &Desk) -> Vec<String> {
+    let mut lines: Vec<String> = desk.read("out/inputs.csv").lines().map(str::to_owned).collect();
+    let closing = lines.pop().unwrap();
+    assert_eq!(closing, format!("0,closed,,,{}", lines.len() - 1), "nothing came in");
+    lines.extend(["9000000,link,left,right,\"{ delay = \"\"8ms\"\" }\"".to_owned(), "12000000,end,,,".to_owned()]);
+    let rows = lines.len() - 1;
+    lines.push(format!("12000000,closed,,,{rows}"));
+    lines
+}
+
+#[test]
+fn a_record_that_is_cut_short_is_refused_without_force() {
+    let desk = session();
+    let lines = cut_at_12_ms(&desk);
+    let line = format!("run two.toml {SET} --inputs out/inputs.csv --no-plot --json");
+    let replayed = |lines: &[String], force: &str| {
+        desk.write("out/inputs.csv", lines.join("\n"));
+        desk.cohaptic(&format!("{line}{force}"))
+    };
+    let whole = replayed(&lines, "");
+    assert_eq!((whole.status, whole.stderr.as_str(), &parse(&whole.stdout)["duration_s"]), (Some(0), "", &json!(0.012)));
+    // Without its last two lines, and with half of the line before.
+    let last = lines.len() - 3;
+    let mut cut = lines[..=last].to_vec();
+    cut[last].pop();
+    let said =
+        format!("it is cut short: its last whole line, {last}, at 0s of the session, does not close it. Expected 0,closed,,,{} behind it", last - 1);
+    replayed(&cut, "").assert_refused(2, &["error: out/inputs.csv: ", &said, "; --force replays it up to its last whole line\n"]);
+    let forced = replayed(&cut, " --force");
+    assert!(forced.status == Some(0) && forced.stderr.starts_with("warning: out/inputs.csv: it is cut short"), "{forced:?}");
+    let document = parse(&forced.stdout);
+    assert_eq!((&document["ending"], &document["duration_s"]), (&json!("interrupted"), &json!(0.0)));
+    assert!(document["replayed_otherwise"][0].as_str().unwrap().starts_with("it is cut short"), "{document:#}");
+    // A line in the middle is missing.
+    let mut holed = lines;
+    holed.remove(3);
+    let said = format!("it is not whole: the last line says that {} rows stand before it, and there are {}", last + 1, last);
+    replayed(&holed, "").assert_refused(2, &[&said, "; --force replays the rows that are there\n"]);
+    let forced = replayed(&holed, " --force");
+    assert_eq!((forced.status, &parse(&forced.stdout)["duration_s"]), (Some(0), &json!(0.012)));
 }
 
 #[test]

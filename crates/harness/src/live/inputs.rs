@@ -87,8 +87,31 @@ pub enum InputsError {
         /// What would have been right.
         expected: String,
     },
+    /// The last whole line is no row that closes the record.
+    #[error(
+        "it is cut short: its last whole line, {line}, at {at} of the session, does not close it. Expected {at_ns},closed,,,{rows} behind it, which \
+         earlier versions did not write",
+        at_ns = .at.as_nanos(),
+        rows = .line - 1
+    )]
+    NotClosed {
+        /// The last line that is whole.
+        line: usize,
+        /// Its instant.
+        at: Instant,
+    },
+    /// Lines are missing before the last one, which says how many there were.
+    #[error("it is not whole: the last line says that {said} rows stand before it, and there are {found}")]
+    Rows {
+        /// The number of rows that the last line says.
+        said: u64,
+        /// The number of rows that there are.
+        found: u64,
+    },
     /// A row stands behind one that is later, or behind the end.
-    #[error("line {line}: a row at {at} behind one at {before}: expected rows in the order of time, and none behind the end")]
+    #[error(
+        "line {line}: a row at {at} behind one at {before}: expected rows in the order of time, and none behind the end but that which closes it"
+    )]
     Order {
         /// The line.
         line: usize,

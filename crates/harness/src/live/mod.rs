@@ -27,6 +27,6 @@ pub use inputs::{HEADER, Input, InputRow, Inputs, InputsError};
 pub use presence::{Datagram, Transmit};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;
-pub use rows::InputLine;
+pub use rows::{ClosingLine, InputLine};
 pub use scene::{LiveScene, PeerState, TurnState};
 pub use seat::{Presence, SampleError, SeatStats};

@@ -7,7 +7,10 @@
 //! 9000000,device,hand,,0.01 -0.5
 //! 9000000,link,left,hand,"{ delay = ""40ms"", loss = 0.1 }"
 //! 12000000,end,,,
+//! 12000000,closed,,,5
 //! ```
+//!
+//! The last row closes the record: it says how many rows stand before it, with the instant of the last of them. A file without it was cut short.
 //!
 //! A sample is written in hexadecimal. A device, or the pointer that pulls one, shows position and velocity on each axis in turn (`x vx y vy`), with digits that read back as the same numbers,
 //! or `none`. A link has all its keys, as a TOML table. The rows before these say [with which scene](super::RecordedScene) they were recorded.
@@ -61,13 +64,42 @@ impl fmt::Display for InputLine<'_> {
     }
 }
 
+/// The row that closes a record, as a line without the newline.
+#[derive(Clone, Copy, Debug)]
+pub struct ClosingLine {
+    /// The instant of the last row before it.
+    pub at: Instant,
+    /// How many rows stand between the header and this one.
+    pub rows: u64,
+}
+
+impl fmt::Display for ClosingLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{CLOSED},,,{}", self.at.as_nanos(), self.rows)
+    }
+}
+
+/// The kind of the row that closes a record.
+const CLOSED: &str = "closed";
+
 impl Inputs {
     /// Reads what [`crate::record::InputRecorder`] wrote for the same scene. `keys`: those of any link of the scene, from [`cohaptic_scene::link_keys`].
     ///
     /// # Errors
     ///
-    /// [`InputsError`] for anything else.
+    /// [`InputsError`] for anything else, and for a record that is not whole.
     pub fn read(text: &str, scene: &Scene, keys: &LinkKeys) -> Result<Self, InputsError> {
+        let (inputs, missing) = Self::read_cut(text, scene, keys)?;
+        missing.map_or(Ok(inputs), Err)
+    }
+
+    /// Reads a record as [`Inputs::read`] does, and also one that is not whole, such as a killed session leaves: then says what is missing. A record that is
+    /// cut short ends the session at its last whole line.
+    ///
+    /// # Errors
+    ///
+    /// [`InputsError`] for whole lines that are no rows of a record.
+    pub fn read_cut(text: &str, scene: &Scene, keys: &LinkKeys) -> Result<(Self, Option<InputsError>), InputsError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut lines = text.lines();
         let header = lines.next().unwrap_or_default();
@@ -76,18 +108,62 @@ impl Inputs {
         }
         let folder = scene.file.parent().unwrap_or_else(|| Path::new(""));
         let mut rows: Vec<(Instant, Recorded)> = Vec::new();
-        // What they say of their scene is for [`RecordedScene`](super::RecordedScene).
-        for (line, row) in (2..).zip(lines).skip_while(|(_, row)| is_about_the_scene(row)) {
+        let mut closed: Option<u64> = None;
+        let mut last_line = 1;
+        let count = text.lines().count();
+        for (line, row) in (2..).zip(lines) {
+            let closing = closing(line, row);
+            // A number without its last digits is a number too: a line without its newline is no row, unless it closes the record with the right number.
+            let is_whole = line < count || text.ends_with('\n');
+            if !is_whole && !matches!(closing, Ok(Some(_))) {
+                break;
+            }
+            let before = rows.last().map_or(Instant::ZERO, |(at, _)| *at);
+            if let Some((at, said)) = closing? {
+                if at < before || closed.is_some() {
+                    return Err(InputsError::Order { line, at, before });
+                }
+                closed = Some(said);
+                continue;
+            }
+            last_line = line;
+            // What they say of their scene is for [`RecordedScene`](super::RecordedScene).
+            if rows.is_empty() && closed.is_none() && is_about_the_scene(row) {
+                continue;
+            }
             let (at, what) = read_row(line, row, scene, keys, folder)?;
-            if let Some((before, last)) = rows.last()
-                && (at < *before || *last == Recorded::End)
-            {
-                return Err(InputsError::Order { line, at, before: *before });
+            if at < before || closed.is_some() || matches!(rows.last(), Some((_, Recorded::End))) {
+                return Err(InputsError::Order { line, at, before });
             }
             rows.push((at, what));
         }
-        Ok(Self { rows })
+        let missing = match closed {
+            Some(said) => {
+                let found = last_line as u64 - 1;
+                (said != found).then_some(InputsError::Rows { said, found })
+            }
+            None => {
+                let at = rows.last().map_or(Instant::ZERO, |(at, _)| *at);
+                if !matches!(rows.last(), Some((_, Recorded::End))) {
+                    rows.push((at, Recorded::End));
+                }
+                Some(InputsError::NotClosed { line: last_line, at })
+            }
+        };
+        Ok((Self { rows }, missing))
     }
+}
+
+/// The instant and the number of rows of a row that closes a record; `None` if the row is another one.
+fn closing(line: usize, row: &str) -> Result<Option<(Instant, u64)>, InputsError> {
+    let mut cells = row.splitn(5, ',');
+    let mut cell = || cells.next().unwrap_or_default();
+    let cells = Cells { line, cells: [cell(), cell(), cell(), cell(), cell()] };
+    if cells.cells[1] != CLOSED {
+        return Ok(None);
+    }
+    let rows = cells.whole_number(4).ok_or_else(|| cells.refused(4, "the number of rows before this one"))?;
+    Ok(Some((cells.instant()?, rows)))
 }
 
 /// The four cells before the value, and that.
@@ -123,7 +199,7 @@ fn read_row(line: usize, row: &str, scene: &Scene, keys: &LinkKeys, folder: &Pat
             Recorded::Link { from, to, keys, model: Box::new(model) }
         }
         "end" => Recorded::End,
-        _ => return Err(cells.refused(1, "sample, device, link or end")),
+        _ => return Err(cells.refused(1, "sample, device, link, end or closed")),
     };
     Ok((at, what))
 }
@@ -133,11 +209,14 @@ impl Cells<'_> {
         InputsError::Cell { line: self.line, column: COLUMNS[column], found: shorten(self.cells[column]), expected: expected.into() }
     }
 
-    fn instant(&self) -> Result<Instant, InputsError> {
+    fn whole_number(&self, column: usize) -> Option<u64> {
         // Rust reads "+1" too, which no writer of this format writes.
-        let plain = self.cells[0].bytes().all(|byte| byte.is_ascii_digit());
-        let nanos = self.cells[0].parse().ok().filter(|_| plain);
-        nanos.map(Instant::from_nanos).ok_or_else(|| self.refused(0, "a whole number of nanoseconds from 0 to 2^64 - 1"))
+        let plain = self.cells[column].bytes().all(|byte| byte.is_ascii_digit());
+        self.cells[column].parse().ok().filter(|_| plain)
+    }
+
+    fn instant(&self) -> Result<Instant, InputsError> {
+        self.whole_number(0).map(Instant::from_nanos).ok_or_else(|| self.refused(0, "a whole number of nanoseconds from 0 to 2^64 - 1"))
     }
 
     /// A peer of one of those kinds, or of any if there are none.

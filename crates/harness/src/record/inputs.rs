@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use cohaptic_scene::{Scene, SceneContent};
+use cohaptic_units::Instant;
 
 use super::file::{RecordFile, create_folder, push_display};
 use crate::Observer;
-use crate::live::{InputLine, InputRow, RecordedScene};
+use crate::live::{ClosingLine, InputLine, InputRow, RecordedScene};
 use crate::record::RecordError;
 
 /// Writes `inputs.csv`: what comes into a [live session](crate::live) from outside, one line each, from which it can be [replayed](crate::live::replay).
@@ -15,6 +16,9 @@ pub struct InputRecorder {
     file: RecordFile,
     names: Vec<String>,
     line: Vec<u8>,
+    /// Rows written so far, and the instant of the last one.
+    rows: u64,
+    last: Instant,
 }
 
 impl InputRecorder {
@@ -27,16 +31,20 @@ impl InputRecorder {
     pub fn create(folder: &Path, scene: &Scene, content: SceneContent) -> Result<Self, RecordError> {
         create_folder(folder)?;
         let mut file = RecordFile::create(folder.join("inputs.csv"))?;
-        file.write(RecordedScene::of(scene, content).to_string().as_bytes())?;
-        Ok(Self { file, names: scene.peers.iter().map(|peer| peer.name.clone()).collect(), line: Vec::new() })
+        let head = RecordedScene::of(scene, content).to_string();
+        file.write(head.as_bytes())?;
+        let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
+        // All lines but the header are rows, also those about the scene: none of them may be missing.
+        Ok(Self { file, names, line: Vec::new(), rows: (head.lines().count() - 1) as u64, last: Instant::ZERO })
     }
 
-    /// Writes the rest and gives the file its name.
+    /// Writes the row that closes the record, without which a reader takes it for one that is cut short, and gives the file its name.
     ///
     /// # Errors
     ///
     /// [`RecordError`] if that cannot be done.
-    pub fn finish(self) -> Result<PathBuf, RecordError> {
+    pub fn finish(mut self) -> Result<PathBuf, RecordError> {
+        self.file.write(format!("{}\n", ClosingLine { at: self.last, rows: self.rows }).as_bytes())?;
         self.file.finish()
     }
 }
@@ -48,6 +56,8 @@ impl Observer for InputRecorder {
         self.line.clear();
         push_display(&mut self.line, InputLine { row, names: &self.names });
         self.line.push(b'\n');
-        self.file.write(&self.line)
+        self.file.write(&self.line)?;
+        (self.rows, self.last) = (self.rows + 1, row.at);
+        Ok(())
     }
 }

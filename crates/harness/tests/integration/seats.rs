@@ -236,7 +236,11 @@ fn a_record_with_a_fault_is_refused_with_its_line_and_what_was_expected() {
     for (rows, expected) in [
         ("+1,end,,,", "line 2, column at_ns: found \"+1\", expected a whole number of nanoseconds"),
         ("1,end,,", "line 2, column value: found \"1,end,,\", expected five cells"),
-        ("1,packet,there,,00", "line 2, column input: found \"packet\", expected sample, device, link or end"),
+        ("1,packet,there,,00", "line 2, column input: found \"packet\", expected sample, device, link, end or closed"),
+        ("1,closed,,,x", "line 2, column value: found \"x\", expected the number of rows before this one"),
+        ("2,device,hand,,none\n1,closed,,,1", "line 3: a row at 0.000000001s behind one at 0.000000002s"),
+        ("1,closed,,,0\n1,end,,,", "line 3: a row at 0.000000001s behind one"),
+        ("1,closed,,,0\n1,closed,,,0", "line 3: a row at 0.000000001s behind one"),
         ("1,sample,here,,00", "line 2, column peer: found \"here\", expected the name of a peer of kind \"udp\""),
         ("1,sample,nobody,,00", "line 2, column peer: found \"nobody\""),
         ("1,sample,there,,0", "line 2, column value: found \"0\", expected the bytes of a sample"),
@@ -256,8 +260,32 @@ fn a_record_with_a_fault_is_refused_with_its_line_and_what_was_expected() {
         assert!(error.to_string().contains(expected), "{rows}: {error}");
     }
     assert!(matches!(Inputs::read("", &scene, &keys), Err(InputsError::Header { .. })));
-    assert_eq!(Inputs::read(&format!("\u{feff}{header}\r\n1,device,hand,,none\r\n"), &scene, &keys).unwrap().len(), 1);
-    assert!(Inputs::read(header, &scene, &keys).unwrap().is_empty());
+    assert_eq!(Inputs::read(&format!("\u{feff}{header}\r\n1,device,hand,,none\r\n1,closed,,,1\r\n"), &scene, &keys).unwrap().len(), 1);
+    assert!(Inputs::read(&format!("{header}\n0,closed,,,0"), &scene, &keys).unwrap().is_empty());
+}
+
+/// Cut at any byte, and with any line gone, a record is not taken for a whole one; what is whole of it is read.
+#[test]
+fn a_record_that_is_cut_anywhere_is_not_whole() {
+    let Written { scene, keys, .. } = trio();
+    let text = "at_ns,input,peer,to,value\n0,program,,,0.1.0\n1,device,hand,,0.01 -0.5\n21,device,hand,,0.012 -0.53\n321,end,,,\n321,closed,,,4\n";
+    let whole = Inputs::read(text, &scene, &keys).unwrap();
+    assert_eq!(whole.len(), 3);
+    assert_eq!(Inputs::read(text.trim_end(), &scene, &keys).unwrap(), whole, "an editor may take the last line break");
+    for length in text.find('\n').unwrap()..text.len() - 1 {
+        let (read, missing) = Inputs::read_cut(&text[..length], &scene, &keys).unwrap();
+        let lines = text[..length].matches('\n').count().max(1);
+        let at = Instant::from_nanos([0, 0, 1, 21, 321][lines - 1]);
+        assert_eq!(missing, Some(InputsError::NotClosed { line: lines, at }), "{length} bytes");
+        // The last row, or an end at the last row, ends the session.
+        assert_eq!((read.last_instant(), read.len()), (Some(at), lines.saturating_sub(2).min(2) + 1), "{length} bytes");
+    }
+    let lines: Vec<&str> = text.lines().collect();
+    for gone in 1..=4 {
+        let cut: String = lines.iter().enumerate().filter(|(place, _)| *place != gone).map(|(_, line)| format!("{line}\n")).collect();
+        let (read, missing) = Inputs::read_cut(&cut, &scene, &keys).unwrap();
+        assert_eq!((missing, read.len()), (Some(InputsError::Rows { said: 4, found: 3 }), if gone == 1 { 3 } else { 2 }), "without line {gone}");
+    }
 }
 
 proptest! {

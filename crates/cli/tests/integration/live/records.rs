@@ -61,7 +61,10 @@ pub(super) fn packets(desk: &Desk, folder: &str) -> Vec<Packet> {
 pub(super) fn inputs(desk: &Desk, folder: &str) -> Vec<Input> {
     let read =
         |row: csv::StringRecord| Input { at: row[0].parse().unwrap(), kind: row[1].to_owned(), peer: row[2].to_owned(), value: row[4].to_owned() };
-    let rows = rows(desk, &format!("{folder}/inputs.csv")).into_iter().map(read);
+    let mut rows = rows(desk, &format!("{folder}/inputs.csv"));
+    let closing = rows.pop().unwrap();
+    assert_eq!((&closing[1], closing[4].parse()), ("closed", Ok(rows.len())), "the record is closed");
+    let rows = rows.into_iter().map(read);
     // Those about the scene are looked at in `replays.rs`.
     rows.filter(|row| !["program", "scene", "file", "key"].contains(&row.kind.as_str())).collect()
 }

@@ -49,7 +49,7 @@ pub(super) const DOCUMENTS: [Document; 24] = [
             ("max_rotation_discrepancy_rad", "where the object turns: the largest angle between two copies"),
             ("measures.NAME", "each [measure](#measures) that is asked for; `null` where it has no value"),
             ("files", "paths written by `--out` and `--links`"),
-            ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session"),
+            ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session, and what the record lacks"),
             ("against", "the document of the second run; absent without `--against`"),
         ],
     },
