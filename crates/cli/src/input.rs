@@ -4,11 +4,9 @@ use std::io::{self, Read as _};
 use std::path::Path;
 use std::sync::Mutex;
 
+use cohaptic_files::MOST_TOML_BYTES;
 use cohaptic_linkfile::reading::{file_text, text_of};
 use cohaptic_scene::SceneError;
-
-/// The most that is read from standard input \[bytes\]: far beyond any scene, far below the memory of a machine.
-const MOST: u64 = 64 << 20;
 
 const STANDARD_INPUT: &str = "<standard input>";
 
@@ -41,9 +39,9 @@ pub(crate) fn text(path: &Path) -> Result<String, SceneError> {
         Some(bytes) => bytes,
         nothing => {
             let mut bytes = Vec::new();
-            io::stdin().lock().take(MOST + 1).read_to_end(&mut bytes).map_err(unreadable)?;
-            if bytes.len() as u64 > MOST {
-                return Err(unreadable(io::Error::other(format!("longer than {} MiB: expected a scene", MOST >> 20))));
+            io::stdin().lock().take(MOST_TOML_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+            if bytes.len() as u64 > MOST_TOML_BYTES {
+                return Err(unreadable(io::Error::other(format!("longer than {} MiB: expected a scene", MOST_TOML_BYTES >> 20))));
             }
             nothing.insert(bytes)
         }

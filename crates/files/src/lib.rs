@@ -27,11 +27,14 @@ pub use lease::{BEAT, Holder, Lease, Owner, STALE, Taking, leases};
 pub use scratch::ScratchFile;
 pub use whole::{PARTIAL, WholeFile, partial_name, write_whole, write_whole_by};
 
-/// The most bytes of a file that is read as a whole, 256 MiB: a scene, a trace, a replay, recorded motion, a table of a distribution, inputs,
+/// The most bytes of a TOML file, 16 MiB: a scene, or a file of links, of a relay or of a router. The tree of a text takes fifty times its length.
+pub const MOST_TOML_BYTES: u64 = 16 << 20;
+
+/// The most bytes of another file that is read as a whole, 256 MiB: a trace, a replay of a scene, recorded motion, a table of a distribution, inputs,
 /// measurements, weights.
 pub const MOST_BYTES: u64 = 256 << 20;
 
-/// The most bytes of a file that is read piece by piece, 4 GiB: a capture, a part of a campaign.
+/// The most bytes of a file that is read piece by piece, 4 GiB: a capture, a log of fates, a part of a campaign.
 pub const MOST_CAPTURE_BYTES: u64 = 4 << 30;
 
 /// Opens a file that is read piece by piece and from several places, with a limit of its length \[bytes\].
@@ -49,7 +52,16 @@ pub fn open(path: &Path, most: u64) -> io::Result<File> {
 ///
 /// What the system says; and [`io::ErrorKind::FileTooLarge`] beyond [`MOST_BYTES`].
 pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
-    let mut from = LimitedFile::open(path, MOST_BYTES)?;
+    read_bytes_up_to(path, MOST_BYTES)
+}
+
+/// The bytes of a file, with a limit of their number.
+///
+/// # Errors
+///
+/// What the system says; and [`io::ErrorKind::FileTooLarge`] beyond the limit.
+pub fn read_bytes_up_to(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let mut from = LimitedFile::open(path, most)?;
     let mut bytes = Vec::new();
     from.read_to_end(&mut bytes)?;
     Ok(bytes)
@@ -61,7 +73,16 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
 ///
 /// As [`read_bytes`], and [`io::ErrorKind::InvalidData`] for bytes that are no UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
-    String::from_utf8(read_bytes(path)?).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text: expected UTF-8"))
+    read_text_up_to(path, MOST_BYTES)
+}
+
+/// The text of a file, with a limit of its length \[bytes\].
+///
+/// # Errors
+///
+/// As [`read_bytes_up_to`], and [`io::ErrorKind::InvalidData`] for bytes that are no UTF-8.
+pub fn read_text_up_to(path: &Path, most: u64) -> io::Result<String> {
+    String::from_utf8(read_bytes_up_to(path, most)?).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text: expected UTF-8"))
 }
 
 /// A file that is read up to a limit, beyond which there is an error.
@@ -79,12 +100,19 @@ impl LimitedFile {
     ///
     /// What the system says; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer.
     pub fn open(path: &Path, most: u64) -> io::Result<Self> {
-        let file = File::open(path)?;
-        let about = file.metadata()?;
-        if about.is_file() && about.len() > most {
-            return Err(too_large(most));
-        }
-        Ok(Self { file, most, left: most })
+        Self { file: File::open(path)?, most, left: most }.limited_to(most)
+    }
+
+    /// The file with a lower limit of its length \[bytes\], once the bytes that were read have shown of which kind it is.
+    ///
+    /// # Errors
+    ///
+    /// What the system says; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer, or if more was read.
+    pub fn limited_to(self, most: u64) -> io::Result<Self> {
+        let about = self.file.metadata()?;
+        let read = self.most - self.left;
+        let left = most.checked_sub(read).filter(|_| !about.is_file() || about.len() <= most);
+        left.map(|left| Self { most, left, ..self }).ok_or_else(|| too_large(most))
     }
 }
 
@@ -128,6 +156,20 @@ mod tests {
         assert_eq!(read(file(100).path(), 100).unwrap(), 100);
         assert_eq!(read(file(101).path(), 100).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         assert_eq!(read(file(0).path(), 0).unwrap(), 0);
+    }
+
+    #[test]
+    fn a_limit_is_lowered_once_the_kind_of_a_file_is_known() {
+        let path = file(100);
+        let begun = || {
+            let mut from = LimitedFile::open(path.path(), 1000).unwrap();
+            from.read_exact(&mut [0; 10]).unwrap();
+            from
+        };
+        let mut rest = Vec::new();
+        begun().limited_to(100).unwrap().read_to_end(&mut rest).unwrap();
+        assert_eq!(rest.len(), 90);
+        assert_eq!(begun().limited_to(99).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
     }
 
     #[test]

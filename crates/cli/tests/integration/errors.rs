@@ -152,7 +152,18 @@ fn too_many_peers_to_simulate_are_refused_before_anything_is_written() {
     assert!(desk.text("explain many.toml").contains("9999900000 links"));
 }
 
-/// Devices without an end, and a pipe that somebody fills: each is read up to the limit of its kind, 256 MiB.
+/// A file in TOML that is too long is refused before it is read: its tree would take fifty times its length of memory.
+#[test]
+fn a_long_file_in_toml_is_refused_before_it_is_read() {
+    let desk = Desk::new();
+    // Zeros that take no room, and would be refused as no text.
+    std::fs::File::create(desk.path("long.toml")).unwrap().set_len((16 << 20) + 1).unwrap();
+    for line in ["run long.toml", "campaign long.toml --runs 2 --out runs", "explain long.toml", "live long.toml", "relay long.toml", "router long.toml"] {
+        desk.cohaptic(line).assert_refused(3, &["long.toml", "it is longer than 16 MiB"]);
+    }
+}
+
+/// Devices without an end, and a pipe that somebody fills: each is read up to the limit of its kind.
 #[cfg(target_os = "linux")]
 #[test]
 fn what_has_no_end_is_read_up_to_a_limit() {
@@ -163,14 +174,16 @@ fn what_has_no_end_is_read_up_to_a_limit() {
         "run two.toml --set link.replay=/dev/zero",
         "run two.toml --set 'link.jitter={ sd = \"1ms\", distribution = { empirical = \"/dev/zero\" } }'",
         "run two.toml --inputs /dev/zero",
-        "run /dev/zero",
-        "check /dev/zero",
         "stability point two.toml --graph /dev/zero",
         "link --from /dev/zero",
         "fit /dev/zero",
     ] {
         let outcome = desk.cohaptic(line);
         assert!(matches!(outcome.status, Some(2 | 3)) && (outcome.stderr + &outcome.stdout).contains(limit), "{line}");
+    }
+    for line in ["run /dev/zero", "check /dev/zero", "relay /dev/zero", "router /dev/zero"] {
+        let outcome = desk.cohaptic(line);
+        assert!(matches!(outcome.status, Some(2 | 3)) && (outcome.stderr + &outcome.stdout).contains("it is longer than 16 MiB"), "{line}");
     }
     let pipe = desk.path("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());

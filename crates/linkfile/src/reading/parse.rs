@@ -4,6 +4,7 @@ use core::ops::Range;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use cohaptic_files::MOST_TOML_BYTES;
 use toml::de::DeTable;
 
 use super::context::{Context, Faults, Files};
@@ -19,7 +20,11 @@ const TOO_DEEP: &str = "nested too deeply: expected at most 16 levels";
 ///
 /// As [`file_text`], and those of `read`.
 pub fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, FileError>) -> Result<T, FileError> {
-    let bytes = cohaptic_files::read_bytes(path).map_err(|source| FileError::Read { path: path.to_path_buf(), source, place: None })?;
+    let bytes = cohaptic_files::read_bytes_up_to(path, MOST_TOML_BYTES).map_err(|source| FileError::Read {
+        path: path.to_path_buf(),
+        source,
+        place: None,
+    })?;
     text_of(path, &bytes).and_then(read)
 }
 
@@ -89,6 +94,11 @@ fn invalid(diagnostic: Diagnostic) -> FileError {
 
 /// The document as a tree. Of several faults of syntax, the first.
 fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, FileError> {
+    // A text that came from elsewhere than a file: before the parser, which takes fifty times its length of memory.
+    if text.len() as u64 > MOST_TOML_BYTES {
+        let message = format!("longer than {} MiB: expected a file of at most that", MOST_TOML_BYTES >> 20);
+        return Err(invalid(sources.diagnostic(BEGINNING, String::new(), message)));
+    }
     let (table, errors) = DeTable::parse_recoverable(text);
     let first = errors.iter().min_by_key(|error| error.span().map_or(usize::MAX, |span| span.start));
     if let Some(error) = first {

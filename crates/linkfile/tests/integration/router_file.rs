@@ -219,3 +219,11 @@ fn the_files_of_the_manual_are_routers() {
         parse(text).unwrap_or_else(|error| panic!("{error}"));
     }
 }
+
+/// Before the parser, whose tree would take fifty times as much memory. Line breaks are TOML.
+#[test]
+fn a_text_of_more_than_16_mebibytes_is_refused() {
+    let parse = |bytes: usize| RouterFile::parse(&"\n".repeat(bytes), Path::new("router.toml"), &[]).unwrap_err().to_string();
+    assert!(parse((16 << 20) + 1).contains("longer than 16 MiB: expected a file of at most that"));
+    assert!(!parse(1 << 20).contains("MiB"));
+}

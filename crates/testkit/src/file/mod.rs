@@ -10,7 +10,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use cohaptic_files::read_text;
+use cohaptic_files::{MOST_TOML_BYTES, read_text, read_text_up_to};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
@@ -141,10 +141,12 @@ impl LinkFile {
     /// [`LinkFileError`] if it cannot be read or makes no sense, with the place.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, LinkFileError> {
         let path = path.as_ref();
-        let text = read_text(path).map_err(|source| LinkFileError::Io { path: path.to_path_buf(), source })?;
+        let unreadable = |source| LinkFileError::Io { path: path.to_path_buf(), source };
         if path.extension().is_some_and(|extension| extension == "toml") {
+            let text = read_text_up_to(path, MOST_TOML_BYTES).map_err(unreadable)?;
             return Self::document(&text, path);
         }
+        let text = read_text(path).map_err(unreadable)?;
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
         let file = |name: &str| read_text(&folder.join(name)).map_err(|error| format!("cannot be read: {error}"));
         Self::parse_with(&text, file).map_err(|error| LinkFileError::Words { path: path.to_path_buf(), error })
