@@ -1,9 +1,11 @@
 //! Text files of users that are read, and files that are written.
 
-use std::io::{self, Write as _};
+use std::io::{self, Read, Write as _};
 use std::path::Path;
 
-use cohaptic_files::write_whole;
+use cohaptic_files::{LimitedFile, MOST_CAPTURE_BYTES, write_whole};
+use cohaptic_measure::fates::{self, ReadError};
+use cohaptic_wan::FateLog;
 
 use crate::failure::Failure;
 use crate::{interrupt, output};
@@ -18,9 +20,27 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
 pub(crate) fn text_of(bytes: Vec<u8>, path: &Path) -> Result<String, Failure> {
     String::from_utf8(bytes).map_err(|error| {
         let right = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = right.iter().filter(|byte| **byte == b'\n').count() + 1;
-        Failure::Input(format!("{}:{line}: not UTF-8: expected a text file", output::path(path)))
+        not_text(path, right.iter().filter(|byte| **byte == b'\n').count() as u64 + 1)
     })
+}
+
+/// That a line of a file is no text.
+pub(crate) fn not_text(path: &Path, line: u64) -> Failure {
+    Failure::Input(format!("{}:{line}: not UTF-8: expected a text file", output::path(path)))
+}
+
+/// Reads a log of fates, from a file that was opened, up to 4 GiB, or what is left of it.
+pub(crate) fn read_fates(path: &Path, from: impl Read) -> Result<FateLog, Failure> {
+    fates::read(from).map_err(|error| match error {
+        ReadError::Io(error) => Failure::File { verb: "read", path: path.to_path_buf(), error },
+        ReadError::NotText { line } => not_text(path, line),
+        other @ ReadError::Log(_) => Failure::Input(format!("{}: {other}", output::path(path))),
+    })
+}
+
+/// Opens a file that is read piece by piece.
+pub(crate) fn open_large(path: &Path) -> Result<LimitedFile, Failure> {
+    LimitedFile::open(path, MOST_CAPTURE_BYTES).map_err(|error| Failure::File { verb: "read", path: path.to_path_buf(), error })
 }
 
 /// Writes a whole file. If it cannot be written, on a disk that is full for instance, nothing of it is left: unlike a record, it can be made again.

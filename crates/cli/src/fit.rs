@@ -1,12 +1,12 @@
 //! `cohaptic fit`.
 
-use std::path::Path;
+use std::io::Read as _;
 use std::process::ExitCode;
 
-use cohaptic_files::{LimitedFile, MOST_CAPTURE_BYTES};
+use cohaptic_files::MOST_BYTES;
 use cohaptic_measure::fit::{self, Fitted, LossFit, LossModel, Measurements, Skew, captures};
 use cohaptic_units::print::Counted;
-use cohaptic_wan::{FateLog, FateRow};
+use cohaptic_wan::FateRow;
 use serde::Serialize;
 
 use crate::arguments::FitArguments;
@@ -60,12 +60,15 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
 fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Failure> {
     let path = &arguments.file;
     if let Some(receiver) = &arguments.receiver {
-        let matched = captures::between(open(path)?, open(receiver)?, arguments.port)
+        let matched = captures::between(file::open_large(path)?, file::open_large(receiver)?, arguments.port)
             .map_err(|error| Failure::Input(format!("{}, {}: {error}", output::path(path), output::path(receiver))))?;
         let left = Matched { unmatched_sent: matched.unmatched_sent, unmatched_arrived: matched.unmatched_arrived, ambiguous: matched.ambiguous };
         return Ok((matched.measurements, Some(left)));
     }
-    let bytes = cohaptic_files::read_bytes(path).map_err(|error| unreadable(path, error))?;
+    let unreadable = |error| Failure::File { verb: "read", path: path.clone(), error };
+    let mut from = file::open_large(path)?;
+    let mut bytes = Vec::new();
+    from.by_ref().take(HEAD).read_to_end(&mut bytes).map_err(unreadable)?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(path)));
     if captures::is_capture(&bytes) {
         return Err(named(
@@ -73,20 +76,18 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
               (of what `cohaptic link` did, give the file of --fates instead)",
         ));
     }
-    let text = file::text_of(bytes, path)?;
-    if text.trim_start_matches('\u{feff}').starts_with(FateRow::HEADER) {
-        return Ok((Measurements::from_fates(&FateLog::parse(&text).map_err(|error| named(&error))?), None));
+    if bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes).starts_with(FateRow::HEADER.as_bytes()) {
+        return Ok((Measurements::from_fates(&file::read_fates(path, bytes.chain(from))?), None));
     }
+    // Any other table is read as a whole.
+    from.limited_to(MOST_BYTES).and_then(|mut rest| rest.read_to_end(&mut bytes)).map_err(unreadable)?;
+    let text = file::text_of(bytes, path)?;
     Ok((Measurements::from_csv(text.as_bytes()).map_err(|error| named(&error))?, None))
 }
 
-fn open(path: &Path) -> Result<LimitedFile, Failure> {
-    LimitedFile::open(path, MOST_CAPTURE_BYTES).map_err(|error| unreadable(path, error))
-}
-
-fn unreadable(path: &Path, error: std::io::Error) -> Failure {
-    Failure::File { verb: "read", path: path.to_path_buf(), error }
-}
+/// The first bytes of a file, which show of which kind it is.
+const HEAD: u64 = 256;
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Matched>) -> String {
     let goodness = &fitted.goodness;

@@ -1,10 +1,10 @@
 //! The fate log as a file: what became of every packet, in a form that [`FateLog`] reads back exactly and a link can replay.
 //!
-//! The columns are those of [`FateRow`]. The writer holds nothing in memory; the reader holds the log.
+//! The columns are those of [`FateRow`]. The writer holds nothing in memory; the reader holds the log, and a line of its text.
 
-use std::io::{self, Read, Write};
+use std::io::{self, BufRead as _, BufReader, Read, Write};
 
-use cohaptic_wan::{FateLog, FateLogError, FateRow, PacketRecord};
+use cohaptic_wan::{FateLog, FateLogError, FateLogReader, FateRow, PacketRecord};
 
 /// Writes a fate log row by row, in the order of the calls.
 ///
@@ -48,23 +48,43 @@ impl<W: Write> FateWriter<W> {
 /// Why a file is not read as a fate log.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The file cannot be read, or is not UTF-8.
+    /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Io(#[from] io::Error),
+    /// A line is not UTF-8. Lines are counted from 1.
+    #[error("line {line}: not UTF-8: expected a text file")]
+    NotText {
+        /// The line.
+        line: u64,
+    },
     /// It is no complete fate log.
     #[error(transparent)]
     Log(#[from] FateLogError),
 }
+
+/// The most bytes of a line; a row of a log has at most 110. What is longer is refused as a line that is no row.
+const LONGEST_LINE: u64 = 4096;
 
 /// Reads a fate log.
 ///
 /// # Errors
 ///
 /// [`ReadError`] if the file cannot be read, is not UTF-8, or is no complete fate log; the error names line, column and what was expected.
-pub fn read(mut from: impl Read) -> Result<FateLog, ReadError> {
-    let mut text = String::new();
-    from.read_to_string(&mut text)?;
-    Ok(FateLog::parse(&text)?)
+pub fn read(from: impl Read) -> Result<FateLog, ReadError> {
+    let mut from = BufReader::with_capacity(1 << 16, from);
+    let mut log = FateLogReader::default();
+    let mut bytes = Vec::new();
+    for line in 1.. {
+        bytes.clear();
+        // A file without line breaks must not fill the memory.
+        if from.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes)? == 0 {
+            break;
+        }
+        let text = core::str::from_utf8(&bytes).map_err(|_| ReadError::NotText { line })?;
+        let text = text.strip_suffix('\n').map_or(text, |text| text.strip_suffix('\r').unwrap_or(text));
+        log.line(text)?;
+    }
+    Ok(log.finish()?)
 }
 
 #[cfg(test)]
@@ -97,8 +117,27 @@ mod tests {
     }
 
     #[test]
+    fn lines_are_those_of_a_text_that_is_read_as_a_whole() {
+        let row = "0,0,0,64,24000000,delivered,0,0";
+        let header = FateRow::HEADER;
+        for text in [
+            format!("\u{feff}{header}\r\n{row}\r\n"),
+            format!("{header}\n{row}"),
+            format!("{header}\n{row}\n\n"),
+            String::new(),
+            format!("{header}\n{row}\r"),
+        ] {
+            let [streamed, whole] =
+                [read(text.as_bytes()).map_err(|error| error.to_string()), FateLog::parse(&text).map_err(|error| error.to_string())];
+            assert_eq!(streamed, whole, "{text:?}");
+        }
+    }
+
+    #[test]
     fn a_file_that_is_no_text_is_refused() {
-        assert!(matches!(read([0xff, 0xfe, 0x00].as_slice()), Err(ReadError::Io(_))));
+        assert!(matches!(read([0xff, 0xfe, 0x00].as_slice()), Err(ReadError::NotText { line: 1 })));
+        let zeros = io::repeat(0).take(1 << 40);
+        assert!(matches!(read(zeros), Err(ReadError::Log(FateLogError::Header { found })) if found.len() as u64 == LONGEST_LINE));
         assert_eq!(read(b"x".as_slice()).unwrap_err().to_string(), FateLog::parse("x").unwrap_err().to_string());
     }
 }

@@ -63,7 +63,7 @@ mod stages;
 
 pub use event_queue::{Event, EventQueue};
 pub use fates::fate::{DropCause, Fate};
-pub use fates::log::{FateLog, FateLogError, FateRow};
+pub use fates::log::{FateLog, FateLogError, FateLogReader, FateRow};
 pub use fates::record::{PacketEvent, PacketRecord};
 pub use fates::stats::LinkStats;
 pub use laws::chance::{Chance, ChanceError};

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use cohaptic_linkfile::link_from_keys;
 use cohaptic_measure::asked::Asked;
-use cohaptic_measure::fates::{self, ReadError};
 use cohaptic_scene::LinkKeys;
 use cohaptic_wan::law::DistTable;
 use cohaptic_wan::netem::kernel::Table;
@@ -157,12 +156,7 @@ fn below(said: &str, option: &str) -> String {
 }
 
 fn replay(path: &Path) -> Result<Spec, Failure> {
-    let unreadable = |error| Failure::File { verb: "read", path: path.to_path_buf(), error };
-    let text = file::read_text(path)?;
-    let log = fates::read(text.as_bytes()).map_err(|error| match error {
-        ReadError::Io(error) => unreadable(error),
-        other @ ReadError::Log(_) => Failure::Input(format!("{}: {other}", output::path(path))),
-    })?;
+    let log = file::read_fates(path, file::open_large(path)?)?;
     let packets = u64::try_from(log.packets()).ok();
     let model = LinkModel::Replay(Arc::new(log));
     Ok(Spec { said: format!("replay of {}", output::path(path)), model, asked: Asked::default(), packets })

@@ -175,7 +175,6 @@ fn what_has_no_end_is_read_up_to_a_limit() {
         "run two.toml --set 'link.jitter={ sd = \"1ms\", distribution = { empirical = \"/dev/zero\" } }'",
         "run two.toml --inputs /dev/zero",
         "stability point two.toml --graph /dev/zero",
-        "link --from /dev/zero",
         "fit /dev/zero",
     ] {
         let outcome = desk.cohaptic(line);
@@ -185,6 +184,8 @@ fn what_has_no_end_is_read_up_to_a_limit() {
         let outcome = desk.cohaptic(line);
         assert!(matches!(outcome.status, Some(2 | 3)) && (outcome.stderr + &outcome.stdout).contains("it is longer than 16 MiB"), "{line}");
     }
+    // A log is read line by line.
+    desk.cohaptic("link --from /dev/zero").assert_refused(2, &["line 1: found", "expected the header"]);
     let pipe = desk.path("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let mut fill = std::process::Command::new("dd")

@@ -62,6 +62,23 @@ fn the_kernel_does_not_do_what_it_is_told_and_the_table_says_so() {
     assert_eq!(desk.json("link delay 1ms 10ms --profile kernel-6.6 --json --packets 1000")["asked"]["mean_s"], Value::Null);
 }
 
+/// The text of a log is not held: its limit is that of files that are read piece by piece.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_log_of_fates_may_be_longer_than_other_files() {
+    let desk = Desk::new();
+    let header = "sequence,copy,offered_ns,size,at_ns,fate,marked,damaged\n0,0,0,64,1,delivered,0,0\n";
+    desk.write("log.csv", header);
+    // Zeros that take no room: they are read as a line that is no row.
+    for (bytes, said) in [(300 << 20, "log.csv: line 3: "), (5 << 30, "it is longer than 4096 MiB")] {
+        std::fs::File::options().write(true).open(desk.path("log.csv")).unwrap().set_len(bytes).unwrap();
+        for line in ["link --from log.csv", "fit log.csv"] {
+            let outcome = desk.cohaptic(line);
+            assert!(outcome.stderr.contains(said), "{line}, {bytes} bytes: {outcome:?}");
+        }
+    }
+}
+
 #[test]
 fn what_was_written_is_replayed_to_the_bit() {
     let desk = Desk::new();

@@ -87,10 +87,12 @@ fn a_wrong_value_of_any_option_is_refused_in_words() {
 #[test]
 fn a_file_that_is_no_text_is_refused_in_words() {
     let desk = Desk::with("two.toml", TWO);
-    desk.write("bin", [b"t,delay\n1,".as_slice(), &[0xff, 0xfe, 0x80]].concat());
+    let no_text = |header: &str| [header.as_bytes(), b"\n1,\xff\xfe\x80"].concat();
+    desk.write("bin", no_text("t,delay"));
+    desk.write("log", no_text("sequence,copy,offered_ns,size,at_ns,fate,marked,damaged"));
     for line in [
         "run two.toml --inputs bin",
-        "link --from bin",
+        "link --from log",
         "fit bin",
         "run bin",
         "relay bin",
@@ -100,6 +102,7 @@ fn a_file_that_is_no_text_is_refused_in_words() {
     ] {
         assert_in_words(&desk, line);
         let message = desk.cohaptic(line).stderr;
-        assert!(message.starts_with("error: bin:2:") && message.contains("not UTF-8: expected a text file"), "{line}: {message}");
+        let file = if line.ends_with("log") { "log" } else { "bin" };
+        assert!(message.starts_with(&format!("error: {file}:2:")) && message.contains("not UTF-8: expected a text file"), "{line}: {message}");
     }
 }

@@ -22,6 +22,7 @@ use alloc::vec::Vec;
 
 pub use error::FateLogError;
 pub use row::FateRow;
+pub use text::FateLogReader;
 use text::Numbered;
 
 use crate::fates::fate::Fate;
@@ -55,7 +56,9 @@ impl FateLog {
     /// [`FateLogError`] with the line, the column and what was expected if the text is no fate log, or if the records are refused by
     /// [`FateLog::new`].
     pub fn parse(text: &str) -> Result<Self, FateLogError> {
-        Self::check(text::rows(text)?)
+        let mut reader = FateLogReader::default();
+        text.lines().try_for_each(|line| reader.line(line))?;
+        reader.finish()
     }
 
     /// The text of the whole log.

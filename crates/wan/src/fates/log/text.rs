@@ -1,11 +1,12 @@
 //! Reads the text of a fate log.
 
-use alloc::string::ToString;
+use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::str::FromStr;
 
 use cohaptic_units::{Bytes, Instant};
 
+use super::FateLog;
 use super::error::FateLogError;
 use super::row::FateRow;
 use crate::fates::fate::{DropCause, Fate};
@@ -14,16 +15,52 @@ use crate::fates::record::PacketRecord;
 /// A record and the line on which it stood.
 pub(super) type Numbered = (u64, PacketRecord);
 
-/// Reads every row, and the line it stands on.
-pub(super) fn rows(text: &str) -> Result<Vec<Numbered>, FateLogError> {
-    // A byte order mark is what some spreadsheets begin a file with.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut lines = text.lines();
-    let header = lines.next().unwrap_or_default();
-    if header != FateRow::HEADER {
-        return Err(FateLogError::Header { found: header.to_string() });
+/// Reads a fate log line by line, for files whose text does not fit into memory beside the log.
+///
+/// ```
+/// use cohaptic_wan::{FateLogReader, FateRow};
+///
+/// let mut reader = FateLogReader::default();
+/// reader.line(FateRow::HEADER)?;
+/// reader.line("0,0,0,64,24000000,delivered,0,0")?;
+/// assert_eq!(reader.finish()?.packets(), 1);
+/// # Ok::<(), cohaptic_wan::FateLogError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct FateLogReader {
+    /// Lines read so far.
+    lines: u64,
+    rows: Vec<Numbered>,
+}
+
+impl FateLogReader {
+    /// Reads the next line, without its line break: the header first.
+    ///
+    /// # Errors
+    ///
+    /// [`FateLogError`] with the line, the column and what was expected.
+    pub fn line(&mut self, line: &str) -> Result<(), FateLogError> {
+        self.lines += 1;
+        if self.lines > 1 {
+            self.rows.push((self.lines, record(self.lines, line)?));
+            return Ok(());
+        }
+        // A byte order mark is what some spreadsheets begin a file with.
+        let header = line.strip_prefix('\u{feff}').unwrap_or(line);
+        if header == FateRow::HEADER { Ok(()) } else { Err(FateLogError::Header { found: header.to_string() }) }
     }
-    (2..).zip(lines).map(|(line, row)| Ok((line, record(line, row)?))).collect()
+
+    /// Checks the log after its last line.
+    ///
+    /// # Errors
+    ///
+    /// [`FateLogError`] if there was no line, or as [`FateLog::new`].
+    pub fn finish(self) -> Result<FateLog, FateLogError> {
+        if self.lines == 0 {
+            return Err(FateLogError::Header { found: String::new() });
+        }
+        FateLog::check(self.rows)
+    }
 }
 
 fn record(line: u64, row: &str) -> Result<PacketRecord, FateLogError> {
