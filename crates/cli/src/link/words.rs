@@ -6,8 +6,8 @@ use cohaptic_measure::achieved::Achieved;
 use cohaptic_measure::comparison::Figure;
 use cohaptic_units::print::Counted;
 
-use super::Measured;
 use super::spec::Spec;
+use super::{MOST_MEASURED, Measured};
 
 pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
     let mut text = format!("{}\n", spec.said);
@@ -31,6 +31,9 @@ pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
     }
     if measured.figures.iter().any(|figure| figure.outside) {
         line("  * asked for is more than 4 standard errors away".to_owned());
+    }
+    if measured.sent > MOST_MEASURED {
+        line(format!("  figures are of the first {MOST_MEASURED} packets, counts are of all"));
     }
     let fates = &measured.achieved.fates;
     let mut parts = vec![format!("{} sent", Counted(fates.offered, "packet")), format!("{} delivered", fates.delivered)];

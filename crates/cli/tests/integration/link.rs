@@ -62,6 +62,20 @@ fn the_kernel_does_not_do_what_it_is_told_and_the_table_says_so() {
     assert_eq!(desk.json("link delay 1ms 10ms --profile kernel-6.6 --json --packets 1000")["asked"]["mean_s"], Value::Null);
 }
 
+/// Memory does not grow with the stream: figures are those of the first packets, and counts of all.
+#[test]
+#[ignore = ".ci/nightly runs it: it takes long"]
+fn a_long_stream_is_measured_by_its_first_packets() {
+    let desk = Desk::new();
+    let words = "delay=20ms loss=10%";
+    let [first, all] = [4_000_000, 4_000_100].map(|packets| desk.json(&format!("link {words} --packets {packets} --json")));
+    assert_eq!((&all["measured_packets"], &first["measured_packets"]), (&4_000_000.into(), &4_000_000.into()));
+    assert_eq!((&all["compared"], &all["achieved"]), (&first["compared"], &first["achieved"]));
+    assert_eq!(all["fates"]["offered"], 4_000_100);
+    let text = desk.text(&format!("link {words} --packets 4000100"));
+    assert!(text.contains("\n  figures are of the first 4000000 packets, counts are of all\n  4000100 packets sent, "), "{text}");
+}
+
 /// The text of a log is not held: its limit is that of files that are read piece by piece.
 #[test]
 #[cfg(target_os = "linux")]

@@ -10,9 +10,13 @@ use crate::series::count_u64;
 /// Takes the records of one link as they happen and gives its figures at any time.
 ///
 /// It holds 17 bytes for every packet, and 16 for every place where arrivals do not follow the order of sending; [`Accumulator::finish`] needs about 48
-/// bytes a packet more while it runs.
+/// bytes a packet more while it runs. [`Accumulator::of_first`] bounds the number of packets.
 #[derive(Clone, Debug, Default)]
 pub struct Accumulator {
+    /// The number of packets that figures are of; packets with greater numbers are counted only. `None`: all.
+    most: Option<u64>,
+    /// The number of packets beyond these.
+    beyond: u64,
     /// Packets by sequence.
     packets: Vec<Packet>,
     counts: FateCounts,
@@ -64,6 +68,12 @@ impl Accumulator {
         Self { counts: FateCounts { dropped, ..FateCounts::default() }, ..Self::default() }
     }
 
+    /// Nothing has happened yet. Figures will be of the first packets only, that number of them at most, so that memory is bounded; fates are counted of all.
+    #[must_use]
+    pub fn of_first(packets: u64) -> Self {
+        Self { most: Some(packets), ..Self::new() }
+    }
+
     /// Takes one record. The order of the calls is the order of arrival, also at equal instants.
     ///
     /// Packets are numbered from 0 without gaps, as a link numbers them; memory grows with the greatest number.
@@ -80,6 +90,11 @@ impl Accumulator {
             return Err(RecordOutOfOrder { at: record.at, latest: self.latest });
         }
         self.latest = record.at;
+        self.count(record);
+        if let Some(beyond) = self.most.and_then(|most| record.sequence.checked_sub(most)) {
+            self.beyond = self.beyond.max(beyond + 1);
+            return Ok(());
+        }
         let number = usize::try_from(record.sequence).expect("a list of packets fits into memory");
         if number >= self.packets.len() {
             self.packets.resize(number + 1, Packet::default());
@@ -87,14 +102,8 @@ impl Accumulator {
         let packet = &mut self.packets[number];
         packet.known = true;
         match record.fate {
-            Fate::Duplicated => {
-                packet.more_copies_than_ends += 1;
-                self.counts.duplicated += 1;
-            }
-            Fate::Dropped(cause) => {
-                packet.more_copies_than_ends -= 1;
-                *self.counts.dropped.entry(cause.name()).or_default() += 1;
-            }
+            Fate::Duplicated => packet.more_copies_than_ends += 1,
+            Fate::Dropped(_) => packet.more_copies_than_ends -= 1,
             Fate::Delivered(at) => {
                 packet.more_copies_than_ends -= 1;
                 let first_copy = packet.delay_plus_one == 0;
@@ -108,10 +117,19 @@ impl Accumulator {
         Ok(())
     }
 
+    fn count(&mut self, record: &PacketRecord) {
+        match record.fate {
+            Fate::Duplicated => self.counts.duplicated += 1,
+            Fate::Dropped(cause) => *self.counts.dropped.entry(cause.name()).or_default() += 1,
+            Fate::Delivered(_) => {
+                self.counts.delivered += 1;
+                self.counts.marked += u64::from(record.marked);
+                self.counts.damaged += u64::from(record.damaged);
+            }
+        }
+    }
+
     fn arrives(&mut self, record: &PacketRecord, at: Instant, first_copy: bool) {
-        self.counts.delivered += 1;
-        self.counts.marked += u64::from(record.marked);
-        self.counts.damaged += u64::from(record.damaged);
         if self.first_arrival.is_some() {
             self.bytes_after_first += u128::from(record.size.get());
         } else {
@@ -143,7 +161,8 @@ impl Accumulator {
     }
 
     fn counts(&self) -> FateCounts {
-        let offered: u64 = self.packets.iter().map(|packet| u64::from(packet.known)).sum();
+        // A packet beyond the first ones is taken for known if a later one is: they are numbered without gaps.
+        let offered = self.packets.iter().map(|packet| u64::from(packet.known)).sum::<u64>() + self.beyond;
         let dropped: u64 = self.counts.dropped.values().sum();
         let in_flight = (offered + self.counts.duplicated).saturating_sub(self.counts.delivered + dropped);
         FateCounts { offered, in_flight, ..self.counts.clone() }

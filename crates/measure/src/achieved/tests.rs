@@ -98,6 +98,18 @@ fn a_packet_is_lost_only_when_its_last_copy_is() {
     assert_eq!(figures(&[lost(1, 0)]), (0, 1));
 }
 
+/// Figures of the first two packets, and fates of all.
+#[test]
+fn figures_of_the_first_packets_are_those_of_a_shorter_stream() {
+    let mut accumulator = Accumulator::of_first(2);
+    let mut records = example();
+    records.sort_by_key(|record| record.at);
+    records.iter().for_each(|record| accumulator.record(record).unwrap());
+    // Packet 1 was lost before packet 0 arrived.
+    let (all, first) = (Achieved::of(&records), Achieved::of(&records[..2]));
+    assert_eq!(accumulator.finish(), Achieved { fates: all.fates, ..first });
+}
+
 #[test]
 fn records_that_go_back_in_time_are_refused() {
     let mut accumulator = Accumulator::new();

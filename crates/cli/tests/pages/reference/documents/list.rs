@@ -461,7 +461,10 @@ pub(super) const DOCUMENTS: [Document; 24] = [
             ("achieved.NAME", "what was measured, with standard errors (`_se`) and intervals of 95 %, as defined by the RFCs; copies count"),
             ("compared[].name, compared[].asked, compared[].achieved, compared[].standard_error, compared[].outside", "the rows of the table"),
             ("fates.@Counters but mean_delay_s", "what became of the packets"),
-            ("packets_per_s, interrupted, files", "how fast; whether cut short; what was written"),
+            (
+                "packets_per_s, measured_packets, interrupted, files",
+                "how fast; of how many packets figures are, the first; whether cut short; what was written",
+            ),
         ],
     },
     Document {
