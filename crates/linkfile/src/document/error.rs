@@ -48,6 +48,20 @@ impl FileError {
             Self::NoFile { .. } => None,
         }
     }
+
+    /// The fault alone, without its place, and without anything that stands in a file which the document names: for a person who may name a file and not see
+    /// its content.
+    #[must_use]
+    pub fn bare_message(&self) -> String {
+        match self.diagnostic() {
+            // The note exists only for a fault in a named file. Message, excerpt and column quote or measure that file.
+            Some(Diagnostic { note: Some(_), origin: Origin::File(path), excerpt, .. }) => {
+                format!("line {} of {} is not what this key takes: expected another file", excerpt.line, path.display())
+            }
+            Some(diagnostic) => diagnostic.message.clone(),
+            None => self.to_string(),
+        }
+    }
 }
 
 fn unreadable(path: &Path, source: &io::Error, place: Option<&Diagnostic>) -> String {

@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::document::{BEGINNING, FileError, Node, Sources, Table, Value, key_text, value_text};
 use crate::link::read_link;
-use crate::reading::{Modulators, parse};
+use crate::reading::{FileReader, Modulators, parse_with};
 
 /// The link of these keys: texts `KEY=VALUE`, such as `delay=24ms` and `loss={ gilbert-elliott = { p = 0.01, r = 0.1 } }`, as in `[link]` of a scene.
 /// Files that they name are looked for in the current folder.
@@ -20,12 +20,12 @@ use crate::reading::{Modulators, parse};
 /// [`FileError`], whose [`override_text`](crate::Diagnostic::override_text) is `link.` and the text with the fault.
 pub fn link_from_keys(keys: &[String]) -> Result<LinkModel, FileError> {
     let overrides: Vec<String> = keys.iter().map(|key| format!("link.{key}")).collect();
-    read_overrides(&overrides, Path::new("link.toml"), &Arc::default())
+    read_overrides(&overrides, Path::new("link.toml"), &Arc::default(), FileReader::ANY)
 }
 
 /// The link that overrides of the keys of `link` make.
-fn read_overrides(overrides: &[String], file: &Path, modulators: &Arc<Modulators>) -> Result<LinkModel, FileError> {
-    let parsed = parse(Sources { file, text: "", overrides }, |document, context| {
+fn read_overrides(overrides: &[String], file: &Path, modulators: &Arc<Modulators>, reader: FileReader<'_>) -> Result<LinkModel, FileError> {
+    let parsed = parse_with(Sources { file, text: "", overrides }, reader, |document, context| {
         let context = context.with_modulators(Some(modulators));
         let nothing = Node::empty_table(BEGINNING, "link".to_owned());
         let link = document.as_table().and_then(|table| table.get("link")).map_or(&nothing, |entry| &*entry.node);
@@ -77,8 +77,17 @@ impl LinkKeys {
     ///
     /// [`FileError`], whose [`override_text`](crate::Diagnostic::override_text) is `link.KEY=VALUE` of the key with the fault.
     pub fn model(&self, folder: &Path) -> Result<LinkModel, FileError> {
+        self.model_with(folder, FileReader::ANY)
+    }
+
+    /// [`model`](Self::model), with the files that the keys name read by `reader`, for keys that somebody else may have written.
+    ///
+    /// # Errors
+    ///
+    /// As [`model`](Self::model). [`FileError::bare_message`] of an error quotes nothing of these files.
+    pub fn model_with(&self, folder: &Path, reader: FileReader<'_>) -> Result<LinkModel, FileError> {
         let overrides: Vec<String> = self.iter().map(|(key, value)| format!("link.{key}={value}")).collect();
-        read_overrides(&overrides, &folder.join("link.toml"), &self.modulators)
+        read_overrides(&overrides, &folder.join("link.toml"), &self.modulators, reader)
     }
 
     /// The keys in the display form of others, in the scene of these. `None` if the text is no table of keys and values; whether they make sense is told
@@ -127,8 +136,12 @@ fn text_node(text: &str) -> Node {
 mod tests {
     use std::time::Duration;
 
+    use std::cell::RefCell;
+    use std::path::PathBuf;
+
     use cohaptic_units::Probability;
-    use cohaptic_wan::{Delay, Distribution, Jitter, LinkConfig, Loss};
+    use cohaptic_wan::parameters::{Form, Key};
+    use cohaptic_wan::{Delay, Distribution, Jitter, LINK_KIND_PARAMETERS, LINK_PARAMETERS, LinkConfig, Loss, Modulator, ModulatorState, Sojourn};
 
     use super::*;
 
@@ -155,6 +168,59 @@ mod tests {
             let diagnostic = error.diagnostic().unwrap();
             assert_eq!(diagnostic.override_text(), Some(text), "{error}");
             assert!(diagnostic.message().contains("expected"), "{error}");
+        }
+    }
+
+    /// How many keys below these name a file.
+    fn files_below(keys: &[Key]) -> usize {
+        fn of(form: &Form) -> usize {
+            match form {
+                Form::File => 1,
+                Form::Table(table) => table.keys().map(|key| of(&key.form)).sum::<usize>() + table.others.map_or(0, of),
+                Form::List(form) | Form::Pair(form) => of(form),
+                Form::AnyOf(forms) => forms.iter().map(of).sum(),
+                Form::Text | Form::Boolean | Form::Integer(..) | Form::Number(_) | Form::Vector(_) | Form::Triple(_) | Form::Duration => 0,
+                Form::Rate | Form::Size | Form::Probability | Form::Like(_) | Form::Words(_) => 0,
+            }
+        }
+        // The states of `modulated` repeat the keys of a link.
+        keys.iter().filter(|key| key.name != "modulated").map(|key| of(&key.form)).sum()
+    }
+
+    /// Keys that name a file, words of tc-netem among them, each with the name of the file.
+    const FILES: [(&str, &str, &str); 10] = [
+        ("replay", "\"a/fates.csv\"", "desk/a/fates.csv"),
+        ("trace", "\"up.trace\"", "desk/up.trace"),
+        ("trace", "{ file = \"up.trace\", bytes = \"1500B\" }", "desk/up.trace"),
+        ("jitter", "{ sd = \"2ms\", distribution = { table = \"../x.dist\" } }", "desk/../x.dist"),
+        ("jitter", "{ sd = \"2ms\", distribution = { empirical = \"/etc/shadow\" } }", "/etc/shadow"),
+        ("slots", "{ delay = \"9ms\", jitter = { sd = \"2ms\", distribution = { empirical = \"slots.csv\" } } }", "desk/slots.csv"),
+        ("netem", "\"delay 20ms 5ms distribution /etc/law\"", "/etc/law.dist"),
+        ("netem", "\"delay 20ms slot distribution 2ms 1ms law\"", "desk/law.dist"),
+        ("modulated", "{ by = \"cell\", bad = { trace = \"bad.trace\" } }", "desk/bad.trace"),
+        ("modulated", "{ by = \"cell\", bad = { jitter = { sd = \"1ms\", distribution = { table = \"bad.dist\" } } } }", "desk/bad.dist"),
+    ];
+
+    /// A key of the catalogue that names a file and is missing from [`FILES`] fails the count.
+    #[test]
+    fn every_file_that_keys_name_is_asked_of_the_reader_and_nothing_of_it_is_quoted() {
+        let in_catalogue: usize = LINK_PARAMETERS.into_iter().chain([LINK_KIND_PARAMETERS.as_slice()]).map(files_below).sum();
+        assert_eq!(in_catalogue, 7, "replay, trace, trace.file, and table and empirical of jitter and of slots");
+        let state = |next: [f64; 2]| ModulatorState { sojourn: Some(Sojourn::Fixed(Duration::from_secs(1))), next: next.to_vec() };
+        let modulator = Modulator::new("cell", vec![state([0.0, 1.0]), state([1.0, 0.0])]).unwrap();
+        let names = ["good", "bad"].map(str::to_owned).to_vec();
+        let modulators = Arc::new(Modulators::from([("cell".to_owned(), (modulator, names))]));
+        for (key, value, file) in FILES {
+            let keys = LinkKeys { keys: vec![(key.to_owned(), value.to_owned())], modulators: Arc::clone(&modulators) };
+            let asked = RefCell::new(Vec::new());
+            let secret = |path: &Path| {
+                asked.borrow_mut().push(path.to_path_buf());
+                Ok(b"root:$6$secret:19000:0:99999:7:::\n".to_vec())
+            };
+            let error = keys.model_with(Path::new("desk"), FileReader(&secret)).unwrap_err();
+            assert_eq!(*asked.borrow(), [PathBuf::from(file)], "{key} = {value}");
+            assert!(error.to_string().contains("secret"), "the owner of the file sees its line: {error}");
+            assert!(!error.bare_message().contains("secret") && error.bare_message().contains(file), "{}", error.bare_message());
         }
     }
 

@@ -2,8 +2,10 @@
 
 use core::any::Any;
 use core::cell::RefCell;
+use core::fmt;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -35,6 +37,23 @@ impl Faults {
 /// The modulators of a file by name, each with the names of its states.
 pub type Modulators = BTreeMap<String, (Modulator, Vec<String>)>;
 
+/// The way in which the files are read that a document names: a function from a path to the bytes of the file.
+///
+/// A program that takes documents from strangers decides here which of their files it opens, and how.
+#[derive(Clone, Copy)]
+pub struct FileReader<'a>(pub &'a dyn Fn(&Path) -> io::Result<Vec<u8>>);
+
+impl FileReader<'_> {
+    /// Opens any file, as a program does for its own user: [`cohaptic_files::read_bytes`].
+    pub const ANY: Self = FileReader(&cohaptic_files::read_bytes);
+}
+
+impl fmt::Debug for FileReader<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("FileReader")
+    }
+}
+
 /// The state of a reader, which the readers of parts are given.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
@@ -44,6 +63,8 @@ pub struct Context<'a> {
     pub(crate) faults: &'a Faults,
     /// The contents of the files that the document names.
     pub(crate) files: &'a Files,
+    /// How these files are read.
+    pub(crate) reader: FileReader<'a>,
     /// The names of the ends of links. `None`: not known, because the list was refused.
     pub names: Option<&'a Names>,
     /// `None`: not known, because the list was refused.
@@ -87,7 +108,7 @@ impl<'a> Context<'a> {
     }
 
     /// Reports that the file which `node` names cannot be read.
-    pub(super) fn unreadable(&self, node: &Node, path: PathBuf, source: std::io::Error) {
+    pub(super) fn unreadable(&self, node: &Node, path: PathBuf, source: io::Error) {
         let message = format!("cannot read {}: {source}: expected a file, relative to the folder of the scene", path.display());
         self.faults.report(node.place, || {
             let place = self.sources.diagnostic(node.place, node.path.clone(), message);

@@ -13,7 +13,7 @@ mod table_reader;
 pub mod testing;
 pub mod values;
 
-pub use context::{Context, Modulators};
+pub use context::{Context, FileReader, Modulators};
 pub use names::{Names, one_of};
-pub use parse::{Parsed, default_title, file_text, parse, text_of, with_text};
+pub use parse::{Parsed, default_title, file_text, parse, parse_with, text_of, with_text};
 pub use table_reader::{TableReader, only_one};

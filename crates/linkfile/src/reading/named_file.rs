@@ -82,7 +82,7 @@ pub fn read_file<T: Clone + 'static>(
 }
 
 fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
-    let bytes = cohaptic_files::read_bytes(path).map_err(|error| context.unreadable(node, path.to_path_buf(), error)).ok()?;
+    let bytes = (context.reader.0)(path).map_err(|error| context.unreadable(node, path.to_path_buf(), error)).ok()?;
     context.files.held.borrow_mut().insert(path.to_path_buf(), Fingerprint::of_bytes(&bytes));
     match String::from_utf8(bytes) {
         Ok(text) => Some(text),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use cohaptic_files::MOST_TOML_BYTES;
 use toml::de::DeTable;
 
-use super::context::{Context, Faults, Files};
+use super::context::{Context, Faults, FileReader, Files};
 use super::overrides;
 use crate::document::{BEGINNING, Diagnostic, FileError, Node, Place, Sources, TooDeep, join};
 use crate::fingerprint::Fingerprint;
@@ -68,10 +68,23 @@ pub struct Parsed<T> {
 ///
 /// [`FileError`]: of several faults of the reader, the one that stands first in the text; faults in overrides come after those in the text.
 pub fn parse<T>(sources: Sources<'_>, read: impl FnOnce(&Node, Context<'_>) -> Option<T>) -> Result<Parsed<T>, FileError> {
+    parse_with(sources, FileReader::ANY, read)
+}
+
+/// [`parse`], with files that the document names read by `reader`.
+///
+/// # Errors
+///
+/// As [`parse`]. A file that `reader` refuses is [`FileError::Read`].
+pub fn parse_with<T>(
+    sources: Sources<'_>,
+    reader: FileReader<'_>,
+    read: impl FnOnce(&Node, Context<'_>) -> Option<T>,
+) -> Result<Parsed<T>, FileError> {
     let mut document = parse_toml(sources.text, sources)?;
     let faults = Faults::default();
     let files = Files::default();
-    let context = Context { sources, faults: &faults, files: &files, names: None, modulators: None, partial: false };
+    let context = Context { sources, faults: &faults, files: &files, reader, names: None, modulators: None, partial: false };
     overrides::apply(&mut document, sources.overrides, context);
     let whole = read(&document, context);
     match (faults.into_first(), whole) {
