@@ -17,6 +17,7 @@
 
 mod lease;
 mod scratch;
+mod secret;
 mod whole;
 
 use std::fs::File;
@@ -25,6 +26,7 @@ use std::path::Path;
 
 pub use lease::{BEAT, Holder, Lease, Owner, STALE, Taking, leases};
 pub use scratch::ScratchFile;
+pub use secret::open_to_others;
 pub use whole::{PARTIAL, WholeFile, partial_name, write_whole, write_whole_by};
 
 /// The most bytes of a TOML file, 16 MiB: a scene, or a file of links, of a relay or of a router. The tree of a text takes fifty times its length.
@@ -100,7 +102,16 @@ impl LimitedFile {
     ///
     /// What the system says; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer.
     pub fn open(path: &Path, most: u64) -> io::Result<Self> {
-        Self { file: File::open(path)?, most, left: most }.limited_to(most)
+        Self::of(File::open(path)?, most)
+    }
+
+    /// Puts a limit \[bytes\] on an open file.
+    ///
+    /// # Errors
+    ///
+    /// As [`LimitedFile::open`].
+    pub fn of(file: File, most: u64) -> io::Result<Self> {
+        Self { file, most, left: most }.limited_to(most)
     }
 
     /// The file with a lower limit of its length \[bytes\], once the bytes that were read have shown of which kind it is.

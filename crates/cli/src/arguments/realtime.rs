@@ -28,7 +28,7 @@ pub(crate) struct RealTimeArguments {
     /// Serve live control and /metrics over HTTP at this address [without one: a free port of 127.0.0.1]. The URL with its token is printed
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
     pub(crate) control: Option<SocketAddr>,
-    /// A file with the token of live control [default: a random one]
+    /// A file with the token of live control, which nobody but its owner may read [default: a random one]
     #[arg(long, value_name = "FILE", requires = "control")]
     pub(crate) token_file: Option<PathBuf>,
     /// Listen on addresses that other machines reach, too

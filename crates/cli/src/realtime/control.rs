@@ -1,12 +1,14 @@
 //! Live control, if it is asked for: its server, changes of links by their keys, and the numbers of a run as it shows them; and what the terminal shows meanwhile.
 
-use std::io::{self, IsTerminal as _, Write as _};
+use std::fs::File;
+use std::io::{self, IsTerminal as _, Read as _, Write as _};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
 use cohaptic_control::{Board, Description, LinkCounters, LinkEditor, Quantiles, ServeError, Server, ServerConfig, Snapshot, Token, serve};
+use cohaptic_files::{LimitedFile, MOST_BYTES, open_to_others};
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::LinkKeys;
 use cohaptic_wan::{DropCause, LinkModel, LinkStats};
@@ -48,7 +50,15 @@ impl LiveControl {
 /// The token that a file has, if one was named.
 pub(crate) fn token_of(arguments: &RealTimeArguments) -> Result<Option<Token>, Failure> {
     let Some(path) = &arguments.token_file else { return Ok(None) };
-    let text = file::read_text(path)?;
+    let unreadable = |error| Failure::File { verb: "read", path: path.clone(), error };
+    let file = File::open(path).map_err(unreadable)?;
+    if let Some(mode) = open_to_others(&file).map_err(unreadable)? {
+        let path = path.display();
+        return Err(Failure::Input(format!("the token file {path} is open to others than its owner (mode {mode:03o}); close it with: chmod 600 {path}")));
+    }
+    let mut bytes = Vec::new();
+    LimitedFile::of(file, MOST_BYTES).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(unreadable)?;
+    let text = file::text_of(bytes, path)?;
     text.trim().parse().map(Some).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
 }
 

@@ -138,6 +138,7 @@ fn two_programs_of_a_file_speak_through_their_link_and_strangers_do_not() {
         ),
     );
     desk.write("token", TOKEN);
+    desk.set_mode("token", 0o600);
     let running = Running::begin(desk.command("relay lab.toml --set link.delay=40ms --json --no-priority --token-file token --control"));
     let (port_of_left, purpose) = running.port();
     assert_eq!(purpose, format!("left, which is at {left_at}"));
@@ -173,6 +174,7 @@ fn two_programs_of_a_file_speak_through_their_link_and_strangers_do_not() {
 fn a_link_is_changed_while_it_runs_and_what_makes_no_sense_changes_nothing() {
     let (server, answering) = echo();
     let desk = Desk::with("token", &format!("{TOKEN}\n"));
+    desk.set_mode("token", 0o600);
     let line = format!("relay --listen 127.0.0.1:0 --to {server} --json --no-priority --token-file token delay=1ms --control");
     let running = Running::begin(desk.command(&line));
     let (port, _) = running.port();
@@ -226,6 +228,7 @@ fn a_link_is_changed_while_it_runs_and_what_makes_no_sense_changes_nothing() {
 fn what_a_seeded_link_loses_is_dropped_and_counted() {
     let server = socket();
     let desk = Desk::with("token", TOKEN);
+    desk.set_mode("token", 0o600);
     let to = server.local_addr().unwrap();
     let line = format!("relay --listen 127.0.0.1:0 --to {to} --json --no-priority --seed 3 loss 50% --token-file token --control");
     let run = || {

@@ -153,6 +153,7 @@ fn packets_cross_the_link_and_one_direction_is_changed_while_it_runs() {
     let (mut left, mut right) = (Host::new(), Host::new());
     let desk = Desk::with("lab.toml", &file(&left.namespace(), &right.namespace()));
     desk.write("token", TOKEN);
+    desk.set_mode("token", 0o600);
     let running = Running::begin(desk.command("router lab.toml --json --no-priority --tolerance 10min --token-file token --control"));
     let between = running.said("between ");
     assert!(between.starts_with("left (tun left0 in the namespace /proc/") && between.contains(" and right (tun right0 in "), "{between}");

@@ -99,7 +99,9 @@ impl SessionKey {
         let path = path.as_ref();
         let read_error = |source| KeyFileError::Read { path: path.to_owned(), source };
         let file = File::open(path).map_err(read_error)?;
-        check_permissions(&file, path)?;
+        if let Some(mode) = cohaptic_files::open_to_others(&file).map_err(read_error)? {
+            return Err(KeyFileError::Open { path: path.to_owned(), mode });
+        }
         // One allocation, so that no copy of the text is left behind by a growing buffer.
         let mut text = Zeroizing::new(Vec::with_capacity(2 * usize::from(MAX_FILE_LEN)));
         file.take(u64::from(MAX_FILE_LEN) + 1).read_to_end(&mut text).map_err(read_error)?;
@@ -129,21 +131,6 @@ impl SessionKey {
         write().map_err(|source| KeyFileError::Write { path: path.to_owned(), source })?;
         Ok(key)
     }
-}
-
-#[cfg(unix)]
-fn check_permissions(file: &File, path: &Path) -> Result<(), KeyFileError> {
-    use std::os::unix::fs::PermissionsExt as _;
-
-    // Asked of the open file, not of the path: nobody can put another one there in between.
-    let metadata = file.metadata().map_err(|source| KeyFileError::Read { path: path.to_owned(), source })?;
-    let mode = metadata.permissions().mode() & 0o777;
-    if mode & 0o077 == 0 { Ok(()) } else { Err(KeyFileError::Open { path: path.to_owned(), mode }) }
-}
-
-#[cfg(not(unix))]
-fn check_permissions(_file: &File, _path: &Path) -> Result<(), KeyFileError> {
-    Ok(())
 }
 
 fn new_file_options() -> OpenOptions {

@@ -100,12 +100,20 @@ fn assert_metrics(control: &Control) {
 fn the_token_may_be_ones_own() {
     let desk = Desk::with("two.toml", TWO);
     desk.write("token", "a-token-of-our-own-0123456789\n");
+    // As the file of a session key: whoever can read it can change the links.
+    desk.set_mode("token", 0o644);
+    for line in ["live two.toml", "play two.toml"] {
+        let line = format!("{line} --no-priority --for 1ms --control --token-file token");
+        desk.cohaptic(&line).assert_refused(2, &["the token file token is open to others than its owner (mode 644)", "chmod 600 token"]);
+    }
+    desk.set_mode("token", 0o600);
     let mut session = Session::begin(&desk, "two.toml --json --for 1h --control 127.0.0.1:0 --token-file token");
     let control = session.control();
     assert_eq!(control.token, "a-token-of-our-own-0123456789");
     assert_eq!(control.state()["kind"], "live");
     session.end();
     desk.write("short", "abc");
+    desk.set_mode("short", 0o600);
     desk.cohaptic("live two.toml --control --token-file short").assert_refused(2, &["short"]);
 }
 

@@ -128,6 +128,7 @@ fn a_lost_connection_is_shown_and_comes_back() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
     desk.write("token", "a-token-of-our-own-0123456789\n");
+    desk.set_mode("token", 0o600);
     let mut session = Session::play(&desk, "--control 127.0.0.1:0 --token-file token");
     let control = open(&mut browser, &mut session);
     assert_eq!(browser.complaints, [""; 0]);
