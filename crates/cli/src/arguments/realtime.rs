@@ -31,6 +31,9 @@ pub(crate) struct RealTimeArguments {
     /// A file with the token of live control, which nobody but its owner may read [default: a random one]
     #[arg(long, value_name = "FILE", requires = "control")]
     pub(crate) token_file: Option<PathBuf>,
+    /// A folder whose files live control may name in keys of links [default: none, but those that a link names already]
+    #[arg(long, value_name = "DIR", requires = "control")]
+    pub(crate) control_files: Option<PathBuf>,
     /// Listen on addresses that other machines reach, too
     #[arg(long)]
     pub(crate) allow_remote: bool,

@@ -24,7 +24,7 @@ use crate::arguments::LiveArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::realtime::{KeyedLinks, LiveControl, loading, say};
+use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, loading, say};
 use crate::{input, interrupt, output};
 use onlookers::SessionConductor;
 use onlookers::{Elapsed, Planned, TimedLinks};
@@ -72,7 +72,8 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let (changes, wanted) = channel();
     let elapsed = Elapsed::default();
-    let editor = TimedLinks { links: KeyedLinks { keys, folder, changes }, planned, elapsed: elapsed.clone() };
+    let editor =
+        TimedLinks { links: KeyedLinks { keys, folder, files: ControlFiles::of(&arguments.real_time)?, changes }, planned, elapsed: elapsed.clone() };
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let session = open(arguments, &scene, content)?;
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };

@@ -186,6 +186,7 @@ mod tests {
     use std::sync::mpsc::channel;
 
     use super::*;
+    use crate::realtime::ControlFiles;
 
     #[test]
     fn keys_follow_the_timeline_and_changes_are_laid_over_what_it_says() {
@@ -194,7 +195,7 @@ mod tests {
         let elapsed = Elapsed::default();
         let at = |millis: u64| Instant::from_nanos(millis * 1_000_000);
         let planned = [(at(100), vec![(0, delay("2ms"))]), (at(200), vec![(0, delay("3ms"))])].into();
-        let links = KeyedLinks { keys: vec![delay("1ms"), delay("1ms")], folder: PathBuf::new(), changes };
+        let links = KeyedLinks { keys: vec![delay("1ms"), delay("1ms")], folder: PathBuf::new(), files: ControlFiles::default(), changes };
         let mut links = TimedLinks { links, planned, elapsed: elapsed.clone() };
         let shown = |links: &TimedLinks, link| links.keys(link)[0].1.clone();
         assert_eq!(shown(&links, 0), "1ms");

@@ -11,7 +11,7 @@ use cohaptic_units::Instant;
 use serde_json::{Value, json};
 
 use super::scene::PlayedScene;
-use super::stage::Finished;
+use super::stage::{Finished, said};
 
 /// As many values of each curve are drawn.
 const VALUES: u64 = 600;
@@ -30,7 +30,7 @@ struct Variant {
 pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
     let began = Clock::now();
     let text = std::fs::read_to_string(&finished.inputs).map_err(|error| format!("{}: {error}", finished.inputs.display()))?;
-    let scene = finished.scene.scene().map_err(|error| error.to_string())?;
+    let scene = finished.scene.scene().map_err(|error| said(&error))?;
     let strategy = scene.coordination.strategy.name();
     let (other, other_name) = if strategy == AP { (PD, "PD") } else { (AP, "AP") };
     let own_name = match strategy {
@@ -43,8 +43,10 @@ pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
         Variant { name: other_name, scene: finished.scene.clone().with_strategy(other), has_network: true },
         Variant { name: "without network", scene: finished.scene.clone().without_network(), has_network: false },
     ];
-    let keys = link_keys_of_text(&finished.scene.text(), finished.scene.file(), &[]).map_err(|error| error.to_string())?;
-    let inputs = Inputs::read(&text, &scene, &keys.into_values().next().unwrap_or_default()).map_err(|error| error.to_string())?;
+    let keys = link_keys_of_text(&finished.scene.text(), finished.scene.file(), &[]).map_err(|error| said(&error))?;
+    let inputs = Inputs::read(&text, &scene, &keys.into_values().next().unwrap_or_default());
+    // The error may quote files that the record names, which the page is not shown.
+    let inputs = inputs.map_err(|_| "the record of the part cannot be read again: `cohaptic run --inputs` says why".to_owned())?;
     let lasted = inputs.last_instant().unwrap_or(Instant::ZERO);
     if inputs.is_empty() || lasted == Instant::ZERO {
         return Err("nothing was recorded: move the cube, then compare".to_owned());
@@ -69,7 +71,7 @@ pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
 }
 
 fn curve(variant: &Variant, inputs: &Inputs, hand: usize, step: Duration, lasted: Instant) -> Result<Value, String> {
-    let scene = variant.scene.scene().map_err(|error| error.to_string())?;
+    let scene = variant.scene.scene().map_err(|error| said(&error))?;
     let mut curves = Curves { hand, step, at: vec![[f64::NAN; 3]; scene.peers.len()], discrepancy: Vec::new(), force: Vec::new() };
     let without_links;
     let inputs = if variant.has_network {

@@ -27,7 +27,7 @@ use self::stage::{Part, PartLinks, PlayStage};
 use crate::arguments::PlayArguments;
 use crate::failure::Failure;
 use crate::live::onlookers;
-use crate::realtime::{Edit, KeyedLinks, Look, refused_server, say, token_of};
+use crate::realtime::{ControlFiles, Edit, KeyedLinks, Look, refused_server, say, token_of};
 use crate::{input, interrupt};
 
 /// The scene if none is given: three users, average-position, 24 ms.
@@ -44,7 +44,7 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     check(&beginning)?;
     let (beginning, lent) = lend_hand(beginning)?;
     let records = Records::create(arguments.out.as_deref())?;
-    let stage = Arc::new(PlayStage::new(beginning.clone(), arguments.scene.is_none()));
+    let stage = Arc::new(PlayStage::new(beginning.clone(), arguments.scene.is_none(), ControlFiles::of(&arguments.real_time)?));
     let scene = beginning.scene()?;
     let board = Arc::new(Board::new(onlookers::description(&scene, &onlookers::pairs(&scene))));
     let address = arguments.real_time.control.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], 0)));
@@ -143,7 +143,7 @@ fn prepare(
     let session = Session::open(&scene, config, |place| stage.device(place)).map_err(crate::live::refused)?;
     board.begin(onlookers::description(&scene, &pairs));
     let axes = scene.axes.count();
-    let part = stage.begin(Part { number, played, scene }, KeyedLinks { keys, folder, changes });
+    let part = stage.begin(Part { number, played, scene }, KeyedLinks { keys, folder, files: stage.files.clone(), changes });
     let end = arguments.length.map(|length| begun + length);
     Ok((part, session, PartConductor { stage: Arc::clone(stage), look: Look::on(board), wanted, pairs, axes, end }))
 }

@@ -18,7 +18,7 @@ use super::compare;
 use super::frames::Frames;
 use super::scene::{Links, PEERS, PlayedScene};
 use crate::live::onlookers::pairs;
-use crate::realtime::KeyedLinks;
+use crate::realtime::{ControlFiles, KeyedLinks};
 
 /// How long a part may take to end and be written before it is compared.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -72,6 +72,8 @@ pub(super) struct PlayStage {
     beginning: PlayedScene,
     /// Whether the three steps of the page say what happens in this scene.
     is_guided: bool,
+    /// Which files changes of links may name.
+    pub(super) files: ControlFiles,
     pointers: Vec<Pointer>,
     taken: Mutex<Vec<bool>>,
     part: Mutex<Option<Arc<Part>>>,
@@ -86,16 +88,19 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn said(error: &SceneError) -> String {
-    error.diagnostic().map_or_else(|| error.to_string(), |diagnostic| format!("{}: {}", diagnostic.key(), diagnostic.message()))
+pub(super) fn said(error: &SceneError) -> String {
+    // A person at the page may name a file and not see its content.
+    let message = error.bare_message();
+    error.diagnostic().map_or_else(|| message.clone(), |diagnostic| format!("{}: {message}", diagnostic.key()))
 }
 
 impl PlayStage {
-    pub(super) fn new(beginning: PlayedScene, is_guided: bool) -> Self {
+    pub(super) fn new(beginning: PlayedScene, is_guided: bool, files: ControlFiles) -> Self {
         Self {
             frames: Frames::default(),
             beginning,
             is_guided,
+            files,
             pointers: (0..*PEERS.end()).map(|_| Pointer::default()).collect(),
             taken: Mutex::new(vec![false; *PEERS.end()]),
             part: Mutex::new(None),

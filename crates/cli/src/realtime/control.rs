@@ -9,10 +9,12 @@ use std::time::Duration;
 
 use cohaptic_control::{Board, Description, LinkCounters, LinkEditor, Quantiles, ServeError, Server, ServerConfig, Snapshot, Token, serve};
 use cohaptic_files::{LimitedFile, MOST_BYTES, open_to_others};
+use cohaptic_linkfile::reading::FileReader;
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::LinkKeys;
 use cohaptic_wan::{DropCause, LinkModel, LinkStats};
 
+use super::ControlFiles;
 use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
 use crate::file;
@@ -54,7 +56,9 @@ pub(crate) fn token_of(arguments: &RealTimeArguments) -> Result<Option<Token>, F
     let file = File::open(path).map_err(unreadable)?;
     if let Some(mode) = open_to_others(&file).map_err(unreadable)? {
         let path = path.display();
-        return Err(Failure::Input(format!("the token file {path} is open to others than its owner (mode {mode:03o}); close it with: chmod 600 {path}")));
+        return Err(Failure::Input(format!(
+            "the token file {path} is open to others than its owner (mode {mode:03o}); close it with: chmod 600 {path}"
+        )));
     }
     let mut bytes = Vec::new();
     LimitedFile::of(file, MOST_BYTES).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(unreadable)?;
@@ -97,6 +101,8 @@ pub(crate) struct KeyedLinks {
     pub(crate) keys: Vec<LinkKeys>,
     /// Where files that keys name are looked for.
     pub(crate) folder: PathBuf,
+    /// Which of them a change may name.
+    pub(crate) files: ControlFiles,
     pub(crate) changes: Sender<Edit>,
 }
 
@@ -110,10 +116,12 @@ impl LinkEditor for KeyedLinks {
         let edits = links.iter().map(|link| {
             let old = self.keys.get(*link).ok_or_else(|| format!("there is no link {link}"))?;
             let new = keys.iter().fold(old.clone(), |laid, (key, value)| laid.with(key, value));
-            let model = new.model(&self.folder).map_err(|error| {
-                let said = error.diagnostic().map_or_else(|| error.to_string(), |diagnostic| diagnostic.message().to_owned());
-                let text = error.diagnostic().and_then(cohaptic_scene::Diagnostic::override_text).unwrap_or_default();
-                let at = text.strip_prefix("link.").unwrap_or(text);
+            let read = |path: &std::path::Path| self.files.read(old, &self.folder, path);
+            let model = new.model_with(&self.folder, FileReader(&read)).map_err(|error| {
+                // A person at the other end may name a file and not see its content.
+                let said = error.bare_message();
+                let at = error.diagnostic().map_or("", |diagnostic| diagnostic.override_text().unwrap_or_else(|| diagnostic.key()));
+                let at = at.strip_prefix("link.").unwrap_or(at);
                 if at.is_empty() { said } else { format!("{at}: {said}") }
             })?;
             Ok(Edit { link: *link, keys: new, model })
@@ -173,7 +181,7 @@ mod tests {
     fn a_change_of_several_links_is_made_whole_or_not_at_all() {
         let (changes, made) = channel();
         let keys = vec![LinkKeys::default().with("delay", "\"8ms\""), LinkKeys::default().with("netem", "\"delay 3ms\"")];
-        let mut links = KeyedLinks { keys, folder: PathBuf::new(), changes };
+        let mut links = KeyedLinks { keys, folder: PathBuf::new(), files: ControlFiles::default(), changes };
         let loss = |value: &str| vec![("loss".to_owned(), value.to_owned())];
         // The second link is written in words of tc-netem, which no other key stands beside.
         let error = links.change(&[0, 1], &loss("\"1%\"")).unwrap_err();

@@ -1,6 +1,7 @@
 //! What the commands that run in real time share.
 
 mod control;
+mod control_files;
 mod words;
 
 use std::time::Duration;
@@ -10,6 +11,7 @@ use cohaptic_realtime::{Pacing, Tolerance, Wishes};
 use crate::arguments::RealTimeArguments;
 
 pub(crate) use control::{Edit, KeyedLinks, LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
+pub(crate) use control_files::ControlFiles;
 pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, lasted, late, loading, notes, say, some_length, status};
 
 impl RealTimeArguments {

@@ -20,7 +20,7 @@ use crate::arguments::RelayArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::realtime::{self, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, quantiles_of, say, some_length};
+use crate::realtime::{self, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, quantiles_of, say, some_length};
 use crate::{interrupt, output};
 use setup::Setup;
 
@@ -31,7 +31,8 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let mut relay = Relay::bind(setup.config.clone(), EndpointConfig::default()).map_err(failure)?;
     setup.opened(relay.ports()).iter().for_each(|line| say(line));
     let (changes, wanted) = channel();
-    let editor = KeyedLinks { keys: std::mem::take(&mut setup.keys), folder: setup.folder.clone(), changes };
+    let files = ControlFiles::of(&arguments.real_time)?;
+    let editor = KeyedLinks { keys: std::mem::take(&mut setup.keys), folder: setup.folder.clone(), files, changes };
     let control = LiveControl::open(&arguments.real_time, description(&setup), Box::new(editor))?;
     let options = RunOptions {
         pacing: arguments.real_time.pacing(),

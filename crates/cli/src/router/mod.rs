@@ -19,7 +19,7 @@ use crate::arguments::RouterArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::realtime::{self, ConfiguredDelay, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, say, some_length};
+use crate::realtime::{self, ConfiguredDelay, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, say, some_length};
 use crate::{input, interrupt, output};
 
 /// Puts the emulator between two devices, and says what it did.
@@ -33,7 +33,8 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     // Each direction has keys of its own: it can be changed by itself.
     let keys = file.links.iter().flat_map(|link| [link.keys.clone(), link.keys.clone()]).collect();
     let folder = arguments.file.parent().map(Path::to_path_buf).unwrap_or_default();
-    let control = LiveControl::open(real_time, description(&file), Box::new(KeyedLinks { keys, folder, changes }))?;
+    let editor = KeyedLinks { keys, folder, files: ControlFiles::of(real_time)?, changes };
+    let control = LiveControl::open(real_time, description(&file), Box::new(editor))?;
     let ran = conduct(&mut router, &file, arguments, until, &control, wanted)?;
     if arguments.json {
         output::json(DocumentSchema::ROUTER, &answer::document(&file, &ran))?;

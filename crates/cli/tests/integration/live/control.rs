@@ -96,6 +96,48 @@ fn assert_metrics(control: &Control) {
     assert_eq!(values[r#"cohaptic_peer_status{peer="left",status="here"}"#], 1.0);
 }
 
+/// Keys that name files: refused without a folder; with one, its files are read, no others, and nothing of a file is shown.
+#[test]
+fn a_change_names_files_of_the_folder_alone_and_is_shown_none_of_them() {
+    let scene = format!("{TWO}\n[[links]]\nfrom = \"right\"\nto = \"left\"\ntrace = \"own.trace\"\n");
+    let desk = Desk::with("two.toml", &scene);
+    for file in ["own.trace", "given/up.trace", "beside/secret.trace"] {
+        desk.write(file, "0\n20\n40\n");
+    }
+    desk.write("given/shadow", "root:secret:19000\n");
+    assert!(std::process::Command::new("mkfifo").arg(desk.path("given/pipe")).status().unwrap().success());
+    let change = |control: &Control, link: usize, key: &str, value: &str| {
+        control.ask("PATCH", &format!("/api/links/{link}"), &json!({ (key): value }).to_string())
+    };
+    let mut session = Session::begin(&desk, "two.toml --json --for 1h --control");
+    let control = session.control();
+    for (key, value) in
+        [("replay", "/etc/passwd"), ("trace", "given/pipe"), ("jitter", "{ sd = \"1ms\", distribution = { table = \"given/shadow\" } }")]
+    {
+        let (status, answer) = change(&control, 0, key, value);
+        assert_eq!(status, 422, "{answer}");
+        assert!(answer.contains("--control-files DIR") && !answer.contains("secret") && !answer.contains("root"), "{answer}");
+    }
+    assert_eq!(change(&control, 1, "delay", "5ms").0, 200, "the file that the scene names is not named by the change");
+    assert_eq!(change(&control, 1, "trace", "own.trace").0, 200, "what is shown can be sent back");
+    session.end();
+    let mut session = Session::begin(&desk, "two.toml --json --for 1h --control --control-files given");
+    let control = session.control();
+    let (status, answer) = change(&control, 0, "trace", "given/up.trace");
+    assert_eq!(status, 200, "{answer}");
+    for path in ["beside/secret.trace", "given/../beside/secret.trace", "/etc/passwd", "given/none"] {
+        let (status, answer) = change(&control, 0, "trace", path);
+        assert!(status == 422 && answer.contains("--control-files"), "{path}: {answer}");
+    }
+    // Without a writer at its other end, a pipe that is waited for stops the server for ever.
+    let (status, answer) = change(&control, 0, "trace", "given/pipe");
+    assert!(status == 422 && answer.contains("no regular file"), "{answer}");
+    let (status, answer) = change(&control, 0, "replay", "given/shadow");
+    assert!(status == 422 && answer.contains("line 1") && !answer.contains("secret"), "{answer}");
+    session.end();
+    desk.cohaptic("live two.toml --control --control-files none").assert_refused(2, &["--control-files none", "expected a folder"]);
+}
+
 #[test]
 fn the_token_may_be_ones_own() {
     let desk = Desk::with("two.toml", TWO);

@@ -1,0 +1,168 @@
+//! Files of which live control may read: those that the user named, and those of one folder, if the user gave one.
+
+use std::cell::Cell;
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::os::fd::AsRawFd as _;
+use std::path::{Component, Path, PathBuf};
+
+use cohaptic_files::{LimitedFile, MOST_BYTES};
+use cohaptic_linkfile::reading::FileReader;
+use cohaptic_scene::LinkKeys;
+use rustix::fs::{Mode, OFlags};
+
+use crate::arguments::RealTimeArguments;
+use crate::failure::Failure;
+
+/// The files that somebody at the other end of live control may name in keys of links.
+///
+/// A person with the token may change links. Keys that name files must neither show the files of the user to that person nor stop the server with a file that
+/// never ends.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ControlFiles {
+    /// The folder of `--control-files`, without symbolic links; `None`: no file may be named but those that the user named at the start.
+    folder: Option<PathBuf>,
+}
+
+impl ControlFiles {
+    /// Those that the command line allows.
+    pub(crate) fn of(arguments: &RealTimeArguments) -> Result<Self, Failure> {
+        let Some(path) = &arguments.control_files else { return Ok(Self::default()) };
+        let refused = |error: io::Error| Failure::Input(format!("--control-files {}: {error}: expected a folder", path.display()));
+        let folder = path.canonicalize().map_err(refused)?;
+        if !folder.is_dir() {
+            return Err(refused(io::ErrorKind::NotADirectory.into()));
+        }
+        Ok(Self { folder: Some(folder) })
+    }
+
+    /// The bytes of a file that changed keys of a link name. `keys` are those from before the change; `base` is the folder that their names are relative to.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::PermissionDenied`] for a file that may not be named, whether there is such a file or not. What the system says, and a refusal of
+    /// whatever is no regular file.
+    pub(crate) fn read(&self, keys: &LinkKeys, base: &Path, path: &Path) -> io::Result<Vec<u8>> {
+        if let Some(within) = self.within(path) {
+            let file = open_regular(&within, OFlags::NOFOLLOW)?;
+            // A link that was put in place of a folder after the path was resolved leads to a file of another path.
+            if std::fs::read_link(format!("/proc/self/fd/{}", file.as_raw_fd()))? != within {
+                return Err(self.refusal());
+            }
+            return read(file);
+        }
+        // Keys name only files of the user and files of the folder, so a file that they name outside the folder is the user's choice.
+        if names(keys, base, path) { read(open_regular(path, OFlags::empty())?) } else { Err(self.refusal()) }
+    }
+
+    /// The path without symbolic links, if it lies in the folder.
+    fn within(&self, path: &Path) -> Option<PathBuf> {
+        let folder = self.folder.as_ref()?;
+        if path.components().any(|part| part == Component::ParentDir) {
+            return None;
+        }
+        path.canonicalize().ok().filter(|real| real.starts_with(folder))
+    }
+
+    /// Says the same of every path, so that nobody learns which files there are.
+    fn refusal(&self) -> io::Error {
+        let message = match &self.folder {
+            Some(folder) => format!("live control reads the files of {} alone (--control-files)", folder.display()),
+            None => "live control reads no files unless it is started with --control-files DIR".to_owned(),
+        };
+        io::Error::new(io::ErrorKind::PermissionDenied, message)
+    }
+}
+
+/// Whether these keys name that file. The files are read for it: a law of which one table cannot be had does not ask for the next one.
+fn names(keys: &LinkKeys, base: &Path, path: &Path) -> bool {
+    let is_named = Cell::new(false);
+    let reader = |named: &Path| {
+        is_named.set(is_named.get() || named == path);
+        read(open_regular(named, OFlags::empty())?)
+    };
+    // Only the names count. Whether the keys still make a link is told by those after the change.
+    let _ = keys.model_with(base, FileReader(&reader));
+    is_named.get()
+}
+
+/// Opens a regular file, and nothing else: a pipe is not waited for.
+fn open_regular(path: &Path, also: OFlags) -> io::Result<File> {
+    let file = File::from(rustix::fs::open(path, OFlags::RDONLY | OFlags::CLOEXEC | OFlags::NONBLOCK | also, Mode::empty())?);
+    // The open file is asked, not the path, which may name another file by now.
+    if file.metadata()?.is_file() { Ok(file) } else { Err(io::Error::other("it is no regular file")) }
+}
+
+fn read(file: File) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    LimitedFile::of(file, MOST_BYTES)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::symlink;
+    use std::process::Command;
+
+    use super::*;
+
+    const TRACE: &str = "0\n10\n20\n";
+
+    /// A folder `open` with files in it and a file beside it.
+    fn desk() -> (tempfile::TempDir, ControlFiles) {
+        let desk = tempfile::tempdir().unwrap();
+        let open = desk.path().join("open");
+        std::fs::create_dir_all(open.join("deep")).unwrap();
+        for file in ["open/a.trace", "open/deep/b.trace", "secret.trace"] {
+            std::fs::write(desk.path().join(file), TRACE).unwrap();
+        }
+        let files = ControlFiles { folder: Some(open.canonicalize().unwrap()) };
+        (desk, files)
+    }
+
+    fn refused(files: &ControlFiles, path: &Path) -> io::ErrorKind {
+        files.read(&LinkKeys::default(), Path::new(""), path).unwrap_err().kind()
+    }
+
+    #[test]
+    fn files_of_the_folder_are_read_and_no_others() {
+        let (desk, files) = desk();
+        let at = |name: &str| desk.path().join(name);
+        for name in ["open/a.trace", "open/deep/b.trace", "open/./deep/b.trace"] {
+            assert_eq!(files.read(&LinkKeys::default(), Path::new(""), &at(name)).unwrap(), TRACE.as_bytes(), "{name}");
+        }
+        symlink(at("open/a.trace"), at("open/inside")).unwrap();
+        assert_eq!(files.read(&LinkKeys::default(), Path::new(""), &at("open/inside")).unwrap(), TRACE.as_bytes());
+        symlink(at("secret.trace"), at("open/leads-out")).unwrap();
+        symlink(desk.path(), at("open/up")).unwrap();
+        for name in ["secret.trace", "open/../secret.trace", "open/deep/../a.trace", "open/leads-out", "open/up/secret.trace", "open/none", "none"] {
+            assert_eq!(refused(&files, &at(name)), io::ErrorKind::PermissionDenied, "{name}");
+        }
+        let none = ControlFiles::default();
+        let said = |path: &Path| none.read(&LinkKeys::default(), Path::new(""), path).unwrap_err().to_string();
+        assert_eq!(said(&at("open/a.trace")), said(Path::new("/none")), "nobody learns which files there are");
+    }
+
+    /// A pipe that nobody writes to has no end: were it read, this test would not return.
+    #[test]
+    fn what_is_no_regular_file_is_not_waited_for() {
+        let (desk, files) = desk();
+        let pipe = desk.path().join("open/pipe");
+        assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for path in [pipe, desk.path().join("open/deep")] {
+            let error = files.read(&LinkKeys::default(), Path::new(""), &path).unwrap_err();
+            assert_eq!(error.to_string(), "it is no regular file");
+        }
+    }
+
+    #[test]
+    fn a_file_that_the_user_named_may_be_named_again() {
+        let (desk, _) = desk();
+        let keys = LinkKeys::default().with("trace", "\"secret.trace\"").with("jitter", "{ sd = \"1ms\", distribution = { table = \"none.dist\" } }");
+        let none = ControlFiles::default();
+        let path = desk.path().join("secret.trace");
+        assert_eq!(none.read(&keys, desk.path(), &path).unwrap(), TRACE.as_bytes());
+        assert_eq!(none.read(&keys, desk.path(), &desk.path().join("none.dist")).unwrap_err().kind(), io::ErrorKind::NotFound);
+        assert_eq!(none.read(&keys, desk.path(), &desk.path().join("open/a.trace")).unwrap_err().kind(), io::ErrorKind::PermissionDenied);
+    }
+}
