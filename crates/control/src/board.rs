@@ -66,10 +66,10 @@ impl Board {
     }
 }
 
-/// Reads and changes the links of a run. Called on the thread of the server, one call at a time.
+/// Reads and changes the links of a run, one call at a time. Keys are read on the thread of the server and should take microseconds: until then nobody else
+/// is answered. A change is made on another thread and may take longer, for instance to read files; other changes and readers of keys wait for it.
 ///
 /// The implementor reads and checks what it is given and hands the change to the real-time side, which takes it up at an instant of its own.
-/// Calls should take milliseconds at most: until they return nobody else is answered.
 pub trait LinkEditor: Send {
     /// The keys that this link was told, each once, in any order, with their values as TOML text: `("delay", "\"40ms\"")`. A key at its default
     /// may be left out. The number is below that of the links in the [`Description`](crate::Description).

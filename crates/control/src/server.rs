@@ -2,14 +2,14 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use thiserror::Error;
 use tokio::runtime::Builder;
-use tokio::sync::{Semaphore, oneshot};
+use tokio::sync::{Mutex, Semaphore, oneshot};
 
-use crate::http::{self, App};
+use crate::http::{self, App, Pace, Shown};
 use crate::ticket::Ticket;
 use crate::{Board, LinkEditor, Stage, Token, TokenError};
 
@@ -110,13 +110,15 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
     let app = App {
         board,
         ticket: Arc::clone(&ticket),
-        editor: Mutex::new(editor),
+        shown: Shown::default(),
+        editor: Arc::new(Mutex::new(editor)),
         token: token.clone(),
         guests: guests.clone(),
         hosts: config.hosts,
         stage,
-        hands: Arc::new(Semaphore::new(http::MOST)),
         comparing: Semaphore::new(1),
+        pace: Pace::default(),
+        patience: http::PATIENCE,
     };
     let runtime = Builder::new_current_thread().enable_io().enable_time().build().map_err(ServeError::Thread)?;
     let listener = {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use axum::body::{Body, to_bytes};
+use axum::body::Body;
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::App;
 use super::read::{named, with_keys};
-use super::{Refusal, json as answer};
+use super::{Refusal, body as bodies, json as answer};
 use crate::typed;
 
 /// Bodies beyond this are refused \[bytes\]. Every key of a link at its longest is a hundredth of it.
@@ -20,31 +20,32 @@ const LARGEST_BODY: usize = 64 * 1024;
 /// Lays keys over those of one link.
 pub(super) async fn one(State(app): State<Arc<App>>, path: Result<Path<String>, PathRejection>, body: Body) -> Result<Response, Refusal> {
     let link = named(&app, path)?;
-    let keys = keys(body).await?;
-    change(&app, &[link], &keys)?;
-    Ok(answer(&with_keys(&app, &[link]).pop().unwrap_or_default()))
+    let keys = keys(&app, body).await?;
+    change(&app, vec![link], keys).await?;
+    Ok(answer(&with_keys(&app, &[link]).await.pop().unwrap_or_default()))
 }
 
 /// Lays keys over those of all links, or of none if one of them cannot take them.
 pub(super) async fn all(State(app): State<Arc<App>>, body: Body) -> Result<Response, Refusal> {
-    let keys = keys(body).await?;
+    let keys = keys(&app, body).await?;
     let links: Vec<usize> = (0..app.board.description().links.len()).collect();
     if links.is_empty() {
         return Err(unprocessable("there is no link to be changed"));
     }
-    change(&app, &links, &keys)?;
-    Ok(answer(&json!({ "links": with_keys(&app, &links) })))
+    change(&app, links.clone(), keys).await?;
+    Ok(answer(&json!({ "links": with_keys(&app, &links).await })))
 }
 
-fn change(app: &App, links: &[usize], keys: &[(String, String)]) -> Result<(), Refusal> {
-    app.editor().change(links, keys).map_err(unprocessable)
+/// On a thread of its own, because keys may name files: others are answered meanwhile.
+async fn change(app: &App, links: Vec<usize>, keys: Vec<(String, String)>) -> Result<(), Refusal> {
+    let mut editor = app.editor().await;
+    let changed = tokio::task::spawn_blocking(move || editor.change(&links, &keys)).await;
+    changed.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the change broke off"))?.map_err(unprocessable)
 }
 
 /// The keys that a body asks for, with their values as TOML text.
-async fn keys(body: Body) -> Result<Vec<(String, String)>, Refusal> {
-    let body = to_bytes(body, LARGEST_BODY)
-        .await
-        .map_err(|_| Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, format!("expected a body of at most {LARGEST_BODY} bytes that arrives whole")))?;
+async fn keys(app: &App, body: Body) -> Result<Vec<(String, String)>, Refusal> {
+    let body = bodies::read(app, body, LARGEST_BODY).await?;
     let keys: Map<String, Value> = serde_json::from_slice(&body)
         .map_err(|error| unprocessable(format!("expected a JSON object of link keys, such as {{\"delay\": \"40ms\", \"loss\": \"1%\"}}: {error}")))?;
     if keys.is_empty() {

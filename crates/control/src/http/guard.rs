@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, he
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Redirect, Response};
 
+use super::places::Seat;
 use super::{App, Refusal, page};
 use crate::Role;
 
@@ -25,8 +26,13 @@ const HEADERS: [(HeaderName, &str); 7] = [
 /// Lets a request through to its route, or refuses it.
 pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let mut request = request;
+    let seat = request.extensions().get::<Arc<Seat>>().cloned();
     let known = check_host(&app, request.uri(), request.headers());
-    let mut answer = match known.and_then(|()| check_token(&app, request.uri(), request.headers())).and_then(|role| may(role, request.method())) {
+    let admitted = known.and_then(|()| check_token(&app, request.uri(), request.headers())).and_then(|role| sit(seat.as_deref(), role));
+    if matches!(admitted, Ok(Role::Guest)) {
+        app.pace.turn().await;
+    }
+    let mut answer = match admitted.and_then(|role| may(role, request.method())) {
         Err(refusal) if refusal.status == StatusCode::UNAUTHORIZED && has_ticket(&app, request.uri(), request.method()) => {
             Redirect::to(&format!("/?token={}", app.token.secret())).into_response()
         }
@@ -47,10 +53,22 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
     if answer.status() == StatusCode::UNAUTHORIZED {
         answer.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
     }
+    // The places of strangers are few: each has one answer.
+    if seat.is_some_and(|seat| seat.is_strange()) {
+        answer.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+    }
     for (name, value) in HEADERS {
         answer.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
     }
     answer
+}
+
+/// Gives the connection a place among those with this role.
+fn sit(seat: Option<&Seat>, role: Role) -> Result<Role, Refusal> {
+    if seat.is_some_and(|seat| !seat.show(role)) {
+        return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "too many connections are open with this token: close some, or try again later"));
+    }
+    Ok(role)
 }
 
 /// A guest changes nothing but a hand.

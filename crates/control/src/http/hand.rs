@@ -13,21 +13,22 @@ use futures_util::{Sink, SinkExt as _, Stream as Incoming, StreamExt as _};
 use hyper::upgrade::{OnUpgrade, Upgraded};
 use hyper_util::rt::TokioIo;
 use serde_json::json;
-use tokio::sync::OwnedSemaphorePermit;
-use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
+use tokio::time::{MissedTickBehavior, interval, timeout};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::server::create_response_with_body;
 use tokio_tungstenite::tungstenite::protocol::{Role as End, WebSocketConfig};
 use tokio_tungstenite::tungstenite::{Error, Message};
 
+use super::frames::Counted;
+use super::places::Seat;
 use super::play::stage;
 use super::{App, Refusal};
 use crate::Stage;
 
 /// A longer message is no place: three numbers with all their digits take 75 bytes.
 const LONGEST: usize = 128;
-/// As many places as the fastest screen shows, and half as many again.
-const MOST_A_SECOND: u32 = 360;
+/// Some places at once \[byte\].
+const READ_AT_ONCE: usize = 8 * LONGEST;
 /// A picture of the motion is sent so often at most.
 const EVERY: Duration = Duration::from_millis(16);
 /// A page that takes no picture for so long is gone.
@@ -42,29 +43,12 @@ fn read(text: &str) -> Option<Place> {
     place.is_none_or(|place| place.iter().all(|x| x.is_finite())).then_some(place)
 }
 
-/// A second, and what came in it.
-struct Rate {
-    began: Instant,
-    count: u32,
-}
-
-impl Rate {
-    /// Whether one more is not too many.
-    fn admits(&mut self, now: Instant) -> bool {
-        if now.duration_since(self.began) >= Duration::from_secs(1) {
-            *self = Self { began: now, count: 0 };
-        }
-        self.count += 1;
-        self.count <= MOST_A_SECOND
-    }
-}
-
 /// Takes a hand for the page that asks, and goes on over a WebSocket. Without `hand=` in the query it is any that is free; `hand=none` only looks on.
 pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -> Result<Response, Refusal> {
     let stage = stage(&app)?;
     check_origin(request.headers())?;
     let wanted = wanted(request.uri())?;
-    let place = Arc::clone(&app.hands).try_acquire_owned().map_err(|_| Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "too many pages are open"))?;
+    let seat = request.extensions().get::<Arc<Seat>>().cloned();
     let answer = create_response_with_body(&request, Body::empty)
         .map_err(|error| Refusal::new(StatusCode::UPGRADE_REQUIRED, format!("expected a WebSocket: {error}")))?;
     let upgrade = hyper::upgrade::on(&mut request);
@@ -73,7 +57,7 @@ pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -
         Wanted::Any => stage.take_hand(None).map(Some),
         Wanted::One(hand) => stage.take_hand(Some(hand)).map(Some),
     };
-    tokio::spawn(talk(stage, hand, upgrade, place));
+    tokio::spawn(talk(stage, hand, upgrade, seat));
     Ok(answer.into_response())
 }
 
@@ -117,30 +101,28 @@ impl Drop for Taken {
     }
 }
 
-async fn talk(stage: Arc<dyn Stage>, hand: Result<Option<usize>, String>, upgrade: OnUpgrade, place: OwnedSemaphorePermit) {
+/// `seat` is the place of the connection, which is taken for as long as this goes on.
+async fn talk(stage: Arc<dyn Stage>, hand: Result<Option<usize>, String>, upgrade: OnUpgrade, seat: Option<Arc<Seat>>) {
     let greeting = match &hand {
         Ok(hand) => json!({ "hand": hand }),
         Err(reason) => json!({ "hand": null, "refused": reason }),
     };
     let taken = hand.ok().flatten().map(|hand| Taken { stage: Arc::clone(&stage), hand });
     let Ok(upgraded) = upgrade.await else { return };
-    let config = WebSocketConfig::default().max_message_size(Some(LONGEST)).max_frame_size(Some(LONGEST));
-    let socket: WebSocketStream<TokioIo<Upgraded>> = WebSocketStream::from_raw_socket(TokioIo::new(upgraded), End::Server, Some(config)).await;
+    let config = WebSocketConfig::default().max_message_size(Some(LONGEST)).max_frame_size(Some(LONGEST)).read_buffer_size(READ_AT_ONCE);
+    let stream = Counted::new(TokioIo::new(upgraded));
+    let socket: WebSocketStream<Counted<TokioIo<Upgraded>>> = WebSocketStream::from_raw_socket(stream, End::Server, Some(config)).await;
     let (mut out, incoming) = socket.split();
     if send(&mut out, greeting.to_string()).await {
         // Whichever ends first ends the other.
         select(pin!(listen(&taken, incoming)), pin!(show(&*stage, out))).await;
     }
-    drop((taken, place));
+    drop((taken, seat));
 }
 
 /// Moves the hand until the page goes, or says something that no page says.
 async fn listen(taken: &Option<Taken>, mut incoming: impl Incoming<Item = Result<Message, Error>> + Unpin) {
-    let mut rate = Rate { began: Instant::now(), count: 0 };
     while let Some(Ok(message)) = incoming.next().await {
-        if !rate.admits(Instant::now()) {
-            return;
-        }
         let place = match message {
             Message::Text(text) => read(&text),
             Message::Ping(_) | Message::Pong(_) => continue,
@@ -191,17 +173,6 @@ mod tests {
         for wrong in ["", "[]", "[1,2]", "[1,2,3,4]", "[1,2,\"3\"]", "[1,2,null]", "[1e999,0,0]", "[NaN,0,0]", "{}", "1", "nul", "[1,2,3] x"] {
             assert_eq!(read(wrong), None, "{wrong}");
         }
-    }
-
-    #[test]
-    fn a_page_that_says_too_much_is_told_apart_from_a_fast_screen() {
-        let begin = Instant::now();
-        let mut rate = Rate { began: begin, count: 0 };
-        for second in 0..3 {
-            assert!((0..240).all(|_| rate.admits(begin + Duration::from_secs(second))), "240 a second");
-        }
-        let admitted = (0..1000).filter(|_| rate.admits(begin + Duration::from_secs(9))).count();
-        assert_eq!(admitted, MOST_A_SECOND as usize);
     }
 
     proptest! {

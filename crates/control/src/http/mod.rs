@@ -1,37 +1,46 @@
 //! The routes and their answers.
 
+mod body;
 mod change;
+mod connection;
+mod frames;
 mod guard;
 mod hand;
+mod pace;
 mod page;
+mod patient;
+mod places;
 mod play;
 mod read;
+mod shown;
 #[cfg(test)]
 mod tests;
 
 use core::time::Duration;
-use std::io;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use axum::Router;
 use axum::http::{HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::from_fn_with_state;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use hyper::server::conn::http1::Builder;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::service::TowerToHyperService;
 use serde_json::{Value, json};
-use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{Mutex, OwnedMutexGuard, Semaphore};
 
 use crate::ticket::Ticket;
 use crate::{Board, LinkEditor, Stage, Token};
 
+pub(crate) use connection::{PATIENCE, answer_all};
+pub(crate) use pace::Pace;
+pub(crate) use shown::Shown;
+
 /// What all answers are made from.
 pub(crate) struct App {
     pub(crate) board: Arc<Board>,
-    pub(crate) editor: Mutex<Box<dyn LinkEditor>>,
+    /// The last snapshot as text.
+    pub(crate) shown: Shown,
+    /// Waited for without keeping the thread: a change may read files.
+    pub(crate) editor: Arc<Mutex<Box<dyn LinkEditor>>>,
     pub(crate) token: Token,
     pub(crate) ticket: Arc<Ticket>,
     /// That of those to whom a link was handed out.
@@ -39,16 +48,18 @@ pub(crate) struct App {
     pub(crate) hosts: Vec<String>,
     /// If people take part from a page.
     pub(crate) stage: Option<Arc<dyn Stage>>,
-    /// The pages that take part.
-    pub(crate) hands: Arc<Semaphore>,
     /// One comparison takes a core.
     pub(crate) comparing: Semaphore,
+    /// The turns of guests' requests.
+    pub(crate) pace: Pace,
+    /// How long a body may take.
+    pub(crate) patience: Duration,
 }
 
 impl App {
-    /// The editor. One that panicked was asked too much once; it is asked again all the same.
-    fn editor(&self) -> MutexGuard<'_, Box<dyn LinkEditor>> {
-        self.editor.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The editor, as soon as no change is being made.
+    async fn editor(&self) -> OwnedMutexGuard<Box<dyn LinkEditor>> {
+        Arc::clone(&self.editor).lock_owned().await
     }
 
     /// The number of the link that a path names, if there is one.
@@ -119,38 +130,4 @@ async fn method_not_allowed(method: Method, uri: Uri) -> Refusal {
         _ => "GET",
     };
     Refusal::new(StatusCode::METHOD_NOT_ALLOWED, format!("{method} is nothing that {} does: expected {expected}", uri.path().escape_debug()))
-}
-
-/// How many connections may be open. The others wait: the real-time side shares the limit of open files with them.
-pub(crate) const MOST: usize = 64;
-/// How long a request head may take, from its connection or from the answer before it.
-const PATIENCE: Duration = Duration::from_secs(10);
-/// When no connection can be taken, because there are too many open files, it is tried again after this.
-const RETRY: Duration = Duration::from_secs(1);
-
-/// Takes connections for ever.
-pub(crate) async fn answer_all(listener: TcpListener, router: Router) {
-    let places = Arc::new(Semaphore::new(MOST));
-    // It is never closed.
-    while let Ok(place) = Arc::clone(&places).acquire_owned().await {
-        match listener.accept().await {
-            Ok((stream, _)) => {
-                tokio::spawn(answer(stream, router.clone(), place));
-            }
-            // It was given up before it was taken.
-            Err(error) if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) => {}
-            Err(_) => tokio::time::sleep(RETRY).await,
-        }
-    }
-}
-
-/// Answers what one connection asks, until it ends.
-async fn answer(stream: TcpStream, router: Router, place: OwnedSemaphorePermit) {
-    // Events are small and should not wait for one another.
-    let _set: io::Result<()> = stream.set_nodelay(true);
-    let mut builder = Builder::new();
-    builder.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
-    // The program at the other end has gone, or spoke no HTTP: nobody is left to be told.
-    let _ended: hyper::Result<()> = builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router)).with_upgrades().await;
-    drop(place);
 }

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use axum::Router;
-use axum::body::{Body, to_bytes};
+use axum::body::Body;
 use axum::extract::{Path, State};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 use serde_json::Value;
 
-use super::{App, Refusal, hand, json as answer, page};
+use super::{App, Refusal, body as bodies, hand, json as answer, page};
 use crate::{Role, Stage};
 
 /// A wish is a few words.
@@ -38,13 +38,13 @@ async fn facts(State(app): State<Arc<App>>, axum::Extension(role): axum::Extensi
 
 async fn begin_anew(State(app): State<Arc<App>>, body: Body) -> Result<Response, Refusal> {
     let unprocessable = |reason: String| Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, reason);
-    let body = to_bytes(body, LARGEST_WISH)
-        .await
-        .map_err(|_| Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, format!("expected a body of at most {LARGEST_WISH} bytes that arrives whole")))?;
+    let body = bodies::read(&app, body, LARGEST_WISH).await?;
     let wish: Value = serde_json::from_slice(&body).map_err(|error| unprocessable(format!("expected a JSON object: {error}")))?;
     let stage = stage(&app)?;
-    stage.begin_anew(&wish).map_err(unprocessable)?;
-    Ok(answer(&stage.facts(Role::Host)))
+    // The scene is read anew, and the files that it names.
+    let begun = tokio::task::spawn_blocking(move || stage.begin_anew(&wish).map(|()| stage.facts(Role::Host))).await;
+    let begun = begun.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the new part broke off"))?;
+    Ok(answer(&begun.map_err(unprocessable)?))
 }
 
 /// Takes a while: others are answered meanwhile, on the thread of the server.
@@ -56,7 +56,11 @@ async fn compare(State(app): State<Arc<App>>) -> Result<Response, Refusal> {
     Ok(answer(&compared.map_err(|reason| Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, reason))?))
 }
 
-async fn file(State(app): State<Arc<App>>, Path(name): Path<String>) -> Result<Response, Refusal> {
+/// For the host alone: a record may be large, and guests who all ask for it at once would fill the memory.
+async fn file(State(app): State<Arc<App>>, axum::Extension(role): axum::Extension<Role>, Path(name): Path<String>) -> Result<Response, Refusal> {
+    if role != Role::Host {
+        return Err(Refusal::new(StatusCode::FORBIDDEN, "only the person who started the run may have its record: this token is that of a guest"));
+    }
     let stage = stage(&app)?;
     let read = tokio::task::spawn_blocking(move || stage.file(&name)).await;
     let Ok(Some(file)) = read else { return Err(Refusal::new(StatusCode::NOT_FOUND, "there is no such file: compare first")) };

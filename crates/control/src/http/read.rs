@@ -4,12 +4,11 @@ use core::convert::Infallible;
 use core::time::Duration;
 use std::sync::Arc;
 
+use axum::body::{Body, Bytes};
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::{HeaderValue, StatusCode, header};
-use axum::response::sse::{Event, Sse};
 use axum::response::{IntoResponse as _, Response};
-use futures_util::Stream;
 use futures_util::stream::unfold;
 use serde_json::{Map, Value, json};
 use tokio::time::{Interval, MissedTickBehavior, interval};
@@ -19,19 +18,20 @@ use crate::{metrics, typed, views};
 
 /// Everything that changes by itself.
 pub(super) async fn state(State(app): State<Arc<App>>) -> Response {
-    answer(&views::state(&app.board.latest()))
+    let shown = app.shown.latest(&app.board);
+    ([(header::CONTENT_TYPE, HeaderValue::from_static("application/json"))], shown.json.clone()).into_response()
 }
 
 /// Every link with its counters and keys.
 pub(super) async fn links(State(app): State<Arc<App>>) -> Response {
     let all: Vec<usize> = (0..app.board.description().links.len()).collect();
-    answer(&json!({ "links": with_keys(&app, &all) }))
+    answer(&json!({ "links": with_keys(&app, &all).await }))
 }
 
 /// One link with its counters and keys.
 pub(super) async fn link(State(app): State<Arc<App>>, path: Result<Path<String>, PathRejection>) -> Result<Response, Refusal> {
     let link = named(&app, path)?;
-    Ok(answer(&with_keys(&app, &[link]).pop().unwrap_or_default()))
+    Ok(answer(&with_keys(&app, &[link]).await.pop().unwrap_or_default()))
 }
 
 /// Distributions of lateness and of delay.
@@ -61,9 +61,9 @@ pub(super) fn named(app: &App, path: Result<Path<String>, PathRejection>) -> Res
 }
 
 /// Links with their counters and keys.
-pub(super) fn with_keys(app: &App, links: &[usize]) -> Vec<Value> {
+pub(super) async fn with_keys(app: &App, links: &[usize]) -> Vec<Value> {
+    let editor = app.editor().await;
     let latest = app.board.latest();
-    let editor = app.editor();
     let view = |link: &usize| {
         let mut view = views::link(&latest.description, &latest.snapshot, *link);
         let keys: Map<String, Value> = editor.keys(*link).into_iter().map(|(key, value)| (key, typed::shown(&value).into())).collect();
@@ -87,32 +87,32 @@ struct Listener {
 }
 
 /// The state at once, then each time that it was published anew, at most ten times a second.
-pub(super) async fn events(State(app): State<Arc<App>>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
+pub(super) async fn events(State(app): State<Arc<App>>) -> Response {
     let mut ticks = interval(EVERY);
     // A slow reader gets less, not the past.
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let listener = Listener { app, ticks, sent: None, quiet: 0 };
-    Sse::new(unfold(listener, |mut listener| async {
+    let events = unfold(listener, |mut listener| async {
         let event = listener.next().await;
-        Some((Ok(event), listener))
-    }))
+        Some((Ok::<Bytes, Infallible>(event), listener))
+    });
+    ([(header::CONTENT_TYPE, HeaderValue::from_static("text/event-stream"))], Body::from_stream(events)).into_response()
 }
 
 impl Listener {
-    async fn next(&mut self) -> Event {
+    async fn next(&mut self) -> Bytes {
         loop {
             self.ticks.tick().await;
-            let latest = self.app.board.latest();
-            if self.sent != Some(latest.number) {
-                self.sent = Some(latest.number);
+            let shown = self.app.shown.latest(&self.app.board);
+            if self.sent != Some(shown.number) {
+                self.sent = Some(shown.number);
                 self.quiet = 0;
-                let state = views::state(&latest);
-                return Event::default().event("state").id(latest.number.to_string()).data(state.to_string());
+                return shown.event.clone();
             }
             self.quiet += 1;
             if self.quiet >= QUIET {
                 self.quiet = 0;
-                return Event::default().comment("nothing new");
+                return Bytes::from_static(b": nothing new\n\n");
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The routes without a socket: admission, answers, and what reaches the editor.
 
+use core::time::Duration;
 use std::sync::{Arc, Mutex};
 
 use axum::Router;
@@ -11,11 +12,11 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::sync::Semaphore;
 use tower::ServiceExt as _;
 
-use super::{App, router};
+use super::{App, Pace, Shown, router};
 use crate::ticket::Ticket;
 use crate::{Board, Body as ObjectBody, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Snapshot, TurnView};
 
-const TOKEN: &str = "a-token-of-more-than-22-characters";
+pub(super) const TOKEN: &str = "a-token-of-more-than-22-characters";
 
 /// Links, and keys with values.
 type Call = (Vec<usize>, Vec<(String, String)>);
@@ -35,9 +36,9 @@ impl LinkEditor for Recorder {
     }
 }
 
-struct Site {
+pub(super) struct Site {
     ticket: Arc<Ticket>,
-    router: Router,
+    pub(super) router: Router,
     calls: Calls,
     runtime: Runtime,
 }
@@ -49,7 +50,7 @@ struct Answer {
 }
 
 impl Site {
-    fn new(links: usize) -> Self {
+    pub(super) fn new(links: usize) -> Self {
         let name = |number| LinkName { name: format!("link {number}"), from: "left".to_owned(), to: "right".to_owned() };
         let description = Description {
             kind: Kind::Relay,
@@ -71,13 +72,15 @@ impl Site {
         let app = App {
             board,
             ticket: Arc::clone(&ticket),
-            editor: Mutex::new(Box::new(Recorder(Arc::clone(&calls)))),
+            shown: Shown::default(),
+            editor: Arc::new(tokio::sync::Mutex::new(Box::new(Recorder(Arc::clone(&calls))))),
             token: TOKEN.parse().unwrap(),
             guests: None,
             hosts: vec!["lab.example".to_owned()],
             stage: None,
-            hands: Arc::new(Semaphore::new(1)),
             comparing: Semaphore::new(1),
+            pace: Pace::default(),
+            patience: Duration::from_millis(200),
         };
         Self { ticket, router: router(app), calls, runtime: Builder::new_current_thread().enable_time().build().unwrap() }
     }

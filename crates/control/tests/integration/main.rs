@@ -4,5 +4,6 @@
 
 mod browser;
 mod contrast;
+mod floods;
 mod run;
 mod server;

@@ -120,6 +120,33 @@ impl Drop for Run {
     }
 }
 
+/// The links of a run that has none.
+pub(crate) struct NoLinks;
+
+impl LinkEditor for NoLinks {
+    fn keys(&self, _link: usize) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
+    fn change(&mut self, _links: &[usize], _keys: &[(String, String)]) -> Result<(), String> {
+        Err("there is nothing to change".to_owned())
+    }
+}
+
+/// The board of a run that has nothing.
+pub(crate) fn empty_board() -> Arc<Board> {
+    let description = Description {
+        kind: Kind::Router,
+        title: String::new(),
+        links: Vec::new(),
+        peers: Vec::new(),
+        clocks: Vec::new(),
+        measures: Vec::new(),
+        body: None,
+    };
+    Arc::new(Board::new(description))
+}
+
 fn measure(name: &str) -> MeasureLabel {
     let unit = if name.ends_with("_j") { "J" } else { "s" };
     MeasureLabel { name: name.to_owned(), unit, about: "A <measure>" }

@@ -2,41 +2,16 @@
 
 use core::net::SocketAddr;
 use core::time::Duration;
-use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Shutdown, TcpStream};
 use std::sync::Arc;
 
-use cohaptic_control::{Board, Description, Kind, LinkEditor, ServeError, ServerConfig, Snapshot, serve};
+use cohaptic_control::{Board, ServeError, ServerConfig, Snapshot, serve};
 
-use crate::run::{Run, TOKEN};
+use crate::run::{NoLinks, Run, TOKEN, empty_board};
 
 /// Nothing here takes long; a wait without end would hide what went wrong.
 const PATIENCE: Duration = Duration::from_secs(60);
-
-struct NoLinks;
-
-impl LinkEditor for NoLinks {
-    fn keys(&self, _link: usize) -> Vec<(String, String)> {
-        Vec::new()
-    }
-
-    fn change(&mut self, _links: &[usize], _keys: &[(String, String)]) -> Result<(), String> {
-        Err("there is nothing to change".to_owned())
-    }
-}
-
-fn empty_board() -> Arc<Board> {
-    let description = Description {
-        kind: Kind::Router,
-        title: String::new(),
-        links: Vec::new(),
-        peers: Vec::new(),
-        clocks: Vec::new(),
-        measures: Vec::new(),
-        body: None,
-    };
-    Arc::new(Board::new(description))
-}
 
 /// Again and again: a reader may be in the way at the very moment.
 fn publish(board: &Board, elapsed: Duration) {
@@ -140,28 +115,6 @@ fn publishing_goes_on_while_others_read() {
     }
     reader.join().unwrap();
     assert_eq!(board.latest().snapshot.elapsed, Duration::from_secs(1000));
-}
-
-#[test]
-fn no_more_than_64_connections_are_open() {
-    let run = Run::still(1, 0);
-    let address = run.server().address();
-    let request = format!("GET /api/events?token={TOKEN} HTTP/1.1\r\nHost: localhost\r\n\r\n");
-    let mut answered = [0; 12];
-    // Each was taken: it is being answered, without an end.
-    let mut open: Vec<TcpStream> = (0..64).map(|_| send(address, &request)).collect();
-    for stream in &mut open {
-        stream.read_exact(&mut answered).unwrap();
-        assert_eq!(&answered, b"HTTP/1.1 200");
-    }
-    let mut waiting = send(address, &request);
-    waiting.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
-    let silence = waiting.read_exact(&mut answered).unwrap_err();
-    assert!(matches!(silence.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut), "{silence}");
-    waiting.set_read_timeout(Some(PATIENCE)).unwrap();
-    drop(open.pop());
-    waiting.read_exact(&mut answered).unwrap();
-    assert_eq!(&answered, b"HTTP/1.1 200");
 }
 
 #[test]

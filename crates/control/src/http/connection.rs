@@ -1,0 +1,169 @@
+//! Connections: taken at once, given a place, and ended when they take too long.
+
+use core::pin::pin;
+use core::time::Duration;
+use std::io;
+use std::sync::Arc;
+
+use axum::Router;
+use axum::http::Request;
+use futures_util::future::select;
+use hyper::body::Incoming;
+use hyper::server::conn::http1::Builder;
+use hyper::service::{Service as _, service_fn};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use tokio::net::{TcpListener, TcpStream};
+
+use super::patient::Patient;
+use super::places::{Limits, Places, Seat};
+
+/// How long the head of a request may take, from its connection or from the answer before it, and how long an answer waits for a reader.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
+/// When no connection can be taken, because there are too many open files, it is tried again after this.
+const RETRY: Duration = Duration::from_millis(100);
+/// The largest head of a request, and the largest part of unread answers that is kept \[byte\].
+const BUFFER: usize = 16 * 1024;
+
+/// Takes connections for ever.
+pub(crate) async fn answer_all(listener: TcpListener, router: Router) {
+    answer_within(listener, router, Limits::USUAL, PATIENCE).await;
+}
+
+async fn answer_within(listener: TcpListener, router: Router, limits: Limits, patience: Duration) {
+    let places = Places::new(limits);
+    loop {
+        match listener.accept().await {
+            Ok((stream, address)) => {
+                tokio::spawn(answer(stream, router.clone(), places.take(address.ip()), patience));
+                // Connections whose request has come already are read before the next connection may take their place.
+                tokio::task::yield_now().await;
+            }
+            // It was given up before it was taken.
+            Err(error) if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) => {}
+            Err(_) => {
+                places.send_one_away();
+                tokio::time::sleep(RETRY).await;
+            }
+        }
+    }
+}
+
+/// Answers what one connection asks, until it ends.
+async fn answer(stream: TcpStream, router: Router, seat: Arc<Seat>, patience: Duration) {
+    // Events are small and should not wait for one another.
+    let _set: io::Result<()> = stream.set_nodelay(true);
+    let routes = TowerToHyperService::new(router);
+    let shown = Arc::clone(&seat);
+    let service = service_fn(move |mut request: Request<Incoming>| {
+        // The guard tells the place which token was shown.
+        request.extensions_mut().insert(Arc::clone(&shown));
+        routes.call(request)
+    });
+    let mut builder = Builder::new();
+    builder.timer(TokioTimer::new()).header_read_timeout(patience).max_buf_size(BUFFER);
+    let serving = builder.serve_connection(TokioIo::new(Patient::new(stream, patience)), service).with_upgrades();
+    // Whichever way it ends, nobody is left to be told: the program at the other end has gone, spoke no HTTP, or was too slow.
+    select(pin!(serving), pin!(seat.sent_away())).await;
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read as _, Write as _};
+    use std::net::{SocketAddr, TcpStream};
+    use std::time::Instant;
+
+    use super::*;
+    use crate::http::tests::{Site, TOKEN};
+
+    /// Longer than the patience of the server below, and short of a wait for ever.
+    const LONG: Duration = Duration::from_secs(30);
+
+    /// The routes of a site over real sockets, by a server that has little patience.
+    fn server() -> SocketAddr {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        listener.set_nonblocking(true).unwrap();
+        let address = listener.local_addr().unwrap();
+        let limits = Limits { strangers: 4, guests: 1, hosts: 2 };
+        let router = Site::new(2).router;
+        std::thread::spawn(move || {
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build().unwrap();
+            runtime.block_on(async {
+                let listener = TcpListener::from_std(listener).unwrap();
+                answer_within(listener, router, limits, Duration::from_millis(300)).await;
+            });
+        });
+        address
+    }
+
+    fn send(address: SocketAddr, text: &str) -> TcpStream {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.set_read_timeout(Some(LONG)).unwrap();
+        stream.write_all(text.as_bytes()).unwrap();
+        stream
+    }
+
+    /// Everything until the server ends the connection.
+    fn rest(mut stream: TcpStream) -> String {
+        let mut bytes = Vec::new();
+        // A connection that was reset has ended too; one that stays open fails the test by its time.
+        let ended = stream.read_to_end(&mut bytes);
+        assert!(ended.is_ok() || ended.is_err_and(|error| error.kind() == io::ErrorKind::ConnectionReset));
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    fn request(method: &str, path: &str) -> String {
+        format!("{method} {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {TOKEN}\r\n")
+    }
+
+    #[test]
+    fn a_body_that_does_not_come_is_not_waited_for() {
+        let slow = send(server(), &(request("PATCH", "/api/links/0") + "Content-Length: 100\r\n\r\n{\"delay\":"));
+        let answer = rest(slow);
+        assert!(answer.starts_with("HTTP/1.1 408 ") && answer.contains("body"), "{answer}");
+    }
+
+    #[test]
+    fn an_answer_that_nobody_reads_ends_the_connection() {
+        let address = server();
+        let mut stream = send(address, "");
+        let page = request("GET", "/") + "\r\n";
+        stream.set_write_timeout(Some(LONG)).unwrap();
+        // Of pages that nobody reads the system keeps some. Then the server takes no more requests, and at last it closes the connection.
+        let ended = (0..).find_map(|_| stream.write_all(page.as_bytes()).err()).unwrap();
+        assert!(matches!(ended.kind(), io::ErrorKind::ConnectionReset | io::ErrorKind::BrokenPipe), "{ended}");
+    }
+
+    #[test]
+    fn half_a_head_and_silence_end_the_connection() {
+        let address = server();
+        for beginning in ["", "GET / HTTP/1.1\r\nHost:"] {
+            assert_eq!(rest(send(address, beginning)), "", "{beginning:?}");
+        }
+        // After an answer, too.
+        let answer = rest(send(address, &(request("GET", "/api/state") + "\r\nGET /")));
+        assert_eq!(answer.matches("HTTP/1.1 200").count(), 1, "{answer}");
+    }
+
+    #[test]
+    fn a_stranger_has_one_answer_and_the_host_has_places_of_its_own() {
+        let address = server();
+        let refused = rest(send(address, "GET /api/state HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+        assert!(refused.starts_with("HTTP/1.1 401 ") && refused.to_lowercase().contains("connection: close"), "{refused}");
+        let events = request("GET", "/api/events") + "\r\n";
+        let mut answered = [0; 12];
+        let mut open: Vec<TcpStream> = (0..2).map(|_| send(address, &events)).collect();
+        for stream in &mut open {
+            stream.read_exact(&mut answered).unwrap();
+            assert_eq!(&answered, b"HTTP/1.1 200");
+        }
+        let answer = rest(send(address, &events));
+        assert!(answer.starts_with("HTTP/1.1 503 ") && answer.contains("too many"), "{answer}");
+        drop(open.pop());
+        // The server sees at its next event that nobody reads it.
+        let begun = Instant::now();
+        while !rest(send(address, &(request("GET", "/api/state") + "Connection: close\r\n\r\n"))).starts_with("HTTP/1.1 200") {
+            assert!(begun.elapsed() < LONG, "the place is never free");
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Places of connections: the host, guests and strangers have places of their own, so that neither guests nor strangers keep the host out.
+
+use core::net::{IpAddr, Ipv6Addr};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tokio::sync::Notify;
+
+use crate::Role;
+
+/// How many connections of each kind may be open. The real-time side shares the limit of open files with them, which is often 1024.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Connections on which no token was shown yet.
+    pub(super) strangers: usize,
+    /// Connections with the token of guests.
+    pub(super) guests: usize,
+    /// Connections with the token of the host.
+    pub(super) hosts: usize,
+}
+
+impl Limits {
+    pub(super) const USUAL: Self = Self { strangers: 256, guests: 64, hosts: 64 };
+
+    const fn of(self, role: Role) -> usize {
+        match role {
+            Role::Host => self.hosts,
+            Role::Guest => self.guests,
+        }
+    }
+}
+
+/// The places of a server.
+#[derive(Debug)]
+pub(super) struct Places {
+    limits: Limits,
+    taken: Mutex<Taken>,
+}
+
+#[derive(Debug, Default)]
+struct Taken {
+    /// In order of arrival.
+    strangers: VecDeque<Stranger>,
+    /// How many of the strangers come from each network.
+    networks: BTreeMap<IpAddr, usize>,
+    guests: usize,
+    hosts: usize,
+    /// Connections so far.
+    arrived: u64,
+}
+
+#[derive(Debug)]
+struct Stranger {
+    number: u64,
+    network: IpAddr,
+    sent_away: Arc<Notify>,
+}
+
+impl Places {
+    pub(super) fn new(limits: Limits) -> Arc<Self> {
+        Arc::new(Self { limits, taken: Mutex::default() })
+    }
+
+    /// Gives a new connection the place of a stranger. If all are taken, another stranger goes, as [`send_one_away`](Self::send_one_away) says.
+    pub(super) fn take(self: &Arc<Self>, address: IpAddr) -> Arc<Seat> {
+        let mut taken = self.lock();
+        if taken.strangers.len() >= self.limits.strangers {
+            taken.send_one_away();
+        }
+        taken.arrived += 1;
+        let (number, network, sent_away) = (taken.arrived, network_of(address), Arc::new(Notify::new()));
+        taken.strangers.push_back(Stranger { number, network, sent_away: Arc::clone(&sent_away) });
+        *taken.networks.entry(network).or_default() += 1;
+        Arc::new(Seat { places: Arc::clone(self), number, sent_away, role: Mutex::new(None) })
+    }
+
+    /// Ends the oldest connection on which no token was shown yet, of the network that has most of them: a flood from elsewhere does not send away the
+    /// host before its first request has come.
+    pub(super) fn send_one_away(&self) {
+        self.lock().send_one_away();
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Taken> {
+        self.taken.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Taken {
+    fn send_one_away(&mut self) {
+        let Some(most) = self.networks.iter().max_by_key(|(_, count)| **count).map(|(network, _)| *network) else { return };
+        let oldest = self.strangers.iter().find(|stranger| stranger.network == most).map(|stranger| stranger.number);
+        if let Some(stranger) = oldest.and_then(|number| self.remove(number)) {
+            stranger.sent_away.notify_one();
+        }
+    }
+
+    /// Takes a connection from among the strangers, if it is there.
+    fn remove(&mut self, number: u64) -> Option<Stranger> {
+        // Numbers grow in order of arrival.
+        let at = self.strangers.binary_search_by_key(&number, |stranger| stranger.number).ok()?;
+        let stranger = self.strangers.remove(at)?;
+        if let Some(count) = self.networks.get_mut(&stranger.network) {
+            *count -= 1;
+            if *count == 0 {
+                self.networks.remove(&stranger.network);
+            }
+        }
+        Some(stranger)
+    }
+
+    const fn count(&mut self, role: Role) -> &mut usize {
+        match role {
+            Role::Host => &mut self.hosts,
+            Role::Guest => &mut self.guests,
+        }
+    }
+}
+
+/// The addresses that one machine can choose from freely count as one: those of IPv6 that begin with the same 64 bits.
+fn network_of(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V4(address) => address.into(),
+        IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() & !u128::from(u64::MAX)).into(),
+    }
+}
+
+/// The place of a connection, which is free again when the last part of the connection ends: the page that it serves, or the WebSocket that it became.
+#[derive(Debug)]
+pub(super) struct Seat {
+    places: Arc<Places>,
+    number: u64,
+    sent_away: Arc<Notify>,
+    /// The highest role that was shown; `None`: a stranger.
+    role: Mutex<Option<Role>>,
+}
+
+impl Seat {
+    /// Whether no token was shown on this connection.
+    pub(super) fn is_strange(&self) -> bool {
+        self.role().is_none()
+    }
+
+    /// Gives the connection a place among those of this role; one that showed the token of the host stays the host's. `false`: there is no place.
+    pub(super) fn show(&self, role: Role) -> bool {
+        let mut shown = self.role();
+        if *shown == Some(role) || *shown == Some(Role::Host) {
+            return true;
+        }
+        let mut taken = self.places.lock();
+        if *taken.count(role) >= self.places.limits.of(role) {
+            return false;
+        }
+        *taken.count(role) += 1;
+        match *shown {
+            Some(before) => *taken.count(before) -= 1,
+            None => drop(taken.remove(self.number)),
+        }
+        *shown = Some(role);
+        true
+    }
+
+    /// Returns when the connection is to end because others need its place.
+    pub(super) async fn sent_away(&self) {
+        self.sent_away.notified().await;
+    }
+
+    fn role(&self) -> MutexGuard<'_, Option<Role>> {
+        self.role.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        let role = *self.role();
+        let mut taken = self.places.lock();
+        match role {
+            Some(role) => *taken.count(role) -= 1,
+            None => drop(taken.remove(self.number)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::net::Ipv4Addr;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const HERE: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+
+    fn places(strangers: usize, guests: usize, hosts: usize) -> Arc<Places> {
+        Places::new(Limits { strangers, guests, hosts })
+    }
+
+    /// Whether the connection was asked to end.
+    fn is_sent_away(seat: &Seat) -> bool {
+        use futures_util::FutureExt as _;
+
+        seat.sent_away().now_or_never().is_some()
+    }
+
+    #[test]
+    fn a_new_stranger_sends_the_oldest_one_away_and_nobody_else() {
+        let places = places(3, 1, 1);
+        let seats: Vec<_> = (0..3).map(|_| places.take(HERE)).collect();
+        assert!(seats[0].show(Role::Host));
+        let more: Vec<_> = (0..2).map(|_| places.take(HERE)).collect();
+        assert_eq!([&seats[0], &seats[1], &seats[2], &more[0], &more[1]].map(|seat| is_sent_away(seat)), [false, true, false, false, false]);
+        drop(more);
+        let _again = places.take(HERE);
+        assert!(!is_sent_away(&seats[2]), "places are free again");
+    }
+
+    #[test]
+    fn a_flood_from_one_network_sends_away_its_own() {
+        let places = places(8, 1, 1);
+        let visitor = places.take("192.0.2.7".parse().unwrap());
+        let flood: Vec<_> = (0..100_u128).map(|low| places.take(IpAddr::from(Ipv6Addr::from_bits((0x2001_0db8 << 96) | low)))).collect();
+        assert!(!is_sent_away(&visitor), "64 bits of addresses are one network");
+        assert_eq!(flood.iter().filter(|seat| !is_sent_away(seat)).count(), 7);
+    }
+
+    #[test]
+    fn every_role_has_places_of_its_own() {
+        let places = places(4, 2, 1);
+        let guests: Vec<_> = (0..2).map(|_| places.take(HERE)).collect();
+        assert!(guests.iter().all(|seat| seat.show(Role::Guest)));
+        let (late, host, second) = (places.take(HERE), places.take(HERE), places.take(HERE));
+        assert!(!late.show(Role::Guest) && late.is_strange());
+        assert!(host.show(Role::Host) && host.show(Role::Guest), "a host's connection stays one");
+        assert!(!second.show(Role::Host));
+        drop((guests, host));
+        assert!(late.show(Role::Guest) && second.show(Role::Host));
+        assert!(late.show(Role::Guest), "it has its place already");
+    }
+
+    proptest! {
+        /// Whatever happens: nobody has more places than there are, and when all have gone every place is free.
+        #[test]
+        fn places_are_counted_right(steps in prop::collection::vec((0..3_u8, 0..8_usize, any::<bool>()), 0..200)) {
+            let places = places(3, 2, 1);
+            let mut seats = Vec::new();
+            for (step, which, is_host) in steps {
+                match step {
+                    0 => seats.push(places.take(HERE)),
+                    1 if which < seats.len() => drop(seats.swap_remove(which)),
+                    2 if which < seats.len() => { seats[which].show(if is_host { Role::Host } else { Role::Guest }); }
+                    _ => {}
+                }
+                let taken = places.lock();
+                prop_assert!(taken.strangers.len() <= 3 && taken.guests <= 2 && taken.hosts <= 1);
+                prop_assert_eq!(taken.networks.values().sum::<usize>(), taken.strangers.len());
+            }
+            drop(seats);
+            let taken = places.lock();
+            prop_assert!(taken.strangers.is_empty() && taken.guests == 0 && taken.hosts == 0);
+        }
+    }
+}
