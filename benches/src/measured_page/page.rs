@@ -27,7 +27,7 @@ const NOT_YET: &str = "Not measured yet:";
 const OTHERS: &str = "## Written by other commands";
 
 /// Pages that need a quiet machine or privileges: what they say, and what writes them.
-const ALONE: [(&str, &str, &str); 7] = [
+const ALONE: [(&str, &str, &str); 8] = [
     (
         "measured-relay.md",
         "how late the relay and how fast",
@@ -37,6 +37,11 @@ const ALONE: [(&str, &str, &str); 7] = [
         "measured-live.md",
         "how late the ticks of a live session, and what they cost",
         "cargo run --profile dist -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md",
+    ),
+    (
+        "measured-floods.md",
+        "how long a host waits for its page while strangers and guests flood the server",
+        "cargo run --profile dist -p cohaptic-benches-realtime --bin floods-table > docs/measured-floods.md",
     ),
     (
         "measured-tcp.md",
