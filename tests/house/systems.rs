@@ -34,9 +34,9 @@ const ACCURACY: &str = "accuracy";
 /// Packages of others that only build on Linux, or that give access to calls that other systems may lack.
 const SYSTEM: [&str; 9] = ["rustix", "linux-raw-sys", "nix", "tun-rs", "thread-priority", "quinn-udp", "netlink-sys", "rtnetlink", "inotify"];
 
-/// Uses that are right: the package of this project, the package of the other, and the systems. `flock` of rustix locks the folder of a campaign on macOS as
-/// on Linux. The terminal of clap asks rustix for its width, and `ctrlc` has its signals from nix.
-const RIGHT: [(&str, &str, &str); 3] = [("campaign", "rustix", "apple"), ("cli", "rustix", "apple"), ("cli", "nix", "apple")];
+/// Uses that are right: the package of this project that brings in the package of the other, that package, and the systems. `flock` of rustix locks files and
+/// folders that are written on macOS as on Linux. The terminal of clap asks rustix for its width, and `ctrlc` has its signals from nix.
+const RIGHT: [(&str, &str, &str); 3] = [("files", "rustix", "apple"), ("cli", "rustix", "apple"), ("cli", "nix", "apple")];
 
 /// Features of the test kit that are for programs of others. No package of the workspace needs them, and they build on each system all the same.
 const OPTIONS: &str = "cohaptic-testkit/axum,cohaptic-testkit/hyper,cohaptic-testkit/quinn,cohaptic-testkit/tonic";
@@ -56,7 +56,7 @@ fn portable_packages_and_the_program_take_nothing_of_linux_elsewhere() {
             let built = tree.of(&ours(package));
             let of_linux: Vec<String> = LINUX.into_iter().chain([ACCURACY]).map(ours).collect();
             let taken = of_linux.iter().map(String::as_str).chain(SYSTEM).filter(|name| built.contains(name));
-            let is_right = |name: &str| RIGHT.iter().any(|right| (right.0, right.1) == (package, name) && target.contains(right.2));
+            let is_right = |name: &str| RIGHT.iter().any(|(by, of, on)| built.contains(ours(by).as_str()) && *of == name && target.contains(on));
             wrong.extend(taken.filter(|name| !is_right(name)).map(|name| format!("{target}: cohaptic-{package} takes {name}")));
         }
     }
@@ -116,8 +116,8 @@ fn portable_sources_name_no_system() {
             found.extend(systems.map(|line| format!("{}: {}", name(&path), line.trim())));
         }
     }
-    // The lock of a campaign's folder: its locks on Unix, exclusive opening on Windows.
-    let is_lock = |line: &String| line.starts_with("crates/campaign/src/folder/") && (line.contains("unix::fs") || line.contains("windows::fs"));
-    let (locks, others): (Vec<_>, Vec<_>) = found.into_iter().partition(is_lock);
-    assert!(locks.len() == 2 && others.is_empty(), "{locks:?}, {others:?}");
+    // Files that are written: their locks on Unix, exclusive opening on Windows, sockets and standard streams.
+    let is_file = |line: &String| ["lock", "target"].iter().any(|file| line.starts_with(&format!("crates/files/src/{file}.rs:")));
+    let (files, others): (Vec<_>, Vec<_>) = found.into_iter().partition(is_file);
+    assert!(files.len() == 5 && others.is_empty(), "{files:?}, {others:?}");
 }

@@ -176,7 +176,7 @@ mod tests {
         for text in ["", "3", "0/8", "9/8", "-1/8", "1/0", "a/b", "1/8/2", "18446744073709551616/18446744073709551617"] {
             assert!(text.parse::<Shard>().unwrap_err().to_string().contains("expected I/N"), "{text}");
         }
-        for name in ["shard-1-of-0.lock", "shard-9-of-8.lock", "shard-1-of-8.lock.a.partial", "campaign.lock"] {
+        for name in ["shard-1-of-0.lock", "shard-9-of-8.lock", "shard-1-of-8.lock.a.partial", "cohaptic.lock"] {
             assert!(!is_lease(name), "{name}");
         }
         assert!(is_log(&worker_log("node-7-1f")) && !is_log("worker-1") && !is_log("a.log"));

@@ -14,17 +14,14 @@ use cohaptic_units::print::Span;
 use crate::arguments::ExplainArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::file::write_into;
+use crate::file::{own_folder, write_into};
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
 
 /// Says what a scene makes the program model, and with `--cost` what its methods cost.
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
     let scene = read(arguments, &[])?;
-    if let Some(folder) = &arguments.out {
-        // Before the measurement, which a folder that cannot be made must not cost.
-        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
-    }
+    let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let explanation = harness::explain(&scene);
     let measured = arguments.cost.then(|| measured(arguments, &scene, &explanation));
     let file = match (&measured, &arguments.out) {

@@ -1,9 +1,9 @@
-//! Text files of users that are read, and files that are written.
+//! Text files of users that are read, and files and folders that are written.
 
 use std::io::{self, Read, Write as _};
 use std::path::Path;
 
-use cohaptic_files::{LimitedFile, MOST_CAPTURE_BYTES, write_whole};
+use cohaptic_files::{LimitedFile, MOST_CAPTURE_BYTES, OwnFolder, write_whole};
 use cohaptic_measure::fates::{self, ReadError};
 use cohaptic_wan::FateLog;
 
@@ -54,6 +54,12 @@ pub(crate) fn write_into(folder: &Path, name: &str, content: impl AsRef<[u8]>) -
     let path = folder.join(name);
     write_file(&path, content)?;
     Ok(output::path(&path))
+}
+
+/// Takes the folder of `--out` for this process alone, as long as the value lives, and makes the folder if there is none. Called before the work, which a
+/// folder that cannot be had must not cost.
+pub(crate) fn own_folder(path: &Path) -> Result<OwnFolder, Failure> {
+    OwnFolder::take(path).map_err(unwritten(path))
 }
 
 /// That a file cannot be written.

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::arguments::PaperArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
-use crate::file::write_file;
+use crate::file::{own_folder, write_file};
 use crate::progress::Progress;
 use crate::{interrupt, output};
 
@@ -30,10 +30,7 @@ impl Watch for Bar {
 /// Computes the paper again.
 pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
     let options = Options { quick: arguments.quick, size: arguments.pictures.size() };
-    if let Some(folder) = &arguments.out {
-        // A folder that cannot be had is found out before the work, not after it.
-        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
-    }
+    let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let bar = Bar(Progress::new(steps(options) as u64, "{bar:30} {percent:>3} %  {elapsed} passed, {eta} left"));
     let start = Clock::now();
     let reproduction = match reproduce(options, &bar) {

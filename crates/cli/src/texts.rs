@@ -9,7 +9,7 @@ use cohaptic_scene::schema::FileSchema;
 
 use crate::arguments::{Arguments, CompletionsArguments, FileKind, ManArguments, SchemaArguments};
 use crate::failure::Failure;
-use crate::file::write_file;
+use crate::file::{own_folder, write_file};
 use crate::output;
 
 /// Prints the JSON Schema of a kind of file.
@@ -32,7 +32,7 @@ pub(crate) fn man(arguments: &ManArguments) -> Result<ExitCode, Failure> {
         output::raw(&page(find(&program, &arguments.command)?)?)?;
         return Ok(ExitCode::SUCCESS);
     };
-    std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
+    let _own = own_folder(folder)?;
     let mut written: Vec<PathBuf> = Vec::new();
     let mut left = vec![&program];
     while let Some(command) = left.pop() {

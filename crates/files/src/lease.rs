@@ -15,12 +15,12 @@
 //! time, for a moment: a lease saves work, and the files that its owners write must be right without it.
 
 use std::fmt;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use crate::PARTIAL;
+use crate::partial::{self, PARTIAL};
 
 /// How often an owner renews its lease.
 pub const BEAT: Duration = Duration::from_secs(5);
@@ -222,22 +222,24 @@ impl Drop for Lease {
 
 /// The time by the clock of the file system: that of a file which was made now.
 fn now_beside(path: &Path, owner: &Owner) -> io::Result<SystemTime> {
-    let probe = beside(path, owner);
-    let made = File::create(&probe).and_then(|file| file.metadata()?.modified());
-    let _ = fs::remove_file(&probe);
+    let (file, probe) = partial::create(&beside(path, owner))?;
+    let made = file.metadata().and_then(|about| about.modified());
+    let _ = fs::remove_file(probe);
     made
 }
 
 /// A name in the same folder that nobody else uses.
 fn beside(path: &Path, owner: &Owner) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
-    name.push(format!(".{}{PARTIAL}", owner.name()));
+    name.push(format!(".{}", owner.name()));
     name.into()
 }
 
 /// Takes a stale lease away. If another process did the same meanwhile and has it now, it is put back.
 fn take_away(path: &Path, owner: &Owner, stale: &Holder) -> io::Result<()> {
-    let away = beside(path, owner);
+    let mut away = beside(path, owner).into_os_string();
+    away.push(PARTIAL);
+    let away = PathBuf::from(away);
     match fs::rename(path, &away) {
         Ok(()) => {}
         // Somebody else was faster, or the answer of a file server was lost.

@@ -3,8 +3,10 @@
 //! You need it if your program reads files that may be too long, must never leave half a file under its name, or shares a folder with processes elsewhere
 //! ([`Lease`]).
 //!
-//! A regular file that is longer than the limit is refused before it is read. A pipe or a device has no length and is read up to the limit. A file that is
-//! written has its name only when it is whole ([`WholeFile`]).
+//! A regular file that is longer than the limit is refused before it is read. A pipe or a device has no length and is read up to the limit.
+//!
+//! The feature `write` has all that writes. A file has its name only when it is whole ([`WholeFile`]). Files that belong together lie in a folder into which
+//! one process at a time writes ([`OwnFolder`]).
 //! ```
 //! use std::io::Write as _;
 //!
@@ -15,19 +17,39 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
+#[cfg(feature = "write")]
+mod continued;
+#[cfg(feature = "write")]
+mod folder;
+#[cfg(feature = "write")]
 mod lease;
+#[cfg(feature = "write")]
+mod lock;
+#[cfg(feature = "write")]
+mod partial;
+#[cfg(feature = "write")]
 mod scratch;
 mod secret;
+#[cfg(feature = "write")]
+mod target;
+#[cfg(feature = "write")]
 mod whole;
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-pub use lease::{BEAT, Holder, Lease, Owner, STALE, Taking, leases};
-pub use scratch::ScratchFile;
 pub use secret::open_to_others;
-pub use whole::{PARTIAL, WholeFile, partial_name, write_whole, write_whole_by};
+#[cfg(feature = "write")]
+pub use {
+    continued::open_continued,
+    folder::{FOLDER_LOCK, OwnFolder},
+    lease::{BEAT, Holder, Lease, Owner, STALE, Taking, leases},
+    lock::Lock,
+    partial::PARTIAL,
+    scratch::ScratchFile,
+    whole::{WholeFile, write_whole, write_whole_by},
+};
 
 /// The most bytes of a TOML file, 16 MiB: a scene, or a file of links, of a relay or of a router. The tree of a text takes fifty times its length.
 pub const MOST_TOML_BYTES: u64 = 16 << 20;

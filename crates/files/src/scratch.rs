@@ -4,9 +4,10 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Read, Seek as _, Write};
 use std::path::{Path, PathBuf};
 
-use crate::PARTIAL;
+use crate::partial;
 
-/// A file that is written once, read once, and removed when it is dropped. Its name ends in [`PARTIAL`], as that of any file that a killed process leaves.
+/// A file that is written once, read once, and removed when it is dropped. Its name ends in [`PARTIAL`](crate::PARTIAL), as that of any file that a killed
+/// process leaves.
 #[derive(Debug)]
 pub struct ScratchFile {
     writer: BufWriter<File>,
@@ -25,16 +26,15 @@ impl Drop for Trace {
 }
 
 impl ScratchFile {
-    /// Begins a file beside another one, with the name of that, a dot and `what` in front of the end. A file of that name is replaced.
+    /// Begins a file beside another one, with the name of that, a dot and `what` in front of the end. Another process that does the same has a file of its own.
     ///
     /// # Errors
     ///
     /// What the system says.
     pub fn create(beside: &Path, what: &str) -> io::Result<Self> {
         let mut path = beside.as_os_str().to_owned();
-        path.push(format!(".{what}{PARTIAL}"));
-        let path = PathBuf::from(path);
-        let file = File::options().read(true).write(true).create(true).truncate(true).open(&path)?;
+        path.push(format!(".{what}"));
+        let (file, path) = partial::create(path.as_ref())?;
         Ok(Self { writer: BufWriter::with_capacity(1 << 16, file), trace: Trace(path) })
     }
 

@@ -1,63 +1,79 @@
 //! Files that have their name only when they are whole and with the disk.
 
-use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// The end of the name of a file that is being written.
-pub const PARTIAL: &str = ".partial";
+use crate::partial;
+use crate::target::Target;
 
-/// The name under which a file is written: its own with [`PARTIAL`] behind it.
-#[must_use]
-pub fn partial_name(path: &Path) -> OsString {
-    let mut name = path.as_os_str().to_owned();
-    name.push(PARTIAL);
-    name
-}
-
-/// A file being written under another name ([`partial_name`]), in the same folder. It takes its own name in [`finish`](Self::finish); a file that was there
-/// until then is replaced. Dropped before that, its beginning stays under the other name.
+/// A file being written under another name in the same folder. The other name ends in [`PARTIAL`](crate::PARTIAL), and no other process writes under it. The
+/// file takes its own name in [`finish`](Self::finish); a file that was there until then is replaced. If two processes write one file, the file of the last is
+/// there, whole. If the file is dropped unfinished, its beginning stays under the other name until the file is written again.
+///
+/// A link is followed: the file that it leads to is written, or made. A device, a pipe or a socket takes the bytes as they come, and stays what it is. So does
+/// a file to which standard output or standard error goes.
 #[derive(Debug)]
 pub struct WholeFile {
     path: PathBuf,
-    partial: PathBuf,
+    place: Place,
     writer: BufWriter<File>,
 }
 
+/// Where bytes go.
+#[derive(Debug)]
+enum Place {
+    /// Into a new file, which takes the name of the target.
+    Beside { partial: PathBuf, target: PathBuf },
+    /// Into what is there.
+    Within,
+}
+
 impl WholeFile {
-    /// Begins a file of that name.
+    /// Begins a file of that name. For a pipe, waits for its reader.
     ///
     /// # Errors
     ///
-    /// What the system says of the file beside it.
+    /// What the system says of the name, and of the file beside it.
     pub fn create(path: impl Into<PathBuf>) -> io::Result<Self> {
-        let path = path.into();
-        let partial = partial_name(&path).into();
-        Self::create_under(path, partial)
+        Self::begin(path.into(), "")
     }
 
-    /// Begins a file of that name, which other processes may be writing too: the other name has that of this worker in it.
+    /// Begins a file of that name, which processes on other machines may be writing too: the other name has that of this worker in it.
     ///
     /// # Errors
     ///
     /// As [`WholeFile::create`].
     pub fn create_by(path: impl Into<PathBuf>, worker: &str) -> io::Result<Self> {
-        let path = path.into();
-        let mut partial = path.as_os_str().to_owned();
-        partial.push(format!(".{worker}{PARTIAL}"));
-        Self::create_under(path, partial.into())
+        Self::begin(path.into(), &format!(".{worker}"))
     }
 
-    fn create_under(path: PathBuf, partial: PathBuf) -> io::Result<Self> {
-        let file = File::create(&partial)?;
-        Ok(Self { path, partial, writer: BufWriter::with_capacity(1 << 16, file) })
+    fn begin(path: PathBuf, worker: &str) -> io::Result<Self> {
+        let (file, place) = match Target::of(&path)? {
+            Target::Stream(file) => (file, Place::Within),
+            Target::Named(target) => {
+                let mut beside = target.clone().into_os_string();
+                beside.push(worker);
+                let (file, partial) = partial::create(beside.as_ref())?;
+                (file, Place::Beside { partial, target })
+            }
+        };
+        Ok(Self { path, place, writer: BufWriter::with_capacity(1 << 16, file) })
     }
 
-    /// The name that it will have.
+    /// The name that it was begun with.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The name of the file in which the bytes are until [`finish`](Self::finish).
+    #[must_use]
+    pub fn written_to(&self) -> &Path {
+        match &self.place {
+            Place::Beside { partial, .. } => partial,
+            Place::Within => &self.path,
+        }
     }
 
     /// Writes the rest, waits until all is with the disk, and gives the file its name.
@@ -66,22 +82,40 @@ impl WholeFile {
     ///
     /// What the system says. The file stays under the other name.
     pub fn finish(mut self) -> io::Result<()> {
+        self.give_name()
+    }
+
+    fn give_name(&mut self) -> io::Result<()> {
         self.writer.flush()?;
-        self.writer.get_ref().sync_all()?;
+        let synced = self.writer.get_ref().sync_all();
+        let Place::Beside { partial, target } = &self.place else {
+            // Pipes, terminals and most devices keep nothing that could be waited for, and say so.
+            return synced
+                .or_else(|error| if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) { Ok(()) } else { Err(error) });
+        };
+        synced?;
         let length = self.writer.get_ref().metadata()?.len();
-        fs::rename(&self.partial, &self.path).or_else(|error| if self.has_its_name(length) { Ok(()) } else { Err(error) })?;
+        fs::rename(partial, target).or_else(|error| if is_renamed(partial, target, length) { Ok(()) } else { Err(error) })?;
         // The name too is to outlast a loss of power. Not every file system can do that for folders; then the name of before may come back, and no more.
-        if let Some(folder) = self.path.parent() {
+        if let Some(folder) = target.parent() {
             let _ = File::open(folder).and_then(|folder| folder.sync_all());
         }
         Ok(())
     }
 
-    /// Whether the file was renamed although the system says that it was not: a file server that answers too late is asked again, and finds the other name gone.
-    fn has_its_name(&self, length: u64) -> bool {
-        let is_whole = || fs::metadata(&self.path).is_ok_and(|found| found.len() == length);
-        fs::symlink_metadata(&self.partial).is_err_and(|error| error.kind() == io::ErrorKind::NotFound) && is_whole()
+    /// Removes the beginning of a file that could not be written.
+    fn abandon(self) {
+        if let Place::Beside { partial, .. } = &self.place {
+            // That it could not be written is the error to report, not that its beginning is still there.
+            let _ = fs::remove_file(partial);
+        }
     }
+}
+
+/// Whether a file was renamed although the system says that it was not: a file server that answers too late is asked again, and finds the other name gone.
+fn is_renamed(partial: &Path, target: &Path, length: u64) -> bool {
+    let is_whole = || fs::metadata(target).is_ok_and(|found| found.len() == length);
+    fs::symlink_metadata(partial).is_err_and(|error| error.kind() == ErrorKind::NotFound) && is_whole()
 }
 
 impl Write for WholeFile {
@@ -113,11 +147,9 @@ pub fn write_whole_by<E: From<io::Error>>(path: &Path, worker: &str, write: impl
 }
 
 fn written<E: From<io::Error>>(mut file: WholeFile, write: impl FnOnce(&mut WholeFile) -> Result<(), E>) -> Result<(), E> {
-    let partial = file.partial.clone();
-    let written = write(&mut file).and_then(|()| Ok(file.finish()?));
+    let written = write(&mut file).and_then(|()| Ok(file.give_name()?));
     if written.is_err() {
-        // That it could not be written is the error to report, not that its beginning is still there.
-        let _ = fs::remove_file(partial);
+        file.abandon();
     }
     written
 }
@@ -132,9 +164,9 @@ mod tests {
         let path = folder.path().join("part-00000.csv");
         let fails = |file: &mut WholeFile| -> io::Result<()> {
             file.write_all(b"half")?;
-            Err(io::ErrorKind::StorageFull.into())
+            Err(ErrorKind::StorageFull.into())
         };
-        assert_eq!(write_whole(&path, fails).unwrap_err().kind(), io::ErrorKind::StorageFull);
+        assert_eq!(write_whole(&path, fails).unwrap_err().kind(), ErrorKind::StorageFull);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
         write_whole(&path, |file| file.write_all(b"whole")).unwrap();
         assert!(write_whole(&path, fails).is_err());
@@ -149,7 +181,25 @@ mod tests {
         file.write_all(b"t,peer\n").unwrap();
         drop(file);
         assert!(!path.exists());
-        assert_eq!(fs::read(partial_name(&path)).unwrap(), b"t,peer\n");
+        assert_eq!(fs::read(folder.path().join("trajectory.csv.partial")).unwrap(), b"t,peer\n");
+        // The next one takes the place of a beginning that nobody goes on with.
+        WholeFile::create(&path).unwrap().finish().unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn of_two_that_write_the_same_name_the_last_is_there_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fates.csv");
+        let mut files = [(); 2].map(|()| WholeFile::create(&path).unwrap());
+        for (file, row) in files.iter_mut().zip([b"one\n", b"two\n"]) {
+            (0..100_000).for_each(|_| file.write_all(row).unwrap());
+        }
+        for (file, row) in files.into_iter().zip(["one\n", "two\n"]) {
+            file.finish().unwrap();
+            assert!(fs::read_to_string(&path).unwrap() == row.repeat(100_000));
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]
@@ -179,11 +229,11 @@ mod tests {
             file
         };
         let file = begun();
-        fs::rename(partial_name(&path), &path).unwrap();
+        fs::rename(file.written_to(), &path).unwrap();
         file.finish().unwrap();
         let file = begun();
-        fs::remove_file(partial_name(&path)).unwrap();
+        fs::remove_file(file.written_to()).unwrap();
         fs::write(&path, b"something else").unwrap();
-        assert_eq!(file.finish().unwrap_err().kind(), io::ErrorKind::NotFound);
+        assert_eq!(file.finish().unwrap_err().kind(), ErrorKind::NotFound);
     }
 }

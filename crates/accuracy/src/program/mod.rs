@@ -9,12 +9,14 @@ mod conclusion;
 mod failure;
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use cohaptic_accuracy::{About, AccuracyError, Row, Watch, measure};
+use cohaptic_files::OwnFolder;
 use cohaptic_units::visible_lines;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -53,10 +55,9 @@ pub(crate) fn run(arguments: &Arguments) -> ExitCode {
 }
 
 fn measured(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    if let Some(folder) = &arguments.out {
-        // Before the measurement: a folder that cannot be made must not cost ten minutes of it.
-        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
-    }
+    // Before the measurement: a folder that cannot be had must not cost ten minutes of it.
+    let own = |folder: &PathBuf| OwnFolder::take(folder).map_err(|error| Failure::File { verb: "write", path: folder.clone(), error });
+    let _own = arguments.out.as_ref().map(own).transpose()?;
     let start = Instant::now();
     let (sender, events) = mpsc::channel();
     let to_interrupt = sender.clone();

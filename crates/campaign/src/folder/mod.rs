@@ -1,7 +1,7 @@
 //! The folder of a campaign: which files there are, and in which order they come and go.
 //!
 //! ```text
-//! campaign.lock            as long as one process works on it alone
+//! cohaptic.lock            as long as one process works on it alone
 //! campaign.json            what the campaign is; the first file with its own name
 //! verdicts.part.csv        judgements, as long as not all are known
 //! verdicts.csv             all judgements
@@ -20,7 +20,6 @@
 //! part-00000.parquet.WORKER.partial …    what it is writing
 //! ```
 
-mod lock;
 mod manifest;
 
 use std::collections::BTreeSet;
@@ -28,7 +27,7 @@ use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use cohaptic_files::{Owner, PARTIAL};
+use cohaptic_files::{FOLDER_LOCK, Lock, Owner, PARTIAL};
 
 use crate::error::CampaignError;
 use crate::shard::{Shard, is_lease, is_log};
@@ -36,10 +35,7 @@ use crate::table::Format;
 
 pub(crate) use manifest::Manifest;
 
-use lock::Lock;
-
 const MANIFEST: &str = "campaign.json";
-const LOCK: &str = "campaign.lock";
 /// How the names of files of judgements end as they are made.
 const JOURNAL: &str = "part.csv";
 
@@ -75,7 +71,7 @@ impl Folder {
                 return Ok(true);
             }
             // What a campaign leaves that was killed before it had a manifest.
-            if name != LOCK && !is_partial(Path::new(&name)) && !is_of_shards(&name) {
+            if name != FOLDER_LOCK && !is_partial(Path::new(&name)) && !is_of_shards(&name) {
                 others.insert(name);
             }
         }
@@ -89,7 +85,7 @@ impl Folder {
     pub(crate) fn take(path: &Path) -> Result<Self, CampaignError> {
         let is_new = !path.exists();
         std::fs::create_dir_all(path).map_err(|error| CampaignError::File { verb: "make the folder", path: path.to_path_buf(), error })?;
-        let file = path.join(LOCK);
+        let file = path.join(FOLDER_LOCK);
         match Lock::take(&file) {
             Ok(Some(lock)) => Ok(Self { path: path.to_path_buf(), lock: Some(lock), is_new }),
             Ok(None) => Err(CampaignError::Busy { path: path.to_path_buf() }),
@@ -106,7 +102,7 @@ impl Folder {
 
     /// That no process works on the folder alone, as far as this machine and its file system know.
     pub(crate) fn is_shared(&self) -> Result<(), CampaignError> {
-        if Lock::is_held(&self.path.join(LOCK)) { Err(CampaignError::Busy { path: self.path.clone() }) } else { Ok(()) }
+        if Lock::is_held(&self.path.join(FOLDER_LOCK)) { Err(CampaignError::Busy { path: self.path.clone() }) } else { Ok(()) }
     }
 
     /// That no worker does a shard here.

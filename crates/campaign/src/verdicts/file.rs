@@ -1,10 +1,10 @@
 //! Judgements as files: a journal that grows by a line for each combination that is judged, and one table of all of them.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Seek as _, SeekFrom, Write as _};
+use std::fs::{self, File};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use cohaptic_files::write_whole;
+use cohaptic_files::{open_continued, write_whole};
 
 use super::{Judgement, Verdict, Words};
 use crate::error::CampaignError;
@@ -44,13 +44,7 @@ impl Journal {
     /// Opens the journal, or begins one, and gives what it holds.
     pub(crate) fn open(path: PathBuf, combinations: u64) -> Result<(Self, Vec<(u64, Judgement)>), CampaignError> {
         let (known, whole) = Self::read(&path, combinations)?;
-        let open = || {
-            let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(&path)?;
-            file.set_len(whole)?;
-            file.seek(SeekFrom::End(0))?;
-            Ok(file)
-        };
-        let file = open().map_err(|error| CampaignError::File { verb: "write", path: path.clone(), error })?;
+        let file = open_continued(&path, whole).map_err(|error| CampaignError::File { verb: "write", path: path.clone(), error })?;
         Ok((Self { path, file }, known))
     }
 

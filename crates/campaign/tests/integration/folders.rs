@@ -73,7 +73,7 @@ fn a_folder_with_something_else_in_it_is_left_alone() {
     // An empty one will do, also one that a campaign left which was killed at once.
     std::fs::create_dir_all(bench.path("a/b")).unwrap();
     std::fs::write(bench.path("a/b/campaign.json.partial"), "{").unwrap();
-    std::fs::write(bench.path("a/b/campaign.lock"), "").unwrap();
+    std::fs::write(bench.path("a/b/cohaptic.lock"), "").unwrap();
     bench.finish("a/b", 1);
     assert_eq!(bench.files("a/b"), ["campaign.json", "runs.parquet"]);
 }
@@ -132,7 +132,7 @@ fn a_file_that_the_scene_names_may_not_change() {
 fn a_second_process_is_refused() {
     let bench = Bench::new(&VARY, 4);
     let first = bench.open("out").unwrap();
-    assert_eq!(bench.files("out"), ["campaign.json", "campaign.lock"]);
+    assert_eq!(bench.files("out"), ["campaign.json", "cohaptic.lock"]);
     let error = bench.assert_refused("out", &["another process works on the campaign in"]);
     assert!(matches!(error, CampaignError::Busy { .. }) && error.is_io());
     drop(first);

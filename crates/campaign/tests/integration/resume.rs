@@ -35,7 +35,7 @@ proptest! {
                 // What a kill leaves: a file that has not its name yet, and the file of a lock that nobody holds.
                 let name = format!("parts/part-00000.{}.partial", bench.format.name());
                 std::fs::write(bench.path(&name), "PAR1 or half a row").unwrap();
-                std::fs::write(bench.path("parts/campaign.lock"), "").unwrap();
+                std::fs::write(bench.path("parts/cohaptic.lock"), "").unwrap();
             }
         }
         let report = bench.finish("parts", threads);

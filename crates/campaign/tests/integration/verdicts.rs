@@ -61,7 +61,7 @@ fn each_combination_is_judged_once_however_often_it_is_stopped() {
         let read = |folder: &str| std::fs::read(bench.path(folder).join(file)).unwrap();
         assert!(read("out") == read("whole"), "{file}");
     }
-    assert_eq!(bench.files("out"), ["campaign.json", "campaign.lock", "runs.csv", "verdicts.csv"]);
+    assert_eq!(bench.files("out"), ["campaign.json", "cohaptic.lock", "runs.csv", "verdicts.csv"]);
     let (header, rows) = comma_separated(&bench.path("out/runs.csv"));
     let place = |name: &str| header.iter().position(|found| found == name).unwrap();
     for row in &rows {

@@ -10,11 +10,10 @@ use super::curve::Curve;
 use crate::failure::Failure;
 use crate::file::write_into;
 
-/// Writes `admittance.csv` and `admittance.svg` into a folder, which is made if it is not there, and gives their paths.
+/// Writes `admittance.csv` and `admittance.svg` into a folder, and gives their paths.
 ///
 /// An incomplete list of points has only the table: a picture takes longer than users wait after Ctrl-C.
 pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool, size: Size) -> Result<Vec<String>, Failure> {
-    std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "write", path: folder.to_path_buf(), error })?;
     let mut written = vec![write_into(folder, "admittance.csv", table(curves))?];
     if is_whole {
         let title = curves.first().map_or("", |curve| curve.title.as_str());

@@ -12,6 +12,7 @@ use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::AdmittanceArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
+use crate::file::own_folder;
 use crate::output;
 use curve::Curve;
 
@@ -25,6 +26,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     let subjects = subjects?;
     let highest = subjects.iter().map(|subject| subject.admittance.highest_frequency()).fold(f64::INFINITY, f64::min);
     let frequencies = frequencies(arguments, highest)?;
+    let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let curves = subjects.into_iter().map(|subject| Curve::of(subject, &frequencies, &watch));
     let curves = curves.collect::<Result<Vec<Curve>, Failure>>();
     watch.clear();

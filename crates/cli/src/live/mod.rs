@@ -23,6 +23,7 @@ use cohaptic_units::print::{Counted, Span};
 use crate::arguments::LiveArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
+use crate::file::own_folder;
 use crate::progress::Progress;
 use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, loading, say};
 use crate::{input, interrupt, output};
@@ -75,6 +76,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let editor =
         TimedLinks { links: KeyedLinks { keys, folder, files: ControlFiles::of(&arguments.real_time)?, changes }, planned, elapsed: elapsed.clone() };
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
+    let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let session = open(arguments, &scene, content)?;
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
     announce(&scene, session.address(), arguments.key_file.is_some());

@@ -8,6 +8,7 @@ mod frames;
 mod scene;
 mod stage;
 
+use std::io::Write as _;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -17,6 +18,7 @@ use std::thread;
 use std::time::Instant as Clock;
 
 use cohaptic_control::{Board, ServerConfig, serve_stage};
+use cohaptic_files::{OwnFolder, write_whole};
 use cohaptic_harness::Ending;
 use cohaptic_live::session::{Motion, Recorded, SessionConfig};
 use cohaptic_live::{Conductor, LinkChange, Report, Session, Status};
@@ -192,27 +194,28 @@ impl Conductor for PartConductor {
 /// The folders of the parts: those that were asked for, or some that go with the program.
 struct Records {
     folder: PathBuf,
-    is_kept: bool,
+    /// `None` for a folder that is not kept.
+    own: Option<OwnFolder>,
 }
 
 impl Records {
     fn create(out: Option<&Path>) -> Result<Self, Failure> {
         let refused = |folder: &Path, error: &std::io::Error| Failure::System(format!("{}: {error}", folder.display()));
         if let Some(folder) = out {
-            std::fs::create_dir_all(folder).map_err(|error| refused(folder, &error))?;
-            return Ok(Self { folder: folder.to_path_buf(), is_kept: true });
+            let own = OwnFolder::take(folder).map_err(|error| refused(folder, &error))?;
+            return Ok(Self { folder: folder.to_path_buf(), own: Some(own) });
         }
         let folder = std::env::temp_dir().join(format!("cohaptic-play-{}", std::process::id()));
         // Its own, not one that somebody else has laid there.
         std::fs::create_dir(&folder).map_err(|error| refused(&folder, &error))?;
-        Ok(Self { folder, is_kept: false })
+        Ok(Self { folder, own: None })
     }
 
     /// The folder of a part, with its scene.
     fn begin(&self, number: usize, scene: &str) -> Result<PathBuf, Failure> {
         let folder = self.part(number);
         let file = folder.join("scene.toml");
-        let written = std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&file, scene));
+        let written = std::fs::create_dir_all(&folder).and_then(|()| write_whole(&file, |file| file.write_all(scene.as_bytes())));
         written.map_err(|error| Failure::System(format!("{}: {error}", file.display())))?;
         Ok(folder)
     }
@@ -228,7 +231,7 @@ impl Records {
 
 impl Drop for Records {
     fn drop(&mut self) {
-        if !self.is_kept {
+        if self.own.is_none() {
             // What cannot be removed now, the system removes with its temporary files.
             let _ = std::fs::remove_dir_all(&self.folder);
         }

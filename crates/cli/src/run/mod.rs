@@ -6,7 +6,6 @@ mod page;
 mod replayed;
 
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,7 +23,7 @@ use cohaptic_units::Instant;
 use crate::arguments::RunArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
-use crate::file::{unwritten, write_file};
+use crate::file::{own_folder, unwritten, write_file};
 use crate::progress::Progress;
 use crate::shell::{path, quoted};
 use crate::{input, interrupt, output};
@@ -59,11 +58,15 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, &scene, arguments, overrides)).transpose()?;
     let (inputs, replayed_otherwise) = inputs.unzip();
     let what = inputs.as_ref().map_or(What::Simulated, What::Replayed);
-    let first = run_one(arguments, &scene, what, arguments.out.clone(), overrides)?;
+    let out = arguments.out.as_deref();
+    let _own = out.map(own_folder).transpose()?;
+    let first = run_one(arguments, &scene, what, out, overrides)?;
     let second = match &variant {
         Some(variant) if !interrupt::requested() => {
             let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
-            Some(run_one(arguments, variant, What::Simulated, arguments.out.as_ref().map(|out| out.join("against")), &both)?)
+            let out = out.map(|out| out.join("against"));
+            let _own = out.as_deref().map(own_folder).transpose()?;
+            Some(run_one(arguments, variant, What::Simulated, out.as_deref(), &both)?)
         }
         _ => None,
     };
@@ -122,7 +125,7 @@ enum What<'a> {
     Replayed(&'a Inputs),
 }
 
-fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<PathBuf>, overrides: &[String]) -> Result<Run, Failure> {
+fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<&Path>, overrides: &[String]) -> Result<Run, Failure> {
     let shown = is_shown(arguments);
     let paged = out.is_some() && !arguments.no_plot;
     let mut watch = Watch {
@@ -133,7 +136,7 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
     let start = Clock::now();
     let measures = Measures::of(scene);
     let values = |measures: Option<Measures>, summary: &Summary| measures.map(|measures| measures.values(summary.duration)).unwrap_or_default();
-    let (summary, measured, mut files) = match out.as_deref() {
+    let (summary, measured, mut files) = match out {
         None => {
             let mut observer = (&mut watch, measures);
             let summary = execute(arguments, scene, what, &mut observer)?;
@@ -161,21 +164,10 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
     let wall_s = start.elapsed().as_secs_f64();
     watch.progress.clear();
     if let Some(path) = &arguments.links {
-        write_links(path, &summary)?;
+        write_whole(path, |file| links_csv(&summary, |rows| file.write_all(rows))).map_err(unwritten(path))?;
         files.push(path.clone());
     }
     Ok(Run { summary, measured, wall_s, positions: watch.positions, places: watch.places, files })
-}
-
-/// Writes a row a link: into a file, or as they come into a pipe or a device.
-fn write_links(path: &Path, summary: &Summary) -> Result<(), Failure> {
-    let is_stream = path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir());
-    let written = if is_stream {
-        File::options().write(true).open(path).and_then(|mut stream| links_csv(summary, |rows| stream.write_all(rows)))
-    } else {
-        write_whole(path, |file| links_csv(summary, |rows| file.write_all(rows)))
-    };
-    written.map_err(unwritten(path))
 }
 
 fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {

@@ -9,15 +9,18 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use cohaptic_campaign::Shard;
+use cohaptic_files::OwnFolder;
 use cohaptic_units::print::Counted;
 
 use crate::arguments::{ShardArguments, ShardName};
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
+use crate::file::own_folder;
 use crate::output::{self, NO_FILES};
 
 pub(crate) use status::{Piece, all_done, logs_in, missing, show};
-pub(crate) use worker::{Worker, nobody_works_in, owner};
+use worker::nobody_works_in;
+pub(crate) use worker::{Worker, owner};
 
 /// What a command does of its work.
 #[derive(Clone, Copy)]
@@ -48,6 +51,21 @@ impl<'a> Sharing<'a> {
             }
         };
         Ok(Self::Shard(shard, folder))
+    }
+
+    /// Takes the folder for this process alone, if the process does all of the work or puts shards together. A merge leaves workers that are still at work
+    /// alone.
+    pub(crate) fn own_folder(self) -> Result<Option<OwnFolder>, Failure> {
+        match self {
+            Self::Whole(None) | Self::Shard(..) | Self::Status(_) => Ok(None),
+            Self::Merge(folder) => own_folder(folder).map(Some),
+            Self::Whole(Some(folder)) => {
+                // A worker that begins looks for the owner of the folder after it has its lease, so that one of the two sees the other.
+                let own = own_folder(folder)?;
+                nobody_works_in(folder)?;
+                Ok(Some(own))
+            }
+        }
     }
 
     /// The folder that files are written into, if there is one.

@@ -9,7 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant as Clock, SystemTime, UNIX_EPOCH};
 
 use cohaptic_campaign::{Shard, worker_log};
-use cohaptic_files::{BEAT, Holder, Lease, Owner, STALE, Taking};
+use cohaptic_files::{BEAT, Holder, Lease, OwnFolder, Owner, STALE, Taking};
 
 use crate::failure::Failure;
 use crate::{interrupt, output};
@@ -37,6 +37,10 @@ impl Worker {
     /// Takes a shard in a folder that is there. If another worker has it, waits until that is seen to live, which is refused, or to be gone.
     pub(crate) fn begin(folder: &Path, shard: Shard, owner: &Owner) -> Result<Self, Failure> {
         let lease = take(folder, shard, owner)?;
+        if OwnFolder::is_taken(folder) {
+            let folder = output::path(folder);
+            return Err(Failure::System(format!("another process works on all shards in {folder}: expected to be the only one; wait for it")));
+        }
         let path = folder.join(worker_log(&owner.name()));
         let head = format!("shard {shard} process {} host {}\n", owner.pid, owner.host);
         let begin = || {
@@ -172,10 +176,7 @@ fn say_that_it_waits(folder: &Path, shard: Shard, holder: &Holder) {
 }
 
 /// That no worker does a shard in a folder, so that this process may work there alone.
-pub(crate) fn nobody_works_in(folder: &Path) -> Result<(), Failure> {
-    if !folder.exists() {
-        return Ok(());
-    }
+pub(super) fn nobody_works_in(folder: &Path) -> Result<(), Failure> {
     let unreadable = |error| Failure::File { verb: "read", path: folder.to_path_buf(), error };
     let leases = cohaptic_files::leases(folder, &owner(), |name| Shard::of_lease(name).is_some()).map_err(unreadable)?;
     match leases.iter().find_map(|(name, holder)| Shard::of_lease(name).filter(|_| !holder.is_stale()).map(|shard| (shard, holder))) {

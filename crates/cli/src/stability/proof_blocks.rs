@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use cohaptic_campaign::Shard;
+use cohaptic_files::OwnFolder;
 use cohaptic_stability::{Family, Guarantee, KnownPieces, ProofError, SharedProof, Watch};
 
 use super::guarantee::PieceWatch;
 use super::rows_file::{Kept, Row, RowsFile};
 use crate::failure::Failure;
-use crate::shard::{Done, Names, Piece, Sharing, Worker, all_done, logs_in, nobody_works_in, owner};
+use crate::shard::{Done, Names, Piece, Sharing, Worker, all_done, logs_in, owner};
 use crate::{interrupt, output};
 
 pub(super) const NAMES: Names = Names { piece: "block", unit: "range" };
@@ -91,13 +92,13 @@ impl<'a> Proofs<'a> {
         Ok((0..self.families.len()).flat_map(of).collect())
     }
 
-    /// The rows of a folder from which a proof goes on: of a merge all that it needs.
-    pub(super) fn rows(self, sharing: Sharing<'_>) -> Result<Vec<Row>, Failure> {
-        match sharing {
-            Sharing::Merge(folder) => all_done(folder, NAMES, &self.pieces()?)?,
-            Sharing::Whole(_) | Sharing::Shard(..) | Sharing::Status(_) => nobody_works_in(self.kept.folder)?,
+    /// The folder, and its rows from which a proof goes on: of a merge all that it needs.
+    pub(super) fn rows(self, sharing: Sharing<'_>) -> Result<(Option<OwnFolder>, Vec<Row>), Failure> {
+        if let Sharing::Merge(folder) = sharing {
+            all_done(folder, NAMES, &self.pieces()?)?;
         }
-        Ok(self.kept.read()?.0)
+        let own = sharing.own_folder()?;
+        Ok((own, self.kept.read()?.0))
     }
 
     /// Looks at the blocks of a shard.

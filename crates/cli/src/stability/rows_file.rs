@@ -5,11 +5,11 @@
 //!
 //! Workers that share a folder have a file each, `NAME.WORKER.partial` beside `NAME.partial`, and read those of all.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Seek as _, SeekFrom, Write as _};
+use std::fs::{self, File};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use cohaptic_files::PARTIAL;
+use cohaptic_files::{PARTIAL, open_continued};
 
 use crate::failure::Failure;
 use crate::output;
@@ -109,9 +109,7 @@ impl RowsFile {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder)?;
         }
-        let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(path)?;
-        file.set_len(whole as u64)?;
-        file.seek(SeekFrom::End(0))?;
+        let mut file = open_continued(path, whole as u64)?;
         if whole == 0 {
             let lines: String = header.iter().map(|line| format!("{line}\n")).collect();
             file.write_all(lines.as_bytes())?;

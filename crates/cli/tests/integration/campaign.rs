@@ -268,7 +268,7 @@ pub(crate) mod interrupted {
         }
         child.kill().unwrap();
         child.wait().unwrap();
-        assert!(desk.path("out/campaign.lock").exists(), "nobody tidied up");
+        assert!(desk.path("out/cohaptic.lock").exists(), "nobody tidied up");
         assert_goes_on(&desk, &line, "csv");
     }
 

@@ -167,7 +167,7 @@ fn people_get_a_table_and_a_picture_of_the_costs() {
     assert!(svg.contains(" width=\"85mm\"") && svg.contains("exact propagator (chosen)"));
     desk.cohaptic("explain three.toml --out out").assert_refused(2, &["--cost"]);
     desk.write("taken", "");
-    desk.cohaptic("explain three.toml --cost --out taken").assert_refused(3, &["cannot create taken"]);
+    desk.cohaptic("explain three.toml --cost --out taken").assert_refused(3, &["cannot write taken"]);
 }
 
 #[test]

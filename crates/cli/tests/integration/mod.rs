@@ -67,3 +67,7 @@ mod standard_input;
 mod stop;
 mod svg;
 mod sweep;
+#[cfg(target_os = "linux")]
+mod targets;
+#[cfg(unix)]
+mod two_processes;

@@ -37,17 +37,32 @@ fn a_full_disk_is_an_output_error() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_record_on_a_full_disk_is_named_and_never_takes_its_name() {
+fn a_record_on_a_full_device_is_named() {
     for file in ["trajectory.csv", "packets.csv", "links.csv", "positions.svg"] {
         // Long enough for more than one buffer of a trajectory, and not for the first of the packets.
         for duration in ["100ms", "2s"] {
             let desk = Desk::with("two.toml", TWO);
             std::fs::create_dir(desk.path("out")).unwrap();
-            std::os::unix::fs::symlink("/dev/full", desk.path(&format!("out/{file}.partial"))).unwrap();
+            std::os::unix::fs::symlink("/dev/full", desk.path("out").join(file)).unwrap();
             let refused = desk.cohaptic(&format!("run two.toml --out out --set scene.duration={duration}"));
-            refused.assert_refused(3, &[&format!("error: cannot write out/{file}.partial: ")]);
-            assert!(!desk.path("out").join(file).exists(), "{file}");
+            refused.assert_refused(3, &[&format!("error: cannot write out/{file}: No space left")]);
+            assert!(desk.path("out").join(file).symlink_metadata().unwrap().is_symlink(), "{file}");
         }
+    }
+}
+
+/// The limit of the shell for the length of files stands for a disk without room.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_record_that_finds_no_room_never_takes_its_name() {
+    for duration in ["100ms", "2s"] {
+        let desk = Desk::with("two.toml", TWO);
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", "trap '' XFSZ; ulimit -f 4; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_cohaptic")]).current_dir(desk.path(""));
+        command.args(["run", "two.toml", "--out", "out", "--set", &format!("scene.duration={duration}")]);
+        let refused = Outcome::of(command.output().unwrap());
+        refused.assert_refused(3, &["error: cannot write out/trajectory.csv.partial: File too large"]);
+        assert!(!desk.path("out/trajectory.csv").exists() && desk.path("out/trajectory.csv.partial").exists());
     }
 }
 

@@ -4,7 +4,7 @@ use crate::integration::desk::Desk;
 
 #[test]
 fn a_file_in_place_of_the_folder_is_refused_before_anything_is_computed() {
-    Desk::with("taken", "").cohaptic("paper --quick --out taken").assert_refused(3, &["cannot create taken"]);
+    Desk::with("taken", "").cohaptic("paper --quick --out taken").assert_refused(3, &["cannot write taken"]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use cohaptic_files::{WholeFile, partial_name};
+use cohaptic_files::WholeFile;
 use cohaptic_units::Instant;
 
 /// Why a record could not be written.
@@ -24,7 +24,8 @@ impl From<std::convert::Infallible> for RecordError {
     }
 }
 
-/// A record on its way: a [`WholeFile`] whose errors are those of a record. If it cannot be written to its end, its beginning stays under the name `….partial`.
+/// A record on its way: a [`WholeFile`] whose errors are those of a record. If it cannot be written to its end, its beginning stays under a name that ends in
+/// `.partial`.
 #[derive(Debug)]
 pub struct RecordFile(WholeFile);
 
@@ -35,8 +36,7 @@ impl RecordFile {
     ///
     /// [`RecordError`] if it cannot be made.
     pub fn create(path: PathBuf) -> Result<Self, RecordError> {
-        let partial = partial_name(&path);
-        WholeFile::create(path).map(Self).map_err(|source| RecordError { path: partial.into(), source })
+        WholeFile::create(&path).map(Self).map_err(|source| RecordError { path, source })
     }
 
     /// Adds to it.
@@ -45,7 +45,7 @@ impl RecordFile {
     ///
     /// [`RecordError`] if that cannot be written.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), RecordError> {
-        self.0.write_all(bytes).map_err(|source| RecordError { path: partial_name(self.0.path()).into(), source })
+        self.0.write_all(bytes).map_err(|source| RecordError { path: self.0.written_to().to_path_buf(), source })
     }
 
     /// Writes the rest and gives the file its name.
@@ -54,8 +54,8 @@ impl RecordFile {
     ///
     /// [`RecordError`] if that cannot be done.
     pub fn finish(self) -> Result<PathBuf, RecordError> {
-        let path = self.0.path().to_path_buf();
-        self.0.finish().map_err(|source| RecordError { path: partial_name(&path).into(), source })?;
+        let [path, written_to] = [self.0.path(), self.0.written_to()].map(Path::to_path_buf);
+        self.0.finish().map_err(|source| RecordError { path: written_to, source })?;
         Ok(path)
     }
 }

@@ -18,7 +18,7 @@ use crate::arguments::BoundaryArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::shard::{Sharing, all_done, nobody_works_in, show};
+use crate::shard::{Sharing, all_done, show};
 use crate::{input, interrupt, output, shard};
 
 /// What files are called in which values looked at are kept.
@@ -47,9 +47,9 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
         (Sharing::Shard(shard, _), Some(kept)) => return shard::answer(arguments.scene.json, &sharing::shard(&order, arguments, shard, kept)?),
         (Sharing::Status(folder), Some(kept)) => return show(arguments.scene.json, folder, sharing::NAMES, &sharing::pieces(&order, kept)?),
         (Sharing::Merge(folder), Some(kept)) => all_done(folder, sharing::NAMES, &sharing::pieces(&order, kept)?)?,
-        (Sharing::Whole(_), Some(kept)) => nobody_works_in(kept.folder)?,
-        (_, None) => {}
+        (Sharing::Whole(_), Some(_)) | (_, None) => {}
     }
+    let _own = sharing.own_folder()?;
     let (rows, known) = match kept {
         None => (None, Vec::new()),
         Some(kept) => kept.open(None).map(|(rows, known)| (Some(rows), known))?,

@@ -41,12 +41,11 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
         (Sharing::Status(folder), Some(proofs)) => return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &proofs.pieces()?),
         (Sharing::Merge(_) | Sharing::Whole(_), _) | (_, None) => {}
     }
-    let rows = proofs.map_or(Ok(Vec::new()), |proofs| proofs.rows(sharing))?;
+    let (_own, rows) = proofs.map_or(Ok((None, Vec::new())), |proofs| proofs.rows(sharing))?;
     let known = Pieces::of(0, &rows, None);
     let line = ProvenLine::prove_with(&order.family, tolerance, &known, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;
     let (mut files, mut uncertified) = (Vec::new(), None);
     if let Some(folder) = sharing.folder() {
-        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
         files.push(write_into(folder, "proof.csv", table(order, &line))?);
         if arguments.certificate && line.is_whole {
             let pieces = line.certify(&order.family, &PieceWatch::new()).map_err(|error| failure(order, arguments, error))?;

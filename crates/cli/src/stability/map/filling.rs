@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use cohaptic_campaign::Shard;
-use cohaptic_files::PARTIAL;
+use cohaptic_files::{OwnFolder, PARTIAL};
 use cohaptic_stability::{Map, MapError, MapRow};
 
 use super::Order;
@@ -14,7 +14,7 @@ use crate::analysis_watch::CellWatch;
 use crate::arguments::MapArguments;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::shard::{Done, Names, Piece, Sharing, Worker, all_done, nobody_works_in, owner, show};
+use crate::shard::{Done, Names, Piece, Sharing, Worker, all_done, owner, show};
 use crate::stability::proof_blocks::on_threads;
 use crate::stability::rows_file::{Kept, Row, RowsFile, fingerprint};
 use crate::stability::source::fingerprint_of;
@@ -37,21 +37,21 @@ pub(super) struct Filled {
     pub(super) cells: usize,
     /// The file of rows, to be removed when the maps are written.
     pub(super) rows: Option<RowsFile>,
+    /// The folder, until the maps are written.
+    pub(super) own: Option<OwnFolder>,
 }
 
 /// Fills every map, or puts together the rows of shards.
 pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>) -> Result<Filled, Failure> {
     let header = header(order, arguments, WHAT)?;
-    let (file, known) = match sharing.folder() {
+    let kept = sharing.folder().map(|folder| Kept { folder, name: ROWS, header: &header });
+    if let (Sharing::Merge(_), Some(kept)) = (sharing, kept) {
+        are_all_there(order, kept)?;
+    }
+    let own = sharing.own_folder()?;
+    let (file, known) = match kept {
         None => (None, Vec::new()),
-        Some(folder) => {
-            let kept = Kept { folder, name: ROWS, header: &header };
-            match sharing {
-                Sharing::Merge(_) => are_all_there(order, kept)?,
-                Sharing::Whole(_) | Sharing::Shard(..) | Sharing::Status(_) => nobody_works_in(folder)?,
-            }
-            kept.open(None).map(|(file, known)| (Some(file), known))?
-        }
+        Some(kept) => kept.open(None).map(|(file, known)| (Some(file), known))?,
     };
     let begun_before = !known.is_empty();
     let keeper = Keeper { file: Mutex::new((file, None)), broken: AtomicBool::new(false), worker: None };
@@ -62,7 +62,7 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>
         return Err(failure);
     }
     match filled {
-        Ok((maps, cells)) if maps.len() == order.variants.len() && maps.iter().all(Map::is_complete) => Ok(Filled { maps, cells, rows }),
+        Ok((maps, cells)) if maps.len() == order.variants.len() && maps.iter().all(Map::is_complete) => Ok(Filled { maps, cells, rows, own }),
         Ok((maps, _)) => Err(interrupted(&maps, order, sharing.folder())),
         Err((variant, error)) => {
             if let Some(rows) = rows.filter(|_| !begun_before) {

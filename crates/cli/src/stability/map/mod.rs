@@ -70,7 +70,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         Sharing::Status(folder) => return filling::status(&order, arguments, folder),
     }
     let start = Clock::now();
-    let Filled { maps, cells, rows } = filling::fill(&order, arguments, sharing)?;
+    let Filled { maps, cells, rows, own: _own } = filling::fill(&order, arguments, sharing)?;
     let named = maps.into_iter().enumerate().map(|(number, map)| {
         let Variant { name, overrides, .. } = &order.variants[number];
         let verdicts = map.verdicts(&order.families[number]).map_err(|error| order.failure(number, arguments, error.into()))?;

@@ -67,7 +67,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
         (Sharing::Status(folder), Some(proofs)) => return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &proofs.pieces()?),
         (Sharing::Merge(_) | Sharing::Whole(_), _) | (_, None) => {}
     }
-    let rows = proofs.map_or(Ok(Vec::new()), |proofs| proofs.rows(sharing))?;
+    let (_own, rows) = proofs.map_or(Ok((None, Vec::new())), |proofs| proofs.rows(sharing))?;
     let watch = PieceWatch::new();
     let prove = |(number, family)| ProvenRegion::prove_with(family, halvings, arguments.every_number, &Pieces::of(number, &rows, None), &watch);
     let regions = on_threads(threads, || order.families.iter().enumerate().map(prove).collect::<Vec<_>>());
@@ -79,7 +79,6 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
     }
     let mut files = Vec::new();
     if let Some(folder) = sharing.folder() {
-        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
         for (number, proof) in proofs.iter_mut().enumerate() {
             let name = if number == 0 { "proof.csv".to_owned() } else { format!("proof-{}.csv", number + 1) };
             let path = write_into(folder, &name, table(order, &proof.region))?;

@@ -1,25 +1,36 @@
-//! One process at a time.
+//! Locks of the system, for processes on one machine.
 
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
+#[cfg(unix)]
+use rustix::{
+    fs::{FlockOperation, flock},
+    io::Errno,
+};
+
 /// A lock on a file of its own, which is removed with it. The system lets go of it when the process ends, however it ends.
 #[derive(Debug)]
-pub(super) struct Lock {
+pub struct Lock {
     path: PathBuf,
     /// Open as long as the lock is held.
     file: Option<File>,
 }
 
 impl Lock {
-    /// `None` if another process has it.
-    pub(super) fn take(path: &Path) -> io::Result<Option<Self>> {
+    /// Makes the file if there is none, and locks it. `None` if another process has it. Does not wait.
+    ///
+    /// # Errors
+    ///
+    /// What the system says, also that its file system has no locks.
+    pub fn take(path: &Path) -> io::Result<Option<Self>> {
         Ok(locked(path)?.map(|file| Self { path: path.to_path_buf(), file: Some(file) }))
     }
 
     /// Whether another process has it. Nothing is written; where the file system has no locks, none is held.
-    pub(super) fn is_held(path: &Path) -> bool {
+    #[must_use]
+    pub fn is_held(path: &Path) -> bool {
         match File::open(path) {
             Ok(file) => is_locked(&file),
             // On Windows the file is open for its process alone.
@@ -30,8 +41,7 @@ impl Lock {
 
 #[cfg(unix)]
 fn is_locked(file: &File) -> bool {
-    use rustix::fs::{FlockOperation, flock};
-    flock(file, FlockOperation::NonBlockingLockShared) == Err(rustix::io::Errno::WOULDBLOCK)
+    flock(file, FlockOperation::NonBlockingLockShared) == Err(Errno::WOULDBLOCK)
 }
 
 #[cfg(windows)]
@@ -42,12 +52,11 @@ fn is_locked(_: &File) -> bool {
 /// The file, open and locked; `None` if another process has locked it.
 #[cfg(unix)]
 fn locked(path: &Path) -> io::Result<Option<File>> {
-    use rustix::fs::{FlockOperation, flock};
     loop {
         let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
         match flock(&file, FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
-            Err(rustix::io::Errno::WOULDBLOCK) => return Ok(None),
+            Err(Errno::WOULDBLOCK) => return Ok(None),
             Err(error) => return Err(error.into()),
         }
         // The process that had it may have removed the file in between: the locked file is then no lock for anybody.
@@ -90,6 +99,64 @@ impl Drop for Lock {
         // Elsewhere while it is held: no other process can have taken it. A file that stays hinders nobody.
         let _ = std::fs::remove_file(&self.path);
     }
+}
+
+/// Whether an error of [`Lock::take`] says that the file system has no locks.
+#[cfg(unix)]
+pub(crate) fn is_impossible(error: &io::Error) -> bool {
+    [Errno::NOLCK, Errno::NOSYS, Errno::OPNOTSUPP].iter().any(|errno| error.raw_os_error() == Some(errno.raw_os_error()))
+}
+
+#[cfg(not(unix))]
+pub(crate) fn is_impossible(_: &io::Error) -> bool {
+    false
+}
+
+/// Locks a file that this process has made, as long as it is open, so that no other process takes it for one that was left. `false` if another process did that
+/// already, and removes it.
+#[cfg(unix)]
+pub(crate) fn hold(file: &File, path: &Path) -> io::Result<bool> {
+    match flock(file, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => is_at(file, path),
+        Err(Errno::WOULDBLOCK) => Ok(false),
+        // Where there are no locks, no process removes the file of another one.
+        Err(_) => Ok(true),
+    }
+}
+
+#[cfg(not(unix))]
+pub(crate) fn hold(_: &File, _: &Path) -> io::Result<bool> {
+    Ok(true)
+}
+
+/// Removes a file that a process has left which has ended. `false` if something is there that cannot be told to be such a file.
+#[cfg(unix)]
+pub(crate) fn remove_left(path: &Path) -> bool {
+    let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
+    match std::fs::symlink_metadata(path) {
+        Ok(about) if about.is_file() => {}
+        Ok(_) => return false,
+        Err(error) => return is_gone(&error),
+    }
+    // Locks over NFS need a file that is open for writing.
+    let file = match File::options().write(true).open(path) {
+        Ok(file) => file,
+        Err(error) => return is_gone(&error),
+    };
+    if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+        return false;
+    }
+    // Its owner may have renamed it before it was locked. After that only the owner of the lock does.
+    match is_at(&file, path) {
+        Ok(true) => std::fs::remove_file(path).is_ok(),
+        Ok(false) => true,
+        Err(_) => false,
+    }
+}
+
+#[cfg(not(unix))]
+pub(crate) fn remove_left(_: &Path) -> bool {
+    false
 }
 
 #[cfg(test)]
