@@ -10,5 +10,8 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 fn main() -> ExitCode {
-    program::run(&program::Arguments::parse())
+    match program::Arguments::try_parse() {
+        Ok(arguments) => program::run(&arguments),
+        Err(error) => program::usage(&error),
+    }
 }

@@ -64,8 +64,7 @@ pub(crate) const NO_FILES: [&str; 0] = [];
 pub(crate) fn raw(content: &[u8]) -> Result<(), Failure> {
     interrupt::has_results();
     ANSWERED.store(true, Ordering::Relaxed);
-    let mut out = io::stdout().lock();
-    out.write_all(content).and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+    cohaptic_files::print(content).map_err(Failure::StandardOutput)
 }
 
 /// Says on standard error which files were written: one a line, for people. A JSON document names them itself.

@@ -1,6 +1,6 @@
 //! How a command that ended without its result says so: in words on standard error, under `--json` in a document on standard output in place of the answer.
 
-use std::io::{self, Write as _};
+use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
 use anstream::{AutoStream, ColorChoice};
@@ -34,8 +34,13 @@ pub(crate) fn report(failure: &Failure) -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Reports arguments that make no sense as clap does, under `--json` in a document too, and gives the exit status. Help and version are no errors.
+/// Reports arguments that make no sense as clap does, under `--json` in a document too, and gives the exit status. Help and version are no errors, unless they
+/// cannot be printed.
 pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
+    // On a terminal clap prints them, with the colours that it has.
+    if !error.use_stderr() && !io::stdout().is_terminal() {
+        return output::raw(error.render().to_string().as_bytes()).map_or_else(|failure| report(&failure), |()| ExitCode::SUCCESS);
+    }
     // As clap itself does it: what cannot be printed is not said.
     let _ = error.print();
     if is_former_command(error) {

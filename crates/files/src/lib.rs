@@ -31,6 +31,8 @@ mod partial;
 mod scratch;
 mod secret;
 #[cfg(feature = "write")]
+mod standard_output;
+#[cfg(feature = "write")]
 mod target;
 #[cfg(feature = "write")]
 mod whole;
@@ -48,6 +50,7 @@ pub use {
     lock::Lock,
     partial::PARTIAL,
     scratch::ScratchFile,
+    standard_output::print,
     whole::{WholeFile, write_whole, write_whole_by},
 };
 

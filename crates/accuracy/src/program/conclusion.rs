@@ -118,9 +118,8 @@ fn print_json(document: &Document<'_>) -> Result<(), Failure> {
     print(&text)
 }
 
-fn print(content: &[u8]) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
-    out.write_all(content).and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+pub(super) fn print(content: &[u8]) -> Result<(), Failure> {
+    cohaptic_files::print(content).map_err(Failure::StandardOutput)
 }
 
 fn write_file(path: PathBuf, content: &str) -> Result<(), Failure> {

@@ -42,16 +42,24 @@ enum Ending {
 
 /// Measures, writes and prints, and returns the exit status.
 pub(crate) fn run(arguments: &Arguments) -> ExitCode {
-    match measured(arguments) {
-        Ok(code) => code,
-        Err(failure) => {
-            if !failure.is_closed_pipe() {
-                // If standard error cannot be written to either, the exit status is all that is left.
-                let _ = writeln!(io::stderr(), "{}", visible_lines(&format!("error: {}", failure.message())));
-            }
-            ExitCode::from(failure.status())
-        }
+    measured(arguments).unwrap_or_else(|failure| report(&failure))
+}
+
+/// Prints help, the version, or the fault of the arguments, and returns the exit status.
+pub(crate) fn usage(error: &clap::Error) -> ExitCode {
+    // On a terminal clap prints them, with the colours that it has.
+    if error.use_stderr() || io::stdout().is_terminal() {
+        error.exit();
     }
+    conclusion::print(error.render().to_string().as_bytes()).map_or_else(|failure| report(&failure), |()| ExitCode::SUCCESS)
+}
+
+fn report(failure: &Failure) -> ExitCode {
+    if !failure.is_closed_pipe() {
+        // If standard error cannot be written to either, the exit status is all that is left.
+        let _ = writeln!(io::stderr(), "{}", visible_lines(&format!("error: {}", failure.message())));
+    }
+    ExitCode::from(failure.status())
 }
 
 fn measured(arguments: &Arguments) -> Result<ExitCode, Failure> {

@@ -185,10 +185,12 @@ fn a_full_disk_is_an_error_that_loses_no_row() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_standard_output_is_an_error() {
-    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let outcome = Outcome::of(Folder::new().command("--quick --only motion").stdout(full).stderr(Stdio::piped()).output().unwrap());
-    assert_eq!(outcome.status, Some(3));
-    assert!(outcome.stderr.starts_with("error: cannot write to standard output: "), "{}", outcome.stderr);
+    for line in ["--quick --only motion", "--help", "--version"] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let outcome = Outcome::of(Folder::new().command(line).stdout(full).stderr(Stdio::piped()).output().unwrap());
+        assert_eq!(outcome.status, Some(3), "{line}");
+        assert!(outcome.stderr.starts_with("error: cannot write to standard output: "), "{line}: {}", outcome.stderr);
+    }
 }
 
 /// Whether a process has a handler for SIGINT, number 2: bit 1 of the signals that it catches.

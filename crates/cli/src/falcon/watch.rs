@@ -278,8 +278,7 @@ impl SamplesFile {
 
 /// Rows on standard output, each as soon as it is there.
 pub(super) fn print_row(row: &str) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
-    writeln!(out, "{row}").and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+    output::raw(format!("{row}\n").as_bytes())
 }
 
 #[cfg(test)]

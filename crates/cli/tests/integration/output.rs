@@ -5,7 +5,18 @@ use std::process::Stdio;
 use crate::integration::desk::{Desk, Outcome, parse};
 use crate::integration::scenes::TWO;
 
-const COMMANDS: [&str; 5] = ["run two.toml", "run two.toml --json", "explain two.toml", "check two.toml", "check two.toml --json"];
+const COMMANDS: [&str; 10] = [
+    "run two.toml",
+    "run two.toml --json",
+    "explain two.toml",
+    "check two.toml",
+    "check two.toml --json",
+    "init --list",
+    "man run",
+    "--help",
+    "help run",
+    "--version",
+];
 
 #[test]
 fn a_file_in_the_way_of_the_folder_is_named() {
@@ -32,6 +43,31 @@ fn a_full_disk_is_an_output_error() {
         let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
         let output = desk.command(line).stdout(full).stderr(Stdio::piped()).spawn().unwrap().wait_with_output().unwrap();
         Outcome::of(output).assert_refused(3, &["error: cannot write to standard output: "]);
+    }
+}
+
+/// The standard library takes such a descriptor for a place that swallows everything.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_standard_output_that_cannot_be_written_to_is_an_error() {
+    let desk = Desk::with("two.toml", TWO);
+    for line in COMMANDS.into_iter().chain(["falcon watch --simulated --virtual-time --for 20ms"]) {
+        let unwritable = std::fs::File::open("/dev/null").unwrap();
+        let output = desk.command(line).stdout(unwritable).stderr(Stdio::piped()).spawn().unwrap().wait_with_output().unwrap();
+        Outcome::of(output).assert_refused(3, &["error: cannot write to standard output: "]);
+    }
+}
+
+/// Nobody has to be told that nobody reads.
+#[cfg(unix)]
+#[test]
+fn a_reader_that_has_gone_is_no_error() {
+    let desk = Desk::with("two.toml", TWO);
+    for line in COMMANDS {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = desk.command(line).stdout(writer).stderr(Stdio::piped()).spawn().unwrap().wait_with_output().unwrap();
+        assert_eq!((output.status.code(), String::from_utf8(output.stderr).unwrap().as_str()), (Some(141), ""), "{line}");
     }
 }
 
