@@ -4,17 +4,18 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use cohaptic_files::{WholeFile, write_whole, write_whole_by};
-
 use crate::compare::{Comparison, MOST_NUMBERS_COMPARED, measured};
 use crate::error::CampaignError;
-use crate::folder::{Folder, Manifest};
+use crate::folder::{Folder, Manifest, hash};
 use crate::plan::{Accepted, CampaignPlan, Parts, Refused};
 use crate::report::{Report, Tally};
 use crate::shard::Missing;
-use crate::table::{Column, Head, Row, TableError, columns};
-use crate::verdicts::{Journal, Judge, Judgement, judge, read_whole, write_all};
+use crate::table::{Column, Head, TableError, columns};
+use crate::verdicts::{Journal, Judge, Judgement, Lines, judge, read_whole, write_all};
 use crate::work::{Keep, Work};
+
+/// How often parts are put together at most: each time but the last, a part that turns out to be damaged is computed again.
+const MOST_MERGES: u32 = 3;
 
 /// What helps where the table is not as it was written.
 const TABLE_WAY_OUT: &str = "remove the folder, or choose another one";
@@ -23,10 +24,12 @@ const TABLE_WAY_OUT: &str = "remove the folder, or choose another one";
 #[derive(Debug)]
 pub struct Campaign {
     pub(crate) plan: CampaignPlan,
-    manifest: Manifest,
+    pub(crate) manifest: Manifest,
     pub(crate) accepted: Accepted,
     pub(crate) parts: Parts,
     columns: Vec<Column>,
+    /// The hash of the manifest, which the digest of each part names.
+    pub(crate) hash: String,
     pub(crate) folder: Folder,
     /// One for each combination; none while they are not known, or not asked for.
     judgements: Arc<[Judgement]>,
@@ -70,7 +73,8 @@ impl Campaign {
         }
         let campaign = Self::open_in(plan, folder, None, &NoWatch)?;
         if !campaign.is_finished() {
-            let missing = campaign.missing(&|_| true)?;
+            // By their names alone: parts that are damaged are computed again by `run`.
+            let missing = campaign.absent()?;
             if !missing.is_empty() {
                 let missing = Missing { piece: "part", count: campaign.parts.count(), pieces: missing };
                 return Err(CampaignError::Missing { path: folder.to_path_buf(), missing });
@@ -107,7 +111,8 @@ impl Campaign {
         let accepted = manifest.accepted(&plan);
         let parts = manifest.parts(accepted.runs());
         let columns = columns(plan.variations(), plan.has_verdicts(), &manifest.roster);
-        Self { plan, manifest, accepted, parts, columns, folder, judgements: Arc::from([]) }
+        let hash = hash(manifest.text().as_bytes());
+        Self { plan, manifest, accepted, parts, columns, hash, folder, judgements: Arc::from([]) }
     }
 
     fn new_manifest(plan: &CampaignPlan, watch: &dyn Watch) -> Result<Manifest, CampaignError> {
@@ -156,23 +161,6 @@ impl Campaign {
         self.folder.table(self.plan.format()).exists()
     }
 
-    /// How many runs are kept so far.
-    #[must_use]
-    pub fn kept(&self) -> u64 {
-        if self.is_finished() {
-            return self.runs();
-        }
-        // In a folder that cannot be read nothing is known to be kept.
-        let kept = self.folder.parts(self.plan.format()).unwrap_or_default();
-        kept.into_iter().filter(|part| *part < self.parts.count()).map(|part| self.parts.len(part)).sum()
-    }
-
-    /// The wanted parts that are not there.
-    pub(crate) fn missing(&self, is_wanted: &dyn Fn(u64) -> bool) -> Result<Vec<u64>, CampaignError> {
-        let there = self.folder.parts(self.plan.format())?;
-        Ok((0..self.parts.count()).filter(|part| is_wanted(*part) && !there.contains(part)).collect())
-    }
-
     /// Judges the combinations that are not judged yet, on all threads of the pool that it is called in. Each judgement is kept as soon as it is known.
     /// Gives how many combinations have none: above 0 if the watch or the judge ended it. Of a plan without verdicts none is missing.
     ///
@@ -216,10 +204,13 @@ impl Campaign {
             return Ok(Err(missing));
         }
         let judgements: Vec<Judgement> = judgements.into_iter().flatten().collect();
-        if !path.exists() {
+        // A table of before the end is written anew: nothing says that it is as it was written.
+        if !self.is_finished() || !path.exists() {
             write_all(path, &self.plan, &judgements)?;
         }
-        self.folder.remove_journals(path)?;
+        if self.is_finished() {
+            self.folder.remove_journals(path)?;
+        }
         Ok(Ok(judgements))
     }
 
@@ -232,7 +223,10 @@ impl Campaign {
         by: &dyn Judge,
         watch: &dyn Watch,
     ) -> Result<Vec<Option<Judgement>>, CampaignError> {
-        if let Some(judgements) = read_whole(path, &self.plan)? {
+        // A campaign goes on from journals, whose lines have digests. The table of judgements has none: only a finished campaign shows what it says.
+        if self.is_finished()
+            && let Some(judgements) = read_whole(path, &self.plan)?
+        {
             return Ok(judgements.into_iter().map(Some).collect());
         }
         let combinations = self.plan.combinations();
@@ -240,7 +234,11 @@ impl Campaign {
         let refused = self.refused().iter().map(|(combination, reason)| (*combination, Judgement::Refused(reason.as_str().into())));
         let mut known = refused.collect::<Vec<_>>();
         for journal in self.folder.journals(path)? {
-            known.extend(Journal::read(&journal, combinations)?.0);
+            let Lines { known: lines, damaged, .. } = Journal::read(&journal, &self.hash, combinations)?;
+            known.extend(lines);
+            if damaged > 0 {
+                watch.damaged(&journal, &format!("{damaged} of its lines are not as they were written: their combinations are judged again"));
+            }
         }
         for (combination, judgement) in known {
             judgements[usize::try_from(combination).unwrap_or_default()] = Some(judgement);
@@ -254,7 +252,7 @@ impl Campaign {
         if missing.is_empty() {
             return Ok(judgements);
         }
-        let (mut file, _) = Journal::open(Folder::journal(path, worker), combinations)?;
+        let (mut file, _) = Journal::open(Folder::journal(path, worker), &self.hash, combinations)?;
         judge(&self.plan, by, watch, &mut file, &missing, judgements)
     }
 
@@ -269,19 +267,29 @@ impl Campaign {
         if self.plan.has_verdicts() && self.judgements.is_empty() {
             return Err(CampaignError::NotJudged);
         }
-        let mut computed = 0;
-        if !self.is_finished() {
-            let missing = self.missing(&|_| true)?;
-            computed = self.compute(&missing, &self.judgements, &|part, rows| self.keep(part, rows), watch)?;
-            let kept = self.kept();
-            if kept < self.runs() {
-                return Ok(Outcome::Interrupted { kept });
+        let (mut computed, mut merges) = (0, 0);
+        while !self.is_finished() {
+            let missing = self.missing(&|_| true, watch)?;
+            let done = self.compute(&missing, &self.judgements, &|part, rows| self.keep(None, part, rows), watch)?;
+            computed += done;
+            let left = self.runs_of(&missing) - done;
+            if left > 0 {
+                return Ok(Outcome::Interrupted { kept: self.runs() - left });
             }
+            merges += 1;
             watch.puts_together();
-            self.merge()?;
+            match self.merge() {
+                // The part was damaged since it was looked at. The next look names it. A disk that does so again and again is an error.
+                Err(CampaignError::Damaged { .. }) if merges < MOST_MERGES => {}
+                merged => merged?,
+            }
         }
         let report = self.report(computed)?;
         self.folder.remove_parts(self.parts.count(), self.plan.format())?;
+        self.folder.remove_journals(&self.folder.verdicts())?;
+        if self.folder.stability().exists() {
+            self.folder.remove_journals(&self.folder.stability())?;
+        }
         self.folder.remove_traces_of_shards()?;
         Ok(Outcome::Finished(report))
     }
@@ -315,42 +323,8 @@ impl Campaign {
         Ok(Comparison::of(&self.plan, &self.accepted, self.refused(), measures, &columns))
     }
 
-    fn head<'a>(&'a self, about: &'a str) -> Head<'a> {
+    pub(crate) fn head<'a>(&'a self, about: &'a str) -> Head<'a> {
         Head { columns: &self.columns, about, program: self.plan.program() }
-    }
-
-    fn keep(&self, part: u64, rows: &[Row]) -> Result<(), CampaignError> {
-        let path = self.folder.part(part, self.plan.format());
-        let written = write_whole(&path, |file| self.write_part(file, rows));
-        written.map_err(|error| unwritten(&path, error))
-    }
-
-    /// [`Campaign::keep`] by one of several workers, which leaves a part alone that another worker has put away: both parts are equal.
-    pub(crate) fn keep_by(&self, worker: &str, part: u64, rows: &[Row]) -> Result<(), CampaignError> {
-        let path = self.folder.part(part, self.plan.format());
-        if path.exists() {
-            return Ok(());
-        }
-        let written = write_whole_by(&path, worker, |file| self.write_part(file, rows));
-        written.map_err(|error| unwritten(&path, error))
-    }
-
-    fn write_part(&self, file: &mut WholeFile, rows: &[Row]) -> Result<(), TableError> {
-        self.plan.format().write(file, self.head(&self.manifest.text()), rows)
-    }
-
-    fn merge(&self) -> Result<(), CampaignError> {
-        let format = self.plan.format();
-        // A range of `u64` does not know its length.
-        let count = u32::try_from(self.parts.count()).unwrap_or(u32::MAX);
-        let parts = (0..count).map(u64::from).map(|part| (self.folder.part(part, format), self.parts.len(part)));
-        let about = self.manifest.text();
-        let path = self.folder.table(format);
-        let merged = write_whole(&path, |file| format.merge(file, self.head(&about), parts));
-        merged.map_err(|error| match error {
-            TableError::Part { path, error } => unread(&path, *error, "remove it and repeat the command, which computes it again"),
-            error @ (TableError::Io(_) | TableError::Content(_)) => unwritten(&path, error),
-        })
     }
 
     /// Sums the table up.
@@ -379,7 +353,7 @@ impl Campaign {
     }
 }
 
-fn unwritten(path: &Path, error: TableError) -> CampaignError {
+pub(crate) fn unwritten(path: &Path, error: TableError) -> CampaignError {
     let error = match error {
         TableError::Io(error) => error,
         error @ (TableError::Content(_) | TableError::Part { .. }) => std::io::Error::other(error.to_string()),
@@ -387,7 +361,7 @@ fn unwritten(path: &Path, error: TableError) -> CampaignError {
     CampaignError::File { verb: "write", path: path.to_path_buf(), error }
 }
 
-fn unread(path: &Path, error: TableError, way_out: &'static str) -> CampaignError {
+pub(crate) fn unread(path: &Path, error: TableError, way_out: &'static str) -> CampaignError {
     match error {
         TableError::Io(error) => CampaignError::File { verb: "read", path: path.to_path_buf(), error },
         error @ (TableError::Content(_) | TableError::Part { .. }) => {
@@ -414,6 +388,9 @@ pub trait Watch: Sync {
 
     /// This number of runs was done since the last call.
     fn ran(&self, _runs: u64) {}
+
+    /// A file that a campaign goes on from is not as it was written. `fault`: what is wrong with it and what is computed again, in words.
+    fn damaged(&self, _file: &Path, _fault: &str) {}
 
     /// A part was put away, which has this number of runs.
     fn kept(&self, _part: u64, _runs: u64) {}

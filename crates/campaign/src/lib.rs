@@ -14,6 +14,9 @@
 //! A campaign over [`Strategies`] is [compared](Campaign::compare): the mean of every measure for each strategy, its difference to the first one seed by seed, and
 //! intervals of both. Combinations that a strategy refuses are [left out](CampaignPlan::leaving_out), and known before anything runs.
 //!
+//! Each part is kept with its SHA-256, its number and the campaign that it belongs to, and checked before a campaign goes on from it: a damaged part is
+//! [named](Watch::damaged) and computed again.
+//!
 //! A [`Shard`] of a campaign is done in the same folder by each of several processes, on any machines that share it ([`SharedCampaign`]);
 //! [`Campaign::open_whole`] then puts the table together, to the same bytes.
 //!
@@ -42,6 +45,7 @@ mod campaign;
 mod compare;
 mod error;
 mod folder;
+mod kept;
 mod plan;
 mod report;
 mod shard;

@@ -1,5 +1,6 @@
 //! A campaign in a folder that several workers share, each of which does a shard of it.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::campaign::{Campaign, Watch};
@@ -20,6 +21,8 @@ pub struct SharedCampaign {
     worker: String,
     /// One for each combination; of those that are not this worker's to judge, nothing that is ever looked at.
     judgements: Vec<Judgement>,
+    /// The parts whose combinations are judged: those that were missing when the worker judged.
+    judged: BTreeSet<u64>,
 }
 
 /// What became of a shard.
@@ -53,7 +56,7 @@ impl SharedCampaign {
     /// Those of [`Campaign::open`], but for other workers.
     pub fn open(plan: CampaignPlan, folder: &Path, worker: &str, watch: &dyn Watch) -> Result<Self, CampaignError> {
         let campaign = Campaign::open_in(plan, folder, Some(worker), watch)?;
-        Ok(Self { campaign, worker: worker.to_owned(), judgements: Vec::new() })
+        Ok(Self { campaign, worker: worker.to_owned(), judgements: Vec::new(), judged: BTreeSet::new() })
     }
 
     /// The parts of the campaign in a folder. Nothing is written.
@@ -69,7 +72,7 @@ impl SharedCampaign {
         let manifest = Campaign::same_manifest(&plan, &folder)?;
         let campaign = Campaign::of(plan, manifest, folder);
         let is_finished = campaign.is_finished();
-        let missing = if is_finished { Vec::new() } else { campaign.missing(&|_| true)? };
+        let missing = if is_finished { Vec::new() } else { campaign.absent()? };
         let state = |part| PartState { runs: campaign.parts.len(part), is_done: missing.binary_search(&part).is_err() };
         Ok((0..campaign.parts.count()).map(state).collect())
     }
@@ -85,18 +88,20 @@ impl SharedCampaign {
             return Ok(0);
         }
         let mut is_wanted = vec![false; usize::try_from(self.campaign.plan.combinations()).unwrap_or_default()];
-        for part in self.campaign.missing(&|part| shard.has(part))? {
-            let runs = self.campaign.parts.range(part);
+        let parts = self.campaign.missing(&|part| shard.has(part), watch)?;
+        for part in &parts {
+            let runs = self.campaign.parts.range(*part);
             let [first, last] = [runs.start, runs.end - 1].map(|run| usize::try_from(self.campaign.accepted.run(run).0).unwrap_or_default());
             is_wanted[first..=last].fill(true);
         }
         let is_wanted = |combination: u64| usize::try_from(combination).is_ok_and(|place| is_wanted[place]);
         let path = self.campaign.folder.verdicts();
         let judgements = self.judge_wanted(&path, &is_wanted, by, watch)?;
-        let missing = (0..).zip(&judgements).filter(|(combination, judgement)| is_wanted(*combination) && judgement.is_none()).count();
+        let unjudged = (0..).zip(&judgements).filter(|(combination, judgement)| is_wanted(*combination) && judgement.is_none()).count();
+        self.judged = parts.into_iter().collect();
         let nobodys = || Judgement::Refused("judged by another worker".into());
         self.judgements = judgements.into_iter().map(|judgement| judgement.unwrap_or_else(nobodys)).collect();
-        Ok(missing as u64)
+        Ok(unjudged as u64)
     }
 
     /// Judges a share of the combinations for [`Campaign::judge_apart`]. Gives how many of them have no verdict: above 0 if the watch or the judge ended it.
@@ -132,7 +137,7 @@ impl SharedCampaign {
         let runs = |parts: &mut dyn Iterator<Item = u64>| parts.map(|part| campaign.parts.len(part)).sum::<u64>();
         let all = ShardReport { parts: parts().count() as u64, runs: runs(&mut parts()), computed: 0, left: 0 };
         campaign.folder.is_shared()?;
-        let missing = campaign.missing(&|part| shard.has(part))?;
+        let mut missing = campaign.missing(&|part| shard.has(part), watch)?;
         // Asked after the parts: they go when the table is there.
         if campaign.is_finished() {
             return Ok(all);
@@ -140,13 +145,17 @@ impl SharedCampaign {
         if campaign.plan.has_verdicts() && self.judgements.is_empty() {
             return Err(CampaignError::NotJudged);
         }
+        if campaign.plan.has_verdicts() {
+            // A part that was damaged since then has combinations without judgements. The next command for the shard finds it.
+            missing.retain(|part| self.judged.contains(part));
+        }
         let keep = |part: u64, rows: &[Row]| {
-            campaign.keep_by(&self.worker, part, rows)?;
+            campaign.keep(Some(&self.worker), part, rows)?;
             watch.kept(part, rows.len() as u64);
             Ok(())
         };
         let computed = campaign.compute(&missing, &self.judgements, &keep, watch)?;
-        Ok(ShardReport { computed, left: runs(&mut missing.into_iter()) - computed, ..all })
+        Ok(ShardReport { computed, left: campaign.runs_of(&missing) - computed, ..all })
     }
 
     /// The campaign.

@@ -3,11 +3,12 @@
 //! ```text
 //! cohaptic.lock            as long as one process works on it alone
 //! campaign.json            what the campaign is; the first file with its own name
-//! verdicts.part.csv        judgements, as long as not all are known
+//! verdicts.part.csv        judgements as they are made, until the table is there
 //! verdicts.csv             all judgements
 //! stability.part.csv       judgements of a campaign whose table has none
 //! stability.csv
 //! part-00000.parquet …     whole parts
+//! part-00000.parquet.sha256 …  what each of them must be
 //! runs.parquet             the table; the parts go when it is there
 //! ```
 //!
@@ -20,6 +21,7 @@
 //! part-00000.parquet.WORKER.partial …    what it is writing
 //! ```
 
+mod digest;
 mod manifest;
 
 use std::collections::BTreeSet;
@@ -33,7 +35,10 @@ use crate::error::CampaignError;
 use crate::shard::{Shard, is_lease, is_log};
 use crate::table::Format;
 
+pub(crate) use digest::{Fault, HashingWriter, Label, hash, write as write_digest};
 pub(crate) use manifest::Manifest;
+
+use digest::DIGEST;
 
 const MANIFEST: &str = "campaign.json";
 /// How the names of files of judgements end as they are made.
@@ -163,12 +168,21 @@ impl Folder {
         self.named(|name| name.starts_with(&begin) && name.ends_with(&format!(".{JOURNAL}")))
     }
 
-    /// Which parts are there.
+    /// Which parts are there by their names, each with its digest or without. Whether their bytes are those that were written is not looked at.
     pub(crate) fn parts(&self, format: Format) -> Result<BTreeSet<u64>, CampaignError> {
         let end = format!(".{}", format.name());
         let mut parts = BTreeSet::new();
-        self.each(|name| parts.extend(name.strip_prefix("part-").and_then(|name| name.strip_suffix(&end)?.parse::<u64>().ok())))?;
+        self.each(|name| parts.extend(number(name, &end)))?;
         Ok(parts)
+    }
+
+    /// Of [`Folder::parts`], those with a digest.
+    pub(crate) fn parts_with_digests(&self, format: Format) -> Result<BTreeSet<u64>, CampaignError> {
+        let end = format!(".{}{DIGEST}", format.name());
+        let (mut digests, parts) = (BTreeSet::new(), self.parts(format)?);
+        self.each(|name| digests.extend(number(name, &end)))?;
+        digests.retain(|part| parts.contains(part));
+        Ok(digests)
     }
 
     /// The files with such names, sorted.
@@ -211,13 +225,20 @@ impl Folder {
         self.named(|name| is_of_shards(name.as_ref()))?.into_iter().try_for_each(remove)
     }
 
-    /// Removes the parts, which are all in the table.
+    /// Removes the parts, which are all in the table, and their digests.
     pub(crate) fn remove_parts(&self, parts: u64, format: Format) -> Result<(), CampaignError> {
         for part in 0..parts {
-            remove(self.part(part, format))?;
+            let path = self.part(part, format);
+            remove(digest::name_of(&path))?;
+            remove(path)?;
         }
         Ok(())
     }
+}
+
+/// The number of the part that a name with this end has.
+fn number(name: &str, end: &str) -> Option<u64> {
+    name.strip_prefix("part-")?.strip_suffix(end)?.parse().ok()
 }
 
 /// Whether a file of a campaign was being written: `campaign.json.partial`, `part-….partial`, `runs.….partial`, `verdicts.csv.partial`.
@@ -254,6 +275,8 @@ mod tests {
             ("campaign.json.partial", true),
             ("a/part-00012.csv.node-7-1f.partial", true),
             ("part-00012.parquet", false),
+            ("part-00012.parquet.sha256", false),
+            ("part-00012.parquet.sha256.partial", true),
             ("thesis.partial", false),
         ] {
             assert_eq!(is_partial(name.as_ref()), swept, "{name}");

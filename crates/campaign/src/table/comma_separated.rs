@@ -1,16 +1,15 @@
 //! Comma-separated values.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
-use std::path::{Path, PathBuf};
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write};
 
 use cohaptic_files::WholeFile;
 
-use super::format::{COMPLETE, GIST, Gist, Gists, RunColumns, TableError, rows_missing};
+use super::format::{COMPLETE, GIST, Gist, Gists, OpenPart, RunColumns, TableError};
 use super::{Column, Row, Value};
 
-pub(super) fn write(file: &mut WholeFile, columns: &[Column], rows: &[Row]) -> io::Result<()> {
-    let mut to = csv::Writer::from_writer(file);
+pub(super) fn write(to: &mut impl Write, columns: &[Column], rows: &[Row]) -> io::Result<()> {
+    let mut to = csv::Writer::from_writer(to);
     to.write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
     for row in rows {
         to.write_record(row.iter().map(text)).map_err(unwritten)?;
@@ -46,16 +45,18 @@ fn unwritten(error: csv::Error) -> io::Error {
     }
 }
 
-pub(super) fn merge(to: &mut WholeFile, columns: &[Column], parts: impl Iterator<Item = (PathBuf, u64)>) -> Result<(), TableError> {
+pub(super) fn merge(to: &mut WholeFile, columns: &[Column], parts: impl Iterator<Item = Result<OpenPart, TableError>>) -> Result<(), TableError> {
     let mut header = Vec::new();
     csv::Writer::from_writer(&mut header).write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
     to.write_all(&header)?;
     let mut buffer = vec![0; 1 << 16];
-    for (path, expected) in parts {
-        let mut part = open(&path, &header, expected).map_err(TableError::of_part(&path))?;
+    for part in parts {
+        let OpenPart { path, mut file, .. } = part?;
+        // Each part has the header of the table: the digest of the part names the campaign.
+        file.seek(SeekFrom::Start(header.len() as u64))?;
         // Not io::copy, which does not say on which side it failed.
         loop {
-            let read = part.read(&mut buffer).map_err(|error| TableError::of_part(&path)(error.into()))?;
+            let read = file.read(&mut buffer).map_err(|error| TableError::of_part(&path)(error.into()))?;
             if read == 0 {
                 break;
             }
@@ -63,38 +64,6 @@ pub(super) fn merge(to: &mut WholeFile, columns: &[Column], parts: impl Iterator
         }
     }
     Ok(())
-}
-
-/// A part that is as it was written, behind its header.
-fn open(path: &Path, header: &[u8], expected: u64) -> Result<File, TableError> {
-    let mut from = cohaptic_files::open(path, cohaptic_files::MOST_CAPTURE_BYTES)?;
-    let mut found = vec![0; header.len()];
-    match from.read_exact(&mut found) {
-        Ok(()) if found == header => {}
-        Ok(()) => return Err(TableError::Content("other columns than this campaign has".to_owned())),
-        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Err(TableError::Content("not even a header".to_owned())),
-        Err(error) => return Err(error.into()),
-    }
-    let rows = rows(path)?;
-    if rows != expected {
-        return Err(rows_missing(rows, expected));
-    }
-    from.seek(SeekFrom::Start(header.len() as u64))?;
-    Ok(from)
-}
-
-/// How many whole rows a part has, behind its header.
-fn rows(path: &Path) -> Result<u64, TableError> {
-    let mut reader = csv::Reader::from_reader(BufReader::new(File::open(path)?));
-    let (mut record, mut rows) = (csv::ByteRecord::new(), 0);
-    while reader.read_byte_record(&mut record).map_err(unread)? {
-        rows += 1;
-    }
-    let mut last = [0];
-    let mut file = File::open(path)?;
-    file.seek(SeekFrom::End(-1))?;
-    file.read_exact(&mut last)?;
-    if last == *b"\n" { Ok(rows) } else { Err(TableError::Content("the last row has no end".to_owned())) }
 }
 
 fn unread(error: csv::Error) -> TableError {

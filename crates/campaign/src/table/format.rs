@@ -1,7 +1,7 @@
 //! A table as a file in either format: its head, the figures that sum a run up, and the failure to write or read it.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use cohaptic_files::WholeFile;
@@ -28,16 +28,21 @@ impl Format {
         }
     }
 
-    /// A file of its own with these rows.
-    pub(crate) fn write(self, file: &mut WholeFile, head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
+    /// A table of its own with these rows.
+    pub(crate) fn write(self, to: &mut (impl Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
         match self {
-            Self::Parquet => parquet_file::write(file, head, rows),
-            Self::Csv => Ok(comma_separated::write(file, head.columns, rows)?),
+            Self::Parquet => parquet_file::write(to, head, rows),
+            Self::Csv => Ok(comma_separated::write(to, head.columns, rows)?),
         }
     }
 
-    /// One file with the rows of all parts, one after the other. Each is given with how many rows it must have.
-    pub(crate) fn merge(self, file: &mut WholeFile, head: Head<'_>, parts: impl ExactSizeIterator<Item = (PathBuf, u64)>) -> Result<(), TableError> {
+    /// One file with the rows of all parts, one after the other.
+    pub(crate) fn merge(
+        self,
+        file: &mut WholeFile,
+        head: Head<'_>,
+        parts: impl ExactSizeIterator<Item = Result<OpenPart, TableError>>,
+    ) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::merge(file, head, parts),
             Self::Csv => comma_separated::merge(file, head.columns, parts),
@@ -59,6 +64,17 @@ impl Format {
             Self::Csv => comma_separated::read_columns(file, names),
         }
     }
+}
+
+/// A part that was checked: its bytes are those that were written.
+#[derive(Debug)]
+pub(crate) struct OpenPart {
+    /// The name of the file, for messages.
+    pub(crate) path: PathBuf,
+    /// The file, at its beginning.
+    pub(crate) file: File,
+    /// How many rows the part has.
+    pub(crate) rows: u64,
 }
 
 /// What goes into every file of a table.
@@ -117,7 +133,7 @@ pub(crate) enum TableError {
 }
 
 impl TableError {
-    pub(super) fn of_part(path: &Path) -> impl Fn(Self) -> Self + Copy {
+    pub(crate) fn of_part(path: &Path) -> impl Fn(Self) -> Self + Copy {
         |error| Self::Part { path: path.to_path_buf(), error: Box::new(error) }
     }
 }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub(crate) use columns::{Roster, columns};
 pub(crate) use comma_separated::{number_text, text as value_text};
 pub use format::Format;
-pub(crate) use format::{Gist, Head, RunColumns, TableError};
+pub(crate) use format::{Gist, Head, OpenPart, RunColumns, TableError};
 pub(crate) use row::{RunId, row};
 
 /// What a column holds.

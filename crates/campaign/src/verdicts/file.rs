@@ -8,6 +8,7 @@ use cohaptic_files::{open_continued, write_whole};
 
 use super::{Judgement, Verdict, Words};
 use crate::error::CampaignError;
+use crate::folder::hash;
 use crate::plan::CampaignPlan;
 use crate::table::{TableError, number_text, value_text};
 
@@ -17,48 +18,86 @@ const WAY_OUT: &str = "remove it and repeat the command, which judges again";
 /// What a judgement says, in the order of its columns.
 const COLUMNS: [&str; 5] = ["verdict", "judged", "radius", "error_bound", "reason"];
 
-/// Judgements as they are made, in any order. A last line that is not whole, as a machine leaves it that loses its power, is forgotten.
+/// How many hexadecimal digits of its hash a line ends with: 128 bits.
+const DIGITS: usize = 32;
+
+/// Judgements as they are made, in any order, each on a line that ends with a hash of the line and of the campaign. A last line that is not whole, as a machine leaves
+/// it that loses its power, is forgotten; other lines that are not as they were written are left out, and their combinations judged again.
 #[derive(Debug)]
 pub(crate) struct Journal {
     path: PathBuf,
+    /// The hash of the campaign's manifest.
+    campaign: String,
     file: File,
 }
 
+/// What a journal holds.
+#[derive(Debug, Default)]
+pub(crate) struct Lines {
+    /// The judgements, each with its combination.
+    pub(crate) known: Vec<(u64, Judgement)>,
+    /// How many lines are not as they were written.
+    pub(crate) damaged: u64,
+    /// How many bytes the lines with an end have.
+    whole: u64,
+}
+
 impl Journal {
-    /// What a journal holds, and how many bytes that is; nothing if there is none.
-    pub(crate) fn read(path: &Path, combinations: u64) -> Result<(Vec<(u64, Judgement)>, u64), CampaignError> {
+    /// What a journal holds; nothing if there is none. `campaign`: the hash of the campaign's manifest.
+    pub(crate) fn read(path: &Path, campaign: &str, combinations: u64) -> Result<Lines, CampaignError> {
         let bytes = match fs::read(path) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(CampaignError::File { verb: "read", path: path.to_path_buf(), error }),
         };
-        let (mut known, mut whole, mut words) = (Vec::new(), 0, Words::default());
+        let (mut lines, mut words) = (Lines::default(), Words::default());
         for line in bytes.split_inclusive(|byte| *byte == b'\n') {
-            let Some((combination, judgement)) = record(line).filter(|(combination, _)| *combination < combinations) else { break };
-            known.push((combination, words.all(judgement)));
-            whole += line.len() as u64;
+            let Some(line) = line.strip_suffix(b"\n") else { break };
+            match record(line, campaign).filter(|(combination, _)| *combination < combinations) {
+                Some((combination, judgement)) => lines.known.push((combination, words.all(judgement))),
+                None => lines.damaged += 1,
+            }
+            lines.whole += line.len() as u64 + 1;
         }
-        Ok((known, whole))
+        Ok(lines)
     }
 
     /// Opens the journal, or begins one, and gives what it holds.
-    pub(crate) fn open(path: PathBuf, combinations: u64) -> Result<(Self, Vec<(u64, Judgement)>), CampaignError> {
-        let (known, whole) = Self::read(&path, combinations)?;
-        let file = open_continued(&path, whole).map_err(|error| CampaignError::File { verb: "write", path: path.clone(), error })?;
-        Ok((Self { path, file }, known))
+    pub(crate) fn open(path: PathBuf, campaign: &str, combinations: u64) -> Result<(Self, Lines), CampaignError> {
+        let lines = Self::read(&path, campaign, combinations)?;
+        let file = open_continued(&path, lines.whole).map_err(|error| CampaignError::File { verb: "write", path: path.clone(), error })?;
+        Ok((Self { path, campaign: campaign.to_owned(), file }, lines))
     }
 
     /// Adds a judgement. It is with the system when this returns.
     pub(crate) fn add(&mut self, combination: u64, judgement: &Judgement) -> Result<(), CampaignError> {
         let cells = std::iter::once(combination.to_string()).chain(cells(judgement));
-        let written = line(cells).and_then(|line| self.file.write_all(&line));
+        let written = line(cells).and_then(|mut line| {
+            line.pop();
+            let digest = digest(&line, &self.campaign);
+            line.push(b',');
+            line.extend(digest.bytes());
+            line.push(b'\n');
+            self.file.write_all(&line)
+        });
         written.map_err(|error| CampaignError::File { verb: "write", path: self.path.clone(), error })
     }
 }
 
-/// A line of the journal; `None` if it is not whole.
-fn record(line: &[u8]) -> Option<(u64, Judgement)> {
-    line.strip_suffix(b"\n")?;
+/// The hash of a line of a campaign, without the end of the line.
+fn digest(line: &[u8], campaign: &str) -> String {
+    let mut digest = hash(&[campaign.as_bytes(), b"\n", line].concat());
+    digest.truncate(DIGITS);
+    digest
+}
+
+/// A line of the journal, without its end; `None` if it is not as it was written.
+fn record(line: &[u8], campaign: &str) -> Option<(u64, Judgement)> {
+    let (line, found) = line.split_at_checked(line.len().checked_sub(DIGITS)?)?;
+    let line = line.strip_suffix(b",")?;
+    if found != digest(line, campaign).as_bytes() {
+        return None;
+    }
     let mut record = csv::StringRecord::new();
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(line);
     let cells = reader.read_record(&mut record).ok().filter(|read| *read).map(|_| &record)?;
@@ -145,28 +184,51 @@ mod tests {
         Judgement::Known(Verdict { word: word.into(), judged: "mean-square".into(), radius, error })
     }
 
+    fn judgements() -> [(u64, Judgement); 3] {
+        [
+            (7, known("stable", 0.1 + 0.2, 5e-324)),
+            (0, Judgement::Refused("no, \"really\" none".into())),
+            (3, known("overflow", f64::INFINITY, f64::INFINITY)),
+        ]
+    }
+
+    fn written(path: &Path) -> Vec<u8> {
+        let (mut journal, _) = Journal::open(path.to_path_buf(), "c0ffee", 9).unwrap();
+        judgements().iter().for_each(|(combination, judgement)| journal.add(*combination, judgement).unwrap());
+        fs::read(path).unwrap()
+    }
+
     #[test]
     fn a_journal_torn_anywhere_gives_back_its_whole_lines() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("journal");
-        let (mut journal, _) = Journal::open(path.clone(), 9).unwrap();
-        let judgements = [
-            (7, known("stable", 0.1 + 0.2, 5e-324)),
-            (0, Judgement::Refused("no, \"really\" none".into())),
-            (3, known("overflow", f64::INFINITY, f64::INFINITY)),
-        ];
-        judgements.iter().for_each(|(combination, judgement)| journal.add(*combination, judgement).unwrap());
-        let whole = fs::read(&path).unwrap();
+        let (whole, judgements) = (written(&path), judgements());
         for end in 0..=whole.len() {
             fs::write(&path, &whole[..end]).unwrap();
-            let (mut journal, found) = Journal::open(path.clone(), 9).unwrap();
+            let (mut journal, found) = Journal::open(path.clone(), "c0ffee", 9).unwrap();
             let lines = whole[..end].iter().filter(|byte| **byte == b'\n').count();
-            assert_eq!(found, judgements[..lines], "{end}");
+            assert_eq!((found.known.as_slice(), found.damaged), (&judgements[..lines], 0), "{end}");
             journal.add(8, &judgements[0].1).unwrap();
-            assert_eq!(Journal::open(path.clone(), 9).unwrap().1.len(), lines + 1, "{end}");
+            assert_eq!(Journal::read(&path, "c0ffee", 9).unwrap().known.len(), lines + 1, "{end}");
         }
-        // One of another campaign has combinations that this one has not.
+        // One of another campaign.
         fs::write(&path, &whole).unwrap();
-        assert_eq!(Journal::open(path, 7).unwrap().1, []);
+        let other = Journal::read(&path, "decaf", 9).unwrap();
+        assert_eq!((other.known, other.damaged), (Vec::new(), 3));
+    }
+
+    /// A line end that is lost joins two lines, of which neither is taken then.
+    #[test]
+    fn no_flipped_bit_of_a_journal_changes_a_judgement() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("journal");
+        let (whole, judgements) = (written(&path), judgements());
+        for bit in 0..8 * whole.len() {
+            let mut flipped = whole.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            fs::write(&path, flipped).unwrap();
+            let found = Journal::read(&path, "c0ffee", 9).unwrap().known;
+            assert!((1..3).contains(&found.len()) && found.iter().all(|found| judgements.contains(found)), "bit {bit}: {found:?}");
+        }
     }
 }

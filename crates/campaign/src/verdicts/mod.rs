@@ -12,7 +12,7 @@ use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::plan::CampaignPlan;
 
-pub(crate) use file::{Journal, read_whole, write_all};
+pub(crate) use file::{Journal, Lines, read_whole, write_all};
 
 /// Judges the scene of a combination. Called from many threads.
 pub trait Judge: Sync {

@@ -73,6 +73,12 @@ impl Bench {
         files
     }
 
+    /// The names of the parts in a folder, sorted; their digests are left out.
+    pub(crate) fn parts(&self, folder: &str) -> Vec<String> {
+        let is_part = |name: &String| name.starts_with("part-") && name.ends_with(self.format.name());
+        self.files(folder).into_iter().filter(is_part).collect()
+    }
+
     pub(crate) fn plan(&self) -> Result<CampaignPlan, CampaignError> {
         let variations = self.vary.iter().map(|text| Variation::parse(text)).collect::<Result<_, _>>()?;
         let file = self.folder.path().join("scene.toml");

@@ -4,6 +4,7 @@
 
 mod bench;
 mod compare;
+mod damaged;
 mod folders;
 mod resume;
 mod shards;

@@ -11,7 +11,7 @@ proptest! {
     /// Ended again and again, with any number of threads, parts torn off or half written by a kill: the table is the one of a campaign that nothing disturbed.
     #[test]
     fn however_it_was_interrupted_the_table_is_the_same(
-        stops in prop::collection::vec((0_u64..60, 1_usize..4, prop::option::of(0_usize..9), any::<bool>()), 0..5),
+        stops in prop::collection::vec((0_u64..60, 1_usize..4, prop::option::of(0_usize..18), any::<bool>()), 0..5),
         part in 1_u64..30, runs in 1_u64..20, csv: bool, threads in 1_usize..4,
     ) {
         let mut bench = Bench::new(&VARY, runs);
@@ -22,11 +22,12 @@ proptest! {
                 Outcome::Finished(report) => prop_assert_eq!(report.combinations, whole.combinations.clone()),
                 Outcome::Interrupted { kept } => {
                     // Only the last part may have fewer runs than the others.
-                    let parts = bench.files("parts").iter().filter(|name| name.starts_with("part-")).count() as u64;
+                    let parts = bench.parts("parts").len() as u64;
                     prop_assert!(kept <= parts * part && (parts == 0 || kept > (parts - 1) * part), "{} runs in {} parts of {}", kept, parts, part);
                     prop_assert!(bench.files("parts").iter().all(|name| !name.ends_with(".partial") && !name.starts_with("runs")));
                 }
             }
+            // Killed before a part had its digest, or the part itself is lost.
             let parts: Vec<String> = bench.files("parts").into_iter().filter(|name| name.starts_with("part-")).collect();
             if let Some(name) = lost.and_then(|place| parts.get(place)) {
                 std::fs::remove_file(bench.path("parts").join(name)).unwrap();
@@ -63,7 +64,7 @@ fn what_is_kept_is_not_computed_again() {
     bench.part = Some(8);
     let Outcome::Interrupted { kept } = bench.outcome("out", 1, &StopAfter::runs(17)).unwrap() else { panic!("it was to be interrupted") };
     // One thread does the chunks of 8 one after the other, and is asked before each: after 24 runs it ends.
-    assert_eq!((kept, bench.files("out").len()), (24, 4));
+    assert_eq!((kept, bench.parts("out").len(), bench.files("out").len()), (24, 3, 7));
     let campaign = bench.open("out").unwrap();
     assert_eq!((campaign.kept(), campaign.is_finished(), campaign.plan().runs()), (24, false, 40));
     drop(campaign);
@@ -87,33 +88,4 @@ fn parts_beside_the_table_are_removed() {
     std::fs::write(bench.path("out/part-00001.parquet"), "").unwrap();
     bench.finish("out", 1);
     assert_eq!((bench.files("out"), bench.table("out")), (vec!["campaign.json".to_owned(), "runs.parquet".to_owned()], table));
-}
-
-#[test]
-fn a_part_that_is_not_as_it_was_written_is_not_taken() {
-    for (format, damage) in
-        [(Format::Csv, "run\n1\n"), (Format::Csv, ""), (Format::Parquet, ""), (Format::Parquet, "PAR1, and nothing that ends like it")]
-    {
-        let mut bench = Bench::new(&VARY, 4);
-        (bench.part, bench.format) = (Some(8), format);
-        bench.finish("whole", 1);
-        bench.outcome("out", 1, &StopAfter::runs(1)).unwrap();
-        let name = format!("part-00000.{}", format.name());
-        std::fs::write(bench.path("out").join(&name), damage).unwrap();
-        let error = bench.outcome("out", 1, &cohaptic_campaign::NoWatch).unwrap_err();
-        assert!(error.to_string().contains(&name) && error.to_string().contains("remove it and repeat the command"), "{error}");
-        assert!(error.is_io());
-        std::fs::remove_file(bench.path("out").join(&name)).unwrap();
-        bench.finish("out", 1);
-        assert_eq!(bench.table("out"), bench.table("whole"));
-    }
-    // Whole rows, and too few of them.
-    let mut bench = Bench::new(&VARY, 4);
-    (bench.part, bench.format) = (Some(8), Format::Csv);
-    bench.outcome("out", 1, &StopAfter::runs(1)).unwrap();
-    let text = std::fs::read_to_string(bench.path("out/part-00000.csv")).unwrap();
-    let rows: Vec<&str> = text.split_inclusive('\n').collect();
-    std::fs::write(bench.path("out/part-00000.csv"), rows[..8].concat()).unwrap();
-    let error = bench.outcome("out", 1, &cohaptic_campaign::NoWatch).unwrap_err();
-    assert!(error.to_string().contains("7 rows: expected 8"), "{error}");
 }

@@ -8,10 +8,10 @@ use cohaptic_scene::Scene;
 use crate::bench::{Bench, comma_separated, finished};
 
 /// Says a number of the scene, refuses every third stiffness, and gives up after so many.
-struct ByStiffness(AtomicU64);
+pub(crate) struct ByStiffness(AtomicU64);
 
 impl ByStiffness {
-    const fn at_most(most: u64) -> Self {
+    pub(crate) const fn at_most(most: u64) -> Self {
         Self(AtomicU64::new(most))
     }
 }
@@ -28,13 +28,13 @@ impl Judge for ByStiffness {
     }
 }
 
-fn bench() -> Bench {
+pub(crate) fn bench() -> Bench {
     let mut bench = Bench::new(&["coordination.stiffness=900..907/8"], 3);
     bench.format = Format::Csv;
     bench
 }
 
-fn open(bench: &Bench, folder: &str) -> Campaign {
+pub(crate) fn open(bench: &Bench, folder: &str) -> Campaign {
     Campaign::open(bench.plan().unwrap().with_verdicts(), &bench.path(folder), &NoWatch).unwrap()
 }
 
@@ -82,7 +82,10 @@ fn each_combination_is_judged_once_however_often_it_is_stopped() {
 #[test]
 fn verdicts_that_are_not_as_they_were_written_are_refused_and_a_campaign_without_is_another() {
     let bench = bench();
-    assert_eq!(open(&bench, "out").judge(&ByStiffness::at_most(8), &NoWatch).unwrap(), 0);
+    let mut campaign = open(&bench, "out");
+    assert_eq!(campaign.judge(&ByStiffness::at_most(8), &NoWatch).unwrap(), 0);
+    finished(campaign.run(&NoWatch).unwrap());
+    drop(campaign);
     let path = bench.path("out/verdicts.csv");
     let text = std::fs::read_to_string(&path).unwrap();
     for damaged in [text.replacen("\n1,", "\n7,", 1), text[..text.len() / 2].rsplit_once('\n').unwrap().0.to_owned() + "\n", text.replace("0.1", "x")]

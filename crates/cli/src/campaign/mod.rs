@@ -5,6 +5,7 @@ mod judge;
 pub(crate) mod picture;
 pub(crate) mod sharing;
 
+use std::io::Write as _;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -251,5 +252,10 @@ impl Watch for Shown {
 
     fn ran(&self, runs: u64) {
         self.0.more(runs);
+    }
+
+    fn damaged(&self, file: &Path, fault: &str) {
+        // If it cannot be said, the file is computed again all the same.
+        self.0.aside(|| drop(writeln!(std::io::stderr(), "note: {} is damaged: {}", output::path(file), fault)));
     }
 }

@@ -81,6 +81,10 @@ impl Watch for Working<'_> {
         self.shown.ran(runs);
     }
 
+    fn damaged(&self, file: &Path, fault: &str) {
+        self.shown.damaged(file, fault);
+    }
+
     fn kept(&self, part: u64, runs: u64) {
         self.worker.kept(part, runs);
     }

@@ -219,7 +219,8 @@ pub(crate) mod interrupted {
     fn parts(desk: &Desk) -> usize {
         fs::read_dir(desk.path("out")).map_or(0, |files| {
             let names = files.map(|file| file.unwrap().file_name().into_string().unwrap());
-            names.filter(|name| name.starts_with("part-") && !name.ends_with(".partial")).count()
+            // A part is kept when its digest is there.
+            names.filter(|name| name.starts_with("part-") && name.ends_with(".sha256")).count()
         })
     }
 
@@ -291,7 +292,7 @@ pub(crate) mod interrupted {
         assert_eq!(desk.files("parts"), ["campaign.json"]);
         let outcome = cramped(&desk, 16, &format!("{line} 16 --out table"));
         outcome.assert_refused(3, &["cannot write table/runs.csv", "200 of 200 runs are kept"]);
-        assert_eq!(desk.files("table").len(), 1 + 13, "{:?}", desk.files("table"));
+        assert_eq!(desk.files("table").len(), 1 + 2 * 13, "{:?}", desk.files("table"));
         for (folder, part) in [("parts", "100"), ("table", "16")] {
             desk.text(&format!("{line} {part} --out {folder}"));
             desk.text(&format!("{line} {part} --out whole-{folder}"));
@@ -310,7 +311,7 @@ pub(crate) mod interrupted {
         // A part has about 7 kB, the table 25 times as much but for what stands at the end of each.
         let outcome = cramped(&desk, 96, &format!("{line} --out table"));
         outcome.assert_refused(3, &["cannot write table/runs.parquet", "File too large", "200 of 200 runs are kept"]);
-        assert_eq!(desk.files("table").len(), 1 + 25);
+        assert_eq!(desk.files("table").len(), 1 + 2 * 25);
         assert_eq!(desk.json(&format!("{line} --out table --json"))["runs_computed"].as_u64(), Some(0));
         desk.text(&format!("{line} --out whole"));
         assert!(fs::read(desk.path("table/runs.parquet")).unwrap() == fs::read(desk.path("whole/runs.parquet")).unwrap());

@@ -2,7 +2,6 @@
 
 use std::fs::File;
 use std::io::Write;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use cohaptic_files::WholeFile;
@@ -16,10 +15,14 @@ use parquet::schema::types::SchemaDescriptor;
 use super::index::{IndexWriter, MAGIC};
 use super::{about, properties, schema};
 use crate::table::Column;
-use crate::table::format::{Head, TableError, rows_missing};
+use crate::table::format::{Head, OpenPart, TableError, rows_missing};
 
 /// The bytes are those that a file writer of the library makes of the same row groups.
-pub(in crate::table) fn merge(file: &mut WholeFile, head: Head<'_>, parts: impl ExactSizeIterator<Item = (PathBuf, u64)>) -> Result<(), TableError> {
+pub(in crate::table) fn merge(
+    file: &mut WholeFile,
+    head: Head<'_>,
+    parts: impl ExactSizeIterator<Item = Result<OpenPart, TableError>>,
+) -> Result<(), TableError> {
     let schema = Arc::new(SchemaDescriptor::new(schema(head.columns)?));
     let properties = properties(head);
     let mut index = IndexWriter::create(file.path(), schema.clone())?;
@@ -27,10 +30,9 @@ pub(in crate::table) fn merge(file: &mut WholeFile, head: Head<'_>, parts: impl 
     let has_places = i16::try_from(parts.len()).is_ok();
     let mut to = TrackedWrite::new(file);
     to.write_all(MAGIC)?;
-    for (place, (path, expected)) in (0..).zip(parts) {
-        let of_part = TableError::of_part(&path);
-        let part = cohaptic_files::open(&path, cohaptic_files::MOST_CAPTURE_BYTES).map_err(|error| of_part(error.into()))?;
-        let group = group(&part, head.columns, expected).map_err(of_part)?;
+    for (place, part) in (0..).zip(parts) {
+        let OpenPart { path, file: part, rows } = part?;
+        let group = group(&part, head.columns, rows).map_err(TableError::of_part(&path))?;
         let place = if has_places { place } else { i32::MAX };
         let mut copied = SerializedRowGroupWriter::new(schema.clone(), properties.clone(), &mut to, place, None);
         append(&mut copied, &part, &group)?;

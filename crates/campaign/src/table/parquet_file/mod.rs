@@ -8,10 +8,9 @@ mod read;
 #[cfg(test)]
 mod tests;
 
-use std::io;
+use std::io::{self, Write};
 use std::sync::Arc;
 
-use cohaptic_files::WholeFile;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
@@ -30,8 +29,8 @@ pub(super) use read::{read_columns, read_gists};
 /// Under which key a file says what it belongs to.
 const ABOUT: &str = "cohaptic.campaign";
 
-pub(super) fn write(file: &mut WholeFile, head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
-    let mut writer = SerializedFileWriter::new(file, schema(head.columns)?, properties(head))?;
+pub(super) fn write(to: &mut (impl Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
+    let mut writer = SerializedFileWriter::new(to, schema(head.columns)?, properties(head))?;
     let mut group = writer.next_row_group()?;
     for place in 0..head.columns.len() {
         let Some(mut column) = group.next_column()? else { break };

@@ -1,15 +1,13 @@
 //! The table beside the library's own writer, which keeps the index of all row groups.
 
 use std::fs::File;
-#[cfg(target_os = "linux")]
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use cohaptic_files::{WholeFile, write_whole};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 
 use super::*;
-use crate::table::format::Gist;
+use crate::table::format::{Gist, OpenPart};
 
 fn columns() -> Vec<Column> {
     let column = |name: &str, kind: Kind, optional: bool| Column { name: name.to_owned(), kind, optional };
@@ -42,8 +40,12 @@ fn parts(folder: &Path, head: Head<'_>, count: u32) -> Vec<(PathBuf, u64)> {
 }
 
 fn merged(table: &Path, head: Head<'_>, parts: &[(PathBuf, u64)]) -> Vec<u8> {
-    write_whole(table, |file: &mut WholeFile| merge(file, head, parts.iter().cloned())).unwrap();
+    write_whole(table, |file: &mut WholeFile| merge(file, head, parts.iter().map(opened))).unwrap();
     std::fs::read(table).unwrap()
+}
+
+fn opened((path, rows): &(PathBuf, u64)) -> Result<OpenPart, TableError> {
+    Ok(OpenPart { path: path.clone(), file: File::open(path)?, rows: *rows })
 }
 
 /// The same parts by the library alone.
@@ -176,7 +178,7 @@ fn no_more_memory_is_taken_by_more_parts() {
     write_whole(&path, |file| write(file, head, &[row])).unwrap();
     let table = folder.path().join("runs.parquet");
     let parts = vec![(path, 1); parts.parse().unwrap()];
-    write_whole(&table, |file: &mut WholeFile| merge(file, head, parts.iter().cloned())).unwrap();
+    write_whole(&table, |file: &mut WholeFile| merge(file, head, parts.iter().map(opened))).unwrap();
     let mut rows = 0;
     read_gists(File::open(&table).unwrap(), &mut |_| rows += 1).unwrap();
     assert_eq!(rows, parts.len());
