@@ -1,7 +1,8 @@
 //! Rows of numbers that are kept while a long computation lasts, so that it can be interrupted and continued.
 //!
-//! The file begins with a header in words, which says what the rows belong to; each row is one line: its number, and values with the fewest digits that read back as
-//! the same `f64`. A line that is not whole, as a machine leaves it that loses its power, is forgotten together with all that follows.
+//! The file begins with a header in words, which says what the rows belong to; each row is one line: its number, values with the fewest digits that read back as
+//! the same `f64`, and the fingerprint of the line so far. A last line that is not whole, as a machine leaves it that loses its power, is forgotten; a line with
+//! another fingerprint is left out, so that its row is computed again.
 //!
 //! Workers that share a folder have a file each, `NAME.WORKER.partial` beside `NAME.partial`, and read those of all.
 
@@ -10,6 +11,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use cohaptic_files::{PARTIAL, open_continued};
+use cohaptic_scene::Fingerprint;
 
 use crate::failure::Failure;
 use crate::output;
@@ -123,7 +125,8 @@ impl RowsFile {
         for value in values {
             line.push_str(&format!(" {value:?}"));
         }
-        line.push('\n');
+        let fingerprint = Fingerprint::of(&line);
+        line.push_str(&format!(" {fingerprint}\n"));
         let written = self.file.write_all(line.as_bytes());
         written.map_err(|error| Failure::File { verb: "write", path: self.path.clone(), error })
     }
@@ -169,15 +172,19 @@ impl Begun {
         }
         let mut rows = Vec::new();
         for line in lines {
-            let Some(row) = row(line) else { break };
-            rows.push(row);
+            rows.extend(row(line));
             whole += line.len() + 1;
         }
         Ok(Self { rows, whole })
     }
 }
 
+/// The row of a line; `None` if it is not as it was written. Another byte is another fingerprint: FNV-1a loses nothing of a single byte that differs.
 fn row(line: &str) -> Option<Row> {
+    let (line, fingerprint) = line.rsplit_once(' ')?;
+    if Fingerprint::of(line).to_string() != fingerprint {
+        return None;
+    }
     let mut words = line.split(' ');
     let number = words.next()?.parse().ok()?;
     Some((number, words.map(str::parse).collect::<Result<_, _>>().ok()?))
@@ -202,7 +209,7 @@ fn refused(path: &Path, Difference { found, expected }: &Difference) -> Failure 
 
 /// That of a text, as a number.
 pub(crate) fn fingerprint(text: &str) -> u64 {
-    cohaptic_scene::Fingerprint::of(text).get()
+    Fingerprint::of(text).get()
 }
 
 #[cfg(test)]
@@ -239,11 +246,39 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
+    /// A file with two rows.
+    fn written(path: &Path) -> String {
+        let (mut file, _) = RowsFile::open(path.to_path_buf(), &header()).unwrap();
+        file.add(0, &[0.5]).unwrap();
+        file.add(12, &[0.25, f64::INFINITY]).unwrap();
+        fs::read_to_string(path).unwrap()
+    }
+
+    /// A line end that is lost joins two lines, of which neither is taken then; and the header is that of something else.
+    #[test]
+    fn no_flipped_bit_of_a_row_is_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.partial");
+        let whole = written(&path).into_bytes();
+        let rows = [(0, vec![0.5]), (12, vec![0.25, f64::INFINITY])];
+        let header_end = "a map\ngrid 2x2\n".len();
+        for bit in 8 * header_end..8 * whole.len() {
+            let mut flipped = whole.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            fs::write(&path, flipped).unwrap();
+            let (mut file, known) = RowsFile::open(path.clone(), &header()).unwrap();
+            assert!(known.len() < 2 && known.iter().all(|row| rows.contains(row)), "bit {bit}: {known:?}");
+            // What is added behind it is kept.
+            file.add(3, &[7.0]).unwrap();
+            assert_eq!(RowsFile::open(path.clone(), &header()).unwrap().1.last(), Some(&(3, vec![7.0])), "bit {bit}");
+        }
+    }
+
     #[test]
     fn a_torn_line_is_forgotten_wherever_it_was_torn() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rows.partial");
-        let whole = "a map\ngrid 2x2\n0 0.5\n12 0.25\n";
+        let whole = written(&path);
         for end in 0..whole.len() {
             fs::write(&path, &whole[..end]).unwrap();
             let (mut file, known) = RowsFile::open(path.clone(), &header()).unwrap();
