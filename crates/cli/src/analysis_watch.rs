@@ -1,13 +1,18 @@
 //! Progress of an analysis on the terminal, and its end when the user asks for it.
 
+use std::io::Write as _;
+
 pub(crate) use cohaptic_answers::OPERATIONS_A_SECOND;
-use cohaptic_stability::Watch;
+use cohaptic_stability::{PartCost, Watch};
 
 use crate::interrupt;
 use crate::progress::Progress;
 
 /// What takes fewer seconds than this has no bar.
 const SHORT: f64 = 1.0;
+
+/// Of what takes more seconds than this, the cost is said before it is begun, also where nobody sees a bar.
+const TOLD: f64 = 2.0;
 
 /// The steps of the bar: millions of operations.
 const STEP: f64 = 1e6;
@@ -22,7 +27,11 @@ impl Watch for Interruptible {
 }
 
 /// Shows how far an analysis is, if it takes long, and ends it when the user asks for it.
-pub(crate) struct AnalysisWatch(std::sync::Mutex<Shown>);
+pub(crate) struct AnalysisWatch {
+    shown: std::sync::Mutex<Shown>,
+    /// The most memory of a part \[bytes\].
+    most_memory: u64,
+}
 
 #[derive(Default)]
 struct Shown {
@@ -34,8 +43,8 @@ struct Shown {
 }
 
 impl AnalysisWatch {
-    pub(crate) fn new() -> Self {
-        Self(std::sync::Mutex::default())
+    pub(crate) fn new(most_memory: u64) -> Self {
+        Self { shown: std::sync::Mutex::default(), most_memory }
     }
 
     pub(crate) fn clear(&self) {
@@ -45,11 +54,27 @@ impl AnalysisWatch {
     }
 
     fn shown(&self) -> std::sync::MutexGuard<'_, Shown> {
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.shown.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 }
 
 impl Watch for AnalysisWatch {
+    fn most_memory(&self) -> u64 {
+        self.most_memory
+    }
+
+    fn begins(&self, cost: &PartCost) {
+        if cost.operations / OPERATIONS_A_SECOND < TOLD {
+            return;
+        }
+        // If it cannot be said, the analysis goes on all the same.
+        let say = || drop(writeln!(std::io::stderr(), "note: {cost}: {}", estimate(cost.operations)));
+        match &self.shown().bar {
+            Some(bar) => bar.aside(say),
+            None => say(),
+        }
+    }
+
     fn expects(&self, operations: f64) {
         let mut shown = self.shown();
         shown.expected += operations;

@@ -4,6 +4,91 @@
 //! factor of about three, which is enough to tell seconds from hours. What an operation takes in time is the machine's affair, not this crate's.
 
 use crate::structure::count;
+use crate::{AnalysisError, Watch};
+
+/// The most memory that the matrices of a part may take if nobody says otherwise, 8 GiB: those of 8192 states.
+pub const MOST_MEMORY: u64 = 8 << 30;
+
+/// How many matrices of its size the eigenvalues of a part take at once, with the enclosure of their errors; measured, of 759 and of 1509 states.
+const MATRICES: f64 = 16.0;
+
+/// What a part of a scene costs, told before it is begun.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PartCost {
+    /// How many states the part has: of bodies, of forces that wait to be applied, and of samples that are held or on the way.
+    pub states: usize,
+    /// The memory of its matrices \[bytes\].
+    pub bytes: f64,
+    /// How many operations it takes.
+    pub operations: f64,
+}
+
+impl std::fmt::Display for PartCost {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { states, bytes, .. } = *self;
+        if bytes < MEBIBYTE { write!(formatter, "{states} states") } else { write!(formatter, "{states} states, {}", Memory(bytes)) }
+    }
+}
+
+const MEBIBYTE: f64 = 1_048_576.0;
+
+/// A number of bytes in words.
+pub(crate) struct Memory(pub(crate) f64);
+
+impl Memory {
+    #[expect(clippy::cast_precision_loss, reason = "a limit and not a count, said with two digits")]
+    pub(crate) const fn of(bytes: u64) -> Self {
+        Self(bytes as f64)
+    }
+}
+
+impl std::fmt::Display for Memory {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        const UNITS: [&str; 4] = ["MiB", "GiB", "TiB", "PiB"];
+        let (mut value, mut unit) = (self.0 / MEBIBYTE, 0);
+        while value >= 1024.0 && unit + 1 < UNITS.len() {
+            (value, unit) = (value / 1024.0, unit + 1);
+        }
+        write!(formatter, "{value:.1} {}", UNITS[unit])
+    }
+}
+
+impl PartCost {
+    /// The eigenvalues of a part.
+    #[must_use]
+    pub fn of_eigenvalues(states: usize) -> Self {
+        let bytes = 8.0 * MATRICES * count(states).powi(2);
+        Self { states, bytes, operations: eigenvalue_operations(states) }
+    }
+
+    /// The same of a part whose unit vectors are pushed, one by one, through that number of events along all axes.
+    pub(crate) fn of_full(states: usize, events: usize, axes: usize) -> Self {
+        Self { operations: full_operations(states, events, axes), ..Self::of_eigenvalues(states) }
+    }
+
+    /// Tells the watch of the cost before anything of that size is made.
+    ///
+    /// # Errors
+    ///
+    /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if it ends the analysis.
+    pub(crate) fn begin(self, watch: &dyn Watch) -> Result<(), AnalysisError> {
+        self.allowed(watch)?;
+        watch.begins(&self);
+        watch.expects(self.operations);
+        if watch.stops() { Err(AnalysisError::Stopped) } else { Ok(()) }
+    }
+
+    /// [`PartCost::begin`] without telling the watch.
+    ///
+    /// # Errors
+    ///
+    /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows.
+    pub(crate) fn allowed(self, watch: &dyn Watch) -> Result<(), AnalysisError> {
+        let Self { states, bytes, .. } = self;
+        let most = watch.most_memory();
+        if bytes <= Memory::of(most).0 { Ok(()) } else { Err(AnalysisError::TooMuchMemory { states, bytes, most }) }
+    }
+}
 
 /// The sizes of a frame in which a second moment is followed event by event.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -76,6 +161,15 @@ mod tests {
         assert!((ratio(FrameCost { rows: 1000, ..frame }) - 10.0).abs() < 0.5);
         // 8 bytes each: a gibibyte is 2^27 numbers.
         assert_eq!(FrameCost { events: 1, rows: 8192, joint: 2 }.numbers().to_bits(), 134_217_728_f64.to_bits());
+    }
+
+    /// 8192 states are 2^26 entries, of 8 bytes, in 16 matrices: 8 GiB.
+    #[test]
+    fn the_memory_of_a_part_is_refused_beyond_the_limit_before_it_is_taken() {
+        assert_eq!(PartCost::of_eigenvalues(8192).begin(&crate::Unwatched), Ok(()));
+        let refused = PartCost::of_eigenvalues(8193).begin(&crate::Unwatched).unwrap_err();
+        assert!(matches!(refused, AnalysisError::TooMuchMemory { states: 8193, most: MOST_MEMORY, .. }), "{refused}");
+        assert!(refused.to_string().contains("8193 states") && refused.to_string().contains("8.0 GiB"), "{refused}");
     }
 
     /// 300 peers with 4 states and 2·4 numbers of samples each: the eigenvalues of 3600 rows are 4.7·10^11 operations.

@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use cohaptic_units::print::Span;
 
+use crate::cost::Memory;
+
 /// Why a scene cannot be analysed.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum AnalysisError {
@@ -171,6 +173,21 @@ pub enum AnalysisError {
         operations: f64,
         /// How many are allowed.
         most: f64,
+    },
+    /// The matrices of a part take more memory than they may.
+    #[error(
+        "a part of this scene has {states} states, most of them samples on the way, and its eigenvalues take {}: expected at most {}; a shorter delay, or a longer \
+         coordination.update, has fewer states, --memory of `cohaptic stability point` and `cohaptic admittance` allows more, \
+         and simulations need no matrix (`cohaptic check`, `cohaptic run`)",
+        Memory(*.bytes), Memory::of(*.most)
+    )]
+    TooMuchMemory {
+        /// How many states it has.
+        states: usize,
+        /// The memory of its matrices \[bytes\].
+        bytes: f64,
+        /// How much is allowed \[bytes\]: see [`Watch::most_memory`](crate::Watch::most_memory).
+        most: u64,
     },
     /// The watcher ended it.
     #[error("the analysis was stopped before its end")]

@@ -15,7 +15,7 @@ use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::Instant;
 
 use self::layout::Layout;
-use crate::cost::{full_operations, pushed_operations};
+use crate::cost::{PartCost, pushed_operations};
 use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
@@ -86,12 +86,12 @@ fn full<const A: usize, S: Strategy<A>>(
     watch: &dyn Watch,
     strategy: impl Fn(usize) -> S,
 ) -> Result<FullMap, AnalysisError> {
-    let mut pusher = Pusher::<A, S>::new(scene, network, contacts, strategy)?;
+    let mut pusher = Pusher::<A, S>::new(scene, network, contacts, strategy, watch)?;
     pusher.settle();
     if trust == Trust::Nothing {
         pusher.check()?;
     }
-    let mut map = pusher.map(watch).ok_or(AnalysisError::Stopped)?;
+    let mut map = pusher.map(watch)?;
     if trust == Trust::Linear && linear_law(scene, 0).is_some_and(|law| law.pull().is_some()) {
         let nodes = Structure::of_each(scene, network, contacts)?;
         map.error = closer_of(map.error, || error_of_known(scene, &nodes, map.time));
@@ -150,13 +150,21 @@ struct Pusher<const A: usize, S> {
 }
 
 impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
-    fn new(scene: &Scene, network: &NominalNetwork, contacts: &Contacts, strategy: impl Fn(usize) -> S) -> Result<Self, AnalysisError> {
+    fn new(
+        scene: &Scene,
+        network: &NominalNetwork,
+        contacts: &Contacts,
+        strategy: impl Fn(usize) -> S,
+        watch: &dyn Watch,
+    ) -> Result<Self, AnalysisError> {
         let peers = scene.peers.len();
         let clocks: Vec<NodeClock> = (0..peers).map(|place| NodeClock::of(scene, place)).collect();
         let pairs = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to)));
         let links: Vec<(usize, usize, LinkTiming)> = pairs.map(|(from, to)| (from, to, network.timing(from, to).clone())).collect();
         let uses = if scene.sample_kind() == SampleKind::State { UseOfHeld::Ticks } else { UseOfHeld::SamplesAndTicks };
         let timetable = Timetable::with_use_of_held(&clocks, &links, uses)?;
+        // A position and a velocity of each sample on the way, along each axis: known before there is room for any.
+        PartCost::of_eigenvalues(2 * A * timetable.depth.iter().sum::<usize>()).allowed(watch)?;
         let member = |place: usize| {
             let spec = &scene.peers[place];
             let mut config = scene.peer_config(place);
@@ -208,11 +216,11 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         })
     }
 
-    /// The matrix, vector by vector; `None` if the watcher ends it.
-    fn map(mut self, watch: &dyn Watch) -> Option<FullMap> {
+    /// The matrix, vector by vector.
+    fn map(mut self, watch: &dyn Watch) -> Result<FullMap, AnalysisError> {
         let size = self.layout.size;
         let events = self.timetable.events.len();
-        watch.expects(full_operations(size, events, A));
+        PartCost::of_full(size, events, A).begin(watch)?;
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
         let free = self.free_translations(&rest);
         // Relative to the copies of reference, and without what nothing depends on.
@@ -224,7 +232,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let (mut unit, mut reached) = (vec![0.0; size], vec![0.0; size]);
         for (column, state) in kept.iter().enumerate() {
             if watch.stops() {
-                return None;
+                return Err(AnalysisError::Stopped);
             }
             unit[*state] = 1.0;
             self.push(&unit, Instant::ZERO, &mut reached);
@@ -243,7 +251,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         // As for the lifted system: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
         let error = 10.0 * f64::EPSILON * count(ticks) * self.growth * self.growth * count(kept.len()).sqrt();
         let names = self.layout.names::<A>(&self.timetable.depth);
-        Some(FullMap {
+        Ok(FullMap {
             monodromy,
             error,
             rigid_modes: free.len() + self.layout.loose.len(),

@@ -66,7 +66,7 @@ pub use analysis::{
     Analysis, CHANGES_LEFT_OUT, ContactMode, Method, UNLOADED, analyse, analyse_loaded, analyse_spinning, analyse_watched, analyse_with,
 };
 pub use boundary::{Boundary, BoundaryBlock, BoundaryError, BoundaryOptions, Crossing, Stretch};
-pub use cost::{FrameCost, eigenvalue_operations, full_operations};
+pub use cost::{FrameCost, MOST_MEMORY, PartCost, eigenvalue_operations, full_operations};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use error::AnalysisError;
 pub use family::{Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange, KeyRangeError};

@@ -5,8 +5,8 @@ use std::time::Duration;
 use cohaptic_peer::{Plant, StepMap};
 use cohaptic_scene::Scene;
 
-use crate::cost::eigenvalue_operations;
-use crate::lifted::{Autonomous, Lifted};
+use crate::cost::{PartCost, eigenvalue_operations};
+use crate::lifted::{Autonomous, Lifted, Sizes};
 use crate::spectrum::bounded_radius;
 use crate::structure::Structure;
 use crate::{AnalysisError, Matrix, Method, Radius, Watch};
@@ -135,19 +135,26 @@ const MOST_SIGNALS: usize = 1024;
 
 /// The part of a scene that a lifted system is.
 pub(crate) fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
+    let Sizes { states: size, history, signals } = lifted.sizes();
+    let asked = method == Method::Determinant && history > 0 && signals <= MOST_SIGNALS;
+    let long = asked || size > LARGE && signals <= FEW;
+    // Eigenvalues cannot ask, and the frame itself may be too large a matrix.
+    let cost = PartCost::of_eigenvalues(size);
+    if !long {
+        cost.begin(watch)?;
+    }
     let frame = lifted.frame_watched(&mut Autonomous, watch).ok_or(AnalysisError::Stopped)?;
-    let size = frame.size();
-    let asked = method == Method::Determinant && frame.history() > 0 && frame.signals() <= MOST_SIGNALS;
-    let long = asked || size > LARGE && frame.signals() <= FEW;
+    debug_assert_eq!((size, history, signals), (frame.size(), frame.history(), frame.signals()));
     let delayed = if long { frame.delayed_loop().ok() } else { None };
     if let Some(delayed) = delayed {
+        // A few rows and columns, whatever the number of states: no memory to speak of.
+        let operations = delayed.operations();
+        PartCost { states: size, bytes: 0.0, operations }.begin(watch)?;
         let radius = delayed.bounded_radius_watched(frame.error, watch).ok_or(AnalysisError::Stopped)?;
         return Ok(Part { kind, size, copies, radius, method: Method::Determinant });
     }
-    // Eigenvalues cannot ask.
-    watch.expects(eigenvalue_operations(size));
-    if watch.stops() {
-        return Err(AnalysisError::Stopped);
+    if long {
+        cost.begin(watch)?;
     }
     let radius = bounded_radius(&frame.monodromy(), frame.error);
     watch.done(eigenvalue_operations(size));

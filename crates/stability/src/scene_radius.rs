@@ -7,6 +7,7 @@ use cohaptic_peer::{Gains, Plant};
 use cohaptic_scene::{FromScene, Scene};
 
 use crate::analysis::{Combination, analyse, pairs};
+use crate::cost::PartCost;
 use crate::full::{FullMap, Trust, full_along};
 use crate::lifted::{Autonomous, Body, Lifted, Node};
 use crate::mean_square::{EqualScratch, Followed};
@@ -74,6 +75,7 @@ struct TurningRadius {
 impl TurningRadius {
     fn new(scenes: &[&Scene], network: &NominalNetwork, why: &'static str) -> Result<Self, AnalysisError> {
         let structure = Structure::of(scenes, network, &turning::contacts(scenes[0])?)?;
+        turning::allowed(&structure, &Unwatched)?;
         let classes = (0..scenes[0].peers.len()).map(|peer| vec![peer]).collect();
         Ok(Self { structure, classes, unfollowed: AnalysisError::Turns { what: "the mean square", why } })
     }
@@ -259,6 +261,9 @@ impl PartsRadius {
         });
         let apart = apart.collect();
         let difference = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
+        // Each radius is that of a matrix: its size is the same for all numbers.
+        let nodes = structure.nodes(scenes[0]);
+        PartCost::of_eigenvalues(structure.quotient(scenes[0], &nodes).sizes().states).allowed(&Unwatched)?;
         let followed = Followed::of(scenes[0], network, &structure);
         Ok(Self { tied: structure.tied, together, apart, difference, followed, structure })
     }

@@ -251,16 +251,21 @@ fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, 
             delay.and_then(|delay| i128::try_from(delay.as_nanos()).ok())
         }
     };
-    let (longest, pattern) = match timing {
-        LinkTiming::Constant(delay) => (delay.as_nanos(), 1),
-        LinkTiming::Pattern(pattern) => (pattern.iter().flatten().map(Duration::as_nanos).max().unwrap_or(0), pattern.len()),
+    let (shortest, longest, pattern) = match timing {
+        LinkTiming::Constant(delay) => (delay.as_nanos(), delay.as_nanos(), 1),
+        LinkTiming::Pattern(pattern) => {
+            let delays = || pattern.iter().flatten().map(Duration::as_nanos);
+            (delays().min().unwrap_or(0), delays().max().unwrap_or(0), pattern.len())
+        }
     };
     // Far enough back that whatever is older has been replaced by the time the frame begins.
     let period = sent_at(1) - sent_at(0);
     let back = i128::try_from(longest).unwrap_or(0) / period.max(1) + 2 * i128::try_from(pattern).unwrap_or(1) + 3;
     let mut arriving: Vec<(i128, i128)> = Vec::new();
     let mut number = first - back;
-    while sent_at(number) < end {
+    // Samples that are still on the way at the end of the frame are not looked at: a delay of an hour has half a million of them.
+    let latest = end - i128::try_from(shortest).unwrap_or(0);
+    while sent_at(number) < latest {
         if let Some(delay) = delay(number) {
             arriving.push((to.instant(to.first_tick(sent_at(number) + delay)), number));
         }

@@ -1,7 +1,17 @@
 //! The watch over a computation, and the limits of its cost.
 
+use crate::cost::{MOST_MEMORY, PartCost};
+
 /// Sees how far a computation is, and may end it.
 pub trait Watch: Sync {
+    /// The most memory that the matrices of a part of a scene may take \[bytes\]; what takes more is refused before it is begun.
+    fn most_memory(&self) -> u64 {
+        MOST_MEMORY
+    }
+
+    /// A part of that cost is about to be begun.
+    fn begins(&self, _cost: &PartCost) {}
+
     /// Operations that are still to be done, by the estimate (see [`FrameCost`](crate::FrameCost)); called before they are begun.
     fn expects(&self, _operations: f64) {}
 

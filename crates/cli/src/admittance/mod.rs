@@ -18,7 +18,7 @@ use curve::Curve;
 
 /// Says what the hand of one peer feels.
 pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Failure> {
-    let watch = AnalysisWatch::new();
+    let watch = AnalysisWatch::new(arguments.memory);
     let subjects = curve::subjects(arguments, &watch);
     if subjects.is_err() {
         watch.clear();

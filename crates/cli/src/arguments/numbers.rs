@@ -28,6 +28,16 @@ pub(crate) fn threads(text: &str) -> Result<u16, String> {
     integer(1, 1024)(text)
 }
 
+/// An amount of memory in bytes: a whole number with MiB or GiB.
+pub(crate) fn memory(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let of_unit = |unit: &str, shift: u32| {
+        let number = text.strip_suffix(unit)?.trim_end().parse::<u64>().ok()?;
+        number.checked_mul(1 << shift).filter(|bytes| *bytes > 0)
+    };
+    of_unit("MiB", 20).or_else(|| of_unit("GiB", 30)).ok_or_else(|| "expected an amount of memory such as 512MiB or 16GiB".to_owned())
+}
+
 /// A number, whatever its range.
 pub(crate) fn real(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "expected a number such as 0.25, 100 or 1e-3".to_owned())
@@ -60,6 +70,14 @@ mod tests {
         assert_eq!(any_integer("-1"), Err("expected an integer of at least 0, below 2^64".to_owned()));
         assert_eq!(some("0"), Err("expected an integer of at least 1, below 2^64".to_owned()));
         assert_eq!(integer::<u16>(0, 65_535)("65536"), Err("expected an integer from 0 to 65535".to_owned()));
+    }
+
+    #[test]
+    fn memory_has_a_unit() {
+        assert_eq!((memory("512MiB"), memory(" 16 GiB")), (Ok(512 << 20), Ok(16 << 30)));
+        for text in ["", "8", "8GB", "0GiB", "-1GiB", "1.5GiB", "17179869184GiB"] {
+            assert_eq!(memory(text), Err("expected an amount of memory such as 512MiB or 16GiB".to_owned()), "{text}");
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_stability::{Method, PushedAxis};
 
 use super::examples::{self, after};
-use super::numbers::{any_integer, integer, real, some, threads};
+use super::numbers::{any_integer, integer, memory, real, some, threads};
 use super::{PictureArguments, SceneArguments, ShardArguments};
 
 #[derive(Debug, Args)]
@@ -68,6 +68,9 @@ pub(crate) struct PointArguments {
     /// How many products of matrices the search for the worst case may look at
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 100_000)]
     pub(crate) products: u64,
+    /// The most memory that the matrices of a part of the scene may take; what takes more is refused before it is begun
+    #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "8GiB")]
+    pub(crate) memory: u64,
 }
 
 /// Along or about which axis a device is pushed.
@@ -281,6 +284,9 @@ pub(crate) struct AdmittanceArguments {
     /// --curve scene.count=3,coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE,...")]
     pub(crate) curve: Vec<String>,
+    /// The most memory that the matrices of a part of the scene may take; what takes more is refused before it is begun
+    #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "8GiB")]
+    pub(crate) memory: u64,
     /// Write admittance.csv and a Bode plot, admittance.svg, into this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,

@@ -246,3 +246,50 @@ fn a_note_says_which_radius_it_is_about() {
     let one = desk.json("stability point two.toml --json --set 'timeline=[{ at = \"100ms\", link = \"all\", set = { delay = \"8ms\" } }]'");
     assert!(one["notes"][0].as_str().unwrap().starts_with("the timeline is left out"), "{one:#}");
 }
+
+/// A command whose standard error is a file, as soon as that has a text.
+#[cfg(unix)]
+pub(crate) fn running(desk: &Desk, line: &str, said: &str) -> (std::path::PathBuf, std::process::Child) {
+    use std::process::Stdio;
+    let path = desk.path("standard-error");
+    let mut child = desk.command(line).stdout(Stdio::piped()).stderr(std::fs::File::create(&path).unwrap()).spawn().unwrap();
+    while !std::fs::read_to_string(&path).unwrap().contains(said) {
+        assert_eq!(child.try_wait().unwrap(), None, "it ended by itself: {}", std::fs::read_to_string(&path).unwrap());
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    (path, child)
+}
+
+/// Ends a command by Ctrl-C.
+#[cfg(unix)]
+pub(crate) fn ended(child: std::process::Child) -> crate::integration::desk::Outcome {
+    assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    crate::integration::desk::Outcome::of(child.wait_with_output().unwrap())
+}
+
+/// 450 million samples on the way of each peer: days.
+#[cfg(unix)]
+#[test]
+fn a_long_analysis_says_what_it_costs_and_ends_at_once() {
+    let desk = Desk::with("two.toml", TWO);
+    for line in ["stability point two.toml --set link.delay=1000h", "admittance two.toml --peer left --set link.delay=1000h"] {
+        let (path, child) = running(&desk, line, "note: ");
+        assert_eq!(ended(child).status, Some(130));
+        let said = std::fs::read_to_string(path).unwrap();
+        assert!(said.contains("note: ") && said.contains(" states: about "), "{said}");
+    }
+}
+
+#[test]
+fn what_takes_more_memory_than_it_may_is_refused() {
+    let desk = Desk::with("two.toml", TWO);
+    for (line, most) in [
+        ("stability point two.toml --set link.delay=1000h --method full", "at most 8.0 GiB"),
+        ("stability point two.toml --set link.delay=500ms --method full --memory 1MiB", "at most 1.0 MiB"),
+        ("stability map two.toml --set link.delay=1000h --x coordination.stiffness=1..2 --y coordination.damping=1..2 --grid 2x2", "at most 8.0 GiB"),
+        ("stability boundary two.toml --set link.delay=1000h --along coordination.stiffness=1..2", "at most 8.0 GiB"),
+    ] {
+        desk.cohaptic(line).assert_refused(2, &["two.toml: ", " states, most of them samples on the way", most, "a shorter delay", "--memory"]);
+    }
+    desk.cohaptic("stability point two.toml --memory 8").assert_refused(2, &["--memory", "512MiB or 16GiB"]);
+}

@@ -42,7 +42,7 @@ impl Turned {
         network: &NominalNetwork,
         watch: &dyn Watch,
     ) -> Result<(Self, Radius), AnalysisError> {
-        let together = Together::with_alone(scene, network, peer)?;
+        let together = Together::with_alone(scene, network, peer, watch)?;
         let radius = mode_of(&together, Method::Reduced, watch)?.radius;
         let structure = &together.structure;
         let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
@@ -54,6 +54,7 @@ impl Turned {
             }
             None
         };
+        together.turning().cost().begin(watch)?;
         let (frame, error) = together.turning().monodromy_under(&mut looks, watch).ok_or(AnalysisError::Stopped)?;
         let velocities = Matrix::from_fn(frame.rows(), ticks.len(), |_, _| seen.pop_front().unwrap_or(0.0));
         Ok((Self { pushed, components, ticks, frame, error, velocities, together }, radius))

@@ -63,8 +63,8 @@ impl DelayedLoop {
         let Some(mut here) = self.point(at(0.0)) else { return trip };
         let (mut angle, mut phase, mut worst) = (0.0, 0.0, here.nuclear(self.now.rows()));
         let mut reach = self.reach(&here, &limits, circle.radius);
-        let steps: u64 = self.terms.iter().map(|term| u64::from(term.kernel.steps())).sum();
-        for _ in 0..POINTS + POINTS_PER_STEP * steps {
+        let operations = self.operations_of_a_point();
+        for _ in 0..POINTS + POINTS_PER_STEP * self.steps() {
             let Some(covered) = reach.filter(|_| !watch.stops()) else {
                 trip.nearest = here.z;
                 return trip;
@@ -72,6 +72,7 @@ impl DelayedLoop {
             let mut step = 1.9 * covered / circle.radius;
             loop {
                 let next = if angle + step >= end { end } else { angle + step };
+                watch.done(operations);
                 let Some(there) = self.point(at(next)) else {
                     trip.nearest = at(next);
                     return trip;

@@ -52,6 +52,9 @@ impl FrameMap {
                     matrix[(row, column)] += factor * coefficient(row, states + number);
                 }
             };
+            if u32::try_from(frames).is_err() {
+                return Err(DelayedLoopError::TooLong { steps: frames });
+            }
             let steps = |frames: usize| u32::try_from(frames).unwrap_or(u32::MAX);
             add(Kernel::Delay(steps(frames - 1)), column, 1.0);
             if reference.is_some() && frames >= 2 {

@@ -44,6 +44,17 @@ pub(crate) trait Instrument {
     }
 }
 
+/// How large the matrix of a frame is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Sizes {
+    /// Its rows: see [`FrameMap::size`].
+    pub(crate) states: usize,
+    /// How many of these are numbers of samples of earlier frames: see [`FrameMap::history`].
+    pub(crate) history: usize,
+    /// The rows of its delayed loop: see [`FrameMap::signals`].
+    pub(crate) signals: usize,
+}
+
 /// Nothing is pushed or looked at.
 pub(crate) struct Autonomous;
 
@@ -221,6 +232,17 @@ impl Lifted<'_> {
                 rounding.bound(|| f64::INFINITY)
             },
         })
+    }
+
+    /// How large its matrix is, told without making one.
+    pub(crate) fn sizes(&self) -> Sizes {
+        let channels = self.sampling.channels();
+        let silent = self.sampling.is_silent(self.time);
+        let reference = usize::from(!self.tied);
+        let own = self.nodes.iter().map(Node::states).sum::<usize>() - reference;
+        let history = if silent { 0 } else { self.timetable.depth.iter().sum::<usize>() * channels };
+        let sent = self.timetable.sent.iter().sum::<usize>() * channels;
+        Sizes { states: own + history, history, signals: own + sent + reference }
     }
 
     /// The rows of each node.

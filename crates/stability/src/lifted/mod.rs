@@ -10,7 +10,7 @@ pub(crate) mod node;
 mod rounding;
 mod sampling;
 
-pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted};
+pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted, Sizes};
 pub(crate) use node::{Body, Node};
 pub(crate) use rounding::{Rounding, closer_of};
 pub(crate) use sampling::Sampling;

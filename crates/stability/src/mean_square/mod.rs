@@ -46,7 +46,7 @@ use crate::parts::{PartKind, radius_of, reduced};
 use crate::pieces::{refuse_topology, split};
 use crate::structure::{Contacts, Structure, count, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
-use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, Radius, Verdict, Watch};
+use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, PartCost, Radius, Verdict, Watch};
 
 /// More unknowns of the second moment than this are refused, whatever the caller allows: they take minutes.
 const MOST_UNKNOWNS: usize = 1 << 20;
@@ -304,7 +304,8 @@ impl Found {
         (method, frame): (MeanSquareMethod, Duration),
         watch: &dyn Watch,
     ) -> Result<Self, AnalysisError> {
-        watch.expects(PASSES * operations);
+        let unknowns = operator.unknowns();
+        PartCost { states: unknowns, bytes: 8.0 * count(unknowns), operations: PASSES * operations }.begin(watch)?;
         let radius = radius_watched(operator, operations, watch).ok_or(AnalysisError::Stopped)?;
         Ok(Self { radius, held, method, frame, unknowns: operator.unknowns() })
     }
@@ -504,7 +505,7 @@ fn one_by_one(
     };
     let cost = FrameCost { joint, ..cost };
     within(cost, limits)?;
-    limits.watch.expects(cost.operations());
+    PartCost { states: cost.rows, bytes: 8.0 * cost.numbers(), operations: cost.operations() }.begin(limits.watch)?;
     let radius = radius_watched(&operator, cost.of_a_pass(), limits.watch).ok_or(AnalysisError::Stopped)?;
     Ok(Found { radius, held, method: MeanSquareMethod::Events, frame: timetable.frame, unknowns })
 }

@@ -5,7 +5,7 @@ use cohaptic_peer::Motion;
 use super::algebra::apply;
 use super::node::Node;
 use super::rigid::Displacement;
-use crate::cost::{full_operations, pushed_operations};
+use crate::cost::{PartCost, pushed_operations};
 use crate::structure::count;
 use crate::timetable::{Event, Instants, Timetable};
 use crate::{Matrix, Watch};
@@ -33,6 +33,11 @@ pub(crate) struct Turning<'a> {
 pub(crate) type Hand<'h> = dyn FnMut(usize, u64, &[Motion]) -> Option<(usize, f64)> + 'h;
 
 impl Turning<'_> {
+    /// The cost of its matrix and of the eigenvalues.
+    pub(crate) fn cost(&self) -> PartCost {
+        PartCost::of_full(self.size(), self.timetable.events.len(), 6)
+    }
+
     /// The matrix of a frame, displacements of everything taken out, and a bound of the error of its entries; `None` if the watch ends it.
     pub(super) fn monodromy(&self, watch: &dyn Watch) -> Option<(Matrix, f64)> {
         self.monodromy_under(&mut |_, _, _| None, watch)
@@ -41,7 +46,6 @@ impl Turning<'_> {
     /// [`Turning::monodromy`]; the hand sees the frame of each unit vector, in the order of [`Turning::kept`].
     pub(crate) fn monodromy_under(&self, hand: &mut Hand<'_>, watch: &dyn Watch) -> Option<(Matrix, f64)> {
         let (size, events) = (self.size(), self.timetable.events.len());
-        watch.expects(full_operations(size, events, 6));
         let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(free)).collect();
         let kept = self.kept();
         let mut matrix = Matrix::zeros(kept.len(), kept.len());

@@ -32,7 +32,7 @@ pub(crate) use self::node::Node;
 use self::rigid::Displacement;
 use self::spin::Spin;
 use crate::analysis::{Analysis, ContactMode, combine};
-use crate::cost::eigenvalue_operations;
+use crate::cost::{PartCost, eigenvalue_operations};
 use crate::network::NominalNetwork;
 use crate::parts::radius_of;
 use crate::scene_radius::worse;
@@ -55,7 +55,7 @@ pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Resul
 /// Analyses an object that turns about where constant forces of the hands leave it at rest, each peer by itself.
 pub(crate) fn analyse_loaded(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
-    let (together, poses) = loaded(scene, &network)?;
+    let (together, poses) = loaded(scene, &network, watch)?;
     let mode = mode_of(&together, Method::Full, watch)?;
     let mut analysis = combine(vec![mode], Method::Full, &network, scene);
     analysis.notes.retain(|note| note != UNLOADED);
@@ -75,7 +75,8 @@ pub(crate) fn analyse_loaded(scene: &Scene, watch: &dyn Watch) -> Result<Analysi
 /// Analyses an object that turns about the steady spin that torques of the hands drive, each peer by itself.
 pub(crate) fn analyse_spinning(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
-    let spin = Spin::of(scene, &network)?;
+    let spin = Spin::of(scene, &network, watch)?;
+    spin.together.turning().cost().begin(watch)?;
     let (matrix, error) = spin.monodromy(scene, watch).ok_or(AnalysisError::Stopped)?;
     if watch.stops() {
         return Err(AnalysisError::Stopped);
@@ -107,8 +108,9 @@ pub(crate) fn analyse_spinning(scene: &Scene, watch: &dyn Watch) -> Result<Analy
 }
 
 /// The peers of a scene about the rest that hands with constant forces leave it at, and where that is.
-fn loaded(scene: &Scene, network: &NominalNetwork) -> Result<(Together, Vec<Pose>), AnalysisError> {
+fn loaded(scene: &Scene, network: &NominalNetwork, watch: &dyn Watch) -> Result<(Together, Vec<Pose>), AnalysisError> {
     let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
+    allowed(&structure, watch)?;
     if structure.silent {
         return Err(AnalysisError::NoRest { why: "a link never delivers, and the samples of the beginning are a load of their own".to_owned() });
     }
@@ -157,8 +159,10 @@ impl Together {
     }
 
     /// With one peer in a class of its own.
-    pub(crate) fn with_alone(scene: &Scene, network: &NominalNetwork, alone: usize) -> Result<Self, AnalysisError> {
-        Ok(Self::new(scene, Structure::with_alone(&[scene], network, &contacts(scene)?, Some(alone))?))
+    pub(crate) fn with_alone(scene: &Scene, network: &NominalNetwork, alone: usize, watch: &dyn Watch) -> Result<Self, AnalysisError> {
+        let structure = Structure::with_alone(&[scene], network, &contacts(scene)?, Some(alone))?;
+        allowed(&structure, watch)?;
+        Ok(Self::new(scene, structure))
     }
 
     /// The system of the classes' averages.
@@ -187,6 +191,7 @@ fn mode(scene: &Scene, network: &NominalNetwork, method: Method, watch: &dyn Wat
     let contacts = contacts(scene)?;
     let one_by_one = method == Method::Full;
     let structure = if one_by_one { Structure::of_each(scene, network, &contacts)? } else { Structure::of(&[scene], network, &contacts)? };
+    allowed(&structure, watch)?;
     mode_of(&Together::new(scene, structure), method, watch)
 }
 
@@ -218,6 +223,11 @@ pub(crate) fn mode_of(together: &Together, method: Method, watch: &dyn Watch) ->
     })
 }
 
+/// Refuses more samples on the way than their matrix may have, before there is room for any of them.
+pub(crate) fn allowed(structure: &Structure, watch: &dyn Watch) -> Result<(), AnalysisError> {
+    PartCost::of_eigenvalues(frame::SAMPLE * structure.timetable.depth.iter().sum::<usize>()).allowed(watch)
+}
+
 /// How many frames of a class on its own the frame of all takes.
 fn repeats(all: &Timetable, own: &Timetable) -> u32 {
     let nanos = |frame: Duration| frame.as_nanos().max(1);
@@ -225,6 +235,7 @@ fn repeats(all: &Timetable, own: &Timetable) -> u32 {
 }
 
 fn part(turning: &Turning<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
+    turning.cost().begin(watch)?;
     let (matrix, error) = turning.monodromy(watch).ok_or(AnalysisError::Stopped)?;
     // Eigenvalues cannot ask.
     if watch.stops() {

@@ -14,7 +14,7 @@ use super::frame::{SAMPLE, Turning};
 use super::levenberg::zero;
 use super::load::Pose;
 use super::peers::{Bases, members, slope};
-use super::{Together, contacts};
+use super::{Together, allowed, contacts};
 use crate::network::NominalNetwork;
 use crate::structure::Structure;
 use crate::timetable::Instants;
@@ -91,8 +91,9 @@ impl Drive {
 
 impl Spin {
     /// The steady spin that the hands of a scene drive, near the attitude in which the object begins.
-    pub(super) fn of(scene: &Scene, network: &NominalNetwork) -> Result<Self, AnalysisError> {
+    pub(super) fn of(scene: &Scene, network: &NominalNetwork, watch: &dyn Watch) -> Result<Self, AnalysisError> {
         let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
+        allowed(&structure, watch)?;
         if structure.silent {
             return Err(none("a link never delivers, and the samples of the beginning do not turn"));
         }

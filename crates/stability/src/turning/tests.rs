@@ -210,7 +210,7 @@ fn about_a_load_the_equations_are_the_linear_part_of_real_peers() {
     for overrides in LOADS {
         let scene = scene(overrides);
         let network = NominalNetwork::of(&scene).unwrap();
-        let (together, poses) = loaded(&scene, &network).unwrap();
+        let (together, poses) = loaded(&scene, &network, &Unwatched).unwrap();
         let apart = poses[0].attitude.angle_to(&poses[1].attitude.orientation);
         assert!(apart > 1e-3, "{overrides:?}: {apart}");
         let turning = together.turning();
@@ -231,12 +231,12 @@ fn about_a_load_the_equations_are_the_linear_part_of_real_peers() {
 fn a_load_leaves_fewer_displacements_that_nothing_resists() {
     for (overrides, expected) in LOADS.into_iter().zip([3, 0, 4]) {
         let scene = scene(overrides);
-        let (together, _) = loaded(&scene, &NominalNetwork::of(&scene).unwrap()).unwrap();
+        let (together, _) = loaded(&scene, &NominalNetwork::of(&scene).unwrap(), &Unwatched).unwrap();
         assert_eq!(together.free.len(), expected, "{overrides:?}");
     }
     let none = scene(&[]);
     let network = NominalNetwork::of(&none).unwrap();
-    assert_eq!(loaded(&none, &network).unwrap().0.free.len(), 6);
+    assert_eq!(loaded(&none, &network, &Unwatched).unwrap().0.free.len(), 6);
     let (about_load, about_rest) = (analyse_loaded(&none, &Unwatched).unwrap(), analyse(&none, Method::Full, &Unwatched).unwrap());
     assert!((about_load.radius.value - about_rest.radius.value).abs() <= about_load.radius.error + about_rest.radius.error);
 }
@@ -284,7 +284,7 @@ const SPINNING: [&str; 4] = [
 fn a_steady_spin_is_that_of_real_peers() {
     let scene = scene(&SPINNING);
     let network = NominalNetwork::of(&scene).unwrap();
-    let spin = Spin::of(&scene, &network).unwrap();
+    let spin = Spin::of(&scene, &network, &Unwatched).unwrap();
     assert!((0.5..50.0).contains(&spin.rate), "{}", spin.rate);
     assert!(spin.apart() > 1e-3, "{}", spin.apart());
     spin.assert_steady(&scene);

@@ -5,8 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Admittance, AdmittanceError, AnalysisError, Boundary, BoundaryOptions, Effort, Family, Graph, GraphError, Grid, KeyRange, Limits, Links, Map,
-    Method, Patterns, SceneWorstCaseError, Watch, analyse_on_watched, analyse_watched, judge_watched, mean_square_watched, worst_case_watched,
+    Admittance, AdmittanceError, AnalysisError, Boundary, BoundaryOptions, Effort, Family, FamilyError, Graph, GraphError, Grid, KeyRange, Limits,
+    Links, MOST_MEMORY, Map, Method, PartCost, Patterns, SceneWorstCaseError, Unwatched, Watch, analyse_on_watched, analyse_watched, judge_watched,
+    mean_square_watched, worst_case_watched,
 };
 
 const THREE: &str = r#"
@@ -102,6 +103,74 @@ fn a_second_moment_that_takes_too_long_is_refused_before_it_is_begun() {
     assert!(matches!(refused, AnalysisError::TooManyOperations { operations, .. } if operations > 1e12), "{refused:?}");
     let refused = mean_square_watched(&drifting, &limits(&watch)).unwrap_err();
     assert!(matches!(refused, AnalysisError::TooManyMoments { unknowns: Some(numbers), .. } if numbers > 900_000_000), "{refused:?}");
+}
+
+/// Is told what parts cost, and ends an analysis that begins one of more than 10¹⁰ operations.
+struct Told {
+    most_memory: u64,
+    costs: Mutex<Vec<PartCost>>,
+}
+
+impl Told {
+    const fn allowing(most_memory: u64) -> Self {
+        Self { most_memory, costs: Mutex::new(Vec::new()) }
+    }
+
+    fn last(&self) -> PartCost {
+        *self.costs.lock().unwrap().last().unwrap()
+    }
+}
+
+impl Watch for Told {
+    fn most_memory(&self) -> u64 {
+        self.most_memory
+    }
+
+    fn begins(&self, cost: &PartCost) {
+        self.costs.lock().unwrap().push(*cost);
+    }
+
+    fn stops(&self) -> bool {
+        self.costs.lock().unwrap().iter().any(|cost| cost.operations > 1e10)
+    }
+}
+
+/// 450 million samples of each peer are on the way: no analysis makes anything of that size before it tells the cost, and those that would need it refuse.
+#[test]
+fn a_delay_of_a_thousand_hours_is_told_or_refused_before_anything_is_made() {
+    let text = THREE.replace("24ms", "1000h");
+    let scene = Scene::parse(&text, "three.toml".as_ref(), &["link.loss=0".to_owned()]).unwrap();
+    let told = Told::allowing(MOST_MEMORY);
+    assert_eq!(analyse_watched(&scene, Method::Reduced, &told).unwrap_err(), AnalysisError::Stopped);
+    // A number of each sample, of the average of equal peers.
+    assert!(told.last().states > 440_000_000 && told.last().operations > 1e12, "{}", told.last());
+    let told = Told::allowing(MOST_MEMORY);
+    let refused = Admittance::of_watched(&scene, 0, &told).unwrap_err();
+    assert_eq!((refused, told.last().states > 440_000_000), (AdmittanceError::Analysis(AnalysisError::Stopped), true));
+    let refused = analyse_watched(&scene, Method::Full, &Unwatched).unwrap_err();
+    assert!(matches!(refused, AnalysisError::TooMuchMemory { states, .. } if states > 2_600_000_000), "{refused}");
+    // A map and a boundary have a matrix for each value.
+    let range = KeyRange { key: "coordination.stiffness".to_owned(), low: 100.0, high: 2000.0, unit: String::new() };
+    let refused = Family::new(&text, "three.toml".as_ref(), &["link.loss=0".to_owned()], vec![range]).map(drop).unwrap_err();
+    assert!(matches!(refused, FamilyError::Analysis(AnalysisError::TooMuchMemory { .. })), "{refused}");
+}
+
+/// The mean delay of the spikes is 99990/s · 60 ms · 400 ms = 2400 s: 300 thousand samples.
+#[test]
+fn what_spikes_add_to_the_mean_delay_is_told_too() {
+    let scene = three(&["link.loss=0", "link.spike={ rate = 99990.0, height = \"60ms\", decay = \"400ms\" }"]);
+    let told = Told::allowing(MOST_MEMORY);
+    let refused = Admittance::of_watched(&scene, 0, &told).unwrap_err();
+    assert_eq!(refused, AdmittanceError::Analysis(AnalysisError::Stopped));
+    assert!(told.last().states > 290_000, "{}", told.last());
+}
+
+#[test]
+fn whoever_watches_says_how_much_memory_there_is() {
+    let scene = three(&["link.delay=2s", "link.loss=0"]);
+    let refused = analyse_watched(&scene, Method::Full, &Told::allowing(1 << 20)).unwrap_err();
+    assert!(matches!(refused, AnalysisError::TooMuchMemory { most: 1_048_576, .. }), "{refused}");
+    assert!(refused.to_string().contains("at most 1.0 MiB") && refused.to_string().contains("--memory"), "{refused}");
 }
 
 #[test]

@@ -147,6 +147,13 @@ fn sentence(verdict: Verdict, mean_square: bool) -> &'static str {
     }
 }
 
+/// The worst case by itself.
+pub(super) fn worst_in_words(worst: &SceneWorstCase) -> String {
+    let mut text = String::new();
+    worst_case(worst, &[], &mut |line: String| text.push_str(&format!("{line}\n")));
+    text.trim_end().to_owned()
+}
+
 /// The worst case, with the pattern that makes it.
 fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(String)) {
     let verdict = match worst.verdict() {

@@ -12,8 +12,8 @@ use std::process::ExitCode;
 use cohaptic_answers::notes;
 use cohaptic_scene::{Scene, read_weights};
 use cohaptic_stability::{
-    Analysis, AnalysisError, CHANGES_LEFT_OUT, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, analyse_spinning,
-    has_chance, judge_watched,
+    Analysis, AnalysisError, CHANGES_LEFT_OUT, Graph, GraphError, Judgement, Limits, Matrix, SceneWorstCase, analyse_loaded, analyse_on_watched,
+    analyse_spinning, has_chance, judge_watched,
 };
 
 use crate::analysis_watch::AnalysisWatch;
@@ -28,6 +28,12 @@ fn ended() -> Failure {
     Failure::Interrupted("the analysis was ended before its verdict".to_owned())
 }
 
+/// The same where the worst case is known already: it took its time, and is told.
+fn ended_after(worst: Option<&SceneWorstCase>) -> Failure {
+    let Some(worst) = worst else { return ended() };
+    Failure::Interrupted(format!("the analysis was ended before its verdict; before that,{}", answer::worst_in_words(worst)))
+}
+
 /// Says whether the scene is stable.
 pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
@@ -40,16 +46,16 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let switching = switching::of(&scene, arguments, path)?;
     let worst = worst::of(&scene, arguments, path)?;
     let mut judgement = match &arguments.graph {
-        Some(graph) => on_graph(&scene, graph, path)?,
+        Some(graph) => on_graph(&scene, graph, path, arguments.memory)?,
         None => {
-            let watch = AnalysisWatch::new();
+            let watch = AnalysisWatch::new(arguments.memory);
             let judged = match arguments.about {
                 RestName::Unloaded => judge_watched(&scene, arguments.method.into(), &Limits { watch: &watch, ..Limits::of_unknowns(usize::MAX) }),
                 RestName::Loaded => analyse_loaded(&scene, arguments.method.into(), &watch).map(|analysis| nominal(&scene, analysis, "about a load")),
                 RestName::Spinning => analyse_spinning(&scene, &watch).map(|analysis| nominal(&scene, analysis, "about a spin")),
             };
             watch.clear();
-            judged.map_err(|error| if error == AnalysisError::Stopped { ended() } else { not_analysed(path, &error) })?
+            judged.map_err(|error| if error == AnalysisError::Stopped { ended_after(worst.as_ref()) } else { not_analysed(path, &error) })?
         }
     };
     if switching.is_some() {
@@ -86,7 +92,7 @@ fn nominal(scene: &Scene, mut analysis: Analysis, place: &str) -> Judgement {
 }
 
 /// The verdict if each peer hears only its neighbours.
-fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failure> {
+fn on_graph(scene: &Scene, graph: &str, path: &Path, most_memory: u64) -> Result<Judgement, Failure> {
     let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", input::named(path).display()));
     if scene.topology.is_some() {
         return Err(refused("the scene has a graph of its own: expected no --graph, or a scene without [topology]".to_owned()));
@@ -97,7 +103,7 @@ fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failur
         "star" => Graph::Star,
         file => weights(Path::new(file))?,
     };
-    let watch = AnalysisWatch::new();
+    let watch = AnalysisWatch::new(most_memory);
     let found = analyse_on_watched(scene, &graph, &watch);
     watch.clear();
     let is_stopped = |error: &GraphError| matches!(error, GraphError::Analysis(AnalysisError::Stopped));

@@ -26,7 +26,7 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
     };
     let patterns = Patterns { losses_in_a_row: arguments.losses_in_a_row.unwrap_or(0), delay: arguments.delay_within, links };
     let effort = Effort { accuracy: arguments.accuracy, products: arguments.products };
-    let watch = AnalysisWatch::new();
+    let watch = AnalysisWatch::new(arguments.memory);
     let found = worst_case_watched(scene, &patterns, &effort, &watch);
     watch.clear();
     found.map(Some).map_err(|error| {
