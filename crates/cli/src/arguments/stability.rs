@@ -213,6 +213,9 @@ pub(crate) struct BoundaryArguments {
     /// How many values are looked at first, the ends among them [default: 400]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(0, u64::MAX))]
     pub(crate) samples: Option<usize>,
+    /// How many values are looked at at most; the answer then says that it is not settled
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(2, u64::MAX), default_value_t = 100_000, conflicts_with = "prove")]
+    pub(crate) values: usize,
     /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep the finished part there if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,

@@ -86,8 +86,9 @@ fn needs_a_look(samples: &[Sample], place: usize, tolerance: f64, spacing: f64) 
     }
     match (low.verdict, high.verdict) {
         (one, other) if one != other => true,
-        // A marginal stretch is looked at twice as closely as the rest, and then believed.
-        (Verdict::Marginal, _) => width > 0.75 * spacing,
+        // A marginal stretch, or one in which nothing is known of the radius, is looked at twice as closely as the rest, and then believed: what the radius does
+        // within its error, or without a number, has no bend.
+        (Verdict::Marginal | Verdict::Overflow, _) => width > 0.75 * spacing,
         _ => {
             let before = place.checked_sub(1).map(|place| bend(samples, place));
             let after = (place + 2 < samples.len()).then(|| bend(samples, place));

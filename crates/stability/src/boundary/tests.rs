@@ -180,3 +180,14 @@ fn blocks_leave_a_search_little_to_do() {
     assert!(10 * rest < whole.samples, "{rest} of {} values are left", whole.samples);
     assert_eq!(Boundary::find(&family, options, &known, |_| (), || false).unwrap(), whole);
 }
+
+/// Where nothing is known of the radius it has no bend, and a look from nearer tells no more.
+#[test]
+fn a_stretch_in_which_nothing_is_known_is_not_halved_to_the_tolerance() {
+    let known = |value: f64| Radius { value: libm::exp(value - 9.0), error: 1e-14 };
+    let radius = |value: f64| Ok::<_, ()>(Cell::certain(if value > CENTRE { Radius::UNKNOWN } else { known(value) }));
+    let boundary = Boundary::search(&range(), BoundaryOptions::of(&range()), &[], radius, |_| (), || false).unwrap();
+    assert!(boundary.is_settled() && boundary.samples < 1500, "{} values", boundary.samples);
+    crosses(&boundary, &[CENTRE]);
+    assert_eq!((boundary.crossings[0].from, boundary.crossings[0].to), (Verdict::Stable, Verdict::Overflow));
+}

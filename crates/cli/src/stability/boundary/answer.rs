@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::Order;
 use crate::document_schema::document;
+use crate::interrupt;
 
 /// The answer of `cohaptic stability boundary --json`.
 pub(super) fn of(order: &Order, found: &Boundary, files: &[String]) -> impl Serialize {
@@ -63,7 +64,12 @@ pub(super) fn describe(order: &Order, found: &Boundary) -> String {
         order.options.tolerance
     ));
     if !found.is_settled() {
-        line("NOT SETTLED: it ended after the most values that it may look at; a larger tolerance or a shorter range decides".to_owned());
+        line(if found.samples < order.options.most && interrupt::requested() {
+            "NOT SETTLED: it was ended before it had looked as closely as it should; what lies between two values is open".to_owned()
+        } else {
+            "NOT SETTLED: it ended after the most values that it may look at; --values allows more, and a larger tolerance or a shorter range decides"
+                .to_owned()
+        });
     }
     super::notes(found).iter().for_each(|note| line(format!("note: {note}")));
     text

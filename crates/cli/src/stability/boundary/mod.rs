@@ -5,7 +5,10 @@ mod files;
 mod prove;
 mod sharing;
 
+use std::io::Write as _;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant as Clock};
 
 use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Cell, Criterion, Family, KeyRange, Radius};
 
@@ -13,13 +16,16 @@ use cohaptic_units::print::Counted;
 
 use super::rows_file::{Kept, Row, RowsFile, fingerprint};
 use super::source::{self, Said};
-use crate::analysis_watch::CellWatch;
+use crate::analysis_watch::{CellWatch, OPERATIONS_A_SECOND, estimate};
 use crate::arguments::BoundaryArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::shard::{Sharing, all_done, show};
 use crate::{input, interrupt, output, shard};
+
+/// A search that has no end by then says how long it may take, where nobody sees a bar.
+const TOLD: Duration = Duration::from_secs(1);
 
 /// What files are called in which values looked at are kept.
 const ROWS: &str = "boundary.rows";
@@ -65,22 +71,27 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
             return Err(failure(arguments, &order.range, error));
         }
     };
-    if !found.is_settled() && interrupt::requested() {
-        return Err(interrupted(&found, rows, &known, kept));
+    let is_interrupted = !found.is_settled() && interrupt::requested();
+    if is_interrupted {
+        let ended = interrupted(&found, rows, &known, kept);
+        if found.samples > 0 {
+            // What is known so far says that it is not settled.
+            say(&order, arguments, &found, &[])?;
+        }
+        return Err(ended);
     }
     let mut written = Vec::new();
     if let Some(folder) = sharing.folder() {
         written = files::write(folder, &order, &found, arguments.pictures.size())?;
         rows.map_or(Ok(()), RowsFile::remove)?;
     }
-    output::answer(
-        arguments.scene.json,
-        DocumentSchema::STABILITY_BOUNDARY,
-        &answer::of(&order, &found, &written),
-        || answer::describe(&order, &found),
-        &written,
-    )?;
+    say(&order, arguments, &found, &written)?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn say(order: &Order, arguments: &BoundaryArguments, found: &Boundary, written: &[String]) -> Result<(), Failure> {
+    let words = || answer::describe(order, found);
+    output::answer(arguments.scene.json, DocumentSchema::STABILITY_BOUNDARY, &answer::of(order, found, written), words, written)
 }
 
 impl Order {
@@ -92,8 +103,13 @@ impl Order {
         if !(options.tolerance > 0.0 && options.tolerance.is_finite()) {
             return Err(Failure::Input(format!("--tolerance {}: expected a finite number above zero", options.tolerance)));
         }
+        options.most = arguments.values;
+        if options.samples > options.most && arguments.samples.is_none() {
+            // Fewer values than are usually looked at first: all of them at once.
+            options.samples = options.most;
+        }
         if options.samples < 2 || options.samples > options.most {
-            return Err(Failure::Input(format!("--samples {}: expected from 2 to {}", options.samples, options.most)));
+            return Err(Failure::Input(format!("--samples {}: expected from 2 to {}, the number of --values", options.samples, options.most)));
         }
         let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
         let text = input::text(file)?;
@@ -132,10 +148,28 @@ fn row(value: f64, Cell { radius, is_nominal }: &Cell) -> [f64; 4] {
 
 fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic_stability::FamilyError>> {
     let known = cells(known);
-    let progress = Progress::new(0, "{spinner} {pos} values looked at, {elapsed} passed{msg}");
+    let most = order.options.most;
+    let progress = Progress::new(most as u64, "{spinner} {pos} values looked at, of {len} at most, {elapsed} passed, {eta} left at most{msg}");
     progress.tick();
     let watch = CellWatch::new(&progress, "value", &interrupt::requested);
-    let found = Boundary::find_watched(&order.family, order.options, &known, |count| progress.reach_number(count as u64), &watch);
+    let (begun, is_told) = (Clock::now(), AtomicBool::new(false));
+    let looked_at = |count: usize| {
+        progress.reach_number(count as u64);
+        let passed = begun.elapsed();
+        if passed >= TOLD && !progress.is_seen() && !is_told.swap(true, Ordering::Relaxed) {
+            #[expect(clippy::cast_precision_loss, reason = "an estimate")]
+            let all = passed.as_secs_f64() * most as f64 / count as f64;
+            // If it cannot be said, the search goes on all the same.
+            let words = estimate(all * OPERATIONS_A_SECOND);
+            let _ = writeln!(
+                std::io::stderr(),
+                "note: {} looked at in {:.0} s: the search ends after {most} at the latest, {words} in all; --values sets another limit, and what is found is said at Ctrl-C",
+                Counted(count, "value"),
+                passed.as_secs_f64()
+            );
+        }
+    };
+    let found = Boundary::find_watched(&order.family, order.options, &known, looked_at, &watch);
     progress.clear();
     found
 }
