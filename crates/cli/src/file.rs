@@ -29,7 +29,7 @@ pub(crate) fn not_text(path: &Path, line: u64) -> Failure {
     Failure::Input(format!("{}:{line}: not UTF-8: expected a text file", output::path(path)))
 }
 
-/// Reads a log of fates, from a file that was opened, up to 4 GiB, or what is left of it.
+/// Reads a log of fates from a file that was opened ([`open_large`]).
 pub(crate) fn read_fates(path: &Path, from: impl Read) -> Result<FateLog, Failure> {
     fates::read(from).map_err(|error| match error {
         ReadError::Io(error) => Failure::File { verb: "read", path: path.to_path_buf(), error },

@@ -62,7 +62,7 @@ pub enum ReadError {
     Log(#[from] FateLogError),
 }
 
-/// The most bytes of a line; a row of a log has at most 110. What is longer is refused as a line that is no row.
+/// The most bytes of a line; a row of a log has at most 110. A longer line is refused as one that is no row.
 const LONGEST_LINE: u64 = 4096;
 
 /// Reads a fate log.

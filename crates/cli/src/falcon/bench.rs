@@ -63,7 +63,7 @@ impl Bench {
 
     /// Exchanges packets; `most` is how long at most. Force is off for good afterwards, whatever happened.
     pub(super) fn run(&mut self, most: Option<Duration>, task: &mut impl Task) -> Result<End, Failure> {
-        // What is read from the device is a result, and each exchange asks for a signal.
+        // Readings of the device are a result, and the loop looks for a signal before each exchange.
         interrupt::has_results();
         let end = self.exchanges(most, task);
         self.driver.stop();

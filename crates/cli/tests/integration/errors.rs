@@ -158,7 +158,9 @@ fn a_long_file_in_toml_is_refused_before_it_is_read() {
     let desk = Desk::new();
     // Zeros that take no room, and would be refused as no text.
     std::fs::File::create(desk.path("long.toml")).unwrap().set_len((16 << 20) + 1).unwrap();
-    for line in ["run long.toml", "campaign long.toml --runs 2 --out runs", "explain long.toml", "live long.toml", "relay long.toml", "router long.toml"] {
+    for line in
+        ["run long.toml", "campaign long.toml --runs 2 --out runs", "explain long.toml", "live long.toml", "relay long.toml", "router long.toml"]
+    {
         desk.cohaptic(line).assert_refused(3, &["long.toml", "it is longer than 16 MiB"]);
     }
 }
