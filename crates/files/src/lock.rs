@@ -53,7 +53,10 @@ fn is_locked(_: &File) -> bool {
 #[cfg(unix)]
 fn locked(path: &Path) -> io::Result<Option<File>> {
     loop {
-        let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
+        let file = File::options().read(true).write(true).create(true).truncate(false).open(path).or_else(|error| {
+            // A process of another user may have left the file, which is then open for reading alone, and can be locked all the same.
+            if error.kind() == io::ErrorKind::PermissionDenied { File::open(path).map_err(|_| error) } else { Err(error) }
+        })?;
         match flock(&file, FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
             Err(Errno::WOULDBLOCK) => return Ok(None),
@@ -175,6 +178,19 @@ mod tests {
         // One that a killed process left is no hindrance.
         std::fs::write(&path, "").unwrap();
         assert!(Lock::take(&path).unwrap().is_some());
+    }
+
+    /// Root may write into every file: this can fail for other users alone.
+    #[test]
+    #[cfg(unix)]
+    fn a_file_that_may_only_be_read_can_be_locked() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        let mut permissions = File::create(&path).unwrap().metadata().unwrap().permissions();
+        permissions.set_readonly(true);
+        std::fs::set_permissions(&path, permissions).unwrap();
+        let first = Lock::take(&path).unwrap();
+        assert!(first.is_some() && Lock::take(&path).unwrap().is_none());
     }
 
     #[test]
