@@ -14,7 +14,8 @@
 //!   every sealed sample. So the session can make the keys again when a sample needs them.
 //! - When a seat is taken, every nonce given out for it before is void. A recording of an earlier joining, or one that is sent from another address,
 //!   has a wrong tag.
-//! - A hello changes nothing. A host that repeats recorded ones gets answers that it cannot use.
+//! - A hello changes nothing, and each hello with a right tag is answered: a limit on answers is what a flood of recorded hellos would use up. A host
+//!   that repeats recorded ones gets answers that it cannot use. `docs/live-protocol.md` has the argument, attacker by attacker.
 //!
 //! Memory is that of the seats. The numbers of a seat never go back for those inside: an admitted sample has the number of the joining in its upper 24
 //! bits and the number that the peer gave it in the lower 40, so a peer that joins again and counts from 0 is newer than it was.
@@ -42,9 +43,6 @@ use seats::{Occupant, SeatState};
 
 /// The numbers that a peer may give its samples are below this.
 pub const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;
-/// How many hellos for one seat are answered within a second. Enough for its peer to be answered while somebody repeats recorded ones, and little
-/// enough work for a session: some milliseconds.
-pub const WELCOMES_PER_SECOND: u32 = 1000;
 
 const SEQUENCE_BITS: u32 = 40;
 const JOININGS_END: u64 = 1 << (64 - SEQUENCE_BITS);
@@ -201,10 +199,11 @@ impl AdmissionControl {
         if datagram.len() > MAX_DATAGRAM {
             return Err(Refusal::Oversized);
         }
-        if datagram.starts_with(&HELLO_MAGIC) { self.handle_hello(now, from, datagram) } else { self.handle_sample(now, from, datagram) }
+        if datagram.starts_with(&HELLO_MAGIC) { self.handle_hello(from, datagram) } else { self.handle_sample(now, from, datagram) }
     }
 
-    fn handle_hello(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
+    /// Answers a hello. Neither the time nor earlier hellos decide whether it is answered: then no hello of an attacker can take the answer from another one.
+    fn handle_hello(&self, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
         let unchecked = Hello::decode(datagram).map_err(Refusal::of_hello)?;
         let Some(key) = &self.key else { return Err(Refusal::Keyless) };
         let Hello { session, place, client_nonce } = unchecked.hello;
@@ -214,11 +213,7 @@ impl AdmissionControl {
         let index = self.find(place).ok_or(Refusal::UnknownSeat)?;
         unchecked.verify(key).map_err(Refusal::of_hello)?;
         let server_nonce = self.server_nonce(index, from);
-        let seat = &mut self.seats[index];
-        if !seat.may_welcome(now) {
-            return Err(Refusal::HandshakeLimit);
-        }
-        let tick = seat.tick();
+        let tick = self.seats[index].tick();
         let axes = u8::try_from(self.axes).expect("at most three");
         let Self { peers, update, kind, .. } = *self;
         let turns = kind == SampleKind::Attitude;

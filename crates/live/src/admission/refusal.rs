@@ -49,15 +49,13 @@ pub enum Refusal {
     NotJoined,
     /// Its number was let in before, or is too old to tell.
     Replayed,
-    /// A good hello, but too many were answered for this seat within a second.
-    HandshakeLimit,
     /// The seat was taken 2²⁴ times: its numbers are used up.
     JoiningsUsedUp,
 }
 
 impl Refusal {
     /// Every cause, in the order of its counters.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 21] = [
         Self::TooShort,
         Self::Oversized,
         Self::Magic,
@@ -78,7 +76,6 @@ impl Refusal {
         Self::Forged,
         Self::NotJoined,
         Self::Replayed,
-        Self::HandshakeLimit,
         Self::JoiningsUsedUp,
     ];
 
@@ -106,7 +103,6 @@ impl Refusal {
             Self::Forged => "forged",
             Self::NotJoined => "not-joined",
             Self::Replayed => "replayed",
-            Self::HandshakeLimit => "handshake-limit",
             Self::JoiningsUsedUp => "joinings-used-up",
         }
     }

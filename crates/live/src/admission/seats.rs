@@ -5,10 +5,8 @@ use std::net::SocketAddr;
 
 use cohaptic_units::Instant;
 
-use super::{JOININGS_END, Place, Refusal, SEQUENCE_BITS, Seat, Under, WELCOMES_PER_SECOND};
+use super::{JOININGS_END, Place, Refusal, SEQUENCE_BITS, Seat, Under};
 use crate::seal::JoiningKeys;
-
-const SECOND: Duration = Duration::from_secs(1);
 
 /// What a seat is like at an instant.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -36,8 +34,6 @@ pub(super) struct SeatState {
     occupant: Option<Occupant>,
     joinings: u64,
     admitted: u64,
-    /// When the present second of welcomes began, and how many it has had.
-    welcomes: Option<(Instant, u32)>,
 }
 
 /// The holder of a seat, present or gone.
@@ -52,7 +48,7 @@ pub(super) struct Occupant {
 
 impl SeatState {
     pub(super) const fn free(seat: Seat) -> Self {
-        Self { seat, occupant: None, joinings: 0, admitted: 0, welcomes: None }
+        Self { seat, occupant: None, joinings: 0, admitted: 0 }
     }
 
     pub(super) const fn place(&self) -> Place {
@@ -86,21 +82,6 @@ impl SeatState {
             present: self.present(now, stale_after).is_some(),
             joinings: *joinings,
             admitted: *admitted,
-        }
-    }
-
-    /// Whether a hello for this seat may be answered now; if so it is counted.
-    pub(super) fn may_welcome(&mut self, now: Instant) -> bool {
-        match &mut self.welcomes {
-            Some((began, count)) if since(*began, now) < SECOND => {
-                let may = *count < WELCOMES_PER_SECOND;
-                *count += u32::from(may);
-                may
-            }
-            welcomes => {
-                *welcomes = Some((now, 1));
-                true
-            }
         }
     }
 

@@ -1,6 +1,5 @@
 //! A session with a key: hello, welcome, and samples under keys of their joining.
 
-use cohaptic_live::admission::WELCOMES_PER_SECOND;
 use cohaptic_live::client::OpenError;
 use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Place, Refusal, SessionKey};
 use cohaptic_peer::wire;
@@ -145,29 +144,6 @@ fn a_peer_that_was_silent_goes_on_under_its_keys() {
     let (anew, _) = admitted(door.handle_datagram(at(60_000), address(1), &sealed(&joined, &sample(1, 8))));
     assert!(!anew);
     assert!(door.seat(at(60_000), SEAT).unwrap().present);
-}
-
-#[test]
-fn a_flood_of_recorded_hellos_is_answered_so_many_times_a_second_and_changes_nothing() {
-    let mut door = keyed_door();
-    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
-    admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 0))));
-    for number in 1..=30_000_u64 {
-        let now = cohaptic_units::Instant::from_nanos(number * 100_000);
-        let port = u16::try_from(number % 50_000).unwrap();
-        match door.handle_datagram(now, address(port), &joining(1).hello()) {
-            Admission::Reply { bytes, .. } => assert!(bytes.len() <= joining(1).hello().len(), "an answer amplifies nothing"),
-            Admission::Refused(cause) => assert_eq!(cause, Refusal::HandshakeLimit),
-            Admission::Sample { .. } => panic!("a hello is no sample"),
-        }
-    }
-    // Three seconds: 1000 in each (the one that was answered at the start among them), and one at the beginning of the fourth.
-    let welcomed = 3 * u64::from(WELCOMES_PER_SECOND) + 1;
-    assert_counts(&door, 1, welcomed, &[(Refusal::HandshakeLimit, 30_001 - welcomed)]);
-    admitted(door.handle_datagram(at(3000), address(1), &sealed(&joined, &sample(1, 1))));
-    // The other seat has its own count.
-    let third = cohaptic_live::client::Joining::new(SESSION, Place(2), &crate::support::key(), [9; 16]);
-    assert!(matches!(door.handle_datagram(at(3000), address(3), &third.hello()), Admission::Reply { .. }));
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod client;
 mod conversation;
 mod examples;
 mod falcons;
+mod floods;
 mod hostile;
 mod key_files;
 mod keyed;
