@@ -13,6 +13,7 @@ use cohaptic_units::Instant;
 use super::files::Release;
 use super::status::SocketCounts;
 use super::{SessionConfig, SessionError};
+use crate::handshake::HANDSHAKE_LEN;
 use crate::{Admission, AdmissionConfig, AdmissionControl, AdmissionStats, Limits, MAX_DATAGRAM, Place, Seat, SystemEntropy};
 
 /// The way to peers in other programs.
@@ -26,6 +27,8 @@ pub(super) struct Outside {
     /// Whether more waited than was read at once.
     is_more: bool,
     sealed: [u8; MAX_DATAGRAM],
+    /// Answers to hellos, with where to: at most a batch.
+    replies: Vec<(SocketAddr, [u8; HANDSHAKE_LEN])>,
 }
 
 /// Nobody at a desk moves a copy farther or faster than this; what says so is no motion but a fault, and would throw every other copy out of the room.
@@ -63,9 +66,11 @@ impl Outside {
             ..AdmissionConfig::new(scene.seed, scene.axes.count(), peers, scene.coordination.update, seats)
         };
         let admission = AdmissionControl::new(admission.with_key(config.key.clone()), &mut SystemEntropy)?;
-        let socket =
-            UdpEndpoint::bind(address, udp::EndpointConfig { receive_buffer: RECEIVE_BUFFER, largest: LARGEST, ..udp::EndpointConfig::default() })?;
-        Ok(Some(Self { socket, buffers: ReceiveBuffers::new(), admission, passes_on, is_more: false, sealed: [0; MAX_DATAGRAM] }))
+        // Single datagrams: put together, a batch of a flood would be 64 times as long, and a tick would wait for it.
+        let endpoint = udp::EndpointConfig { receive_buffer: RECEIVE_BUFFER, largest: LARGEST, joined: false, ..udp::EndpointConfig::default() };
+        let socket = UdpEndpoint::bind(address, endpoint)?;
+        let (buffers, sealed, replies) = (ReceiveBuffers::new(), [0; MAX_DATAGRAM], Vec::new());
+        Ok(Some(Self { socket, buffers, admission, passes_on, is_more: false, sealed, replies }))
     }
 
     pub(super) const fn address(&self) -> SocketAddr {
@@ -77,10 +82,9 @@ impl Outside {
         (self.passes_on || self.is_more).then(|| std::os::fd::AsFd::as_fd(&self.socket))
     }
 
-    /// Hands on the samples that have come in and may, with the instant at which the kernel saw them, and answers requests to join.
+    /// Hands on the samples that have come in and may, with the instant at which the kernel saw them. Hellos are answered with the next [`Outside::flush`].
     pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<()> {
-        let Self { socket, buffers, admission, is_more, .. } = self;
-        let mut replies = Vec::new();
+        let Self { socket, buffers, admission, is_more, replies, .. } = self;
         // One batch: more than come in between two ticks of a session in order. The rest waits in the kernel until the next look, which is after the next
         // tick if that is due, so that a flood cannot keep the loop from its ticks.
         let count = socket.receive(buffers, clock, |datagram| match admission.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
@@ -89,9 +93,6 @@ impl Outside {
             Admission::Refused(_) => {}
         })?;
         *is_more = count == UdpEndpoint::BATCH;
-        for (to, bytes) in replies {
-            socket.queue(to, &bytes, None);
-        }
         Ok(())
     }
 
@@ -104,8 +105,13 @@ impl Outside {
         Some(Release { to: transmit.to, due: transmit.at, late: now.saturating_duration_since(transmit.at) })
     }
 
+    /// Sends samples, and then answers to hellos. A flood of hellos must not delay samples: an answer for which the kernel has no room is dropped and counted,
+    /// and its peer says hello again.
     pub(super) fn flush(&mut self) {
         self.socket.flush();
+        for (to, bytes) in self.replies.drain(..) {
+            self.socket.send_or_drop(to, &bytes);
+        }
     }
 
     pub(super) const fn admission_stats(&self) -> &AdmissionStats {

@@ -25,7 +25,7 @@ pub struct EndpointCounts {
 /// Datagrams that were not sent, by reason.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct SendFailures {
-    /// The kernel's buffer was full, and as many as may wait were waiting.
+    /// The kernel's buffer was full, and as many as may wait were waiting, or the datagram was one that does not wait.
     pub full: u64,
     /// Nobody listens there. On loopback the kernel may say so of an earlier datagram.
     pub refused: u64,

@@ -7,7 +7,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 
 use cohaptic_units::Instant;
 use nix::sys::socket::setsockopt;
-use nix::sys::socket::sockopt::{Ipv4PacketInfo, Ipv6RecvPacketInfo};
+use nix::sys::socket::sockopt::{Ipv4PacketInfo, Ipv6RecvPacketInfo, UdpGroSegment};
 use quinn_udp::{BATCH_SIZE, RecvMeta, Transmit, UdpSockRef, UdpSocketState};
 use rustix::io::Errno;
 use rustix::net::{AddressFamily, SocketFlags, SocketType, bind, ipproto, socket_with, sockopt};
@@ -28,12 +28,15 @@ pub struct EndpointConfig {
     pub largest: usize,
     /// The number of datagrams that may wait to be sent when the kernel's buffer is full; beyond, new ones are dropped and counted.
     pub waiting: usize,
+    /// Whether the kernel may put datagrams of one sender together before it hands them over, up to 64 of them: less work for each, but one call of
+    /// [`UdpEndpoint::receive`] may then hand on 64 times [`UdpEndpoint::BATCH`] datagrams.
+    pub joined: bool,
 }
 
 impl Default for EndpointConfig {
-    /// 8 MiB, datagrams of any length, 4096 that wait.
+    /// 8 MiB, datagrams of any length, 4096 that wait, and datagrams that the kernel puts together.
     fn default() -> Self {
-        Self { receive_buffer: 8 << 20, largest: 65_535, waiting: 4096 }
+        Self { receive_buffer: 8 << 20, largest: 65_535, waiting: 4096, joined: true }
     }
 }
 
@@ -104,6 +107,10 @@ impl UdpEndpoint {
         } else {
             setsockopt(&socket, Ipv4PacketInfo, &false)?;
         }
+        // The state has asked for it where the kernel can. An older kernel does not know the option, and puts nothing together.
+        if !config.joined && state.gro_segments() > 1 {
+            setsockopt(&socket, UdpGroSegment, &false)?;
+        }
         let (address, granted) = (socket.local_addr()?, sockopt::socket_recv_buffer_size(&socket)?);
         Ok(Self { socket, state, address, granted, config, outbox: Outbox::default(), counts: EndpointCounts::default(), order: ArrivalOrder::NEW })
     }
@@ -137,7 +144,7 @@ impl UdpEndpoint {
     }
 
     /// Hands on what has come in, one batch at most, in the order in which it came, and says how many datagrams the kernel gave: after fewer than
-    /// [`UdpEndpoint::BATCH`] none is left to read. Never blocks. One clock is given to all calls of an endpoint.
+    /// [`UdpEndpoint::BATCH`] none is left to read. Datagrams that the kernel has put together count as one here ([`EndpointConfig::joined`]). Never blocks. One clock is given to all calls of an endpoint.
     ///
     /// # Errors
     ///
@@ -243,6 +250,20 @@ impl UdpEndpoint {
                 }
             }
             done(asked, settled);
+        }
+    }
+
+    /// Sends a datagram at once, or drops and counts it if the kernel's buffer is full or earlier datagrams wait: for a datagram that must not delay others,
+    /// and whose receiver asks for it again.
+    pub fn send_or_drop(&mut self, to: SocketAddr, bytes: &[u8]) {
+        if self.has_waiting() {
+            self.counts.failures.full += 1;
+            return;
+        }
+        self.counts.send_calls += 1;
+        match send(&self.socket, &self.state, &Run { to, ecn: None, bytes, segment: bytes.len(), count: 1 }) {
+            Ok(()) => self.counts.sent += 1,
+            Err(error) => self.counts.failures.count(&error),
         }
     }
 

@@ -119,6 +119,45 @@ fn what_waits_is_bounded_and_what_the_kernel_drops_is_known() {
     assert!(small.kernel_drops().unwrap().unwrap() > 0);
 }
 
+/// A sender that has the kernel cut one long call into 64 datagrams: at a socket that takes single ones, a batch is as many datagrams as it says.
+#[test]
+fn a_batch_of_single_datagrams_has_no_more_than_it_says() {
+    let clock = MonotonicClock::start();
+    let (sent, mut most) = (2 * UdpEndpoint::BATCH, [0; 2]);
+    for (most, joined) in most.iter_mut().zip([false, true]) {
+        let mut receiver = endpoint("127.0.0.1:0", EndpointConfig { joined, ..EndpointConfig::default() });
+        let mut sender = endpoint("127.0.0.1:0", EndpointConfig::default());
+        for number in 0..sent {
+            sender.queue(receiver.local_address(), &[u8::try_from(number).unwrap(); 88], None);
+        }
+        sender.flush();
+        let (mut buffers, mut numbers) = (ReceiveBuffers::new(), Vec::new());
+        let end = clock.now() + Duration::from_secs(60);
+        while numbers.len() < sent && clock.now() < end {
+            let before = numbers.len();
+            receiver.receive(&mut buffers, &clock, |datagram| numbers.push(usize::from(datagram.bytes[0]))).unwrap();
+            *most = (numbers.len() - before).max(*most);
+        }
+        assert!(numbers.into_iter().eq(0..sent));
+    }
+    assert!(most[0] <= UdpEndpoint::BATCH, "{most:?}");
+}
+
+#[test]
+fn what_must_not_delay_others_is_sent_at_once_or_dropped() {
+    let clock = MonotonicClock::start();
+    let (mut sender, mut receiver) = (endpoint("127.0.0.1:0", EndpointConfig::default()), endpoint("127.0.0.1:0", EndpointConfig::default()));
+    let there = receiver.local_address();
+    sender.send_or_drop(there, b"at once");
+    sender.queue(there, b"waits", None);
+    sender.send_or_drop(there, b"dropped");
+    sender.flush();
+    sender.send_or_drop(there, b"again");
+    let texts: Vec<Vec<u8>> = receive(&mut receiver, &clock, 3).into_iter().map(|(_, bytes, ..)| bytes).collect();
+    assert_eq!(texts, [b"at once".to_vec(), b"waits".to_vec(), b"again".to_vec()]);
+    assert_eq!((sender.counts().sent, sender.counts().failures.full), (3, 1));
+}
+
 #[test]
 fn an_address_that_is_taken_is_refused_with_the_address() {
     let first = endpoint("[::1]:0", EndpointConfig::default());
