@@ -1,7 +1,7 @@
 //! What a relay does.
 
 use core::time::Duration;
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 
 use cohaptic_linkfile::{LinkTable, RelayFile, RelayLimits};
 use cohaptic_units::{Bytes, Instant};
@@ -108,6 +108,14 @@ pub enum ConfigError {
         /// The receiver.
         to: NodeId,
     },
+    /// The relay would send to a port of its own: each datagram would pass the link again and again.
+    #[error("{to} is a port of the relay itself, {port}, to which each datagram would come back again and again: expected the address of a program")]
+    ToItself {
+        /// Where the relay would send to.
+        to: SocketAddr,
+        /// The port of the relay.
+        port: SocketAddr,
+    },
 }
 
 impl From<RelayLimits> for Limits {
@@ -161,6 +169,25 @@ impl RelayConfig {
         }
     }
 
+    /// The ports of the relay as configured: 0 is a port that the system chooses.
+    pub(crate) fn ports(&self) -> Vec<SocketAddr> {
+        match &self.form {
+            Form::Mesh(mesh) => mesh.programs.iter().map(|program| program.port).collect(),
+            Form::Proxy(proxy) => vec![proxy.listen],
+        }
+    }
+
+    /// Refuses a relay that sends to one of `ports`, its own ones, by whatever name. Addresses that are learnt are not known yet; the relay drops what a
+    /// program sends to the port that stands for the program itself.
+    pub(crate) fn check_targets(&self, ports: &[SocketAddr]) -> Result<(), ConfigError> {
+        let targets: Vec<SocketAddr> = match &self.form {
+            Form::Mesh(mesh) => mesh.programs.iter().filter_map(|program| program.address).collect(),
+            Form::Proxy(proxy) => vec![proxy.to],
+        };
+        let own = |to: SocketAddr| ports.iter().find(|port| reaches(to, **port)).map(|port| ConfigError::ToItself { to, port: *port });
+        targets.into_iter().find_map(own).map_or(Ok(()), Err)
+    }
+
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         let nodes = match &self.form {
             Form::Mesh(mesh) if mesh.programs.len() < 2 || mesh.links.peers() != mesh.programs.len() => {
@@ -173,6 +200,58 @@ impl RelayConfig {
         match self.changes.iter().find(|change| !is_link(change.from, change.to)) {
             Some(Change { from, to, .. }) => Err(ConfigError::NoLink { from: *from, to: *to }),
             None => Ok(()),
+        }
+    }
+}
+
+/// Whether a datagram to that address arrives at a socket that is bound to `port` on this machine.
+fn reaches(to: SocketAddr, port: SocketAddr) -> bool {
+    // The kernel sends datagrams for the unspecified address to the loopback address.
+    let target = match (to.ip().to_canonical(), to.ip().is_ipv4()) {
+        (target, _) if !target.is_unspecified() => target,
+        (_, true) => IpAddr::V4(Ipv4Addr::LOCALHOST),
+        (_, false) => IpAddr::V6(Ipv6Addr::LOCALHOST),
+    };
+    // A port of IPv6 takes IPv6 alone: [::]:7000 and 127.0.0.1:7000 are two ports.
+    let own = port.ip().to_canonical();
+    let is_here = || if own.is_unspecified() { own.is_ipv4() == target.is_ipv4() && is_of_this_machine(target) } else { own == target };
+    to.port() == port.port() && port.port() != 0 && is_here()
+}
+
+/// Whether this machine has that address: the system lets a socket be bound to its own addresses alone.
+fn is_of_this_machine(ip: IpAddr) -> bool {
+    ip.is_loopback() || UdpSocket::bind((ip, 0)).is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 192.0.2.1 is an address of documentation (RFC 5737): no machine has it.
+    #[test]
+    fn a_port_is_known_by_each_of_its_names() {
+        let address = |text: &str| text.parse::<SocketAddr>().unwrap();
+        for (to, port) in [
+            ("127.0.0.1:7000", "127.0.0.1:7000"),
+            ("127.0.0.1:7000", "0.0.0.0:7000"),
+            ("127.0.0.2:7000", "0.0.0.0:7000"),
+            ("0.0.0.0:7000", "127.0.0.1:7000"),
+            ("0.0.0.0:7000", "0.0.0.0:7000"),
+            ("[::1]:7000", "[::]:7000"),
+            ("[::]:7000", "[::1]:7000"),
+            ("[::ffff:127.0.0.1]:7000", "127.0.0.1:7000"),
+        ] {
+            assert!(reaches(address(to), address(port)), "{to} {port}");
+        }
+        for (to, port) in [
+            ("127.0.0.1:7001", "127.0.0.1:7000"),
+            ("127.0.0.2:7000", "127.0.0.1:7000"),
+            ("127.0.0.1:7000", "[::]:7000"),
+            ("[::1]:7000", "0.0.0.0:7000"),
+            ("192.0.2.1:7000", "0.0.0.0:7000"),
+            ("127.0.0.1:0", "127.0.0.1:0"),
+        ] {
+            assert!(!reaches(address(to), address(port)), "{to} {port}");
         }
     }
 }

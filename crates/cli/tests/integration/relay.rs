@@ -281,6 +281,8 @@ fn bad_arguments_are_refused() {
         ("relay --listen 127.0.0.1:0 --to 192.0.2.1:9", &["--to 192.0.2.1:9 is not on loopback", "--allow-remote"]),
         ("relay --listen 127.0.0.1:0 --to 127.0.0.1:0", &["--to 127.0.0.1:0", "not 0"]),
         ("relay lab.toml --set link.delay=1ms --set programs.a.port=0.0.0.0:0", &["allow-remote"]),
+        ("relay --listen 127.0.0.1:7000 --to localhost:7000", &["127.0.0.1:7000 is a port of the relay itself", "expected the address of a program"]),
+        ("relay --listen [::]:7000 --to [::1]:7000 --allow-remote", &["[::1]:7000 is a port of the relay itself, [::]:7000"]),
     ] {
         desk.cohaptic_within(PATIENCE, line).assert_refused(2, parts);
     }

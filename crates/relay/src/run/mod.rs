@@ -98,9 +98,12 @@ impl Relay {
     ///
     /// # Errors
     ///
-    /// [`RelayError`] if there is no such relay, or a port cannot be had.
+    /// [`RelayError`] if there is no such relay, if it would send to a port of its own, or if a port cannot be had.
     pub fn bind(config: RelayConfig, port: EndpointConfig) -> Result<Self, RelayError> {
+        // Before the ports are opened, because a program that has the port already would hide the fault; after it for a port that the system chose.
+        config.check_targets(&config.ports())?;
         let ports = Ports::open(&config, port)?;
+        config.check_targets(&ports.addresses().map(|(_, address)| address).collect::<Vec<_>>())?;
         Ok(Self { engine: Engine::new(config)?, ports, release: Lateness::new(), density: Density::new(), refused_changes: 0 })
     }
 

@@ -66,12 +66,9 @@ const RELEASES: usize = 1024;
 impl Ports {
     /// Opens the ports that are there from the beginning.
     pub(super) fn open(config: &RelayConfig, endpoint: EndpointConfig) -> Result<Self, BindError> {
-        let (addresses, layout): (Vec<SocketAddr>, _) = match &config.form {
-            Form::Mesh(mesh) => {
-                let names = mesh.programs.iter().map(|program| program.name.clone()).collect();
-                (mesh.programs.iter().map(|program| program.port).collect(), Layout::Mesh(names))
-            }
-            Form::Proxy(proxy) => (vec![proxy.listen], Layout::Proxy { clients: beside(proxy.to) }),
+        let layout = match &config.form {
+            Form::Mesh(mesh) => Layout::Mesh(mesh.programs.iter().map(|program| program.name.clone()).collect()),
+            Form::Proxy(proxy) => Layout::Proxy { clients: beside(proxy.to) },
         };
         let nowhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0));
         let failed = |address: SocketAddr| move |error: Errno| BindError { address, source: error.into() };
@@ -87,7 +84,7 @@ impl Ports {
             left: Tally::default(),
             without_socket: 0,
         };
-        for (place, address) in addresses.into_iter().enumerate() {
+        for (place, address) in config.ports().into_iter().enumerate() {
             ports.open_at(place, address)?;
         }
         Ok(ports)

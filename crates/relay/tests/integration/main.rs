@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 mod engine;
+mod itself;
 mod loopback;
 mod proxy;
 

@@ -70,7 +70,7 @@ impl Router {
     ///
     /// [`OpenError`]: which side, what was tried, and what the system says.
     pub fn open(file: &RouterFile, pacing: Pacing) -> Result<Self, OpenError> {
-        let devices = [AnyDevice::open(Side::Left, &file.left)?, AnyDevice::open(Side::Right, &file.right)?];
+        let devices = AnyDevice::open_both(&file.left, &file.right)?;
         Ok(Self::with(file, devices, MonotonicClock::start(), pacing))
     }
 }

@@ -75,17 +75,30 @@ pub enum AnyDevice {
 }
 
 impl AnyDevice {
-    /// Opens what a side is attached to.
-    ///
-    /// # Errors
-    ///
-    /// [`OpenError`] with what was tried and what the system says.
-    pub fn open(side: Side, attachment: &Attachment) -> Result<Self, OpenError> {
+    fn open(side: Side, attachment: &Attachment) -> Result<Self, OpenError> {
         let opened = namespace::within(attachment.namespace(), || match attachment {
             Attachment::Tun(tun) => Tun::open(tun).map(Self::Tun),
             Attachment::Interface(interface) => Interface::open(interface).map(Self::Interface),
         });
-        opened.map_err(|failed| OpenError { side, device: attachment.device().to_owned(), failed })
+        opened.map_err(|failed| OpenError::of(side, attachment, failed))
+    }
+
+    /// Opens the devices of both sides, left and right.
+    ///
+    /// # Errors
+    ///
+    /// [`OpenError`] with what was tried and what the system says, and if both sides are one device, whatever its namespace is called: each packet would
+    /// come back again and again.
+    pub fn open_both(left: &Attachment, right: &Attachment) -> Result<[Self; 2], OpenError> {
+        if left.device() == right.device() {
+            let failed = match namespace::are_one(left.namespace(), right.namespace()) {
+                Ok(true) => Some(Failed::SameDevice),
+                Ok(false) => None,
+                Err(failed) => Some(failed),
+            };
+            failed.map_or(Ok(()), |failed| Err(OpenError::of(Side::Right, right, failed)))?;
+        }
+        Ok([Self::open(Side::Left, left)?, Self::open(Side::Right, right)?])
     }
 }
 
@@ -125,9 +138,18 @@ pub struct OpenError {
     pub failed: Failed,
 }
 
+impl OpenError {
+    fn of(side: Side, attachment: &Attachment, failed: Failed) -> Self {
+        Self { side, device: attachment.device().to_owned(), failed }
+    }
+}
+
 /// Why a device could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum Failed {
+    /// Both sides name it.
+    #[error("it is the device of the other side, in the same network namespace: expected two devices")]
+    SameDevice,
     /// The system refused something.
     #[error("cannot {what}: {source}{}", way_out(source))]
     System {

@@ -1,6 +1,7 @@
 //! Network namespaces: a device is opened in the one that it belongs to, and keeps working from outside.
 
-use std::fs::File;
+use std::fs::{self, File};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use nix::sched::{CloneFlags, setns};
@@ -24,6 +25,16 @@ pub(super) fn within<T>(namespace: Option<&str>, does: impl FnOnce() -> Result<T
     let done = does();
     enter(&own, "return to the network namespace of the program".to_owned())?;
     done
+}
+
+/// Whether two namespaces are one, whatever they are called: a name, the path that the name stands for, and the namespace of this program have several names.
+pub(super) fn are_one(one: Option<&str>, other: Option<&str>) -> Result<bool, Failed> {
+    let identity = |namespace: Option<&str>| {
+        let path = namespace.map_or_else(|| PathBuf::from(OWN), path);
+        let metadata = fs::metadata(&path).map_err(Failed::system(format!("open the network namespace {}", path.display())))?;
+        Ok((metadata.dev(), metadata.ino()))
+    };
+    Ok(one == other || identity(one)? == identity(other)?)
 }
 
 /// A name is one that `ip netns` gave; what has a slash is a path.

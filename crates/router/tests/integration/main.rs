@@ -9,4 +9,5 @@ mod headers;
 mod kernel;
 mod rules;
 mod run;
+mod sides;
 mod support;
