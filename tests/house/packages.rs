@@ -10,59 +10,54 @@ use serde_json::Value;
 use crate::house::metadata::{list, metadata, metadata_of, text};
 use crate::house::{files, name, root};
 
-/// Licences that ask for no more than that they are named. `MIT-0` and `CC0-1.0` do not even ask for that, and only tests and build scripts have them.
-const ACCEPTED: [&str; 13] = [
-    "MIT",
-    "MIT-0",
-    "Apache-2.0",
-    "Apache-2.0 WITH LLVM-exception",
-    "BSD-2-Clause",
-    "BSD-3-Clause",
-    "ISC",
-    "Zlib",
-    "Unicode-3.0",
-    "0BSD",
-    "BSL-1.0",
-    "CC0-1.0",
-    "Unlicense",
-];
+/// The rules of the project for packages of others, which `cargo deny check` reads.
+fn rules() -> toml::Table {
+    fs::read_to_string(root().join("deny.toml")).unwrap().parse().unwrap()
+}
+
+/// The accepted licences.
+fn accepted() -> BTreeSet<String> {
+    let listed = rules()["licenses"]["allow"].as_array().unwrap().iter().map(|licence| licence.as_str().unwrap().to_owned()).collect::<BTreeSet<_>>();
+    assert!(listed.contains("MIT") && listed.contains("Apache-2.0"), "{listed:?}");
+    listed
+}
 
 /// Whether an expression of SPDX holds with the accepted licences. `A/B` is how old packages write `A OR B`.
-fn is_accepted(expression: &str) -> bool {
+fn is_accepted(expression: &str, listed: &BTreeSet<String>) -> bool {
     let spaced = expression.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ");
     let mut words = spaced.split_whitespace().peekable();
-    let accepted = alternatives(&mut words);
+    let accepted = alternatives(&mut words, listed);
     assert!(words.next().is_none(), "{expression}");
     accepted
 }
 
 type Words<'a> = std::iter::Peekable<std::str::SplitWhitespace<'a>>;
 
-fn alternatives(words: &mut Words<'_>) -> bool {
-    let mut accepted = all_of(words);
+fn alternatives(words: &mut Words<'_>, listed: &BTreeSet<String>) -> bool {
+    let mut accepted = all_of(words, listed);
     while words.next_if_eq(&"OR").is_some() {
-        accepted |= all_of(words);
+        accepted |= all_of(words, listed);
     }
     accepted
 }
 
-fn all_of(words: &mut Words<'_>) -> bool {
-    let mut accepted = one(words);
+fn all_of(words: &mut Words<'_>, listed: &BTreeSet<String>) -> bool {
+    let mut accepted = one(words, listed);
     while words.next_if_eq(&"AND").is_some() {
-        accepted &= one(words);
+        accepted &= one(words, listed);
     }
     accepted
 }
 
-fn one(words: &mut Words<'_>) -> bool {
+fn one(words: &mut Words<'_>, listed: &BTreeSet<String>) -> bool {
     let word = words.next().unwrap_or_default();
     if word == "(" {
-        let accepted = alternatives(words);
+        let accepted = alternatives(words, listed);
         assert_eq!(words.next(), Some(")"));
         return accepted;
     }
     let exception = words.next_if_eq(&"WITH").and_then(|_| words.next()).map_or_else(String::new, |name| format!(" WITH {name}"));
-    ACCEPTED.contains(&format!("{word}{exception}").as_str())
+    listed.contains(&format!("{word}{exception}"))
 }
 
 /// Workspaces of this project whose tests decide about a change or run at night: the folder, from the folder of the project.
@@ -71,12 +66,13 @@ const WORKSPACES: [&str; 2] = ["", "tests/programs"];
 /// All features, because `cargo metadata` leaves out packages that only a feature needs which is off.
 #[test]
 fn every_licence_in_the_lock_files_is_accepted() {
+    let listed = accepted();
     for workspace in WORKSPACES {
         let metadata = metadata_of(&root().join(workspace), &["--all-features"]);
         let packages = list(&metadata, "packages");
         let refused: Vec<String> = packages
             .iter()
-            .filter(|package| !is_accepted(text(package, "license")))
+            .filter(|package| !is_accepted(text(package, "license"), &listed))
             .map(|package| format!("{} {}: {:?}", text(package, "name"), text(package, "version"), text(package, "license")))
             .collect();
         assert!(packages.len() > 100 && refused.is_empty(), "{workspace}: of {} packages:\n{}", packages.len(), refused.join("\n"));
@@ -102,16 +98,30 @@ fn the_tests_of_programs_lock_the_versions_of_the_project() {
     assert!(programs.len() > 100 && other.is_empty(), "not in Cargo.lock of the project: {other:?}; {hint}");
 }
 
+/// An advisory that is passed over names its package and says why, and is gone when the package is.
+#[test]
+fn every_advisory_that_is_passed_over_has_a_reason_and_its_package() {
+    let (rules, locked) = (rules(), locked(""));
+    for entry in rules["advisories"]["ignore"].as_array().unwrap() {
+        let field = |key: &str| entry[key].as_str().unwrap();
+        let (id, reason) = (field("id"), field("reason"));
+        let package = reason.split('`').nth(1).unwrap_or_default();
+        assert!(id.starts_with("RUSTSEC-") && reason.len() > 40, "{id}: {reason}");
+        assert!(locked.iter().any(|(name, _)| name == package), "{id}: {package:?} is not in Cargo.lock: the exception can go");
+    }
+}
+
 #[test]
 fn expressions_of_licences_are_read() {
+    let listed = accepted();
     for accepted in
         ["MIT", "GPL-3.0-only OR MIT", "MIT/Apache-2.0", "(GPL-2.0-only OR ISC) AND Zlib", "Apache-2.0 WITH LLVM-exception OR GPL-3.0-only"]
     {
-        assert!(is_accepted(accepted), "{accepted}");
+        assert!(is_accepted(accepted, &listed), "{accepted}");
     }
     for refused in ["", "GPL-3.0-only", "MIT AND GPL-3.0-only", "MIT AND (GPL-3.0-only OR AGPL-3.0-only)", "Apache-2.0 WITH Classpath-exception-2.0"]
     {
-        assert!(!is_accepted(refused), "{refused}");
+        assert!(!is_accepted(refused, &listed), "{refused}");
     }
 }
 
