@@ -33,7 +33,7 @@ loss = "1%"
 ///
 /// If it is refused, which a test would show.
 pub fn scene(title: &str, seed: u64, peers: usize, duration: Duration) -> Result<Scene, SceneError> {
-    with(title, seed, peers - 1, "\n[[peers]]\nname = \"program\"\nkind = \"udp\"\n", duration)
+    with_programs(title, seed, peers - 1, &["program"], duration)
 }
 
 /// The same with all of this number of peers simulated.
@@ -42,15 +42,22 @@ pub fn scene(title: &str, seed: u64, peers: usize, duration: Duration) -> Result
 ///
 /// If it is refused, which a test would show.
 pub fn simulated_scene(title: &str, seed: u64, peers: usize, duration: Duration) -> Result<Scene, SceneError> {
-    with(title, seed, peers, "", duration)
+    with_programs(title, seed, peers, &[], duration)
 }
 
-fn with(title: &str, seed: u64, simulated: usize, others: &str, duration: Duration) -> Result<Scene, SceneError> {
+/// The same with peers in several other programs, of these names, after the simulated ones.
+///
+/// # Errors
+///
+/// If it is refused, which a test would show.
+pub fn with_programs(title: &str, seed: u64, simulated: usize, programs: &[&str], duration: Duration) -> Result<Scene, SceneError> {
     let mut text = format!("[scene]\ntitle = \"{title}\"\nduration = \"1s\"\nseed = {seed}\n{COMMON}");
     for place in 1..=simulated {
         text.push_str(&format!("\n[[peers]]\nname = \"peer-{place}\"\n"));
     }
-    text.push_str(others);
+    for name in programs {
+        text.push_str(&format!("\n[[peers]]\nname = \"{name}\"\nkind = \"udp\"\n"));
+    }
     let mut scene = Scene::parse_live(&text, Path::new("session.toml"), &[])?;
     scene.duration = duration;
     Ok(scene)

@@ -1,5 +1,6 @@
-//! The soak, for a few seconds, and that its verdicts can be bad.
+//! The soaks and the floods, for a few seconds, and that verdicts can be bad.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
+mod hello_floods;
 mod soak;
 mod verdicts;
