@@ -8,7 +8,13 @@ pub use cohaptic_benches_common::machine::{name, process_time, thread_time};
 /// The memory that this process holds now \[kB\].
 #[must_use]
 pub fn memory() -> u64 {
-    let text = field("/proc/self/status", "VmRSS").unwrap_or_default();
+    memory_of("self")
+}
+
+/// The memory that a process holds now \[kB\]: its number, or `self`. 0 if it has ended.
+#[must_use]
+pub fn memory_of(process: &str) -> u64 {
+    let text = field(&format!("/proc/{process}/status"), "VmRSS").unwrap_or_default();
     text.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or(0)
 }
 
@@ -16,12 +22,18 @@ pub fn memory() -> u64 {
 #[must_use]
 pub fn open_files() -> usize {
     // One is the folder itself, while it is read.
-    let count = || std::fs::read_dir("/proc/self/fd").map_or(0, |files| files.count().saturating_sub(1));
+    let count = || open_files_of("self").saturating_sub(1);
     let look = |_| {
         std::thread::sleep(Duration::from_millis(2));
         count()
     };
     (0..3).map(look).min().unwrap_or(0)
+}
+
+/// How many files a process has open now: its number, or `self`. 0 if it has ended.
+#[must_use]
+pub fn open_files_of(process: &str) -> usize {
+    std::fs::read_dir(format!("/proc/{process}/fd")).map_or(0, Iterator::count)
 }
 
 /// What the processors of this machine did so far, by the kernel's count of ticks.

@@ -1,25 +1,27 @@
 //! The soak: `cargo run --profile dist -p cohaptic-benches-realtime --bin soak -- [DURATION] [--every SPAN] [--out FILE.md]`. An hour, unless told otherwise; Ctrl-C ends it early, with
-//! what was seen until then.
+//! what was seen until then. With `--flooded` it starts the program `cohaptic` that lies beside this one, floods its ports, and writes the last section of the
+//! page.
 #![allow(clippy::print_stdout, reason = "printing the table is what this program is for")]
 
 use std::error::Error;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use cohaptic_benches_realtime::machine;
+use cohaptic_benches_realtime::soak::flooded::{self, FloodedPlan, HEADING};
 use cohaptic_benches_realtime::soak::{HEADER, Judgement, Outcome, SoakPlan, Verdict, judge, run};
 use cohaptic_units::parse;
 
-const USAGE: &str = "expected: soak [DURATION] [--every SPAN] [--out FILE.md], with spans such as 90s, 10min or 1h";
+const USAGE: &str = "expected: soak [DURATION] [--flooded] [--every SPAN] [--out FILE.md], with spans such as 90s, 10min or 1h";
 
 fn main() -> Result<ExitCode, Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let Arguments { duration, every, out } = read(&arguments)?;
+    let Arguments { duration, every, out, is_flooded } = read(&arguments)?;
     let interrupted = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&interrupted);
     ctrlc::set_handler(move || {
@@ -27,34 +29,72 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
             std::process::exit(130);
         }
     })?;
-    println!("{HEADER}");
-    let plan = SoakPlan::new(duration, every);
-    let outcome = run(&plan, &interrupted, |row| {
-        println!("{row}");
-        // Somebody may read it in a file while it grows.
-        let _ = std::io::stdout().flush();
-    })?;
-    let judgements = judge(&outcome);
+    let command = arguments.join(" ");
+    let every = every.unwrap_or(Duration::from_secs(if is_flooded { 1 } else { 60 }));
+    let judgements = if is_flooded {
+        let plan = FloodedPlan { duration, every, program: flooded::program_beside_this_one()?, rate: RATE, priority: true };
+        let outcome = flooded::run(&plan, &interrupted, |row| print(row))?;
+        let judgements = flooded::judge(&outcome);
+        let lines: Vec<String> = verdicts(&judgements).collect();
+        let command = format!("{BUILD} && {RUN} -- {command}");
+        let section = flooded::section(&plan, &outcome, &lines, &command, &today())?;
+        out.map_or(Ok(()), |file| write(&file, |before, _| format!("{}\n\n{section}", before.trim_end())))?;
+        judgements
+    } else {
+        println!("{HEADER}");
+        let plan = SoakPlan::new(duration, every);
+        let outcome = run(&plan, &interrupted, |row| print(row))?;
+        let judgements = judge(&outcome);
+        let page = page(&plan, &outcome, &judgements, &command)?;
+        out.map_or(Ok(()), |file| write(&file, |_, section| if section.is_empty() { page } else { format!("{page}\n{section}") }))?;
+        judgements
+    };
     println!();
     for line in verdicts(&judgements) {
         println!("{line}");
-    }
-    if let Some(file) = out {
-        let command = arguments.join(" ");
-        std::fs::write(&file, page(&plan, &outcome, &judgements, &command)?).map_err(|error| format!("{}: {error}", file.display()))?;
     }
     let is_broken = judgements.iter().any(|judgement| judgement.verdict == Verdict::Broken);
     Ok(if is_broken { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
+/// The commands on the page.
+const BUILD: &str = "cargo build --profile dist -p cohaptic-cli";
+const RUN: &str = "cargo run --profile dist -p cohaptic-benches-realtime --bin soak";
+
+/// Recorded hellos a second of a flooded soak: what once shut a session.
+const RATE: u32 = 9_700;
+
+/// Somebody may read it in a file while it grows.
+fn print(row: &impl std::fmt::Display) {
+    println!("{row}");
+    let _ = std::io::stdout().flush();
+}
+
+/// Writes a file anew: `make` is given what stands in it before the section on floods, and that section.
+fn write(file: &Path, make: impl FnOnce(&str, &str) -> String) -> Result<(), String> {
+    let failed = |error| format!("{}: {error}", file.display());
+    let text = match std::fs::read_to_string(file) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+        read => read.map_err(failed)?,
+    };
+    let (before, section) = split(&text);
+    std::fs::write(file, make(before, section)).map_err(failed)
+}
+
+/// The text before the section on floods, and that section, which is the last one.
+fn split(text: &str) -> (&str, &str) {
+    text.split_at(text.find(&format!("\n{HEADING}")).map_or(text.len(), |at| at + 1))
+}
+
 struct Arguments {
     duration: Duration,
-    every: Duration,
+    every: Option<Duration>,
     out: Option<PathBuf>,
+    is_flooded: bool,
 }
 
 fn read(arguments: &[String]) -> Result<Arguments, Box<dyn Error>> {
-    let mut read = Arguments { duration: Duration::from_secs(3600), every: Duration::from_secs(60), out: None };
+    let mut read = Arguments { duration: Duration::from_secs(3600), every: None, out: None, is_flooded: false };
     let span = |text: &str| match parse::duration(text) {
         Ok(span) if !span.is_zero() => Ok(span),
         Ok(_) => Err(format!("\"{text}\" is no time at all; {USAGE}")),
@@ -63,7 +103,8 @@ fn read(arguments: &[String]) -> Result<Arguments, Box<dyn Error>> {
     let mut rest = arguments.iter();
     while let Some(argument) = rest.next() {
         match argument.as_str() {
-            "--every" => read.every = span(rest.next().ok_or(USAGE)?)?,
+            "--every" => read.every = Some(span(rest.next().ok_or(USAGE)?)?),
+            "--flooded" => read.is_flooded = true,
             "--out" => read.out = Some(rest.next().ok_or(USAGE)?.into()),
             text if text.starts_with('-') => return Err(format!("\"{text}\" is not known; {USAGE}").into()),
             text => read.duration = span(text)?,
@@ -88,7 +129,7 @@ fn page(plan: &SoakPlan, outcome: &Outcome, judgements: &[Judgement], command: &
     let span = |span: Duration| cohaptic_units::print::Span(span).to_string();
     writeln!(page, "# A soak\n")?;
     writeln!(page, "A live session and a relay beside each other in one process, for {}. This page is written by\n", span(plan.duration))?;
-    writeln!(page, "    cargo run --profile dist -p cohaptic-benches-realtime --bin soak -- {command}\n")?;
+    writeln!(page, "    {RUN} -- {command}\n")?;
     writeln!(page, "and measured on: {}; {}.\n", machine::name(), today())?;
     writeln!(
         page,
@@ -148,7 +189,13 @@ fn date(days: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::date;
+    use super::{date, split};
+
+    #[test]
+    fn the_section_on_floods_is_the_last_part_of_its_page() {
+        assert_eq!(split("# A soak\n\ntext\n\n## Under floods\n\nmore\n"), ("# A soak\n\ntext\n\n", "## Under floods\n\nmore\n"));
+        assert_eq!(split("# A soak\n\ntext\n"), ("# A soak\n\ntext\n", ""));
+    }
 
     #[test]
     fn days_are_dates() {

@@ -1,4 +1,4 @@
-//! The peer in another program, played by a thread: it joins over loopback with the key, moves to and fro, leaves, and joins again from another port.
+//! The peer in another program, played by a thread: it joins over loopback with the key, moves to and fro along x, leaves, and joins again from another port.
 
 use std::error::Error;
 use std::io;
@@ -185,10 +185,10 @@ impl Visiting {
         }
         let turn = core::f64::consts::TAU * TURNS_PER_SECOND;
         let (sine, cosine) = (turn * now.saturating_duration_since(Instant::ZERO).as_secs_f64()).sin_cos();
-        let state = State { position: [REACH * sine], velocity: [REACH * turn * cosine] };
+        let state = State { position: [REACH * sine, 0.0, 0.0], velocity: [REACH * turn * cosine, 0.0, 0.0] };
         let sample = Sample { session: self.invitation.session, sender: self.invitation.place, sequence: self.sequence, sent: now, state };
         let (mut plain, mut sealed) = ([0; MAX_LEN], [0; MAX_DATAGRAM]);
-        let len = sample.encode(1, &mut plain);
+        let len = sample.encode(self.client.info().map_or(1, |info| info.axes), &mut plain);
         // Before the first welcome there is nothing to seal it with.
         if let Some(len) = self.client.seal(&plain[..len], &mut sealed) {
             self.present.queue(self.invitation.door, &sealed[..len], None);

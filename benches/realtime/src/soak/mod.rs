@@ -1,7 +1,9 @@
 //! The soak: a live session and a relay run beside each other for an hour, and are looked at every minute.
 //!
 //! What must not happen in an hour: memory or open files grow, logical time parts from the clock on the wall, or something is lost without being counted.
+//! The soak of [`flooded`] starts the programs themselves, and floods each of their ports meanwhile.
 
+pub mod flooded;
 mod live;
 mod probe;
 mod row;

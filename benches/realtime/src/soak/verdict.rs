@@ -56,14 +56,14 @@ fn quarters(rows: &[Row]) -> Option<[&[Row]; 2]> {
     (quarter > 0).then(|| [&rows[..quarter], &rows[rows.len() - quarter..]])
 }
 
-fn median(mut numbers: Vec<u64>) -> u64 {
+pub(super) fn median(mut numbers: Vec<u64>) -> u64 {
     numbers.sort_unstable();
     numbers.get(numbers.len() / 2).copied().unwrap_or(0)
 }
 
 fn memory(rows: &[Row]) -> Judgement {
     let rule = "memory does not grow";
-    let Some(quarters) = quarters(rows) else { return too_few(rule, rows) };
+    let Some(quarters) = quarters(rows) else { return too_few(rule, rows.len()) };
     let [first, last] = quarters.map(|rows| median(rows.iter().map(|row| row.memory).collect()));
     let grown = last.saturating_sub(first);
     let why = format!("median of the first quarter {first} kB, of the last {last} kB; bound {MEMORY_BOUND} kB more");
@@ -72,7 +72,7 @@ fn memory(rows: &[Row]) -> Judgement {
 
 fn files(rows: &[Row]) -> Judgement {
     let rule = "open files do not grow";
-    let Some(quarters) = quarters(rows) else { return too_few(rule, rows) };
+    let Some(quarters) = quarters(rows) else { return too_few(rule, rows.len()) };
     // The least: a file that is open for a moment, such as one of /proc, is no growth.
     let [first, last] = quarters.map(|rows| rows.iter().map(|row| row.files).min().unwrap_or(0));
     Judgement { rule, verdict: verdict(first > 0 && last <= first), why: format!("least of the first quarter {first}, of the last {last}") }
@@ -81,7 +81,7 @@ fn files(rows: &[Row]) -> Judgement {
 fn ahead(outcome: &Outcome) -> Judgement {
     let rule = "logical time is never ahead of the wall";
     let least = outcome.rows.iter().map(|row| row.lag.least_at_most).min();
-    let Some(least) = least else { return too_few(rule, &outcome.rows) };
+    let Some(least) = least else { return too_few(rule, outcome.rows.len()) };
     let [ahead, _] = outcome.at_end;
     let looks: u64 = outcome.rows.iter().map(|row| row.lag.looks).sum();
     let why = format!(
@@ -96,7 +96,7 @@ fn ahead(outcome: &Outcome) -> Judgement {
 fn behind(outcome: &Outcome) -> Judgement {
     let rule = "logical time does not fall behind: once up to date, less than a tick";
     let least = outcome.rows.iter().map(|row| row.lag.least_at_least).max();
-    let Some(least) = least else { return too_few(rule, &outcome.rows) };
+    let Some(least) = least else { return too_few(rule, outcome.rows.len()) };
     let [_, missing] = outcome.at_end;
     let why = format!(
         "the wall less logical time, at the most favourable look before each row, was at most {:.1} µs; when asked to stop, logical time caught up but for {} ns; when the \
@@ -132,11 +132,11 @@ fn visited(outcome: &Outcome) -> Judgement {
     Judgement { rule: "the visitor was let in and heard the others", verdict: verdict(visits.joinings > 0 && visits.newest > 0), why }
 }
 
-fn too_few(rule: &'static str, rows: &[Row]) -> Judgement {
-    Judgement { rule, verdict: Verdict::Skipped, why: format!("{} looks are too few", rows.len()) }
+pub(super) fn too_few(rule: &'static str, looks: usize) -> Judgement {
+    Judgement { rule, verdict: Verdict::Skipped, why: format!("{looks} looks are too few") }
 }
 
-const fn verdict(is_kept: bool) -> Verdict {
+pub(super) const fn verdict(is_kept: bool) -> Verdict {
     if is_kept { Verdict::Kept } else { Verdict::Broken }
 }
 
