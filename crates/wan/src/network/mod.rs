@@ -5,7 +5,8 @@
 //!             (shared) └── link a->c   └── (shared, also by c->b)
 //! ```
 //!
-//! Every pair of nodes has a link in either direction, unless the network is one [of some](Network::of_some). A node may have an *uplink*, one line that all it sends passes before the links, and a
+//! Every pair of nodes has a link in either direction, unless the network is one [of some](Network::of_some). Links are made at the beginning, or
+//! [on demand](Network::on_demand). A node may have an *uplink*, one line that all it sends passes before the links, and a
 //! *downlink*, one line that all it receives passes after them.
 
 mod awaited;
@@ -13,6 +14,7 @@ mod config;
 pub(crate) mod direct_links;
 pub(crate) mod id;
 mod lines;
+mod on_demand;
 mod passage;
 mod paths;
 mod pending;
@@ -29,6 +31,7 @@ use awaited::Awaited;
 pub use config::{AccessLine, NetworkConfig, NetworkError};
 use id::{LinkId, NodeId, Path};
 use lines::Lines;
+use on_demand::OnDemand;
 use paths::Paths;
 use pending::{InNetwork, LineId, Pending, SizeAndMarks};
 use traffic::Traffic;
@@ -65,8 +68,9 @@ pub struct Network<P> {
     now: Instant,
     lines: Lines<P>,
     places: Paths,
-    /// How many packets each path has taken; kept only where uplinks make it differ from what the link was offered.
+    /// How many packets each path has taken, by the place of its link; kept only where uplinks make it differ from what the link was offered.
     paths: Vec<u64>,
+    has_uplinks: bool,
     traffic: Traffic<P>,
     outputs: Outputs<InNetwork<P>>,
     /// Whether anything but final arrivals can be pending.
@@ -99,9 +103,7 @@ impl<P: Clone> Network<P> {
     /// With more than [`MOST_NODES`].
     #[must_use]
     pub fn new<M: Into<LinkModel>>(config: NetworkConfig, link: impl FnMut(NodeId, NodeId) -> M) -> Self {
-        let nodes =
-            u16::try_from(config.nodes.len()).ok().filter(|nodes| usize::from(*nodes) <= MOST_NODES).expect("a network has at most 23,170 nodes");
-        Self::on(Paths::All { nodes }, config, link)
+        Self::on(Paths::All { nodes: nodes_of_all(&config) }, config, link)
     }
 
     /// A network with links from each node to some others alone: `receivers` gives those of each node, in order. It takes memory for these links and no others.
@@ -119,26 +121,22 @@ impl<P: Clone> Network<P> {
         Self::on(Paths::some(nodes, receivers), config, link)
     }
 
+    /// A network as [`Network::new`] gives it, whose links are made when they are first used: it takes memory and time for the nodes and for the links that
+    /// carry packets or are changed, and not for all pairs. No answer differs.
+    ///
+    /// # Panics
+    ///
+    /// With more than [`MOST_NODES`].
+    #[must_use]
+    pub fn on_demand<M: Into<LinkModel>>(config: NetworkConfig, link: impl Fn(NodeId, NodeId) -> M + Send + Sync + 'static) -> Self {
+        let places = Paths::All { nodes: nodes_of_all(&config) };
+        Self { lines: Lines::new(&config, Some(OnDemand::new(move |from, to| link(from, to).into()))), ..Self::without_links(places, config) }
+    }
+
     fn on<M: Into<LinkModel>>(places: Paths, config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> M) -> Self {
         let nodes = places.nodes();
-        let mut network = Self {
-            nodes,
-            now: Instant::ZERO,
-            lines: Lines {
-                links: Vec::with_capacity(places.lines()),
-                uplinks: config.nodes.iter().map(|_| None).collect(),
-                downlinks: config.nodes.iter().map(|_| None).collect(),
-            },
-            places,
-            paths: Vec::new(),
-            traffic: Traffic::new(),
-            outputs: Vec::new(),
-            has_inner_events: false,
-            is_random: false,
-            has_filters: false,
-            has_relay: false,
-            config,
-        };
+        let mut network = Self::without_links(places, config);
+        network.lines.links.reserve_exact(network.places.lines());
         for from in (0..nodes).map(NodeId) {
             let mut place = 0;
             while let Some(to) = network.places.receiver(from, place) {
@@ -151,6 +149,24 @@ impl<P: Clone> Network<P> {
             }
         }
         network
+    }
+
+    fn without_links(places: Paths, config: NetworkConfig) -> Self {
+        Self {
+            nodes: places.nodes(),
+            now: Instant::ZERO,
+            lines: Lines::new(&config, None),
+            places,
+            paths: Vec::new(),
+            has_uplinks: false,
+            traffic: Traffic::new(),
+            outputs: Vec::new(),
+            has_inner_events: false,
+            is_random: false,
+            has_filters: false,
+            has_relay: false,
+            config,
+        }
     }
 
     /// Gives a node an access line, before the first packet is sent.
@@ -168,7 +184,7 @@ impl<P: Clone> Network<P> {
         let line = self.line(&name, model.into());
         match access {
             AccessLine::Uplink(_) => {
-                self.paths = alloc::vec![0; self.lines.links.len()];
+                (self.has_uplinks, self.paths) = (true, alloc::vec![0; self.lines.links.len()]);
                 self.lines.uplinks[node.index()] = Some(line);
             }
             AccessLine::Downlink(_) => self.lines.downlinks[node.index()] = Some(line),
@@ -199,8 +215,8 @@ impl<P: Clone> Network<P> {
         drops: impl Fn(&Offered<'_, P>) -> bool + Send + Sync + 'static,
     ) -> Result<Self, NetworkError> {
         let path = self.path(from, to)?;
-        let link = self.link(path);
-        self.lines.links[link.index()].set_filter(Filter::new(drops));
+        let (_, place) = self.link_and_place(path);
+        self.lines.links[place].set_filter(Filter::new(drops));
         self.has_filters = true;
         Ok(self)
     }
@@ -237,15 +253,15 @@ impl<P: Clone> Network<P> {
     ) -> Result<Option<Instant>, NetworkError> {
         let Path { from, to } = path;
         let path = self.path(from, to)?;
-        let link = self.link(path);
         check_time(&mut self.now, now)?;
+        let (link, place) = self.link_and_place(path);
         let size = SizeAndMarks::new(info.into());
         if self.has_inner_events || self.has_filters {
-            self.send_through(now, path, link, size, payload);
+            self.send_through(now, path, (link, place), size, payload);
             return Ok(None);
         }
         // Nothing is before this link or after it: only the link is asked.
-        let line = &mut self.lines.links[link.index()];
+        let line = &mut self.lines.links[place];
         let sequence = line.offered();
         let packet = InNetwork { sequence, offered: now, entered: now, path, size, payload };
         match line.offer(now, None) {
@@ -266,12 +282,12 @@ impl<P: Clone> Network<P> {
 
     /// Takes a packet that may pass more than its link.
     #[inline(never)]
-    fn send_through(&mut self, now: Instant, path: Path, link: LinkId, size: SizeAndMarks, payload: P) {
+    fn send_through(&mut self, now: Instant, path: Path, (link, place): (LinkId, usize), size: SizeAndMarks, payload: P) {
         if self.has_inner_events {
             self.let_happen(now);
         }
-        let sequence = match self.paths.get_mut(link.index()) {
-            None => self.lines.links[link.index()].offered(),
+        let sequence = match self.paths.get_mut(place) {
+            None => self.lines.links[place].offered(),
             Some(count) => {
                 *count += 1;
                 *count - 1
@@ -297,7 +313,7 @@ impl<P: Clone> Network<P> {
             self.send_to_relay(now, from, SizeAndMarks::new(info), payload);
             return Ok(());
         }
-        if !self.paths.is_empty() {
+        if self.has_uplinks {
             let mut place = 0;
             while let Some(to) = self.places.receiver(from, place) {
                 if to != from {
@@ -309,10 +325,12 @@ impl<P: Clone> Network<P> {
         }
         self.let_pass(now)?;
         let size = SizeAndMarks::new(info);
-        if let Paths::Some(_) = &self.places {
+        if self.lines.on_demand.is_some() || matches!(self.places, Paths::Some(_)) {
             let mut place = 0;
             while let Some(to) = self.places.receiver(from, place) {
-                self.send(now, Path { from, to }, size, payload.clone(), None);
+                if to != from {
+                    self.send(now, Path { from, to }, size, payload.clone(), None);
+                }
                 place += 1;
             }
             return Ok(());
@@ -415,7 +433,7 @@ impl<P: Clone> Network<P> {
         let Self { now, traffic, lines, .. } = self;
         // Without inner events nobody is woken, and no packet has another line before it.
         let taken = traffic.pending.take_due(*now, |Pending { at, offered, entered, turn, path, payload, .. }| {
-            lines.links[turn.link().index()].deliver(entered, at);
+            lines.link_mut(turn.link()).deliver(entered, at);
             payload.map(|payload| take(MereArrival { path, offered, at, payload }))
         });
         taken.flatten()
@@ -428,8 +446,8 @@ impl<P: Clone> Network<P> {
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
     pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, model: impl Into<LinkModel>) -> Result<(), NetworkError> {
         let path = self.path(from, to)?;
-        let link = self.link(path);
         self.let_pass(now)?;
+        let (link, _) = self.link_and_place(path);
         let model = model.into();
         self.has_inner_events |= !model.is_direct();
         self.is_random |= model.is_random();
@@ -443,14 +461,15 @@ impl<P: Clone> Network<P> {
     #[must_use]
     pub fn offered(&self, from: NodeId, to: NodeId) -> Option<u64> {
         let path = self.path(from, to).ok()?;
-        Some(self.lines.links.get(self.link(path).index())?.offered())
+        // A link that was not made yet was offered nothing.
+        Some(self.lines.find_link(self.link(path)).map_or(0, Line::offered))
     }
 
     /// The counters of a link; `None` if there is none.
     #[must_use]
     pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<LinkStats> {
         let path = self.path(from, to).ok()?;
-        Some(self.lines.links.get(self.link(path).index())?.stats())
+        Some(self.lines.find_link(self.link(path)).map_or_else(LinkStats::default, Line::stats))
     }
 
     /// The counters of an access line; `None` if the node has none.
@@ -487,6 +506,40 @@ impl<P: Clone> Network<P> {
         }
     }
 
+    /// The link of a path, which is made if it is to be made on demand, and its place.
+    #[inline(always)]
+    fn link_and_place(&mut self, path: Path) -> (LinkId, usize) {
+        let link = self.link(path);
+        let place = match &self.lines.on_demand {
+            None => Some(link.index()),
+            Some(on_demand) => on_demand.place(link),
+        };
+        (link, place.unwrap_or_else(|| self.make(path, link)))
+    }
+
+    /// Makes a link on demand, and gives its place. A link that nothing was offered to is as it was at the beginning, whenever it is made: its model begins at
+    /// [`Instant::ZERO`], and its random numbers have the address of its name.
+    #[cold]
+    #[inline(never)]
+    fn make(&mut self, path: Path, link: LinkId) -> usize {
+        let name = self.link_name(path);
+        let place = self.lines.links.len();
+        let on_demand = self.lines.on_demand.as_mut().expect("links are missing only where they are made on demand");
+        let model = on_demand.model(path);
+        on_demand.made(link, place);
+        if !model.is_direct() && !self.has_inner_events {
+            // From now on all that is due has happened before a packet is offered.
+            self.let_happen(self.now);
+        }
+        self.is_random |= model.is_random();
+        let line = self.line(&name, model);
+        self.lines.links.push(line);
+        if self.has_uplinks {
+            self.paths.push(0);
+        }
+        place
+    }
+
     /// Lets time pass. Inner events happen now, so that what they leave behind is there for the next packet; mere arrivals wait to be polled.
     #[inline]
     fn let_pass(&mut self, now: Instant) -> Result<(), TimeWentBack> {
@@ -496,4 +549,9 @@ impl<P: Clone> Network<P> {
         }
         Ok(())
     }
+}
+
+/// How many nodes a network has in which all have links to all.
+fn nodes_of_all(config: &NetworkConfig) -> u16 {
+    u16::try_from(config.nodes.len()).ok().filter(|nodes| usize::from(*nodes) <= MOST_NODES).expect("a network has at most 23,170 nodes")
 }

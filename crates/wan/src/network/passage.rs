@@ -71,8 +71,8 @@ impl<P: Clone> Network<P> {
     /// Offers a packet to its link where there are no uplinks; its first random words may have been drawn before.
     #[inline(always)]
     pub(super) fn send(&mut self, now: Instant, path: Path, size: SizeAndMarks, payload: P, words: Option<Words>) {
-        let link = self.link(path);
-        let sequence = self.lines.links[link.index()].offered();
+        let (link, place) = self.link_and_place(path);
+        let sequence = self.lines.links[place].offered();
         self.offer(now, LineId::Link(link), words, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 

@@ -27,9 +27,9 @@ impl<P: Clone> Network<P> {
         let mut place = 0;
         while let Some(to) = self.places.receiver(from, place) {
             if to != from {
-                let link = self.link(Path { from, to });
-                sequence = self.paths[link.index()];
-                self.paths[link.index()] += 1;
+                let (_, link) = self.link_and_place(Path { from, to });
+                sequence = self.paths[link];
+                self.paths[link] += 1;
             }
             place += 1;
         }

@@ -21,6 +21,7 @@ mod loss_laws;
 mod mere_arrivals;
 mod metamorphic;
 mod naive;
+mod on_demand;
 mod oracle;
 mod queue_laws;
 mod random_links;

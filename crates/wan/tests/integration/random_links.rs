@@ -75,8 +75,20 @@ impl Plan {
     }
 
     pub(crate) fn build(&self, general: bool) -> Network<Payload> {
-        let nodes = (0..self.nodes).map(name).collect();
-        let mut network = Network::new(NetworkConfig { seed: SEED, nodes, general }, |from, to| self.link(from, to).clone());
+        self.with_access_lines(Network::new(self.config(general), |from, to| self.link(from, to).clone()))
+    }
+
+    /// The same network, whose links are made when they are first used.
+    pub(crate) fn build_on_demand(&self, general: bool) -> Network<Payload> {
+        let plan = self.clone();
+        self.with_access_lines(Network::on_demand(self.config(general), move |from, to| plan.link(from, to).clone()))
+    }
+
+    fn config(&self, general: bool) -> NetworkConfig {
+        NetworkConfig { seed: SEED, nodes: (0..self.nodes).map(name).collect(), general }
+    }
+
+    fn with_access_lines(&self, mut network: Network<Payload>) -> Network<Payload> {
         for (node, uplink, downlink) in self.node_ids().zip(&self.uplinks).zip(&self.downlinks).map(|((node, up), down)| (node, up, down)) {
             if let Some(config) = uplink {
                 network = network.with_access_line(AccessLine::Uplink(node), config.clone()).unwrap();

@@ -1,0 +1,145 @@
+//! Links that are made when they are first used: their models, and where they lie.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt;
+
+use super::id::{LinkId, NodeId, Path};
+use crate::line::model::LinkModel;
+
+type ModelOf = dyn Fn(NodeId, NodeId) -> LinkModel + Send + Sync;
+
+/// The models of links that are made when they are first used, and the places of those that were made.
+#[derive(Clone)]
+pub(super) struct OnDemand {
+    model: Arc<ModelOf>,
+    places: Places,
+}
+
+impl OnDemand {
+    pub(super) fn new(model: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static) -> Self {
+        Self { model: Arc::new(model), places: Places::new() }
+    }
+
+    /// The model of a link that is to be made.
+    pub(super) fn model(&self, path: Path) -> LinkModel {
+        if path.from == path.to { LinkModel::default() } else { (self.model)(path.from, path.to) }
+    }
+
+    /// The place of a link; `None` if the link was not made yet.
+    #[inline(always)]
+    pub(super) fn place(&self, link: LinkId) -> Option<usize> {
+        self.places.find(link.0)
+    }
+
+    /// A link was made, and lies in that place.
+    pub(super) fn made(&mut self, link: LinkId, place: usize) {
+        self.places.insert(link.0, LinkId::new(place).0);
+    }
+}
+
+impl fmt::Debug for OnDemand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OnDemand").field("made", &self.places.len).finish_non_exhaustive()
+    }
+}
+
+/// Places by the numbers of links, in an open-addressed table: each packet looks its link up twice, and a tree took several comparisons more each time. Nothing asks the
+/// table for its order.
+#[derive(Clone, Debug)]
+struct Places {
+    /// Numbers and places. The table has a power of two of slots, of which at most half are taken.
+    slots: Vec<(u32, u32)>,
+    len: usize,
+}
+
+/// A slot without a link: links are counted in 29 bits.
+const FREE: (u32, u32) = (u32::MAX, 0);
+
+impl Places {
+    fn new() -> Self {
+        Self { slots: alloc::vec![FREE; 16], len: 0 }
+    }
+
+    /// The slot of a number, or the free one in which it would be.
+    #[inline(always)]
+    fn slot(&self, number: u32) -> usize {
+        let mask = self.slots.len() - 1;
+        // Fibonacci hashing: numbers that are a fixed distance apart, as those of a ring of hosts, are spread evenly by the upper bits of the product.
+        let mut slot = (u64::from(number).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize & mask;
+        // Half of the slots are free, so that the search ends.
+        while self.slots[slot].0 != number && self.slots[slot].0 != FREE.0 {
+            slot = (slot + 1) & mask;
+        }
+        slot
+    }
+
+    #[inline(always)]
+    fn find(&self, number: u32) -> Option<usize> {
+        let (found, place) = self.slots[self.slot(number)];
+        (found == number).then_some(place as usize)
+    }
+
+    fn insert(&mut self, number: u32, place: u32) {
+        if 2 * self.len >= self.slots.len() {
+            let doubled = alloc::vec![FREE; 2 * self.slots.len()];
+            for (number, place) in core::mem::replace(&mut self.slots, doubled) {
+                if number != FREE.0 {
+                    self.put(number, place);
+                }
+            }
+        }
+        self.put(number, place);
+        self.len += 1;
+    }
+
+    fn put(&mut self, number: u32, place: u32) {
+        let slot = self.slot(number);
+        self.slots[slot] = (number, place);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::network::{Network, NetworkConfig};
+
+    /// 10⁴ nodes of which each sends to the next: as many links as senders, where there were 10⁸.
+    #[test]
+    fn a_network_holds_the_links_that_carry_packets() {
+        let nodes: Vec<_> = (0..10_000).map(|node| alloc::format!("node-{node}")).collect();
+        let mut network: Network<()> = Network::on_demand(NetworkConfig { seed: 1, nodes, general: false }, |_, _| LinkModel::default());
+        assert_eq!((network.lines.links.len(), network.offered(NodeId(3), NodeId(4))), (0, Some(0)));
+        for from in 0..10_000 {
+            network
+                .handle_packet(cohaptic_units::Instant::ZERO, NodeId(from), NodeId((from + 1) % 10_000), cohaptic_units::Bytes::new(1), ())
+                .unwrap();
+        }
+        assert_eq!((network.lines.links.len(), network.offered(NodeId(3), NodeId(4))), (10_000, Some(1)));
+        let places = &network.lines.on_demand.as_ref().unwrap().places;
+        assert_eq!((places.len, places.slots.len()), (10_000, 32_768));
+    }
+
+    proptest! {
+        /// Numbers of a progression, as a ring of hosts or a star has them, and others.
+        #[test]
+        fn places_are_those_of_a_map(first in 0_u32..1000, step in 1_u32..30_000, count in 0_u32..300, others in prop::collection::vec(0_u32..1 << 29, 0..100)) {
+            let (mut places, mut map) = (Places::new(), BTreeMap::new());
+            for number in (0..count).map(|turn| first + turn * step).chain(others) {
+                let place = map.len() as u32;
+                prop_assert_eq!(places.find(number), map.get(&number).map(|place: &u32| *place as usize));
+                if map.insert(number, place).is_none() {
+                    places.insert(number, place);
+                } else {
+                    map.insert(number, places.find(number).unwrap() as u32);
+                }
+            }
+            prop_assert!(map.iter().all(|(number, place)| places.find(*number) == Some(*place as usize)));
+            prop_assert!(places.len == map.len() && places.slots.len() <= (4 * map.len()).max(16));
+        }
+    }
+}
