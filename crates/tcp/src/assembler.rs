@@ -12,6 +12,8 @@ use crate::sequence::Position;
 pub(crate) struct Assembler {
     ready: VecDeque<u8>,
     pieces: BTreeMap<Position, Vec<u8>>,
+    /// Octets in `pieces`.
+    waiting: usize,
     ranges: Ranges,
     /// A position in each of the ranges that changed last, the latest first (RFC 2018, section 4).
     recent: Vec<Position>,
@@ -26,9 +28,12 @@ impl Assembler {
         }
         let offset = |position: Position| usize::try_from(position - start).unwrap_or(data.len());
         if start > *next {
-            let pieces = &mut self.pieces;
+            let (pieces, waiting) = (&mut self.pieces, &mut self.waiting);
             self.ranges.insert(start, end, |from, to| {
-                pieces.insert(from, data[offset(from)..offset(to)].to_vec());
+                let piece = data[offset(from)..offset(to)].to_vec();
+                *waiting += piece.len();
+                let before = pieces.insert(from, piece);
+                *waiting -= before.map_or(0, |piece| piece.len());
             });
             self.remember(start);
             return;
@@ -44,6 +49,7 @@ impl Assembler {
     fn join(&mut self, next: &mut Position) {
         while let Some(first) = self.pieces.first_entry().filter(|first| first.key() <= next) {
             let (start, piece) = first.remove_entry();
+            self.waiting -= piece.len();
             let known = usize::try_from(*next - start).map_or(piece.len(), |known| known.min(piece.len()));
             self.ready.extend(&piece[known..]);
             *next += (piece.len() - known) as u64;
@@ -80,6 +86,11 @@ impl Assembler {
         self.ready.len()
     }
 
+    /// Octets that lie here, in order or not.
+    pub(crate) fn held(&self) -> usize {
+        self.ready.len() + self.waiting
+    }
+
     /// Copies what can be read, without taking it.
     pub(crate) fn peek(&self, to: &mut [u8]) -> usize {
         let (first, second) = self.ready.as_slices();
@@ -102,6 +113,7 @@ impl Assembler {
     /// Lets go of the pieces out of order, which nobody will complete.
     pub(crate) fn forget_gaps(&mut self) {
         self.pieces.clear();
+        self.waiting = 0;
         self.ranges.clear();
         self.recent = Vec::new();
     }
@@ -131,6 +143,7 @@ mod tests {
                     prop_assert!(span.start > expected && covered[span].iter().all(|is_there| *is_there));
                 }
                 prop_assert_eq!(assembler.has_gaps(), covered[expected..].contains(&true));
+                prop_assert_eq!(assembler.held(), assembler.unread() + assembler.pieces.values().map(Vec::len).sum::<usize>());
             }
             let mut read = vec![0; 300];
             let count = assembler.read(&mut read);

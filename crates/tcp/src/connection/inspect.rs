@@ -21,6 +21,12 @@ impl Connection {
         is_idle && self.keepalive_at.is_some() && self.counters.probes == 0
     }
 
+    /// How many octets the connection holds: those that were written and not acknowledged, and those that have arrived and were not read, in order or not.
+    #[must_use]
+    pub fn held(&self) -> usize {
+        self.send.buffer.len() + self.receive.assembler.held()
+    }
+
     /// The sequence numbers of the SYNs, this end's and the peer's, once that has come: for tools that show numbers counted from them.
     #[must_use]
     pub const fn initial_sequences(&self) -> (u32, Option<u32>) {
