@@ -1,11 +1,13 @@
 //! Names and addresses: which host has which.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::sync::Arc;
 
 use cohaptic_wan::NodeId;
 
+use crate::bed::{Names, SHOWN};
 use crate::context;
 
 /// Which host has which name and which addresses.
@@ -14,7 +16,7 @@ use crate::context;
 /// by [`Host::change_addresses`](crate::Host::change_addresses), come after those of all hosts.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct AddressPlan {
-    names: Vec<String>,
+    names: Arc<Names>,
     current: Vec<Addresses>,
     /// By number, from 1: the host that has the addresses of that number. Those behind the last one no host has had.
     owners: Vec<Option<NodeId>>,
@@ -63,7 +65,7 @@ impl Addresses {
 }
 
 impl AddressPlan {
-    pub(crate) fn new(names: Vec<String>) -> Self {
+    pub(crate) fn new(names: Arc<Names>) -> Self {
         let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: Vec::new() };
         for host in 0..plan.names.len() {
             let addresses = plan.fresh(NodeId::new(host));
@@ -92,10 +94,14 @@ impl AddressPlan {
         &self.names
     }
 
+    pub(crate) const fn shared_names(&self) -> &Arc<Names> {
+        &self.names
+    }
+
     /// The addresses of a host; `None` if there is none of that name.
     #[must_use]
     pub fn addresses(&self, name: &str) -> Option<Addresses> {
-        self.node(name).map(|host| self.of(host))
+        self.names.find(name).map(|host| self.of(host))
     }
 
     /// The name of the host that has this address now.
@@ -109,8 +115,20 @@ impl AddressPlan {
         Self::place(address) < self.owners.len()
     }
 
-    pub(crate) fn node(&self, name: &str) -> Option<NodeId> {
-        self.names.iter().position(|known| known == name).map(NodeId::new)
+    /// Says that no host has an address, and which hosts have which.
+    pub(crate) fn unknown(&self, address: IpAddr) -> String {
+        let mut text = format!("no host has the address {address}; the hosts are\n");
+        // Writing to a `String` cannot fail.
+        let _ = self.write_lines(&mut text, SHOWN);
+        if self.names.len() > SHOWN {
+            let _ = writeln!(text, "and {} more", self.names.len() - SHOWN);
+        }
+        text
+    }
+
+    /// A line for each of the first hosts.
+    fn write_lines(&self, to: &mut impl fmt::Write, count: usize) -> fmt::Result {
+        self.names.iter().zip(&self.current).take(count).try_for_each(|(name, addresses)| writeln!(to, "{name} {} {}", addresses.v4, addresses.v6))
     }
 
     pub(crate) fn owner_node(&self, address: IpAddr) -> Option<NodeId> {
@@ -138,10 +156,7 @@ impl AddressPlan {
 impl fmt::Display for AddressPlan {
     /// A line a host: `server 10.0.0.2 fd00::2`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (name, addresses) in self.names.iter().zip(&self.current) {
-            writeln!(f, "{name} {} {}", addresses.v4, addresses.v6)?;
-        }
-        Ok(())
+        self.write_lines(f, usize::MAX)
     }
 }
 
@@ -231,10 +246,7 @@ impl<T: ToSocketAddrs + ?Sized> ToSocketAddrs for &T {
 }
 
 fn look_up(name: &str) -> io::Result<Addresses> {
-    let shared = context::shared().ok_or_else(|| context::outside("a host's name means something"))?;
-    let core = shared.lock();
-    core.plan.addresses(name).ok_or_else(|| {
-        let text = format!("there is no host `{name}`; the hosts are {}", core.plan.names().join(", "));
-        io::Error::new(io::ErrorKind::NotFound, text)
-    })
+    let shared = context::shared().ok_or_else(|| context::outside(&format!("the name `{name}` of a host means something")))?;
+    let found = shared.lock().plan.addresses(name);
+    found.ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, shared.names().unknown(name)))
 }

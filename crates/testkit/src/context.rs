@@ -53,6 +53,12 @@ pub(crate) fn running() -> Option<Running> {
     RUNNING.with_borrow(Clone::clone)
 }
 
+/// Whether the run with that state is the one of this thread. A value may ask that is dropped while the thread ends.
+#[inline]
+pub(crate) fn is_running(shared: &Shared) -> bool {
+    RUNNING.try_with(|running| running.borrow().as_ref().is_some_and(|running| std::ptr::eq(&raw const *running.shared, shared))).unwrap_or(false)
+}
+
 /// Its state.
 pub(crate) fn shared() -> Option<Arc<Shared>> {
     RUNNING.with_borrow(|running| running.as_ref().map(|running| Arc::clone(&running.shared)))
@@ -79,6 +85,12 @@ pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T 
         Some(running) => question(&running.shared),
         None => panic!("{}", outside_text(what)),
     })
+}
+
+/// The task that is being polled on this thread, in words; `None` outside of a run.
+pub(crate) fn task() -> Option<String> {
+    let running = running()?;
+    Some(running.tasks.current(running.shared.names()))
 }
 
 /// The host on which the task that is being polled lives.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use cohaptic_wan::NodeId;
 
 use crate::address::{Addresses, ToSocketAddrs};
-use crate::context;
+use crate::context::{self, Running};
 use crate::core::Shared;
 use crate::socket::UdpSocket;
 use crate::task::JoinHandle;
@@ -32,7 +32,7 @@ impl Host {
     /// Its name.
     #[must_use]
     pub fn name(&self) -> String {
-        self.shared.lock().plan.names()[self.node.index()].clone()
+        self.shared.names()[self.node.index()].clone()
     }
 
     /// The addresses that it has now.
@@ -68,7 +68,7 @@ impl Host {
         F: Future + 'static,
         F::Output: 'static,
     {
-        let running = context::expect_running("tasks can be spawned");
+        let running = self.running("tasks can be spawned");
         self.expect_up("spawn a task");
         running.tasks.spawn(Some(self.node), Location::caller(), future)
     }
@@ -83,7 +83,7 @@ impl Host {
     where
         F: Future<Output = ()> + 'static,
     {
-        let running = context::expect_running("programs can be started");
+        let running = self.running("programs can be started");
         self.expect_up("start a program");
         running.tasks.set_program(self.node, Location::caller(), Rc::new(move || Box::pin(program())));
     }
@@ -114,6 +114,7 @@ impl Host {
     /// As [`TcpStream::connect`](crate::TcpStream::connect); [`io::ErrorKind::NetworkDown`] if the host is down.
     #[cfg(feature = "tcp")]
     pub async fn connect(&self, address: impl ToSocketAddrs) -> io::Result<crate::TcpStream> {
+        self.shared.check_open(self.node, "a connection")?;
         let address = address.to_socket_addr()?;
         let config = self.shared.lock().tcp_config(self.node).clone();
         crate::TcpStream::connect_on(Arc::clone(&self.shared), self.node, None, address, config)?.established().await
@@ -136,7 +137,7 @@ impl Host {
     ///
     /// Outside the run.
     pub fn crash(&self) {
-        let running = context::expect_running("hosts crash");
+        let running = self.running("hosts crash");
         // First the sockets: what the tasks do while they are dropped does not reach anybody.
         self.shared.lock().crash(self.node);
         running.tasks.stop_all_of(self.node);
@@ -149,7 +150,7 @@ impl Host {
     ///
     /// Outside the run.
     pub fn kill(&self) {
-        let running = context::expect_running("programs are killed");
+        let running = self.running("programs are killed");
         if self.is_up() {
             // First the tasks, which drop what they hold; then what others hold of this host's.
             running.tasks.stop_all_of(self.node);
@@ -163,7 +164,7 @@ impl Host {
     ///
     /// Outside the run.
     pub fn restart(&self) {
-        let running = context::expect_running("hosts restart");
+        let running = self.running("hosts restart");
         let begins = self.shared.lock().restart(self.node);
         if begins {
             running.tasks.restart(self.node);
@@ -182,6 +183,18 @@ impl Host {
         self.shared.lock().change_addresses(self.node)
     }
 
+    /// The run of this host, on its thread.
+    ///
+    /// # Panics
+    ///
+    /// Outside of that run.
+    fn running(&self, what: &str) -> Running {
+        let running = context::expect_running(what);
+        let is_own = Arc::ptr_eq(&running.shared, &self.shared);
+        assert!(is_own, "host `{}` belongs to another test bed than the one that runs: take a host of the `Bed` of this run", self.name());
+        running
+    }
+
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     #[track_caller]
     fn expect_up(&self, what: &str) {
@@ -193,7 +206,8 @@ impl Host {
 
 impl fmt::Debug for Host {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Host").field("name", &self.name()).field("addresses", &self.addresses()).finish_non_exhaustive()
+        let addresses = self.shared.try_lock().map(|core| core.plan.of(self.node));
+        f.debug_struct("Host").field("name", &self.name()).field("addresses", &addresses).finish_non_exhaustive()
     }
 }
 
@@ -205,6 +219,8 @@ impl From<&Host> for IpAddr {
 
 impl ToSocketAddrs for (&Host, u16) {
     fn to_socket_addr(&self) -> io::Result<std::net::SocketAddr> {
-        Ok((self.0.addresses().v4, self.1).into())
+        let (host, port) = self;
+        let core = host.shared.open(host.node, "the address")?;
+        Ok((core.plan.of(host.node).v4, *port).into())
     }
 }

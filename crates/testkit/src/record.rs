@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use cohaptic_units::Instant;
 use cohaptic_wan::{FateLog, FateLogError, PacketRecord, Path};
 
-use crate::bed::path;
 use crate::seed::Seed;
 use crate::trace::Trace;
 use crate::wire::{HitCount, Recorded, Seen};
@@ -53,7 +52,7 @@ impl Record {
     /// If there is no such host.
     #[must_use]
     pub fn fates(&self, from: &str, to: &str) -> FateLog {
-        self.fates_of(path(self.recorded.trace.hosts(), from, to))
+        self.fates_of(self.recorded.trace.names().path(from, to))
     }
 
     /// Every path with a packet on its link.

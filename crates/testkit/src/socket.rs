@@ -13,7 +13,10 @@ use cohaptic_wan::NodeId;
 
 use crate::address::ToSocketAddrs;
 use crate::context;
-use crate::core::{Inlet, Shared, SocketId};
+use crate::core::{Guard, Inlet, Shared, SocketId};
+
+/// What messages call it.
+const KIND: &str = "a UDP socket";
 
 /// A UDP socket of a host of the running test bed: the methods of tokio's, with the same meaning.
 ///
@@ -27,10 +30,12 @@ use crate::core::{Inlet, Shared, SocketId};
 /// - If no socket is at the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`], once the answer has come back over the
 ///   link: by the next call, or by the call that waits to receive.
 /// - A socket at `[::]` hears IPv6 only.
-/// - Another thread gets at it between two polls of tasks: a task that blocks its own thread until that is done waits for ever.
-/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
+/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out. So does every method once the run of its test bed has
+///   ended, also within the run of another test bed.
+/// - It belongs to the thread that runs the test bed. On another thread every method gives [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct UdpSocket {
     shared: Arc<Shared>,
+    host: NodeId,
     id: SocketId,
     inlet: Arc<Inlet>,
     options: options::Options,
@@ -50,13 +55,26 @@ impl UdpSocket {
     }
 
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
+        // The host is asked before the address is looked up: a name means nothing, or another host, where this one may not be used.
+        shared.check_open(host, KIND)?;
         let address = address.to_socket_addr()?;
         let mut core = shared.lock();
         core.check_up(host)?;
         let id = core.bind(host, address)?;
         let inlet = core.inlet_of(id);
         drop(core);
-        Ok(Self { shared, id, inlet, options: options::Options::default() })
+        Ok(Self { shared, host, id, inlet, options: options::Options::default() })
+    }
+
+    /// The state, for a call.
+    ///
+    /// # Errors
+    ///
+    /// If the run has ended, this is another thread, or the host of the socket has crashed.
+    fn open(&self) -> io::Result<Guard<'_>> {
+        let core = self.shared.open(self.host, KIND)?;
+        core.check_alive(self.id)?;
+        Ok(core)
     }
 
     /// The address at which it is bound.
@@ -65,9 +83,7 @@ impl UdpSocket {
     ///
     /// If its host has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        let core = self.shared.lock();
-        core.check_alive(self.id)?;
-        Ok(core.local_of(self.id))
+        Ok(self.open()?.local_of(self.id))
     }
 
     /// The peer to which it is connected.
@@ -76,9 +92,7 @@ impl UdpSocket {
     ///
     /// [`io::ErrorKind::NotConnected`] if it is not.
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
-        let core = self.shared.lock();
-        core.check_alive(self.id)?;
-        core.peer_of(self.id).ok_or_else(|| io::ErrorKind::NotConnected.into())
+        self.open()?.peer_of(self.id).ok_or_else(|| io::ErrorKind::NotConnected.into())
     }
 
     /// From now on it sends to that peer and hears nobody else. What has come before stays in its buffer.
@@ -88,6 +102,7 @@ impl UdpSocket {
     /// If the peer is of the other version of IP, or is no address.
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn connect(&self, peer: impl ToSocketAddrs) -> io::Result<()> {
+        self.shared.check_open(self.host, KIND)?;
         let peer = peer.to_socket_addr()?;
         self.shared.lock().connect(self.id, peer)
     }
@@ -98,9 +113,7 @@ impl UdpSocket {
     ///
     /// If its host has crashed.
     pub fn broadcast(&self) -> io::Result<bool> {
-        let mut core = self.shared.lock();
-        core.check_alive(self.id)?;
-        Ok(*core.may_broadcast(self.id))
+        Ok(*self.open()?.may_broadcast(self.id))
     }
 
     /// Lets it send to 255.255.255.255, or not.
@@ -109,9 +122,7 @@ impl UdpSocket {
     ///
     /// If its host has crashed.
     pub fn set_broadcast(&self, on: bool) -> io::Result<()> {
-        let mut core = self.shared.lock();
-        core.check_alive(self.id)?;
-        *core.may_broadcast(self.id) = on;
+        *self.open()?.may_broadcast(self.id) = on;
         Ok(())
     }
 
@@ -121,20 +132,20 @@ impl UdpSocket {
     ///
     /// If its host has crashed.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
-        let mut core = self.shared.lock();
-        core.check_alive(self.id)?;
-        Ok(core.take_error(self.id))
+        Ok(self.open()?.take_error(self.id))
     }
 }
 
 impl Drop for UdpSocket {
     fn drop(&mut self) {
-        self.shared.lock().close(self.id);
+        let id = self.id;
+        self.shared.release(move |core| core.close(id));
     }
 }
 
 impl fmt::Debug for UdpSocket {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("UdpSocket").field("local", &self.shared.lock().local_of(self.id)).finish_non_exhaustive()
+        let local = self.shared.try_lock().map(|core| core.local_of(self.id));
+        f.debug_struct("UdpSocket").field("local", &local).finish_non_exhaustive()
     }
 }

@@ -126,7 +126,7 @@ impl Future for Sleep {
 impl Drop for Sleep {
     fn drop(&mut self) {
         if let Some((timer, _)) = self.timer.take() {
-            self.shared.lock().timers.cancel(timer);
+            self.shared.release(move |core| core.timers.cancel(timer));
         }
     }
 }

@@ -1,11 +1,13 @@
 //! What happened in a run, event by event, and where two runs part.
 
 use std::fmt;
+use std::sync::Arc;
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::{Seconds, Span};
 use cohaptic_wan::{DropCause, NodeId, Path};
 
+use crate::bed::Names;
 use crate::hit::Verdict;
 
 /// What happened, and when.
@@ -141,12 +143,12 @@ impl fmt::Display for Lost {
 /// All that happened in a run, in order.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Trace {
-    hosts: Vec<String>,
+    hosts: Arc<Names>,
     events: Vec<TraceEvent>,
 }
 
 impl Trace {
-    pub(crate) const fn new(hosts: Vec<String>) -> Self {
+    pub(crate) const fn new(hosts: Arc<Names>) -> Self {
         Self { hosts, events: Vec::new() }
     }
 
@@ -157,6 +159,10 @@ impl Trace {
     /// The names of the hosts.
     #[must_use]
     pub fn hosts(&self) -> &[String] {
+        &self.hosts
+    }
+
+    pub(crate) fn names(&self) -> &Names {
         &self.hosts
     }
 
@@ -310,7 +316,7 @@ mod tests {
 
     #[test]
     fn the_first_difference_is_told_with_its_time() {
-        let trace = |events: Vec<TraceEvent>| Trace { hosts: vec!["a".into(), "b".into()], events };
+        let trace = |events: Vec<TraceEvent>| Trace { hosts: Arc::new(["a", "b"].into_iter().collect()), events };
         let one = trace(vec![sent(0, 0), sent(5_000, 1), sent(9_000, 2)]);
         assert_eq!(one.first_difference(&one.clone()), None);
         let other = trace(vec![sent(0, 0), sent(5_001, 1), sent(9_000, 2)]);

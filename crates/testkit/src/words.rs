@@ -22,9 +22,9 @@ use std::sync::Arc;
 
 use cohaptic_units::Excerpt;
 use cohaptic_wan::netem::Netem;
-use cohaptic_wan::{FateLog, LinkModel};
+use cohaptic_wan::{FateLog, LinkModel, MOST_NODES};
 
-use crate::bed::name_fault;
+use crate::bed::{Names, name_fault};
 use crate::hit::{self, PathHit};
 
 /// What a text says.
@@ -95,7 +95,7 @@ pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, Str
         let end = last.1.len()..last.1.len();
         return Err(locate(last.0, last.1, (end, "no line names a host: expected one such as `a -> b: delay 24ms` or `hosts: a b`".to_owned())));
     }
-    Ok(Words { hosts: reader.hosts, every, links: reader.links, hits: reader.hits, seed: reader.seed })
+    Ok(Words { hosts: reader.hosts.to_vec(), every, links: reader.links, hits: reader.hits, seed: reader.seed })
 }
 
 /// Reads lines of hits alone: a path, a colon, and the words.
@@ -120,7 +120,7 @@ fn locate(number: usize, line: &str, (span, message): Fault) -> WordsError {
 
 #[derive(Debug, Default)]
 struct Reader {
-    hosts: Vec<String>,
+    hosts: Names,
     /// Whether a line has named the hosts.
     is_closed: bool,
     every: Option<LinkModel>,
@@ -208,7 +208,7 @@ impl Reader {
         }
         for span in rest {
             let name = &line[span.clone()];
-            if self.hosts.iter().any(|known| known == name) {
+            if self.hosts.find(name).is_some() {
                 return Err((span.clone(), format!("host `{name}` is named twice: expected it once")));
             }
             self.host(line, span)?;
@@ -220,8 +220,8 @@ impl Reader {
     /// The place of a host, which is a new one unless it is known.
     fn host(&mut self, line: &str, span: &Range<usize>) -> Result<usize, Fault> {
         let name = &line[span.clone()];
-        if let Some(place) = self.hosts.iter().position(|known| known == name) {
-            return Ok(place);
+        if let Some(host) = self.hosts.find(name) {
+            return Ok(host.index());
         }
         if self.is_closed {
             return Err((span.clone(), format!("there is no host `{name}`: expected one of {}", self.hosts.join(", "))));
@@ -229,7 +229,10 @@ impl Reader {
         if let Some(fault) = name_fault(name) {
             return Err((span.clone(), fault));
         }
-        self.hosts.push(name.to_owned());
+        if self.hosts.len() == MOST_NODES {
+            return Err((span.clone(), format!("this is host {}: expected {MOST_NODES} at most", MOST_NODES + 1)));
+        }
+        self.hosts.add(name.to_owned());
         Ok(self.hosts.len() - 1)
     }
 }

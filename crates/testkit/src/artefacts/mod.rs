@@ -102,10 +102,13 @@ impl Artefacts {
         !self.folders.is_empty()
     }
 
-    /// Tells on standard error that a run has failed: where what happened is, and how to run it again, and which laws hit nothing. Whatever goes wrong is told too, and no more: the
-    /// test has failed for another reason.
+    /// Tells on standard error that a run has failed: in which task, if a task has panicked, where what happened is, how to run it again, and which laws hit
+    /// nothing. Whatever goes wrong is told too, and no more: the test has failed for another reason.
     #[expect(clippy::print_stderr, reason = "a test that fails says how to see it again")]
-    pub(crate) fn report(&self, seed: &Seed, hits: &[HitCount], record: impl FnOnce() -> Record) {
+    pub(crate) fn report(&self, seed: &Seed, task: Option<&str>, hits: &[HitCount], record: impl FnOnce() -> Record) {
+        if let Some(task) = task {
+            eprintln!("{task} has panicked");
+        }
         for line in self.lines(seed, hits, record) {
             eprintln!("{line}");
         }

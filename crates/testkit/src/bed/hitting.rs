@@ -2,7 +2,7 @@
 
 use std::panic::Location;
 
-use super::{Testbed, path};
+use super::{Names, Testbed};
 use crate::hit::{Hits, Laws, PacketLaw, PathHit, SentPacket, Verdict, WordsLaw};
 use crate::words::hits_on;
 
@@ -69,30 +69,25 @@ fn place() -> String {
     format!("the law of {}", Location::caller())
 }
 
-fn checked(names: &[String], [from, to]: [&str; 2]) -> cohaptic_wan::Path {
-    let path = path(names, from, to);
+fn checked(names: &Names, [from, to]: [&str; 2]) -> cohaptic_wan::Path {
+    let path = names.path(from, to);
     assert!(path.from != path.to, "host `{from}` has no link to itself");
     path
 }
 
 #[track_caller]
-pub(crate) fn add_function(
-    laws: &mut Laws,
-    names: &[String],
-    ends: [&str; 2],
-    judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static,
-) {
+pub(crate) fn add_function(laws: &mut Laws, names: &Names, ends: [&str; 2], judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static) {
     laws.add_function(checked(names, ends), place(), judge);
 }
 
 #[track_caller]
-pub(crate) fn add_law(laws: &mut Laws, names: &[String], ends: [&str; 2], law: impl PacketLaw + Clone + Send + 'static) {
+pub(crate) fn add_law(laws: &mut Laws, names: &Names, ends: [&str; 2], law: impl PacketLaw + Clone + Send + 'static) {
     laws.add(checked(names, ends), place(), law);
 }
 
 #[track_caller]
 #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
-pub(crate) fn add_words(laws: &mut Laws, names: &[String], ends: [&str; 2], words: &str) {
+pub(crate) fn add_words(laws: &mut Laws, names: &Names, ends: [&str; 2], words: &str) {
     let path = checked(names, ends);
     let hits = hits_on(words).unwrap_or_else(|error| panic!("these are no words of hits: {error}"));
     for hit in hits {
@@ -101,7 +96,7 @@ pub(crate) fn add_words(laws: &mut Laws, names: &[String], ends: [&str; 2], word
 }
 
 #[track_caller]
-pub(crate) fn add_all(laws: &mut Laws, names: &[String], hits: &[PathHit]) {
+pub(crate) fn add_all(laws: &mut Laws, names: &Names, hits: &[PathHit]) {
     for PathHit { from, to, hit } in hits {
         laws.add(checked(names, [from, to]), hit.to_string(), WordsLaw::new(hit.clone()));
     }

@@ -20,7 +20,7 @@ use std::time::Duration;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
 pub(crate) use hitting::{add_all, add_function, add_law, add_words};
-pub(crate) use names::{check_name, name_fault, node, path};
+pub(crate) use names::{Names, SHOWN, name_fault};
 pub use running::Bed;
 
 use crate::artefacts::Artefacts;
@@ -37,7 +37,7 @@ use crate::task::Tasks;
 use crate::tcp::TcpConfig;
 use crate::trace::Trace;
 use crate::watch::{Kind, LIMIT, Watched};
-use crate::wire::{Recorded, Settings};
+use crate::wire::{BYTE_LIMIT, Recorded, Settings};
 
 /// Hosts, the links between them, and a program that is run on them in virtual time.
 ///
@@ -62,7 +62,7 @@ use crate::wire::{Recorded, Settings};
 #[derive(Clone, Debug)]
 #[must_use = "a test bed does nothing until it is run"]
 pub struct Testbed {
-    names: Vec<String>,
+    names: Arc<Names>,
     every: LinkModel,
     links: BTreeMap<Path, LinkModel>,
     changes: Vec<LinkChange>,
@@ -88,16 +88,13 @@ impl Testbed {
     ///
     /// # Panics
     ///
-    /// If there is no host, a name is empty or there twice, or has one of the characters that an address is written with (`:`, `[`, `]`, white space).
+    /// If there is no host or more than 23,170, a name is empty or there twice, or has one of the characters that an address is written with (`:`, `[`, `]`,
+    /// white space).
     pub fn new<N: Into<String>>(hosts: impl IntoIterator<Item = N>) -> Self {
-        let names = hosts.into_iter().map(Into::into).fold(Vec::new(), |mut names: Vec<String>, name: String| {
-            check_name(&names, &name);
-            names.push(name);
-            names
-        });
+        let names: Names = hosts.into_iter().collect();
         assert!(!names.is_empty(), "a test bed without hosts; expected one name at least");
         Self {
-            names,
+            names: Arc::new(names),
             every: LinkModel::default(),
             links: BTreeMap::new(),
             changes: Vec::new(),
@@ -108,6 +105,7 @@ impl Testbed {
                 digests: true,
                 keeps_packets: false,
                 patience: PATIENCE,
+                byte_limit: BYTE_LIMIT,
                 laws: Laws::default(),
             },
             #[cfg(feature = "tcp")]
@@ -155,7 +153,7 @@ impl Testbed {
     ///
     /// If there is no such host, both are the same, or the words are none.
     pub fn link(mut self, from: &str, to: &str, link: impl ToLink) -> Self {
-        let path = path(&self.names, from, to);
+        let path = self.names.path(from, to);
         assert!(path.from != path.to, "host `{from}` has no link to itself");
         self.links.insert(path, link.to_link());
         self
@@ -188,6 +186,14 @@ impl Testbed {
     /// How often tasks may be polled at one instant before the run is given up, because time does not pass; a million if it is not said.
     pub const fn patience(mut self, polls: u64) -> Self {
         self.settings.patience = polls;
+        self
+    }
+
+    /// How many bytes the run may hold that were sent and neither read nor lost, on links, in buffers of sockets and in streams of TCP; a gibibyte if it is not
+    /// said. Each packet counts with 200 bytes beside those that it carries, for its places in queues. A run that comes to hold more fails, and names the host, the
+    /// socket and the task that sent last: a loop that only sends would take all memory otherwise. `u64::MAX` is no limit.
+    pub const fn byte_limit(mut self, bytes: u64) -> Self {
+        self.settings.byte_limit = bytes;
         self
     }
 
@@ -235,8 +241,8 @@ impl Testbed {
     ///
     /// # Panics
     ///
-    /// If the program or one of its tasks does, with the seed on standard error; if nothing will ever happen any more, or time does not pass; inside another
-    /// test bed or runtime.
+    /// If the program or one of its tasks does, with the task and the seed on standard error; if nothing will ever happen any more, time does not pass, or more
+    /// than [`Testbed::byte_limit`] is on its way; if another thread uses a socket of the run; inside another test bed or runtime.
     #[track_caller]
     pub fn run<T, F>(self, program: impl FnOnce(Bed) -> F) -> T
     where
@@ -299,29 +305,35 @@ impl Testbed {
         let mut settings = self.settings.clone();
         settings.keeps_packets |= artefacts.is_wanted();
         settings.traces |= artefacts.is_wanted();
-        let (every, links) = (&self.every, &self.links);
-        let link = |from, to| links.get(&Path { from, to }).unwrap_or(every).clone();
+        let (every, links) = (self.every, self.links);
+        let link = move |from, to| links.get(&Path { from, to }).unwrap_or(&every).clone();
         #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only TCP has constants"))]
         let mut core = Core::new(&self.names, seed.value, settings, self.changes.clone(), link);
         #[cfg(feature = "tcp")]
         self.tcp.iter().for_each(|(host, config)| core.set_tcp(*host, config.clone()));
         let mut recorded = None;
+        #[cfg(feature = "tokio")]
+        let kind = if self.is_tokio { Kind::Tokio } else { Kind::Own };
+        #[cfg(not(feature = "tokio"))]
+        let kind = Kind::Own;
+        let watched = Watched::begin(kind, &self.names, self.stall_limit, seed, &artefacts);
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             #[cfg(feature = "tokio")]
             if self.is_tokio {
-                let watched = Watched::begin(Kind::Tokio, &self.names, self.stall_limit, seed, &artefacts);
                 return crate::runtime::on_tokio::run(core, self.names.len(), program, origin, &watched, &mut recorded);
             }
-            let watched = Watched::begin(Kind::Own, &self.names, self.stall_limit, seed, &artefacts);
             on_own(core, self.names.len(), program, origin, &watched, &mut recorded)
         }));
-        let recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(self.names.clone()), ..Recorded::default() });
+        // While a panic is reported nothing is watched any more.
+        let panicked = watched.pulse.running().map(|runner| runner.words(&self.names));
+        drop(watched);
+        let recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(Arc::clone(&self.names)), ..Recorded::default() });
         let record = Record::new(seed.clone(), recorded);
         match outcome {
             Ok(outcome) => (outcome, record),
             Err(panic) => {
                 let hits = record.hits().to_vec();
-                artefacts.report(seed, &hits, || record);
+                artefacts.report(seed, panicked.as_deref(), &hits, || record);
                 resume_unwind(panic)
             }
         }
@@ -350,6 +362,7 @@ impl Drop for Recorder<'_> {
         *self.recorded = Some(self.shared.lock().wire.recorded());
         // Tasks hold the state, and the state their wakers.
         self.tasks.stop_all();
+        self.shared.end();
     }
 }
 

@@ -1,16 +1,107 @@
 //! The names of hosts.
 
-use cohaptic_wan::{NodeId, Path};
+use std::fmt::{self, Write as _};
+use std::ops::Deref;
 
-/// Checks the name of one more host.
-///
-/// # Panics
-///
-/// If it is none, or one of the others has it.
-pub(crate) fn check_name(others: &[String], name: &str) {
-    let fault = name_fault(name);
-    assert!(fault.is_none(), "{}", fault.unwrap_or_default());
-    assert!(!others.iter().any(|other| other == name), "two hosts are called `{name}`");
+use cohaptic_wan::{MOST_NODES, NodeId, Path};
+
+use crate::context;
+
+/// The names of hosts, in the order in which they were given, and an index of them: to look a host up takes as many steps as the number of hosts has bits.
+#[derive(Clone, PartialEq, Eq, Default)]
+pub(crate) struct Names {
+    list: Vec<String>,
+    /// The places in `list`, sorted by name.
+    sorted: Vec<NodeId>,
+}
+
+/// How many hosts a message names at most.
+pub(crate) const SHOWN: usize = 16;
+
+impl Names {
+    /// Adds the name of one more host.
+    ///
+    /// # Panics
+    ///
+    /// If it is none, another host has it, or there are more hosts than a network has.
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    pub(crate) fn add(&mut self, name: String) {
+        let fault = name_fault(&name);
+        assert!(fault.is_none(), "{}", fault.unwrap_or_default());
+        assert!(self.list.len() < MOST_NODES, "a test bed has at most {MOST_NODES} hosts");
+        match self.search(&name) {
+            Ok(_) => panic!("two hosts are called `{name}`"),
+            Err(place) => self.sorted.insert(place, NodeId::new(self.list.len())),
+        }
+        self.list.push(name);
+    }
+
+    fn search(&self, name: &str) -> Result<usize, usize> {
+        self.sorted.binary_search_by(|node| (*self.list[node.index()]).cmp(name))
+    }
+
+    /// The host of that name.
+    pub(crate) fn find(&self, name: &str) -> Option<NodeId> {
+        self.search(name).ok().map(|place| self.sorted[place])
+    }
+
+    /// The host of that name.
+    ///
+    /// # Panics
+    ///
+    /// If there is none.
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    pub(crate) fn node(&self, name: &str) -> NodeId {
+        self.find(name).unwrap_or_else(|| panic!("{}", self.unknown(name)))
+    }
+
+    /// The path from one host to another.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host.
+    pub(crate) fn path(&self, from: &str, to: &str) -> Path {
+        Path { from: self.node(from), to: self.node(to) }
+    }
+
+    /// Says that no host has that name, which hosts there are, and which task asks.
+    pub(crate) fn unknown(&self, name: &str) -> String {
+        let mut text = format!("there is no host `{name}`; the hosts are {}", self.list[..self.list.len().min(SHOWN)].join(", "));
+        // Writing to a `String` cannot fail.
+        if self.list.len() > SHOWN {
+            let _ = write!(text, " and {} more", self.list.len() - SHOWN);
+        }
+        if let Some(task) = context::task() {
+            let _ = write!(text, "; {task} asks for it");
+        }
+        text
+    }
+}
+
+impl fmt::Debug for Names {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(&self.list).finish()
+    }
+}
+
+impl Deref for Names {
+    type Target = [String];
+
+    #[inline]
+    fn deref(&self) -> &[String] {
+        &self.list
+    }
+}
+
+impl<N: Into<String>> FromIterator<N> for Names {
+    /// # Panics
+    ///
+    /// As [`Names::add`].
+    fn from_iter<I: IntoIterator<Item = N>>(names: I) -> Self {
+        let mut all = Self::default();
+        names.into_iter().for_each(|name| all.add(name.into()));
+        all
+    }
 }
 
 /// Why a text is no name of a host; `None` if it is one.
@@ -18,25 +109,4 @@ pub(crate) fn name_fault(name: &str) -> Option<String> {
     let is_word =
         !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
     (!is_word).then(|| format!("`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address"))
-}
-
-/// Which of the hosts is called so.
-///
-/// # Panics
-///
-/// If there is none.
-#[expect(clippy::panic, reason = "a misuse, and the way out")]
-pub(crate) fn node(names: &[String], name: &str) -> NodeId {
-    let index = names.iter().position(|known| known == name);
-    NodeId::new(index.unwrap_or_else(|| panic!("there is no host `{name}`; the hosts are {}", names.join(", "))))
-}
-
-/// The path from one host to another.
-///
-/// # Panics
-///
-/// If there is no such host.
-pub(crate) fn path(names: &[String], from: &str, to: &str) -> Path {
-    let [from, to] = [from, to].map(|name| node(names, name));
-    Path { from, to }
 }

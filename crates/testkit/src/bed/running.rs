@@ -9,7 +9,7 @@ use std::sync::Arc;
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkStats, NodeId};
 
-use super::{node, path};
+use super::Names;
 use crate::address::AddressPlan;
 use crate::context;
 use crate::core::Shared;
@@ -36,14 +36,13 @@ impl Bed {
     /// If there is none of that name.
     #[must_use]
     pub fn host(&self, name: &str) -> Host {
-        Host::new(Arc::clone(&self.shared), node(&self.names(), name))
+        Host::new(Arc::clone(&self.shared), self.names().node(name))
     }
 
     /// All hosts, in the order in which they were named.
     #[must_use]
     pub fn hosts(&self) -> Vec<Host> {
-        let count = self.shared.lock().plan.names().len();
-        (0..count).map(|host| Host::new(Arc::clone(&self.shared), NodeId::new(host))).collect()
+        (0..self.names().len()).map(|host| Host::new(Arc::clone(&self.shared), NodeId::new(host))).collect()
     }
 
     /// Which host has which addresses now.
@@ -73,14 +72,16 @@ impl Bed {
     ///
     /// # Panics
     ///
-    /// Outside the run.
+    /// Outside the run, also within that of another test bed.
     #[track_caller]
     pub fn spawn<F>(&self, future: F) -> JoinHandle<F::Output>
     where
         F: Future + 'static,
         F::Output: 'static,
     {
-        context::expect_running("tasks can be spawned").tasks.spawn(None, Location::caller(), future)
+        let running = context::expect_running("tasks can be spawned");
+        assert!(Arc::ptr_eq(&running.shared, &self.shared), "the run of this `Bed` has ended: spawn the task by the `Bed` of the run that goes on");
+        running.tasks.spawn(None, Location::caller(), future)
     }
 
     /// Cuts the way from one host to another: packets that are sent or would arrive from now on are lost. The way back is as before.
@@ -124,7 +125,7 @@ impl Bed {
     ///
     /// If there is no such host, both are the same, or the words are none.
     pub fn set_link(&self, from: &str, to: &str, link: impl ToLink) {
-        let path = path(&self.names(), from, to);
+        let path = self.names().path(from, to);
         assert!(path.from != path.to, "host `{from}` has no link to itself");
         self.shared.lock().set_link(path, link.to_link());
     }
@@ -136,7 +137,7 @@ impl Bed {
     /// If there is no such link.
     #[must_use]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
-        let path = path(&self.names(), from, to);
+        let path = self.names().path(from, to);
         self.shared.lock().wire.link_stats(path).unwrap_or_else(|| unreachable_link(from))
     }
 
@@ -147,7 +148,7 @@ impl Bed {
     /// If there is no such host.
     #[must_use]
     pub fn hits(&self, from: &str, to: &str) -> u64 {
-        let path = path(&self.names(), from, to);
+        let path = self.names().path(from, to);
         self.shared.lock().wire.hits(path)
     }
 
@@ -179,13 +180,12 @@ impl Bed {
     }
 
     fn set_cut(&self, from: &str, to: &str, cut: bool) {
-        let path = path(&self.names(), from, to);
+        let path = self.names().path(from, to);
         self.shared.lock().wire.set_cut(path, cut);
     }
 
-    /// The names of the hosts: copied, so that the state is not held while a panic says them.
-    fn names(&self) -> Vec<String> {
-        self.shared.lock().plan.names().to_vec()
+    fn names(&self) -> &Names {
+        self.shared.names()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use cohaptic_wan::NodeId;
 
-use super::{Testbed, node};
+use super::Testbed;
 use crate::tcp::TcpConfig;
 
 impl Testbed {
@@ -24,7 +24,7 @@ impl Testbed {
     /// If they cannot be, or there is no such host.
     pub fn tcp_of(mut self, host: &str, config: TcpConfig) -> Self {
         check_tcp(&config);
-        self.tcp.insert(node(&self.names, host), config);
+        self.tcp.insert(self.names.node(host), config);
         self
     }
 }

@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 
+use crate::context;
+
 /// The time, and the calls since it last passed. The holder of the state writes the time; a call that is lost between two threads counts for nothing.
 #[derive(Debug)]
 pub(crate) struct Face {
@@ -63,7 +65,7 @@ impl Face {
     #[inline]
     pub(crate) fn note_call(&self) {
         if !self.count_call() {
-            self.lose_patience();
+            self.lose_patience(None);
         }
     }
 
@@ -75,13 +77,20 @@ impl Face {
         calls <= self.most_calls
     }
 
+    /// Fails the run, because time does not pass. `socket` is the one that was called last, in words.
     #[cold]
-    #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
-    fn lose_patience(&self) -> ! {
+    #[expect(clippy::panic, reason = "time cannot pass; says who keeps it, why, and the way out")]
+    pub(super) fn lose_patience(&self, socket: Option<&str>) -> ! {
         // A value that is dropped while it unwinds may ask again.
         self.calls.store(0, Ordering::Relaxed);
+        let who = match (context::task(), socket) {
+            (Some(task), Some(socket)) => format!(". It is {task}, which called {socket} last"),
+            (Some(task), None) => format!(". It is {task}"),
+            (None, Some(socket)) => format!(". It called {socket} last"),
+            (None, None) => String::new(),
+        };
         panic!(
-            "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass",
+            "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass{who}",
             Seconds(self.now())
         );
     }

@@ -1,5 +1,6 @@
 //! The hosts, their sockets and the network between them, as one state machine: it is told the time.
 
+mod elsewhere;
 mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
@@ -8,6 +9,7 @@ mod inlet;
 mod octets;
 mod passing;
 mod shared;
+mod socket_name;
 mod sockets;
 #[cfg(feature = "tcp")]
 mod tcp;
@@ -22,6 +24,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
 use crate::address::{self, AddressPlan};
+use crate::bed::Names;
 use crate::file::LinkChange;
 use crate::trace::Happening;
 use crate::wire::{self, Settings, Wire};
@@ -33,7 +36,8 @@ use waking::Woken;
 pub(crate) use inlet::Inlet;
 pub(crate) use octets::Octets;
 pub(crate) use passing::Outgoing;
-pub(crate) use shared::{Clock, Shared, asked_here};
+pub(crate) use shared::{Clock, Guard, Shared, asked_here};
+pub(crate) use socket_name::SocketName;
 pub(crate) use sockets::{Datagram, SocketId};
 #[cfg(feature = "tcp")]
 pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
@@ -66,14 +70,14 @@ pub(crate) type Parcel = wire::Parcel<Ends>;
 
 impl Core {
     pub(crate) fn new(
-        names: &[String],
+        names: &Arc<Names>,
         seed: u64,
         settings: Settings,
         changes: Vec<LinkChange>,
-        link: impl FnMut(NodeId, NodeId) -> LinkModel,
+        link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static,
     ) -> Self {
         Self {
-            plan: AddressPlan::new(names.to_vec()),
+            plan: AddressPlan::new(Arc::clone(names)),
             wire: Wire::new(names, seed, &settings, changes, link),
             face: Arc::new(Face::new(settings.patience)),
             settings,
@@ -136,10 +140,21 @@ impl Core {
         self.pass(now);
     }
 
-    /// See [`Face::note_call`].
+    /// A program calls a socket, which takes no time.
+    ///
+    /// # Panics
+    ///
+    /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass, with the host and the socket.
     #[inline]
-    pub(crate) fn note_call(&self) {
-        self.face.note_call();
+    pub(crate) fn note_call(&self, socket: impl FnOnce(&Self) -> SocketName) {
+        if !self.face.count_call() {
+            self.lose_patience(socket(self));
+        }
+    }
+
+    #[cold]
+    fn lose_patience(&self, socket: SocketName) -> ! {
+        self.face.lose_patience(Some(&socket.words(&self.plan)))
     }
 
     pub(crate) fn set_link(&mut self, path: Path, link: LinkModel) {
@@ -186,7 +201,7 @@ impl Core {
         (state.ports, state.plain) = (BTreeMap::new(), None);
         let now = self.now();
         for socket in self.sockets.all_of(host) {
-            socket.die(now, &mut self.woken);
+            socket.die(now, &mut self.wire.held, &mut self.woken);
         }
         #[cfg(feature = "tcp")]
         self.crash_tcp(host);
@@ -204,7 +219,7 @@ impl Core {
         (state.ports, state.plain) = (BTreeMap::new(), None);
         let now = self.now();
         for socket in self.sockets.all_of(host) {
-            socket.die(now, &mut self.woken);
+            socket.die(now, &mut self.wire.held, &mut self.woken);
         }
         #[cfg(feature = "tcp")]
         self.kill_tcp(host);

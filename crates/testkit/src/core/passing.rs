@@ -31,12 +31,19 @@ impl Core {
     /// Sends a datagram, now.
     #[inline]
     pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
-        self.note_call();
+        self.note_call(|core| core.sockets.get(id).name());
         let Outgoing { to, bytes, ecn_capable } = outgoing;
         // By its parts, so that nothing is written to memory for it.
-        let Some((path, addresses)) = self.plainly(id, to, bytes.len()) else { return self.send_any(id, to, bytes, ecn_capable) };
-        let parcel = self.spare.copied(addresses, bytes, ecn_capable);
-        self.offer(path, parcel);
+        if let Some((path, addresses)) = self.plainly(id, to, bytes.len()) {
+            let parcel = self.spare.copied(addresses, bytes, ecn_capable);
+            self.offer(path, parcel);
+        } else {
+            self.send_any(id, to, bytes, ecn_capable)?;
+        }
+        // What arrives at once and is read or lost counts no more.
+        if self.wire.held.is_too_much() {
+            self.fail_for(self.sockets.get(id).name());
+        }
         Ok(())
     }
 
@@ -101,8 +108,7 @@ impl Core {
         } else if let Some(receiver) = receiver {
             self.offer(Path { from: host, to: receiver }, parcel);
         } else if !self.plan.was_given(to.ip()) {
-            let text = format!("no host has the address {}; the hosts are\n{}", to.ip(), self.plan);
-            return refuse(io::ErrorKind::HostUnreachable, text);
+            return refuse(io::ErrorKind::HostUnreachable, self.plan.unknown(to.ip()));
         }
         Ok(())
     }
@@ -169,7 +175,7 @@ impl Core {
     #[inline(always)]
     fn take_plain(&mut self, other: &mut Option<(Path, cohaptic_units::Instant, Box<Parcel>)>) -> bool {
         let Self { wire, hosts, sockets, settings, woken, .. } = self;
-        let taken = wire.take_plain(|path, at, is_cut, parcel| {
+        let taken = wire.take_plain(|path, at, is_cut, parcel, held| {
             if is_cut {
                 return;
             }
@@ -178,7 +184,7 @@ impl Core {
                 return;
             };
             // Nobody is told that a buffer was full.
-            let _ = sockets.get_mut(id).keep(at, parcel, false, settings.receive_buffer, woken);
+            let _ = sockets.get_mut(id).keep(at, parcel, false, (settings.receive_buffer, held), woken);
         });
         taken.is_some()
     }
@@ -255,7 +261,7 @@ impl Core {
                     socket.wake_readers(&mut self.woken);
                 }
             }
-            Kind::Datagram => return socket.keep(at, parcel, marked, self.settings.receive_buffer, &mut self.woken),
+            Kind::Datagram => return socket.keep(at, parcel, marked, (self.settings.receive_buffer, &mut self.wire.held), &mut self.woken),
         }
         Ok(())
     }

@@ -1,14 +1,12 @@
 //! How tasks get at the state machine.
 //!
 //! The state lies with the thread that polls the tasks of a run: each call takes it from there and puts it back, which costs a few moves where a mutex costs two
-//! atomic operations. A datagram makes six or seven calls, and they were a quarter of its time. Another thread waits until the executor hands the state out between two
-//! polls. Where somebody else looks at the state while a task has the thread (the watchdog at the record of a run), it lies behind the mutex all the time.
+//! atomic operations. A datagram makes six or seven calls, and they were a quarter of its time. Other threads have no part in a run: see
+//! [`elsewhere`](super::elsewhere). Where the watchdog looks at the record of a run while a task has the thread, the state lies behind the mutex all the time.
 
 use std::cell::Cell;
 use std::mem::ManuallyDrop;
-#[cfg(feature = "tokio")]
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 use std::time::Duration;
@@ -16,7 +14,9 @@ use std::time::Duration;
 use cohaptic_units::Instant;
 
 use super::Core;
+use super::elsewhere::Elsewhere;
 use super::face::Face;
+use crate::bed::Names;
 use crate::wire::Recorded;
 
 thread_local! {
@@ -52,8 +52,11 @@ pub(crate) struct Shared {
     home: Mutex<Option<Box<Core>>>,
     /// Somebody has put the state into `home`.
     returned: Condvar,
-    /// How many threads wait for that.
-    asking: AtomicUsize,
+    /// What other threads have left for the thread of the run.
+    pub(super) elsewhere: Elsewhere,
+    /// The run is over: whoever has something of it may have the state, to let it go.
+    has_ended: AtomicBool,
+    names: Arc<Names>,
     /// Which run it is of.
     run: u64,
     /// Whether the state stays in `home`, where other threads see it.
@@ -83,13 +86,15 @@ impl Shared {
     pub(crate) fn new(core: Core, clock: Clock) -> Self {
         static RUNS: AtomicU64 = AtomicU64::new(1);
         let run = RUNS.fetch_add(1, Ordering::Relaxed);
-        let (face, stays) = (Arc::clone(&core.face), core.is_looked_at());
+        let (face, stays, names) = (Arc::clone(&core.face), core.is_looked_at(), Arc::clone(core.plan.shared_names()));
         let at_hand = if matches!(clock, Clock::Own) { run } else { 0 };
         let home = Mutex::new(Some(Box::new(Core { run, at_hand, ..core })));
         Self {
             home,
             returned: Condvar::new(),
-            asking: AtomicUsize::new(0),
+            elsewhere: Elsewhere::default(),
+            has_ended: AtomicBool::new(false),
+            names,
             run,
             stays,
             #[cfg(feature = "tokio")]
@@ -103,6 +108,20 @@ impl Shared {
     #[inline]
     pub(crate) fn is_at_hand(&self) -> bool {
         AT_HAND.get() == self.run
+    }
+
+    /// The names of the hosts.
+    pub(crate) const fn names(&self) -> &Arc<Names> {
+        &self.names
+    }
+
+    /// The run is over, and its tasks are gone.
+    pub(crate) fn end(&self) {
+        self.has_ended.store(true, Ordering::Release);
+    }
+
+    pub(super) fn has_ended(&self) -> bool {
+        self.has_ended.load(Ordering::Acquire)
     }
 
     #[inline]
@@ -178,9 +197,18 @@ impl Shared {
     }
 
     /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.
+    ///
+    /// # Panics
+    ///
+    /// On another thread while the run goes on.
     #[inline]
     pub(crate) fn lock(&self) -> Guard<'_> {
         Guard { core: Some(self.take()), shared: self }
+    }
+
+    /// As [`Shared::lock`]; `None` on another thread while the run goes on.
+    pub(crate) fn try_lock(&self) -> Option<Guard<'_>> {
+        (self.is_at_hand() || self.may_be_had()).then(|| self.lock())
     }
 
     #[inline(always)]
@@ -210,6 +238,7 @@ impl Shared {
 
     /// Takes the state from where others find it, unless it lay here, and lets time pass to that of the clock. The state of another run, which may lie here, stays here.
     #[inline(never)]
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
     fn fetch(&self, here: Option<Box<Core>>) -> Box<Core> {
         #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
         let mut core = match here {
@@ -218,6 +247,9 @@ impl Shared {
                 if let Some(other) = other {
                     put_here(other);
                 }
+                if !self.may_be_had() {
+                    panic!("{}", self.note_misuse("a test bed"));
+                }
                 let mut core = self.take_home();
                 core.is_from_home = true;
                 core
@@ -225,6 +257,8 @@ impl Shared {
         };
         #[cfg(feature = "tokio")]
         if !self.is_synced()
+            // Another test bed may have its clock here by then.
+            && !self.has_ended()
             && let Clock::Tokio { origin } = self.clock
         {
             follow(&mut core, origin);
@@ -239,9 +273,7 @@ impl Shared {
             if let Some(core) = home.take() {
                 return core;
             }
-            self.asking.fetch_add(1, Ordering::Relaxed);
             home = self.returned.wait(home).unwrap_or_else(PoisonError::into_inner);
-            self.asking.fetch_sub(1, Ordering::Relaxed);
         }
     }
 
@@ -255,25 +287,8 @@ impl Shared {
         Stay(self)
     }
 
-    /// Hands the state out to other threads that wait for it: between two polls.
-    #[inline]
-    pub(crate) fn hand_out(&self) {
-        if self.asking.load(Ordering::Relaxed) > 0 {
-            self.wait_for_others();
-        }
-    }
-
-    #[cold]
-    fn wait_for_others(&self) {
-        self.bring_home();
-        while self.asking.load(Ordering::Relaxed) > 0 {
-            std::thread::yield_now();
-        }
-        self.bring_here();
-    }
-
     /// The state lies with this thread, unless others look at it.
-    pub(crate) fn bring_here(&self) {
+    fn bring_here(&self) {
         if !self.stays {
             let core = self.take_home();
             AT_HAND.set(core.at_hand);
@@ -282,7 +297,7 @@ impl Shared {
     }
 
     /// Others may have the state.
-    pub(crate) fn bring_home(&self) {
+    fn bring_home(&self) {
         if let Some(core) = take_here() {
             AT_HAND.set(0);
             self.return_home(core);
@@ -339,7 +354,7 @@ pub(crate) struct Guard<'a> {
 #[cfg(feature = "tokio")]
 #[inline(never)]
 fn follow(core: &mut Core, origin: tokio::time::Instant) {
-    // Once the run is over, tokio's clock is that of the machine; and other threads have that one always.
+    // After `block_on` tokio's clock is that of the machine.
     if !core.is_from_home || tokio::runtime::Handle::try_current().is_ok() {
         let now = Instant::ZERO + origin.elapsed();
         if now > core.now() {

@@ -9,8 +9,9 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{NodeId, Ring};
 
 use super::waking::{Waiters, Woken};
-use super::{Core, Inlet, Parcel};
+use super::{Core, Inlet, Parcel, SocketName};
 use crate::trace::Lost;
+use crate::wire::{Held, Where};
 
 /// A socket, until it is closed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -85,16 +86,35 @@ pub(crate) struct SocketState {
 impl SocketState {
     /// Takes a datagram into the buffer, which holds this number of bytes.
     #[inline(always)]
-    pub(super) fn keep(&mut self, at: Instant, parcel: Box<Parcel>, marked: bool, room: usize, woken: &mut Woken) -> Result<(), Lost> {
+    pub(super) fn keep(
+        &mut self,
+        at: Instant,
+        parcel: Box<Parcel>,
+        marked: bool,
+        (room, all): (usize, &mut Held),
+        woken: &mut Woken,
+    ) -> Result<(), Lost> {
         let len = parcel.bytes.len();
         let held = self.held + len;
         if held > room {
             return Err(Lost::BufferFull);
         }
         self.held = held;
+        all.add(Where::Buffers, Held::cost(len));
         self.inbox.push(|| Datagram { parcel, at, len, marked });
         self.wake_readers(woken);
         Ok(())
+    }
+
+    /// Lets go of all datagrams in the buffer.
+    fn clear(&mut self, all: &mut Held) {
+        all.remove(Where::Buffers, self.held as u64 + self.inbox.len() as u64 * Held::cost(0));
+        self.inbox.clear();
+        self.held = 0;
+    }
+
+    pub(super) const fn name(&self) -> SocketName {
+        SocketName { kind: "UDP", host: self.host, local: self.local, peer: None }
     }
 
     /// Whether the next call gives an error.
@@ -124,10 +144,9 @@ impl SocketState {
         }
     }
 
-    pub(super) fn die(&mut self, at: Instant, woken: &mut Woken) {
+    pub(super) fn die(&mut self, at: Instant, all: &mut Held, woken: &mut Woken) {
         self.died = Some(at);
-        self.inbox.clear();
-        self.held = 0;
+        self.clear(all);
         self.wake_readers(woken);
     }
 }
@@ -223,7 +242,8 @@ impl Core {
 
     /// The socket is closed: its port is free.
     pub(crate) fn close(&mut self, id: SocketId) {
-        let Some(state) = self.sockets.places[id.0].take() else { return };
+        let Some(mut state) = self.sockets.places[id.0].take() else { return };
+        state.clear(&mut self.wire.held);
         self.sockets.free.push(id.0);
         self.hosts[state.host.index()].plain = None;
         let key = (state.local.is_ipv6(), state.local.port());
@@ -316,12 +336,22 @@ impl Core {
             return Poll::Pending;
         };
         socket.held -= datagram.len;
+        self.wire.held.remove(Where::Buffers, Held::cost(datagram.len));
         if socket.inbox.is_empty() && socket.readers.first().is_some() {
             socket.inlet.set_quiet();
         }
         let seen = look(&datagram);
         self.spare.put(datagram.parcel);
         Poll::Ready(Ok(seen))
+    }
+
+    /// As [`Core::receive`], for a program that does not wait.
+    pub(crate) fn try_receive<const PEEK: bool, T>(&mut self, id: SocketId, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
+        self.note_call(|core| core.sockets.get(id).name());
+        match self.receive::<PEEK, _>(id, None, look) {
+            Poll::Ready(seen) => seen,
+            Poll::Pending => Err(io::ErrorKind::WouldBlock.into()),
+        }
     }
 
     /// The error that a socket has, which is taken out.

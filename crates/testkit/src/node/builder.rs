@@ -8,19 +8,19 @@ use std::time::Duration;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
 use super::{Node, NodeRun};
-use crate::bed::{add_all, check_name, node, path};
+use crate::bed::{Names, add_all};
 use crate::file::{LinkChange, LinkFile};
 use crate::hit::Laws;
 use crate::link::ToLink;
 use crate::record::Record;
 use crate::seed::{Place, Seed};
 use crate::watch::LIMIT;
-use crate::wire::Settings;
+use crate::wire::{BYTE_LIMIT, Settings};
 
 /// State machines, and the links between them.
 #[must_use = "nodes do nothing until they are started"]
 pub struct Nodes {
-    pub(super) names: Vec<String>,
+    pub(super) names: Names,
     pub(super) nodes: Vec<Box<dyn Node>>,
     every: LinkModel,
     links: BTreeMap<Path, LinkModel>,
@@ -49,13 +49,21 @@ impl Nodes {
     /// No nodes yet, with ideal links between those that come.
     pub fn new() -> Self {
         Self {
-            names: Vec::new(),
+            names: Names::default(),
             nodes: Vec::new(),
             every: LinkModel::default(),
             links: BTreeMap::new(),
             changes: Vec::new(),
             seed: None,
-            settings: Settings { receive_buffer: 0, traces: false, keeps_packets: false, patience: PATIENCE, digests: true, laws: Laws::default() },
+            settings: Settings {
+                receive_buffer: 0,
+                traces: false,
+                keeps_packets: false,
+                patience: PATIENCE,
+                byte_limit: BYTE_LIMIT,
+                digests: true,
+                laws: Laws::default(),
+            },
             time_limit: TIME_LIMIT,
             artefacts: None,
             stall_limit: LIMIT,
@@ -68,8 +76,7 @@ impl Nodes {
     ///
     /// If the name is empty or there already, or has one of the characters that an address is written with (`:`, `[`, `]`, white space).
     pub fn add(mut self, name: &str, node: impl Node) -> Self {
-        check_name(&self.names, name);
-        self.names.push(name.to_owned());
+        self.names.add(name.to_owned());
         self.nodes.push(Box::new(node));
         self
     }
@@ -90,7 +97,7 @@ impl Nodes {
     ///
     /// If there is no such node, both are the same, or the words are none.
     pub fn link(mut self, from: &str, to: &str, link: impl ToLink) -> Self {
-        let path = path(&self.names, from, to);
+        let path = self.names.path(from, to);
         assert!(path.from != path.to, "node `{from}` has no link to itself");
         self.links.insert(path, link.to_link());
         self
@@ -119,7 +126,7 @@ impl Nodes {
             Err(error) => panic!("{error}"),
         };
         add_all(&mut self.settings.laws, &self.names, &hits);
-        let nodes: Vec<NodeId> = hosts.iter().map(|host| node(&self.names, host)).collect();
+        let nodes: Vec<NodeId> = hosts.iter().map(|host| self.names.node(host)).collect();
         let links = links.into_iter().map(|((from, to), link)| (Path { from: nodes[from], to: nodes[to] }, link)).collect();
         let changes =
             changes.into_iter().map(|change| LinkChange { from: nodes[change.from].index(), to: nodes[change.to].index(), ..change }).collect();
@@ -137,6 +144,13 @@ impl Nodes {
     /// not said.
     pub const fn patience(mut self, events: u64) -> Self {
         self.settings.patience = events;
+        self
+    }
+
+    /// How many bytes the run may hold that were sent and neither read nor lost; a gibibyte if it is not said. A run that comes to hold more fails, and names the
+    /// node that sent last: see [`Testbed::byte_limit`](crate::Testbed::byte_limit).
+    pub const fn byte_limit(mut self, bytes: u64) -> Self {
+        self.settings.byte_limit = bytes;
         self
     }
 
@@ -180,7 +194,7 @@ impl Nodes {
         assert!(!self.names.is_empty(), "a run without nodes; `add` one before `start`");
         let seed = Seed::choose(self.seed, place);
         let (every, links) = (self.every.clone(), self.links.clone());
-        NodeRun::new(self, seed, |from, to| links.get(&Path { from, to }).unwrap_or(&every).clone())
+        NodeRun::new(self, seed, move |from, to| links.get(&Path { from, to }).unwrap_or(&every).clone())
     }
 
     /// Runs nodes twice, and gives what came out first, if all that happened was the same to the nanosecond: every packet, with what it carried. `build` makes the

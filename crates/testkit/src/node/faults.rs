@@ -5,7 +5,6 @@ use std::fmt;
 
 use super::run::is_another;
 use super::{Node, NodeRun};
-use crate::bed::path;
 use crate::link::ToLink;
 use crate::trace::Happening;
 
@@ -52,7 +51,7 @@ impl NodeRun {
     ///
     /// If there is no such node, both are the same, or the words are none.
     pub fn set_link(&mut self, from: &str, to: &str, link: impl ToLink) {
-        let path = path(&self.names, from, to);
+        let path = self.names.path(from, to);
         assert!(path.from != path.to, "node `{from}` has no link to itself");
         self.ask_touched();
         self.wire.set_link(self.now(), path, link.to_link());
@@ -114,7 +113,7 @@ impl NodeRun {
     }
 
     fn set_cut(&mut self, from: &str, to: &str, cut: bool) {
-        let path = path(&self.names, from, to);
+        let path = self.names.path(from, to);
         self.ask_touched();
         self.wire.set_cut(path, cut);
     }

@@ -8,7 +8,7 @@ use super::address::{addresses, place_of};
 use super::run::Ports;
 use super::{NodeRun, Packet, Transmit};
 use crate::trace::{Happening, Lost};
-use crate::wire::{Arrival, Parcel};
+use crate::wire::{Arrival, Held, Parcel, Where};
 
 /// What a node does that keeps time from passing.
 #[derive(Clone, Copy, Debug)]
@@ -81,11 +81,15 @@ impl NodeRun {
         let path = Path { from, to };
         if to == from {
             // It does not leave the node, and so meets no link.
-            return self.arrive(path, parcel, false);
+            self.arrive(path, parcel, false);
+        } else {
+            match self.wire.offer(path, Box::new(parcel)) {
+                Ok(_) => self.take_arrivals(),
+                Err(_) => self.counts[from.index()].cut += 1,
+            }
         }
-        match self.wire.offer(path, Box::new(parcel)) {
-            Ok(_) => self.take_arrivals(),
-            Err(_) => self.counts[from.index()].cut += 1,
+        if self.wire.held.is_too_much() {
+            self.wire.held.fail(format_args!("node `{}`", self.names[from.index()]));
         }
     }
 
@@ -108,6 +112,7 @@ impl NodeRun {
 
     fn arrive(&mut self, Path { from, to }: Path, parcel: Parcel<Ports>, marked: bool) {
         let Parcel { addresses: ports, bytes, .. } = parcel;
+        self.wire.held.add(Where::Buffers, Held::cost(bytes.len()));
         let address = |node: NodeId, port: u16| {
             let addresses = addresses(node.index());
             let ip = if ports.is_six { addresses.v6.into() } else { addresses.v4.into() };
@@ -119,6 +124,7 @@ impl NodeRun {
     /// Hands over what has arrived, in its order, and what arrives at once because of it.
     pub(super) fn hand_over(&mut self) {
         while let Some((to, packet)) = self.arrived.pop_front() {
+            self.wire.held.remove(Where::Buffers, Held::cost(packet.bytes.len()));
             self.count(Does::Receives, to);
             self.counts[to.index()].arrived += 1;
             if let Some(node) = &mut self.nodes[to.index()] {

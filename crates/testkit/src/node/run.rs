@@ -14,7 +14,7 @@ use super::deadlines::Deadlines;
 use super::passing::Does;
 use super::{Node, Nodes, Packet};
 use crate::artefacts::Artefacts;
-use crate::bed::{node, path};
+use crate::bed::Names;
 use crate::record::Record;
 use crate::seed::Seed;
 use crate::watch::{Kind, Watched};
@@ -26,7 +26,7 @@ use crate::wire::Wire;
 /// [network](cohaptic_wan::Network); then the timers go off that are due, in the order of the nodes; then packets arrive that are sent at this instant over links without
 /// delay. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`] asked for is written.
 pub struct NodeRun {
-    pub(super) names: Vec<String>,
+    pub(super) names: Arc<Names>,
     /// `None`: crashed, or being asked.
     pub(super) nodes: Vec<Option<Box<dyn Node>>>,
     pub(super) up: Vec<bool>,
@@ -74,11 +74,12 @@ pub struct NodeCounts {
 }
 
 impl NodeRun {
-    pub(super) fn new(nodes: Nodes, seed: Seed, link: impl FnMut(NodeId, NodeId) -> LinkModel) -> Self {
+    pub(super) fn new(nodes: Nodes, seed: Seed, link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static) -> Self {
         let Nodes { names, nodes, changes, mut settings, time_limit, artefacts, stall_limit, .. } = nodes;
         let artefacts = Artefacts::new(artefacts, &seed);
         settings.traces |= artefacts.is_wanted();
         settings.keeps_packets |= artefacts.is_wanted();
+        let names = Arc::new(names);
         let count = names.len();
         let watched = Watched::begin(Kind::Nodes, &names, stall_limit, &seed, &artefacts);
         let mut run = Self {
@@ -156,7 +157,7 @@ impl NodeRun {
     #[must_use]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
-        self.wire.link_stats(path(&self.names, from, to)).unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
+        self.wire.link_stats(self.names.path(from, to)).unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
     }
 
     /// When something happens next; `None` if nothing will.
@@ -265,7 +266,7 @@ impl NodeRun {
     }
 
     pub(super) fn id(&self, name: &str) -> NodeId {
-        node(&self.names, name)
+        self.names.node(name)
     }
 
     fn next(&self) -> Option<Instant> {
@@ -286,7 +287,7 @@ pub(super) fn is_another<T>(name: &str) -> ! {
 impl Drop for NodeRun {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            self.artefacts.report(&self.seed, &self.wire.hit_counts(), || self.record());
+            self.artefacts.report(&self.seed, None, &self.wire.hit_counts(), || self.record());
         }
     }
 }

@@ -55,21 +55,13 @@ struct Idle {
     is_wanted: AtomicBool,
     /// Where the hook has left the clock \[ns\], if nothing runs between it and the executor that could move it; else [`NO_INSTANT`].
     moved: AtomicU64,
-    /// Other threads may have the state, because tokio parks its thread.
-    is_parked: AtomicBool,
     /// Wakes the pump, and the executor.
     main: Mutex<Option<Waker>>,
 }
 
 impl Default for Idle {
     fn default() -> Self {
-        Self {
-            armed: AtomicU64::new(NO_INSTANT - 1),
-            is_wanted: AtomicBool::new(true),
-            moved: AtomicU64::new(NO_INSTANT),
-            is_parked: AtomicBool::new(false),
-            main: Mutex::new(None),
-        }
+        Self { armed: AtomicU64::new(NO_INSTANT - 1), is_wanted: AtomicBool::new(true), moved: AtomicU64::new(NO_INSTANT), main: Mutex::new(None) }
     }
 }
 
@@ -116,17 +108,7 @@ impl Idle {
         drop(core);
         if self.armed.load(Ordering::Relaxed) != armed {
             self.is_wanted.store(true, Ordering::Relaxed);
-            return self.wake(now);
-        }
-        // What blocks elsewhere, such as a task of `spawn_blocking`, may want it.
-        self.is_parked.store(true, Ordering::Relaxed);
-        shared.bring_home();
-    }
-
-    /// Tokio has parked its thread, or has not because of something.
-    fn resume(&self, shared: &Shared) {
-        if self.is_parked.swap(false, Ordering::Relaxed) {
-            shared.bring_here();
+            self.wake(now);
         }
     }
 }
@@ -178,7 +160,6 @@ where
     let idle = Arc::new(Idle::default());
     let known: Arc<OnceLock<Arc<Shared>>> = Arc::default();
     let (hook_idle, hook_known, pulse) = (Arc::clone(&idle), Arc::clone(&known), Arc::clone(&watched.pulse));
-    let (back_idle, back_known) = (Arc::clone(&idle), Arc::clone(&known));
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_time()
         .start_paused(true)
@@ -186,11 +167,6 @@ where
             pulse.turns();
             if let Some(shared) = hook_known.get() {
                 hook_idle.notice(shared);
-            }
-        })
-        .on_thread_unpark(move || {
-            if let Some(shared) = back_known.get() {
-                back_idle.resume(shared);
             }
         })
         .build()
@@ -231,6 +207,7 @@ where
             let synced = shared.sync((moved != NO_INSTANT).then(|| Instant::from_nanos(moved)));
             let mut left = POLLS;
             let all_wait = executor.run_some(|| {
+                shared.attend();
                 if let Some(patience) = shared.count_poll() {
                     time_stands_still(&shared, patience, executor.last().as_deref());
                 }

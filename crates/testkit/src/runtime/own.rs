@@ -14,7 +14,7 @@ use std::task::{Context, Poll, Wake, Waker};
 use cohaptic_units::print::Seconds;
 
 use crate::core::Shared;
-use crate::task::{Named, Spawner, Task, Tasks};
+use crate::task::{Spawner, Task, Tasks};
 
 thread_local! {
     static HERE: Here = const { Here { executor: Cell::new(0), ready: RefCell::new(Vec::new()), main: RefCell::new(None), waits: Cell::new(false) } };
@@ -226,9 +226,9 @@ impl Executor {
         let (mut polls, mut batch) = (0, Batch::default());
         self.begin(None);
         loop {
-            shared.hand_out();
             // A task that is polled tells by itself that the executor does not stand.
             if let Some(polled) = self.poll_one(&mut batch) {
+                shared.attend();
                 polls += 1;
                 if polls > patience {
                     self.give_up(shared, polls);
@@ -341,11 +341,8 @@ impl Executor {
 /// Always.
 #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
 pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>) -> ! {
-    let (now, hosts) = {
-        let core = shared.lock();
-        (core.now(), core.plan.names().to_vec())
-    };
-    let who = last.map_or_else(|| "a task that is over now".to_owned(), |task| Named { task, hosts: &hosts }.to_string());
+    let now = shared.lock().now();
+    let who = last.map_or_else(|| "a task that is over now".to_owned(), |task| task.words(shared.names()));
     panic!(
         "time stands still at {} s: tasks were polled {polls} times without waiting for it to pass, {who} the last. It wakes itself, or others, again and again: let \
          it wait for a socket or a `sleep`",
@@ -361,14 +358,14 @@ pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>
 #[expect(clippy::panic, reason = "the program waits for ever; says who does, and the way out")]
 pub(crate) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
     const SHOWN: usize = 8;
-    let (now, hosts, sockets) = {
+    let (now, sockets) = {
         let core = shared.lock();
-        (core.now(), core.plan.names().to_vec(), core.waits())
+        (core.now(), core.waits())
     };
     let waiting = tasks.waiting();
     let mut text = String::new();
     for task in waiting.iter().take(SHOWN) {
-        let _ = write!(text, "\n  {}", Named { task, hosts: &hosts });
+        let _ = write!(text, "\n  {}", task.words(shared.names()));
     }
     if waiting.len() > SHOWN {
         let _ = write!(text, "\n  and {} more", waiting.len() - SHOWN);

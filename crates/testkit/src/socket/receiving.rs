@@ -8,7 +8,7 @@ use std::task::{Context, Poll};
 use bytes::BufMut;
 use cohaptic_units::Instant;
 
-use super::UdpSocket;
+use super::{KIND, UdpSocket};
 use crate::core::Datagram;
 
 impl UdpSocket {
@@ -190,7 +190,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// None: an error of the socket is given by the next call.
+    /// If the run has ended, or this is another thread. An error of the socket is given by the next call.
     pub async fn readable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_recv_ready(cx)).await
     }
@@ -201,7 +201,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::readable`].
     pub fn poll_recv_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let mut core = self.shared.lock();
+        let mut core = self.shared.open(self.host, KIND)?;
         if core.is_readable(self.id) {
             return Poll::Ready(Ok(()));
         }
@@ -211,12 +211,7 @@ impl UdpSocket {
 
     /// A view of a datagram, if there is one.
     pub(crate) fn try_look<const PEEK: bool, T>(&self, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
-        let mut core = self.shared.lock();
-        core.note_call();
-        match core.receive::<PEEK, _>(self.id, None, look) {
-            Poll::Ready(seen) => seen,
-            Poll::Pending => Err(io::ErrorKind::WouldBlock.into()),
-        }
+        self.shared.open(self.host, KIND)?.try_receive::<PEEK, _>(self.id, look)
     }
 
     /// A view of the next datagram. It gives the future that is polled, and no other around it: each that is there for a datagram takes 20 instructions.
@@ -230,6 +225,7 @@ impl UdpSocket {
         if !self.inlet.is_busy() && self.shared.is_at_hand() && self.inlet.waits_again(cx.waker()) {
             return Poll::Pending;
         }
+        self.shared.check_open(self.host, KIND)?;
         self.shared.with(|core| core.receive::<PEEK, _>(self.id, Some(cx.waker()), look))
     }
 }

@@ -5,7 +5,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
 
-use super::UdpSocket;
+use super::{KIND, UdpSocket};
 use crate::address::ToSocketAddrs;
 use crate::core::Outgoing;
 
@@ -36,7 +36,7 @@ impl UdpSocket {
     /// As [`UdpSocket::send`]; [`io::ErrorKind::HostUnreachable`] if no host ever had that address.
     #[inline]
     pub fn send_to<'a>(&'a self, bytes: &'a [u8], to: impl ToSocketAddrs + 'a) -> impl Future<Output = io::Result<usize>> + 'a {
-        poll_fn(move |_| Poll::Ready(self.send_now(Some(&to.to_socket_addr()?), bytes, false)))
+        poll_fn(move |_| Poll::Ready(self.send_to_now(&to, bytes)))
     }
 
     /// Sends to an address; gives the length.
@@ -67,7 +67,17 @@ impl UdpSocket {
     }
 
     #[inline]
+    fn send_to_now(&self, to: &impl ToSocketAddrs, bytes: &[u8]) -> io::Result<usize> {
+        match to.to_socket_addr() {
+            Ok(to) => self.send_now(Some(&to), bytes, false),
+            // A name means nothing where the socket may not be used, which is the better reason.
+            Err(error) => self.shared.check_open(self.host, KIND).and(Err(error)),
+        }
+    }
+
+    #[inline]
     pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
+        self.shared.check_open(self.host, KIND)?;
         let ecn_capable = ecn_capable || self.options.is_ecn_capable();
         let outgoing = Outgoing { to, bytes, ecn_capable };
         self.shared.with(|core| core.send(self.id, outgoing))?;
@@ -78,18 +88,18 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// None.
+    /// If the run has ended, or this is another thread.
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn writable(&self) -> io::Result<()> {
-        Ok(())
+        self.shared.check_open(self.host, KIND)
     }
 
     /// Always ready: sending never waits.
     ///
     /// # Errors
     ///
-    /// None.
+    /// As [`UdpSocket::writable`].
     pub fn poll_send_ready(&self, _cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Poll::Ready(Ok(()))
+        Poll::Ready(self.shared.check_open(self.host, KIND))
     }
 }

@@ -48,15 +48,10 @@ pub fn any_hits<N: Into<String>, A: AsRef<str>>(
     packets: u64,
     actions: impl IntoIterator<Item = A>,
 ) -> PacketSets {
-    let hosts: Vec<String> = hosts.into_iter().fold(Vec::new(), |mut hosts, host| {
-        let host = host.into();
-        crate::bed::check_name(&hosts, &host);
-        hosts.push(host);
-        hosts
-    });
+    let hosts: crate::bed::Names = hosts.into_iter().collect();
     let actions: Vec<Action> = actions.into_iter().map(|words| action(words.as_ref())).collect();
     assert!(!actions.is_empty(), "hits without actions: expected one at least, such as `drop`");
-    let space = SetSpace { hosts: hosts.into(), actions: actions.into() };
+    let space = SetSpace { hosts: hosts.to_vec().into(), actions: actions.into() };
     PacketSets(Sets { space, packets })
 }
 

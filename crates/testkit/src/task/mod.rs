@@ -3,7 +3,6 @@
 mod join;
 
 use std::cell::{Cell, RefCell};
-use std::fmt;
 use std::future::Future;
 use std::panic::Location;
 use std::pin::Pin;
@@ -24,8 +23,7 @@ pub(crate) type Program = Pin<Box<dyn Future<Output = ()>>>;
 
 /// A task.
 pub(crate) struct Task {
-    host: Option<NodeId>,
-    origin: &'static Location<'static>,
+    runner: Runner,
     pulse: Arc<Pulse>,
     /// What the pulse knows it by.
     number: usize,
@@ -37,11 +35,10 @@ pub(crate) struct Task {
 }
 
 impl Task {
-    fn new(host: Option<NodeId>, origin: &'static Location<'static>, program: Program, pulse: &Arc<Pulse>) -> Rc<Self> {
-        let number = pulse.number(Runner { host, origin });
+    fn new(runner: Runner, program: Program, pulse: &Arc<Pulse>) -> Rc<Self> {
+        let number = pulse.number(runner);
         Rc::new(Self {
-            host,
-            origin,
+            runner,
             pulse: Arc::clone(pulse),
             number,
             program: RefCell::new(Some(program)),
@@ -61,7 +58,7 @@ impl Task {
         let mut program = self.program.borrow_mut();
         let Some(future) = program.as_mut() else { return Poll::Ready(()) };
         self.pulse.begins(self.number);
-        let polled = context::on_host(self.host, || future.as_mut().poll(cx));
+        let polled = context::on_host(self.runner.host, || future.as_mut().poll(cx));
         self.pulse.returns();
         if polled.is_pending() && !self.is_doomed.get() {
             return Poll::Pending;
@@ -75,7 +72,7 @@ impl Task {
     /// Drops the program as one of its host.
     #[inline(never)]
     fn drop_there(&self, program: Option<Program>) {
-        context::on_host(self.host, || drop(program));
+        context::on_host(self.runner.host, || drop(program));
     }
 
     /// Drops the program; a task that stops itself is dropped when it next waits.
@@ -95,20 +92,10 @@ impl Task {
     fn is_over(&self) -> bool {
         self.program.try_borrow().is_ok_and(|program| program.is_none())
     }
-}
 
-/// A task in words: where it was spawned, and on which host it lives.
-pub(crate) struct Named<'a> {
-    pub(crate) task: &'a Task,
-    pub(crate) hosts: &'a [String],
-}
-
-impl fmt::Display for Named<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.task.host.and_then(|host| self.hosts.get(host.index())) {
-            Some(host) => write!(f, "the task of host `{host}` that was spawned at {}", self.task.origin),
-            None => write!(f, "the task that was spawned at {}", self.task.origin),
-        }
+    /// The task in words: see [`Runner::words`].
+    pub(crate) fn words(&self, hosts: &[String]) -> String {
+        self.runner.words(hosts)
     }
 }
 
@@ -148,7 +135,7 @@ impl Tasks {
     }
 
     fn start(&self, host: Option<NodeId>, origin: &'static Location<'static>, program: Program) -> Rc<Task> {
-        let task = Task::new(host, origin, program, &self.pulse);
+        let task = Task::new(Runner { host, origin }, program, &self.pulse);
         let mut known = self.known.borrow_mut();
         // Now and then those that are over are forgotten: so that they are never more than twice those that run.
         if known.len() == known.capacity() {
@@ -178,7 +165,7 @@ impl Tasks {
     /// Stops all tasks of a host.
     pub(crate) fn stop_all_of(&self, host: NodeId) {
         // Dropping a program may spawn and stop others.
-        let of_host: Vec<Rc<Task>> = self.known.borrow().iter().filter_map(Weak::upgrade).filter(|task| task.host == Some(host)).collect();
+        let of_host: Vec<Rc<Task>> = self.known.borrow().iter().filter_map(Weak::upgrade).filter(|task| task.runner.host == Some(host)).collect();
         of_host.iter().for_each(|task| task.stop());
     }
 
@@ -197,6 +184,17 @@ impl Tasks {
     #[inline]
     pub(crate) fn turns(&self) {
         self.pulse.turns();
+    }
+
+    /// The task that is being polled, in words.
+    pub(crate) fn current(&self, hosts: &[String]) -> String {
+        let host = context::host();
+        match (self.pulse.running(), host.and_then(|host| hosts.get(host.index()))) {
+            // A task that lives on no host may do this as one of a host: see `Host::scope`.
+            (Some(runner), _) => Runner { host: runner.host.or(host), ..runner }.words(hosts),
+            (None, Some(host)) => format!("a task on host `{host}` that the test bed has not spawned"),
+            (None, None) => "a task that the test bed has not spawned, or the function that makes the program".to_owned(),
+        }
     }
 
     /// The tasks that are not over.

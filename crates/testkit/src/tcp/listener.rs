@@ -9,10 +9,10 @@ use std::task::{Context, Poll};
 
 use cohaptic_wan::NodeId;
 
-use super::TcpStream;
+use super::{KIND, TcpStream};
 use crate::address::ToSocketAddrs;
 use crate::context;
-use crate::core::{HoldId, Inherited, ListenId, Shared};
+use crate::core::{Guard, HoldId, Inherited, ListenId, Shared};
 
 /// How many connections may wait at a listener that does not say it; Linux lets one more wait.
 const BACKLOG: usize = 128;
@@ -26,9 +26,12 @@ const BACKLOG: usize = 128;
 ///   Linux does it, so that its sender tries again after 1, 3, 7 … s.
 /// - A connection that is reset while it waits is accepted all the same, and reading from it fails.
 /// - A listener at `[::]` hears IPv6 only.
-/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
+/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out. So does every method once the run of its test bed has
+///   ended, also within the run of another test bed.
+/// - It belongs to the thread that runs the test bed. On another thread every method gives [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct TcpListener {
     shared: Arc<Shared>,
+    host: NodeId,
     id: ListenId,
 }
 
@@ -45,6 +48,7 @@ impl TcpListener {
     }
 
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
+        shared.check_open(host, KIND)?;
         let address = address.to_socket_addr()?;
         let mut core = shared.lock();
         core.check_up(host)?;
@@ -56,13 +60,24 @@ impl TcpListener {
 
     /// Listens at a port that is held, and releases it if that fails.
     pub(super) fn listen(shared: Arc<Shared>, host: NodeId, held: (HoldId, SocketAddr), backlog: usize, inherited: Inherited) -> io::Result<Self> {
-        let mut core = shared.lock();
+        let mut core = shared.open(host, KIND)?;
         let listening = core.listen(host, held, backlog, inherited);
         if listening.is_err() {
             core.release_port(held.0);
         }
         drop(core);
-        Ok(Self { id: listening?, shared })
+        Ok(Self { id: listening?, host, shared })
+    }
+
+    /// The state, for a call.
+    ///
+    /// # Errors
+    ///
+    /// If the run has ended, this is another thread, or the host of the listener has crashed.
+    fn open(&self) -> io::Result<Guard<'_>> {
+        let core = self.shared.open(self.host, KIND)?;
+        core.check_listener(self.id)?;
+        Ok(core)
     }
 
     /// Waits for a connection; gives it and the address of its other end.
@@ -80,11 +95,11 @@ impl TcpListener {
     ///
     /// As [`TcpListener::accept`].
     pub fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(TcpStream, SocketAddr)>> {
-        let mut core = self.shared.lock();
+        let mut core = self.shared.open(self.host, KIND)?;
         match core.accept(self.id) {
             Ok(Some((id, peer))) => {
                 drop(core);
-                Poll::Ready(Ok((TcpStream::new(Arc::clone(&self.shared), id), peer)))
+                Poll::Ready(Ok((TcpStream::new(Arc::clone(&self.shared), self.host, id), peer)))
             }
             Ok(None) => {
                 core.wait_to_accept(self.id, cx.waker());
@@ -100,9 +115,7 @@ impl TcpListener {
     ///
     /// If its host has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        let core = self.shared.lock();
-        core.check_listener(self.id)?;
-        Ok(core.listener_address(self.id))
+        Ok(self.open()?.listener_address(self.id))
     }
 
     /// The time to live of packets of the connections that it takes, which nothing counts down here: there are no routers.
@@ -111,9 +124,7 @@ impl TcpListener {
     ///
     /// If its host has crashed.
     pub fn ttl(&self) -> io::Result<u32> {
-        let mut core = self.shared.lock();
-        core.check_listener(self.id)?;
-        Ok(core.listener_config(self.id).ttl.into())
+        Ok(self.open()?.listener_config(self.id).ttl.into())
     }
 
     /// Sets that time to live, from 1 to 255.
@@ -122,8 +133,7 @@ impl TcpListener {
     ///
     /// If it is none, or its host has crashed.
     pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
-        let mut core = self.shared.lock();
-        core.check_listener(self.id)?;
+        let mut core = self.open()?;
         core.listener_config(self.id).ttl = super::options::ttl(ttl)?;
         Ok(())
     }
@@ -131,12 +141,14 @@ impl TcpListener {
 
 impl Drop for TcpListener {
     fn drop(&mut self) {
-        self.shared.lock().close_listener(self.id);
+        let id = self.id;
+        self.shared.release(move |core| core.close_listener(id));
     }
 }
 
 impl fmt::Debug for TcpListener {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("TcpListener").field("local", &self.shared.lock().listener_address(self.id)).finish_non_exhaustive()
+        let local = self.shared.try_lock().map(|core| core.listener_address(self.id));
+        f.debug_struct("TcpListener").field("local", &local).finish_non_exhaustive()
     }
 }

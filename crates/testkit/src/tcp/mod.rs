@@ -18,6 +18,9 @@ mod traits;
 
 use std::net::SocketAddr;
 
+/// What messages call the sockets of this module.
+const KIND: &str = "a TCP socket";
+
 pub use cohaptic_tcp::{ConfigError, CongestionControl, EcnFallback, Flags, Info, Keepalive, State, TcpConfig};
 #[cfg(feature = "tokio")]
 pub use owned::{OwnedReadHalf, OwnedWriteHalf, ReuniteError};

@@ -20,8 +20,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn nodelay(&self) -> io::Result<bool> {
-        let core = self.shared.lock();
-        core.check_connection(self.id)?;
+        let core = self.open_alive()?;
         Ok(core.connection(self.id).nodelay())
     }
 
@@ -31,7 +30,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn set_nodelay(&self, nodelay: bool) -> io::Result<()> {
-        self.shared.lock().change_connection(self.id, |_, connection| connection.set_nodelay(nodelay))
+        self.open()?.change_connection(self.id, |_, connection| connection.set_nodelay(nodelay))
     }
 
     /// Whether acknowledgements leave at once now (`TCP_QUICKACK`).
@@ -40,8 +39,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn quickack(&self) -> io::Result<bool> {
-        let core = self.shared.lock();
-        core.check_connection(self.id)?;
+        let core = self.open_alive()?;
         Ok(core.connection(self.id).quickack())
     }
 
@@ -51,7 +49,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn set_quickack(&self, quickack: bool) -> io::Result<()> {
-        self.shared.lock().change_connection(self.id, |_, connection| connection.set_quickack(quickack))
+        self.open()?.change_connection(self.id, |_, connection| connection.set_quickack(quickack))
     }
 
     /// What [`TcpStream::set_linger`] has set.
@@ -60,8 +58,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn linger(&self) -> io::Result<Option<Duration>> {
-        let mut core = self.shared.lock();
-        core.check_connection(self.id)?;
+        let mut core = self.open_alive()?;
         Ok(*core.linger(self.id))
     }
 
@@ -72,8 +69,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn set_linger(&self, linger: Option<Duration>) -> io::Result<()> {
-        let mut core = self.shared.lock();
-        core.check_connection(self.id)?;
+        let mut core = self.open_alive()?;
         *core.linger(self.id) = linger.map(|linger| Duration::from_secs(linger.as_secs()));
         Ok(())
     }
@@ -93,8 +89,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn ttl(&self) -> io::Result<u32> {
-        let core = self.shared.lock();
-        core.check_connection(self.id)?;
+        let core = self.open_alive()?;
         Ok(core.connection(self.id).config().ttl.into())
     }
 
@@ -105,7 +100,7 @@ impl TcpStream {
     /// If it is none, or its host has crashed.
     pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
         let ttl = self::ttl(ttl)?;
-        self.shared.lock().change_connection(self.id, |_, connection| connection.set_ttl(ttl))
+        self.open()?.change_connection(self.id, |_, connection| connection.set_ttl(ttl))
     }
 
     /// Probes the peer while nothing is sent, at these times, or does not (`SO_KEEPALIVE`, `TCP_KEEPIDLE`, `TCP_KEEPINTVL`, `TCP_KEEPCNT`): with tokio this takes
@@ -118,7 +113,7 @@ impl TcpStream {
         if keepalive.is_some_and(|keepalive| keepalive.idle.is_zero() || keepalive.interval.is_zero()) {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "a time of keep-alive probes is zero; expected one above zero"));
         }
-        self.shared.lock().change_connection(self.id, |now, connection| connection.set_keepalive(now, keepalive))
+        self.open()?.change_connection(self.id, |now, connection| connection.set_keepalive(now, keepalive))
     }
 
     /// How long written data may stay unanswered before the connection is given up (`TCP_USER_TIMEOUT`, RFC 5482); `None`: as
@@ -128,6 +123,6 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn set_user_timeout(&self, timeout: Option<Duration>) -> io::Result<()> {
-        self.shared.lock().change_connection(self.id, |_, connection| connection.set_user_timeout(timeout))
+        self.open()?.change_connection(self.id, |_, connection| connection.set_user_timeout(timeout))
     }
 }

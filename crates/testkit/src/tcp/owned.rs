@@ -95,8 +95,7 @@ impl OwnedWriteHalf {
 impl Drop for OwnedWriteHalf {
     fn drop(&mut self) {
         if self.shuts_when_dropped {
-            // A connection that went with its host has nothing to shut.
-            let _ = self.stream.shut_write_half();
+            self.stream.let_write_half_go();
         }
     }
 }

@@ -13,7 +13,7 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// None: an error of the connection is given by the next call.
+    /// If the run has ended, or this is another thread. An error of the connection is given by the next call.
     pub async fn readable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_read_ready(cx)).await
     }
@@ -24,7 +24,7 @@ impl TcpStream {
     ///
     /// As [`TcpStream::readable`].
     pub fn poll_read_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let mut core = self.shared.lock();
+        let mut core = self.open()?;
         if core.is_ready(self.id)[0] {
             return Poll::Ready(Ok(()));
         }
@@ -36,7 +36,7 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// None: an error of the connection is given by the next call.
+    /// If the run has ended, or this is another thread. An error of the connection is given by the next call.
     pub async fn writable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_write_ready(cx)).await
     }
@@ -47,7 +47,7 @@ impl TcpStream {
     ///
     /// As [`TcpStream::writable`].
     pub fn poll_write_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let mut core = self.shared.lock();
+        let mut core = self.open()?;
         if core.is_ready(self.id)[1] {
             return Poll::Ready(Ok(()));
         }
@@ -70,7 +70,7 @@ impl TcpStream {
     ///
     /// As [`TcpStream::try_read`].
     pub fn try_read_vectored(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
-        self.shared.lock().read(self.id, buffers)
+        self.open()?.read(self.id, buffers)
     }
 
     /// Reads what has arrived into the free room of a buffer.
@@ -81,7 +81,8 @@ impl TcpStream {
     pub fn try_read_buf<B: BufMut>(&self, buffer: &mut B) -> io::Result<usize> {
         // As much as a buffer that grows would be given by tokio.
         let room = buffer.chunk_mut().len().min(buffer.remaining_mut());
-        let mut read = vec![0; room.min(self.info().unread.max(1))];
+        let unread = self.open()?.connection(self.id).info().unread;
+        let mut read = vec![0; room.min(unread.max(1))];
         let count = self.try_read(&mut read)?;
         buffer.put_slice(&read[..count]);
         Ok(count)
@@ -102,22 +103,22 @@ impl TcpStream {
     ///
     /// As [`TcpStream::try_write`].
     pub fn try_write_vectored(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize> {
-        self.shared.lock().write(self.id, buffers)
+        self.open()?.write(self.id, buffers)
     }
 
     /// Waits until it can do one of these.
     ///
     /// # Errors
     ///
-    /// None: an error of the connection is given by the next call.
+    /// If the run has ended, or this is another thread. An error of the connection is given by the next call.
     #[cfg(feature = "tokio-net")]
     pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         poll_fn(|cx| {
-            let ready = self.readiness(interest);
+            let ready = self.readiness(interest)?;
             if !ready.is_empty() {
                 return Poll::Ready(Ok(ready));
             }
-            let mut core = self.shared.lock();
+            let mut core = self.open()?;
             if interest.is_readable() {
                 core.wait_to_read_from(self.id, cx.waker());
             }
@@ -131,15 +132,15 @@ impl TcpStream {
 
     /// What of these it can do now.
     #[cfg(feature = "tokio-net")]
-    fn readiness(&self, interest: tokio::io::Interest) -> tokio::io::Ready {
+    fn readiness(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         use tokio::io::Ready;
-        let core = self.shared.lock();
+        let core = self.open()?;
         let [can_read, can_write] = core.is_ready(self.id);
         let connection = core.connection(self.id);
         let flag = |is_set: bool, flag| if is_set { flag } else { Ready::EMPTY };
         let readable = flag(can_read, Ready::READABLE) | flag(connection.is_read_closed(), Ready::READ_CLOSED);
         let writable = flag(can_write, Ready::WRITABLE) | flag(connection.is_write_closed() && can_write, Ready::WRITE_CLOSED);
-        flag(interest.is_readable(), readable) | flag(interest.is_writable(), writable)
+        Ok(flag(interest.is_readable(), readable) | flag(interest.is_writable(), writable))
     }
 
     /// Tries an operation of one's own, such as [`TcpStream::try_read`].
@@ -149,7 +150,7 @@ impl TcpStream {
     /// Those of the operation; [`io::ErrorKind::WouldBlock`] if it can do none of these now.
     #[cfg(feature = "tokio-net")]
     pub fn try_io<R>(&self, interest: tokio::io::Interest, operation: impl FnOnce() -> io::Result<R>) -> io::Result<R> {
-        if self.readiness(interest).is_empty() {
+        if self.readiness(interest)?.is_empty() {
             return Err(io::ErrorKind::WouldBlock.into());
         }
         operation()

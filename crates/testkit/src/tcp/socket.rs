@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use cohaptic_wan::NodeId;
 
-use super::{TcpConfig, TcpListener, TcpStream};
+use super::{KIND, TcpConfig, TcpListener, TcpStream};
 use crate::context;
 use crate::core::{HoldId, Shared};
 
@@ -94,7 +94,7 @@ impl TcpSocket {
                 if settings.bound.is_some() { "the socket is bound already".to_owned() } else { format!("{address} is of the other version of IP") };
             return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
         }
-        let mut core = self.shared.lock();
+        let mut core = self.shared.open(self.host, KIND)?;
         core.check_up(self.host)?;
         settings.bound = Some(core.hold_port(self.host, address, settings.is_shared)?);
         Ok(())
@@ -130,7 +130,7 @@ impl TcpSocket {
         let held = match settings.bound.take() {
             Some(held) => held,
             None => {
-                let mut core = self.shared.lock();
+                let mut core = self.shared.open(self.host, KIND)?;
                 core.check_up(self.host)?;
                 core.hold_port(self.host, self.any(), settings.is_shared)?
             }
@@ -143,8 +143,9 @@ impl TcpSocket {
     ///
     /// # Errors
     ///
-    /// None.
+    /// If the run has ended, or this is another thread.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
+        self.shared.check_open(self.host, KIND)?;
         Ok(self.settings().bound.map_or_else(|| self.any(), |(_, address)| address))
     }
 
@@ -157,8 +158,9 @@ impl TcpSocket {
     ///
     /// # Errors
     ///
-    /// None.
-    pub const fn take_error(&self) -> io::Result<Option<io::Error>> {
+    /// If the run has ended, or this is another thread.
+    pub fn take_error(&self) -> io::Result<Option<io::Error>> {
+        self.shared.check_open(self.host, KIND)?;
         Ok(None)
     }
 }
@@ -170,8 +172,9 @@ macro_rules! option {
         ///
         /// # Errors
         ///
-        /// None.
+        /// If the run has ended, or this is another thread.
         pub fn $get(&self) -> io::Result<$kind> {
+            self.shared.check_open(self.host, KIND)?;
             let $settings = self.settings();
             Ok($read)
         }
@@ -180,8 +183,9 @@ macro_rules! option {
         ///
         /// # Errors
         ///
-        /// None.
+        /// If the run has ended, or this is another thread.
         pub fn $set(&self, $value: $kind) -> io::Result<()> {
+            self.shared.check_open(self.host, KIND)?;
             let $to = &mut *self.settings();
             $write;
             Ok(())
@@ -255,7 +259,7 @@ impl TcpSocket {
     ///
     /// # Errors
     ///
-    /// None.
+    /// As [`TcpSocket::set_linger`].
     pub fn set_zero_linger(&self) -> io::Result<()> {
         self.set_linger(Some(Duration::ZERO))
     }
@@ -265,7 +269,7 @@ impl Drop for TcpSocket {
     fn drop(&mut self) {
         let bound = self.settings().bound.take();
         if let Some((hold, _)) = bound {
-            self.shared.lock().release_port(hold);
+            self.shared.release(move |core| core.release_port(hold));
         }
     }
 }

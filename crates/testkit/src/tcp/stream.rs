@@ -10,10 +10,10 @@ use std::task::{Context, Poll};
 use cohaptic_tcp::State;
 use cohaptic_wan::NodeId;
 
-use super::{Info, TcpConfig};
+use super::{Info, KIND, TcpConfig};
 use crate::address::ToSocketAddrs;
 use crate::context;
-use crate::core::{ConnId, HoldId, Shared};
+use crate::core::{ConnId, Guard, HoldId, Shared};
 
 /// A TCP connection of a host of the running test bed: the methods of tokio's, with the same meaning.
 ///
@@ -27,15 +27,38 @@ use crate::core::{ConnId, HoldId, Shared};
 /// - A host with new addresses loses its connections: both ends are silent, and time out when they write.
 /// - [`TcpStream::set_linger`] acts with zero only: to drop a stream takes no time.
 /// - `from_std`, `into_std` and `AsFd` are missing: there is no socket of the system.
-/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
+/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out. So does every method once the run of its test bed has
+///   ended, also within the run of another test bed.
+/// - It belongs to the thread that runs the test bed. On another thread every method gives [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct TcpStream {
     pub(super) shared: Arc<Shared>,
+    host: NodeId,
     pub(super) id: ConnId,
 }
 
 impl TcpStream {
-    pub(super) const fn new(shared: Arc<Shared>, id: ConnId) -> Self {
-        Self { shared, id }
+    pub(super) const fn new(shared: Arc<Shared>, host: NodeId, id: ConnId) -> Self {
+        Self { shared, host, id }
+    }
+
+    /// The state, for a call.
+    ///
+    /// # Errors
+    ///
+    /// If the run has ended, or this is another thread.
+    pub(super) fn open(&self) -> io::Result<Guard<'_>> {
+        self.shared.open(self.host, KIND)
+    }
+
+    /// The state, for a call that a connection without a host cannot answer.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::open`]; if the host has crashed.
+    pub(super) fn open_alive(&self) -> io::Result<Guard<'_>> {
+        let core = self.open()?;
+        core.check_connection(self.id)?;
+        Ok(core)
     }
 
     /// Opens a connection from the host of the task that is running, and waits until it is there.
@@ -60,17 +83,17 @@ impl TcpStream {
         to: SocketAddr,
         config: TcpConfig,
     ) -> io::Result<Self> {
-        let mut core = shared.lock();
+        let mut core = shared.open(host, KIND)?;
         core.check_up(host)?;
         let id = core.connect_tcp(host, bound, to, config)?;
         drop(core);
-        Ok(Self { shared, id })
+        Ok(Self { shared, host, id })
     }
 
     /// Waits until the handshake is over.
     pub(crate) async fn established(self) -> io::Result<Self> {
         poll_fn(|cx| {
-            let mut core = self.shared.lock();
+            let mut core = self.open()?;
             core.is_settled(self.id).map_or_else(
                 || {
                     core.wait_to_write_to(self.id, cx.waker());
@@ -89,8 +112,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        let core = self.shared.lock();
-        core.check_connection(self.id)?;
+        let core = self.open_alive()?;
         Ok(core.connection(self.id).local_addr())
     }
 
@@ -100,8 +122,7 @@ impl TcpStream {
     ///
     /// [`io::ErrorKind::NotConnected`] once the connection is gone.
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
-        let core = self.shared.lock();
-        core.check_connection(self.id)?;
+        let core = self.open_alive()?;
         let connection = core.connection(self.id);
         match connection.state() {
             State::SynSent | State::Closed | State::TimeWait => Err(io::ErrorKind::NotConnected.into()),
@@ -111,7 +132,11 @@ impl TcpStream {
         }
     }
 
-    /// Figures of the connection: its state, round trips, timeout, congestion window and retransmissions.
+    /// Figures of the connection: its state, round trips, timeout, congestion window and retransmissions; once the run has ended, those of its end.
+    ///
+    /// # Panics
+    ///
+    /// On another thread than that of the run.
     #[must_use]
     pub fn info(&self) -> Info {
         self.shared.lock().connection(self.id).info()
@@ -123,7 +148,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
-        self.shared.lock().take_error_of(self.id)
+        self.open()?.take_error_of(self.id)
     }
 
     /// Reads what has arrived and leaves it; waits until something has.
@@ -136,7 +161,7 @@ impl TcpStream {
     }
 
     pub(super) fn poll_peek_into(&self, cx: &Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
-        let mut core = self.shared.lock();
+        let mut core = self.open()?;
         match core.peek_connection(self.id, buffer) {
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
                 core.wait_to_read_from(self.id, cx.waker());
@@ -148,7 +173,7 @@ impl TcpStream {
 
     #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
     pub(super) fn poll_read_into(&self, cx: &Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
-        let mut core = self.shared.lock();
+        let mut core = self.open()?;
         match core.read(self.id, &mut [IoSliceMut::new(buffer)]) {
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
                 core.wait_to_read_from(self.id, cx.waker());
@@ -160,7 +185,7 @@ impl TcpStream {
 
     #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
     pub(super) fn poll_write_from(&self, cx: &Context<'_>, buffers: &[IoSlice<'_>]) -> Poll<io::Result<usize>> {
-        let mut core = self.shared.lock();
+        let mut core = self.open()?;
         match core.write(self.id, buffers) {
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
                 core.wait_to_write_to(self.id, cx.waker());
@@ -173,19 +198,30 @@ impl TcpStream {
     /// A FIN follows what was written. On a connection that is gone it does nothing, as tokio's.
     #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
     pub(super) fn shut_write_half(&self) -> io::Result<()> {
-        self.shared.lock().change_connection(self.id, |_, connection| connection.shutdown())
+        self.open()?.change_connection(self.id, |_, connection| connection.shutdown())
+    }
+}
+
+impl TcpStream {
+    /// A FIN follows what was written, once the thread of the run has time: for a half that is dropped.
+    #[cfg(feature = "tokio")]
+    pub(super) fn let_write_half_go(&self) {
+        let id = self.id;
+        // A connection that went with its host has nothing to shut.
+        self.shared.release(move |core| drop(core.change_connection(id, |_, connection| connection.shutdown())));
     }
 }
 
 impl Drop for TcpStream {
     fn drop(&mut self) {
-        self.shared.lock().drop_connection(self.id);
+        let id = self.id;
+        self.shared.release(move |core| core.drop_connection(id));
     }
 }
 
 impl fmt::Debug for TcpStream {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let core = self.shared.lock();
+        let Some(core) = self.shared.try_lock() else { return f.debug_struct("TcpStream").finish_non_exhaustive() };
         let connection = core.connection(self.id);
         let (local, peer, state) = (connection.local_addr(), connection.peer_addr(), connection.state());
         drop(core);

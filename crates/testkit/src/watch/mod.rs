@@ -15,6 +15,7 @@ use std::time::Duration;
 use cohaptic_wan::NodeId;
 
 use crate::artefacts::Artefacts;
+use crate::bed::Names;
 use crate::core::Shared;
 use crate::seed::Seed;
 
@@ -46,6 +47,16 @@ struct Runners {
 pub(crate) struct Runner {
     pub(crate) host: Option<NodeId>,
     pub(crate) origin: &'static Location<'static>,
+}
+
+impl Runner {
+    /// One of the tasks in words: where it was spawned, and on which host it lives.
+    pub(crate) fn words(self, hosts: &[String]) -> String {
+        match self.host.and_then(|host| hosts.get(host.index())) {
+            Some(host) => format!("the task of host `{host}` that was spawned at {}", self.origin),
+            None => format!("the task that was spawned at {}", self.origin),
+        }
+    }
 }
 
 impl Pulse {
@@ -83,6 +94,11 @@ impl Pulse {
         (self.turns.load(Ordering::Relaxed), self.running.load(Ordering::Relaxed))
     }
 
+    /// What runs now. While a panic unwinds, the task that panicked is the one.
+    pub(crate) fn running(&self) -> Option<Runner> {
+        self.runner(self.now().1)
+    }
+
     fn runner(&self, number: usize) -> Option<Runner> {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.all.get(number.checked_sub(1)?).copied()
@@ -93,7 +109,7 @@ impl Pulse {
 #[derive(Debug)]
 pub(crate) struct Watched {
     pub(crate) pulse: Arc<Pulse>,
-    hosts: Vec<String>,
+    hosts: Arc<Names>,
     limit: Duration,
     seed: Seed,
     artefacts: Artefacts,
@@ -115,10 +131,10 @@ pub(crate) enum Kind {
 
 impl Watched {
     /// Begins to watch. The limit is what the test says, unless the environment says another one.
-    pub(crate) fn begin(kind: Kind, hosts: &[String], said: Duration, seed: &Seed, artefacts: &Artefacts) -> Arc<Self> {
+    pub(crate) fn begin(kind: Kind, hosts: &Arc<Names>, said: Duration, seed: &Seed, artefacts: &Artefacts) -> Arc<Self> {
         let watched = Arc::new(Self {
             pulse: Arc::default(),
-            hosts: hosts.to_vec(),
+            hosts: Arc::clone(hosts),
             limit: limit(said),
             seed: seed.clone(),
             artefacts: artefacts.clone(),

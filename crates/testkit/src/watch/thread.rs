@@ -10,7 +10,7 @@ use std::time::Duration;
 use cohaptic_units::print::{Seconds, Span};
 
 use super::guard::is_debugged;
-use super::{Kind, Runner, STALL_VARIABLE, Watched};
+use super::{Kind, STALL_VARIABLE, Watched};
 
 /// How often it looks at most.
 const SHORTEST: Duration = Duration::from_millis(5);
@@ -92,8 +92,7 @@ impl Watched {
         let name = |host: usize| self.hosts.get(host).map_or("?", |name| name);
         let runner = match (self.kind, self.pulse.runner(running)) {
             (Kind::Nodes, _) => format!("node `{}`", name(running.saturating_sub(1))),
-            (_, Some(Runner { host: Some(host), origin })) => format!("the task of host `{}` that was spawned at {origin}", name(host.index())),
-            (_, Some(Runner { host: None, origin })) => format!("the task that was spawned at {origin}"),
+            (_, Some(runner)) => runner.words(&self.hosts),
             (Kind::Own, None) => "the function that makes the program, or a waker,".to_owned(),
             #[cfg(feature = "tokio")]
             (Kind::Tokio, None) => {

@@ -4,19 +4,23 @@
 //! [`Wire::poll`], until it gives `None`, after each packet and whenever time has passed.
 
 mod exits;
+mod held;
 mod hitting;
 mod recording;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::Arc;
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{Fate, LinkModel, LinkStats, MereArrival, Network, NetworkConfig, NodeId, PacketInfo, Path};
 
 use exits::{Out, counted};
+pub(crate) use held::{BYTE_LIMIT, Held, Where};
 pub(crate) use hitting::HitCount;
 use hitting::Hitting;
 pub(crate) use recording::{Recorded, Recording, Seen};
 
+use crate::bed::Names;
 use crate::core::Octets;
 use crate::file::LinkChange;
 use crate::hit::{Laws, Verdict};
@@ -36,6 +40,8 @@ pub(crate) struct Settings {
     pub(crate) keeps_packets: bool,
     /// How often tasks may be polled, or packets and timers handled, at one instant.
     pub(crate) patience: u64,
+    /// How many bytes the run may hold.
+    pub(crate) byte_limit: u64,
     /// Which packets are hit.
     pub(crate) laws: Laws,
 }
@@ -73,13 +79,13 @@ pub(crate) struct Arrival<A> {
 
 pub(crate) struct Wire<A> {
     now: Instant,
-    hosts: usize,
     network: Network<Box<Parcel<A>>>,
     /// Links that become other ones, in order of time.
     changes: VecDeque<LinkChange>,
-    /// By sender, then receiver: whether the way is cut.
-    cut: Vec<bool>,
-    is_any_cut: bool,
+    /// The ways that are cut.
+    cut: BTreeSet<Path>,
+    /// What the run holds, here and with sockets and nodes.
+    pub(crate) held: Held,
     /// Whether packets are hit or recorded.
     is_watched: bool,
     /// Where packets are hit.
@@ -89,24 +95,23 @@ pub(crate) struct Wire<A> {
 
 impl<A: Clone + Send + Sync + 'static> Wire<A> {
     pub(crate) fn new(
-        names: &[String],
+        names: &Arc<Names>,
         seed: u64,
         settings: &Settings,
         changes: impl Into<VecDeque<LinkChange>>,
-        link: impl FnMut(NodeId, NodeId) -> LinkModel,
+        link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static,
     ) -> Self {
         let config = NetworkConfig { seed, nodes: names.to_vec(), general: false };
-        let (hitting, network) = Hitting::new(&settings.laws, names, seed, Network::new(config, link));
-        let recording = Recording::new(names.to_vec(), settings);
+        let (hitting, network) = Hitting::new(&settings.laws, names, seed, Network::on_demand(config, link));
+        let recording = Recording::new(Arc::clone(names), settings);
         let is_watched = hitting.is_some() || recording.is_on();
         Self {
             now: Instant::ZERO,
-            hosts: names.len(),
             network,
             hitting,
             changes: changes.into(),
-            cut: vec![false; names.len() * names.len()],
-            is_any_cut: false,
+            cut: BTreeSet::new(),
+            held: Held::new(settings.byte_limit),
             is_watched,
             recording,
         }
@@ -161,9 +166,10 @@ impl<A: Clone> Wire<A> {
     /// Hands a packet to its link, and says whether [`Wire::poll`] may give something. It fails if the way is cut.
     #[inline(always)]
     pub(crate) fn offer(&mut self, path: Path, parcel: Box<Parcel<A>>) -> Result<bool, Lost> {
-        if self.is_watched || self.is_any_cut {
+        if self.is_watched || !self.cut.is_empty() {
             self.note_offer(path, &parcel)?;
         }
+        self.held.add(Where::Links, Held::cost(parcel.bytes.len()));
         let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable: parcel.ecn_capable };
         let offered = self.network.handle_packet_timed(self.now, path, info, parcel);
         debug_assert!(offered.is_ok(), "hosts are checked, and time does not go back");
@@ -175,7 +181,7 @@ impl<A: Clone> Wire<A> {
     #[inline(never)]
     fn note_offer(&mut self, path: Path, parcel: &Parcel<A>) -> Result<(), Lost> {
         let packet = self.next_packet(path);
-        if self.cut[self.pair(path)] {
+        if self.cut.contains(&path) {
             // It does not reach the link, so that it uses up none of the link's numbers.
             self.note(Happening::Lost { packet, why: Lost::Cut });
             return Err(Lost::Cut);
@@ -194,16 +200,19 @@ impl<A: Clone> Wire<A> {
     }
 
     /// Takes the next packet that has arrived, if nothing but arrivals can come and nobody asks for more of them than this: from where to where, when, whether
-    /// its way is cut, and what travels. [`Wire::poll`] gives those that this does not give. What else it tells of each took a fifth of the time of a
-    /// datagram.
+    /// its way is cut, what travels, and the count of what the run holds, of which the packet is no part any more. [`Wire::poll`] gives those that this does not
+    /// give. What else it tells of each took a fifth of the time of a datagram.
     #[inline(always)]
-    pub(crate) fn take_plain<T>(&mut self, take: impl FnOnce(Path, Instant, bool, Box<Parcel<A>>) -> T) -> Option<T> {
+    pub(crate) fn take_plain<T>(&mut self, take: impl FnOnce(Path, Instant, bool, Box<Parcel<A>>, &mut Held) -> T) -> Option<T> {
         if self.is_watched {
             return None;
         }
-        let Self { network, cut, hosts, is_any_cut, .. } = self;
-        let is_cut = |path: Path| *is_any_cut && cut[path.from.index() * *hosts + path.to.index()];
-        network.take_mere_arrival(|MereArrival { path, at, payload, .. }| take(path, at, is_cut(path), payload))
+        let Self { network, cut, held, .. } = self;
+        let is_cut = |path: Path| !cut.is_empty() && cut.contains(&path);
+        network.take_mere_arrival(|MereArrival { path, at, payload, .. }| {
+            held.remove(Where::Links, Held::cost(payload.bytes.len()));
+            take(path, at, is_cut(path), payload, held)
+        })
     }
 
     /// Whether [`Wire::poll`] may give something. `false` is certain.
@@ -218,12 +227,18 @@ impl<A: Clone> Wire<A> {
             let event = self.poll_out()?;
             let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy };
             self.recording.keep(&event);
+            let cost = Held::cost(event.payload.bytes.len());
+            if event.fate.is_end() {
+                self.held.remove(Where::Links, cost)
+            } else {
+                self.held.add(Where::Links, cost)
+            }
             match event.fate {
                 Fate::Delivered(at) => {
                     if let Some(hitting) = &mut self.hitting {
                         hitting.exits.arrived(event.path, at);
                     }
-                    let (marked, is_cut) = (event.marked, self.cut[self.pair(event.path)]);
+                    let (marked, is_cut) = (event.marked, self.cut.contains(&event.path));
                     let mut parcel = event.payload;
                     if let Some(damage) = &event.damage {
                         // A copy of it may be on its way still, undamaged.
@@ -263,17 +278,14 @@ impl<A: Clone> Wire<A> {
     }
 
     pub(crate) fn set_cut(&mut self, path: Path, cut: bool) {
-        let pair = self.pair(path);
-        if path.from != path.to && std::mem::replace(&mut self.cut[pair], cut) != cut {
-            self.is_any_cut = self.cut.contains(&true);
+        let has_changed = if cut { path.from != path.to && self.cut.insert(path) } else { self.cut.remove(&path) };
+        if has_changed {
             self.note(if cut { Happening::Cut(path) } else { Happening::Mended(path) });
         }
     }
 
     pub(crate) fn mend_all(&mut self) {
-        let nodes = || (0..self.hosts).map(NodeId::new);
-        let paths: Vec<Path> = nodes().flat_map(|from| nodes().map(move |to| Path { from, to })).collect();
-        paths.into_iter().for_each(|path| self.set_cut(path, false));
+        std::mem::take(&mut self.cut).into_iter().for_each(|path| self.note(Happening::Mended(path)));
     }
 
     /// `None` if both are one host.
@@ -305,9 +317,5 @@ impl<A: Clone> Wire<A> {
     /// What each law did.
     pub(crate) fn hit_counts(&self) -> Vec<HitCount> {
         self.hitting.as_ref().map(|hitting| hitting.counts()).unwrap_or_default()
-    }
-
-    const fn pair(&self, path: Path) -> usize {
-        path.from.index() * self.hosts + path.to.index()
     }
 }

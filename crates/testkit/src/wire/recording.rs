@@ -1,11 +1,14 @@
 //! The record of a run.
 
+use std::sync::Arc;
+
 use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Fate, Network, PacketEvent, Path};
 
 use super::exits::{Exits, Out};
 use super::{HitCount, Parcel, Settings};
+use crate::bed::Names;
 use crate::trace::{Happening, Trace};
 
 /// The record of a run, as far as it is asked for.
@@ -36,7 +39,7 @@ pub(crate) struct Recorded {
 const MOST_EVENTS: u32 = 10_000_000;
 
 impl Recording {
-    pub(super) const fn new(hosts: Vec<String>, settings: &Settings) -> Self {
+    pub(super) const fn new(hosts: Arc<Names>, settings: &Settings) -> Self {
         let Settings { traces, digests, keeps_packets, .. } = *settings;
         Self { trace: Trace::new(hosts), packets: Vec::new(), traces, digests, keeps_packets }
     }

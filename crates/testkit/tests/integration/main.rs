@@ -2,13 +2,17 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::missing_panics_doc, clippy::cast_possible_truncation, reason = "tests")]
 
 mod artefacts;
+mod byte_limit;
 #[cfg(feature = "strategies")]
 mod chapter;
+#[cfg(feature = "tcp")]
+mod ended;
 mod equivalence;
 mod faults;
 mod hits;
 mod like_tokio;
 mod link_files;
+mod many_hosts;
 mod misuse;
 mod nodes;
 mod seeds;

@@ -60,9 +60,57 @@ fn what_takes_no_time_does_not_let_it_pass() {
                     },
                 }
             };
-            says(|| bed.clone().run(spin), &parts);
+            let text = complaint(|| bed.clone().run(spin));
+            for part in parts {
+                assert!(text.contains(part), "no {part:?} in {text:?}");
+            }
+            // It is the program itself, and its sockets are of host `a`.
+            assert!(text.contains(". It is the task that was spawned at crates/testkit/tests/integration/misuse.rs:"), "{text}");
+            assert_eq!(text.ends_with(", which called the UDP socket 0.0.0.0:49152 of host `a` last"), way == 2 || way == 3, "{text}");
         }
     }
+}
+
+#[test]
+fn a_task_that_tries_again_and_again_is_named_with_its_host() {
+    for bed in [bed().patience(1000), bed().patience(1000).on_tokio()] {
+        let spin = |bed: Bed| async move {
+            bed.host("b").spawn(async {
+                let socket = UdpSocket::bind("0.0.0.0:7").await.unwrap();
+                while socket.try_recv(&mut [0; 1]).is_err() {}
+            });
+            time::sleep(Duration::from_secs(1)).await;
+        };
+        let parts = [
+            "It is the task of host `b` that was spawned at crates/testkit/tests/integration/misuse.rs:",
+            "which called the UDP socket 0.0.0.0:7 of host `b` last",
+        ];
+        says(|| bed.run(spin), &parts);
+    }
+}
+
+#[test]
+fn a_name_that_no_host_has_is_told_with_the_task_that_asks() {
+    let asks = "; the task of host `b` that was spawned at crates/testkit/tests/integration/misuse.rs:";
+    for bed in [bed(), bed().on_tokio()] {
+        let names = |bed: Bed| async move {
+            let other = bed.clone();
+            bed.host("b").spawn(async move { drop(other.host("c")) });
+            time::sleep(Duration::from_secs(1)).await;
+        };
+        says(|| bed.clone().run(names), &["there is no host `c`; the hosts are a, b; the task", asks, " asks for it"]);
+        let sends = |bed: Bed| async move {
+            bed.host("b").spawn(async {
+                let socket = UdpSocket::bind("0.0.0.0:7").await.unwrap();
+                socket.send_to(b"x", "c:7").await.unwrap();
+            });
+            time::sleep(Duration::from_secs(1)).await;
+        };
+        says(|| bed.run(sends), &["there is no host `c`; the hosts are a, b; the task", asks]);
+    }
+    // Of many hosts not all are named.
+    let many = Testbed::new((0..100).map(|host| format!("host-{host}")));
+    says(|| drop(many.link("host-0", "host-x", "")), &["there is no host `host-x`; the hosts are host-0, host-1, ", ", host-15 and 84 more"]);
 }
 
 #[test]
@@ -96,7 +144,7 @@ fn outside_of_a_test_bed_nothing_can_be_bound_and_no_time_passes() {
     let error = bed().run(|_| async { UdpSocket::bind("0.0.0.0:0").await.unwrap_err().to_string() });
     assert!(error.contains("this task lives on no host") && error.contains("`Host::spawn`"), "{error}");
     let error = bed().run(|bed| async move { bed.host("a").bind("c:0").unwrap_err().to_string() });
-    assert_eq!(error, "there is no host `c`; the hosts are a, b");
+    assert!(error.starts_with("there is no host `c`; the hosts are a, b; the task that was spawned at "), "{error}");
 }
 
 #[test]

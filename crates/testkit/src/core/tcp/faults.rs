@@ -34,11 +34,12 @@ impl Core {
             let hold = end.hold.take();
             end.readers.wake(&mut self.woken);
             end.writers.wake(&mut self.woken);
+            self.recount(id);
             self.tcp.set_timer(id, None);
             self.tcp.unroute(id);
             hold.into_iter().for_each(|hold| self.tcp.ports.release(hold));
             if !self.tcp.end(id).is_held {
-                self.tcp.remove(id);
+                self.remove_connection(id);
             }
         }
         self.tcp.loopback.retain(|(of, _)| *of != host);

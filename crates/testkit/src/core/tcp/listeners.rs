@@ -10,7 +10,7 @@ use cohaptic_tcp::{Connection, Segment, TcpConfig};
 use cohaptic_wan::NodeId;
 
 use super::super::waking::Waiters;
-use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener};
+use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener, SocketName};
 use crate::trace::Lost;
 
 /// What connections inherit of their listener: the constants, and the time to linger when they are dropped.
@@ -54,9 +54,10 @@ impl Core {
         mut remote: SocketAddr,
         mut config: TcpConfig,
     ) -> io::Result<ConnId> {
-        self.note_call();
-        self.forget_old();
         let local = bound.map(|(_, local)| local);
+        let any = if remote.is_ipv6() { Ipv6Addr::UNSPECIFIED.into() } else { Ipv4Addr::UNSPECIFIED.into() };
+        self.note_call(|_| SocketName { kind: "TCP", host, local: local.unwrap_or_else(|| SocketAddr::new(any, 0)), peer: Some(remote) });
+        self.forget_old();
         if let Some(local) = local.filter(|local| local.is_ipv6() != remote.is_ipv6()) {
             let text = format!("a socket at {local} cannot reach {remote}, which is of the other version of IP");
             return refuse(io::ErrorKind::InvalidInput, text);
@@ -71,10 +72,9 @@ impl Core {
         if remote.ip().is_unspecified() {
             remote.set_ip(loopback);
         }
-        let any = if remote.is_ipv6() { Ipv6Addr::UNSPECIFIED.into() } else { Ipv4Addr::UNSPECIFIED.into() };
         let from = self.source(host, local.map_or(any, |local| local.ip()), remote.ip())?;
         if !remote.ip().is_loopback() && self.plan.owner_node(remote.ip()).is_none() && !self.plan.was_given(remote.ip()) {
-            return refuse(io::ErrorKind::HostUnreachable, format!("no host has the address {}; the hosts are\n{}", remote.ip(), self.plan));
+            return refuse(io::ErrorKind::HostUnreachable, self.plan.unknown(remote.ip()));
         }
         let port = match local {
             Some(local) => local.port(),
@@ -138,7 +138,7 @@ impl Core {
 
     /// Takes the connection that has waited longest.
     pub(crate) fn accept(&mut self, id: ListenId) -> io::Result<Option<(ConnId, SocketAddr)>> {
-        self.note_call();
+        self.note_call(|core| core.tcp.listeners.get(id.0).name());
         self.check_listener(id)?;
         let Some(conn) = self.tcp.listeners.get_mut(id.0).waiting.pop_front() else { return Ok(None) };
         self.tcp.calls += 1;
@@ -178,7 +178,7 @@ impl Core {
         let (half_open, waiting) = (std::mem::take(&mut listener.half_open), std::mem::take(&mut listener.waiting));
         self.tcp.ports.release(listener.hold);
         for conn in half_open {
-            self.tcp.remove(conn);
+            self.remove_connection(conn);
         }
         for conn in waiting {
             let end = self.tcp.end_mut(conn);

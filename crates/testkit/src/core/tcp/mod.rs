@@ -21,9 +21,10 @@ use cohaptic_tcp::{Connection, TcpConfig};
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
-use super::Core;
 use super::entropy::Entropy;
 use super::waking::Waiters;
+use super::{Core, SocketName};
+use crate::wire::Where;
 use slots::Slots;
 
 pub(crate) use listeners::Inherited;
@@ -86,6 +87,8 @@ struct End {
     timer: Option<Instant>,
     is_in_time_wait: bool,
     gone: Option<Gone>,
+    /// How many bytes of it are in the count of what the run holds.
+    counted: u64,
     /// The call at which it was looked at, and its deadline then: see [`Core::is_stuck`].
     looked_at: (u64, Option<Instant>),
 }
@@ -154,6 +157,7 @@ impl Tcp {
             timer: None,
             is_in_time_wait: false,
             gone: None,
+            counted: 0,
             looked_at: (u64::MAX, None),
         })));
         self.routes.insert(route, id);
@@ -169,17 +173,6 @@ impl Tcp {
         }
     }
 
-    /// Forgets an end.
-    fn remove(&mut self, id: ConnId) {
-        self.unroute(id);
-        self.set_timer(id, None);
-        if let Some(end) = self.connections.remove(id.0)
-            && let Some(hold) = end.hold
-        {
-            self.ports.release(hold);
-        }
-    }
-
     fn initial_sequence(&mut self) -> u32 {
         u32::from_le_bytes(self.entropy.bytes())
     }
@@ -189,7 +182,36 @@ const fn route(host: NodeId, local: SocketAddr, remote: SocketAddr) -> Route {
     (host, local.port(), local.ip(), remote)
 }
 
+impl End {
+    fn name(&self) -> SocketName {
+        SocketName { kind: "TCP", host: self.host, local: self.machine.local_addr(), peer: Some(self.machine.peer_addr()) }
+    }
+}
+
+impl Listener {
+    const fn name(&self) -> SocketName {
+        SocketName { kind: "listening TCP", host: self.host, local: self.local, peer: None }
+    }
+}
+
 impl Core {
+    /// Forgets an end.
+    fn remove_connection(&mut self, id: ConnId) {
+        self.tcp.unroute(id);
+        self.tcp.set_timer(id, None);
+        let Some(end) = self.tcp.connections.remove(id.0) else { return };
+        self.wire.held.remove(Where::Streams, end.counted);
+        end.hold.into_iter().for_each(|hold| self.tcp.ports.release(hold));
+    }
+
+    /// Counts what an end holds now.
+    fn recount(&mut self, id: ConnId) {
+        let end = self.tcp.connections.get_mut(id.0);
+        let held = end.machine.held() as u64;
+        self.wire.held.add(Where::Streams, held);
+        self.wire.held.remove(Where::Streams, std::mem::replace(&mut end.counted, held));
+    }
+
     /// Sets the constants of the connections that a host opens or takes from now on.
     pub(crate) fn set_tcp(&mut self, host: NodeId, config: TcpConfig) {
         self.tcp.configs[host.index()] = config;

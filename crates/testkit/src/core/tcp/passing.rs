@@ -106,6 +106,7 @@ impl Core {
         while let Some(segment) = self.tcp.end_mut(id).machine.poll_transmit(now) {
             self.emit(host, Some(id), &segment);
         }
+        self.recount(id);
         let end = self.tcp.connections.get_mut(id.0);
         if !end.readers.is_empty() && end.machine.is_readable() {
             end.readers.wake(&mut self.woken);
@@ -139,7 +140,7 @@ impl Core {
         if !end.machine.is_finished() {
             return;
         }
-        if end.is_held || end.listener.is_some() { self.tcp.unroute(id) } else { self.tcp.remove(id) }
+        if end.is_held || end.listener.is_some() { self.tcp.unroute(id) } else { self.remove_connection(id) }
     }
 }
 

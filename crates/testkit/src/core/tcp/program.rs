@@ -80,7 +80,7 @@ impl Core {
 
     /// Reads what has arrived, into one buffer after the other.
     pub(crate) fn read(&mut self, id: ConnId, to: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
-        self.note_call();
+        self.note_call(|core| core.tcp.end(id).name());
         self.check_connection(id)?;
         let machine = &mut self.tcp.end_mut(id).machine;
         let mut count = 0;
@@ -100,7 +100,7 @@ impl Core {
 
     /// Reads without taking.
     pub(crate) fn peek_connection(&mut self, id: ConnId, to: &mut [u8]) -> io::Result<usize> {
-        self.note_call();
+        self.note_call(|core| core.tcp.end(id).name());
         self.check_connection(id)?;
         let end = self.tcp.end_mut(id);
         end.machine.peek(to).map_err(|error| end.explain(error))
@@ -108,7 +108,7 @@ impl Core {
 
     /// Writes one buffer after the other, as much as the send buffer takes.
     pub(crate) fn write(&mut self, id: ConnId, from: &[IoSlice<'_>]) -> io::Result<usize> {
-        self.note_call();
+        self.note_call(|core| core.tcp.end(id).name());
         self.check_connection(id)?;
         let end = self.tcp.end_mut(id);
         let mut count = 0;
@@ -121,6 +121,9 @@ impl Core {
         }
         end.is_write_blocked |= outcome == Err(Error::WouldBlock);
         self.after_call(id);
+        if self.wire.held.is_too_much() {
+            self.fail_for(self.tcp.end(id).name());
+        }
         match outcome {
             Err(error) if count == 0 => Err(self.tcp.end(id).explain(error)),
             _ => Ok(count),
@@ -164,7 +167,7 @@ impl Core {
         end.readers.clear();
         end.writers.clear();
         if end.gone.is_some_and(|gone| !gone.is_killed) {
-            self.tcp.remove(id);
+            self.remove_connection(id);
             return;
         }
         if end.linger.is_some_and(|linger| linger.is_zero()) {

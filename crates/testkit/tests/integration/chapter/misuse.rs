@@ -52,6 +52,33 @@ fn tasks_that_never_wait() {
     });
     assert_begin_shown(&message, ", the task");
     let message = message_of(|| pair().patience(1000).run(|_| async { while time::now() < Instant::from_nanos(1) {} }));
+    assert_begin_shown(&message, ". It is the task");
+}
+
+#[test]
+fn more_bytes_than_the_limit() {
+    let message = message_of(|| {
+        pair().links("delay 1000s").byte_limit(1 << 20).run(|bed| async move {
+            let socket = bed.host("client").bind("0.0.0.0:0").unwrap();
+            loop {
+                socket.send_to(&[0; 1000], "server:7").await.unwrap();
+            }
+        });
+    });
+    let (begin, end) = (message.find(", used by").unwrap(), message.find(", has sent").unwrap());
+    assert_shown(&format!("{}…{}", &message[..begin], &message[end..]));
+}
+
+#[test]
+fn sockets_after_their_run_and_on_another_thread() {
+    let socket = pair().run(|bed| async move { bed.host("server").bind("0.0.0.0:7").unwrap() });
+    assert_shown(&socket.try_send(b"hello").unwrap_err().to_string());
+    let message = message_of(|| {
+        pair().run(|bed| async move {
+            let socket = bed.host("server").bind("0.0.0.0:7").unwrap();
+            drop(std::thread::spawn(move || socket.try_send(b"hello")).join());
+        });
+    });
     assert_shown(&message);
 }
 
@@ -79,7 +106,7 @@ fn waits_that_never_end() {
 
 #[test]
 fn names_that_nobody_has_and_what_works_inside_a_run_only() {
-    assert_shown(&message_of(|| pair().run(|bed| async move { drop(bed.host("sever")) })));
+    assert_begin_shown(&message_of(|| pair().run(|bed| async move { drop(bed.host("sever")) })), "; the task");
     let outside = || {
         let _ = time::now();
     };

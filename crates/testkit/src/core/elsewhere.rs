@@ -1,0 +1,127 @@
+//! Who may use what belongs to a run: its own thread while it goes on, and anybody once it has ended, to drop it.
+//!
+//! A socket that another thread uses would act at an instant that depends on the machine. Its thread would also have to wait until the thread of the run has time, for ever if a
+//! task waits for that other thread. So such a use is an error at once, and the run fails with the same words.
+
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use cohaptic_wan::NodeId;
+
+use super::{Core, Guard, Shared};
+use crate::context;
+
+/// What other threads have left for the thread of a run.
+#[derive(Default)]
+pub(super) struct Elsewhere {
+    is_any: AtomicBool,
+    left: Mutex<Left>,
+}
+
+#[derive(Default)]
+struct Left {
+    /// What was used on another thread first, in words.
+    misuse: Option<String>,
+    acts: Vec<Act>,
+}
+
+/// What is to be done with the state.
+type Act = Box<dyn FnOnce(&mut Core) + Send>;
+
+impl Elsewhere {
+    fn leave(&self, leave: impl FnOnce(&mut Left)) {
+        leave(&mut self.left.lock().unwrap_or_else(PoisonError::into_inner));
+        self.is_any.store(true, Ordering::Release);
+    }
+
+    fn take(&self) -> Left {
+        self.is_any.store(false, Ordering::Relaxed);
+        std::mem::take(&mut self.left.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Shared {
+    /// Whether this thread may have the state, which may lie elsewhere: it runs the test bed, or the run has ended.
+    pub(super) fn may_be_had(&self) -> bool {
+        context::is_running(self) || self.has_ended()
+    }
+
+    /// The state, for a call of something of that host: `kind`, such as "a UDP socket".
+    ///
+    /// # Errors
+    ///
+    /// As [`Shared::check_open`].
+    #[inline]
+    pub(crate) fn open(&self, host: NodeId, kind: &str) -> io::Result<Guard<'_>> {
+        self.check_open(host, kind)?;
+        Ok(self.lock())
+    }
+
+    /// Fails unless something of that host may be used here and now.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::ConnectionAborted`] once the run has ended; [`io::ErrorKind::Unsupported`] on another thread than that of the run, which fails then.
+    #[inline]
+    pub(crate) fn check_open(&self, host: NodeId, kind: &str) -> io::Result<()> {
+        if self.is_at_hand() || context::is_running(self) { Ok(()) } else { self.refuse(host, kind) }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn refuse(&self, host: NodeId, kind: &str) -> io::Result<()> {
+        let name = &self.names()[host.index()];
+        if self.has_ended() {
+            let place = if context::running().is_some() { ", in the run of another test bed" } else { "" };
+            let text =
+                format!("{kind} of host `{name}` is used after the run of its test bed has ended{place}: take one of a host of the run that uses it");
+            return Err(io::Error::new(io::ErrorKind::ConnectionAborted, text));
+        }
+        Err(io::Error::new(io::ErrorKind::Unsupported, self.note_misuse(&format!("{kind} of host `{name}`"))))
+    }
+
+    /// Notes that another thread uses this, so that the run fails, and says so.
+    pub(super) fn note_misuse(&self, what: &str) -> String {
+        let text = format!(
+            "{what} was used on another thread{}: the sockets of a test bed belong to the thread that runs it. Use them in its tasks, and let other threads hand over what \
+             they have through a channel",
+            std::thread::current().name().map_or_else(String::new, |name| format!(" (`{name}`)"))
+        );
+        self.elsewhere.leave(|left| {
+            left.misuse.get_or_insert_with(|| text.clone());
+        });
+        text
+    }
+
+    /// Lets go of something: now, or, on a thread that may not have the state, when the task that the run's thread polls has returned.
+    pub(crate) fn release(&self, act: impl FnOnce(&mut Core) + Send + 'static) {
+        if self.is_at_hand() || self.may_be_had() {
+            act(&mut self.lock());
+        } else {
+            self.elsewhere.leave(|left| left.acts.push(Box::new(act)));
+        }
+    }
+
+    /// Does what other threads have left: between two polls of tasks.
+    ///
+    /// # Panics
+    ///
+    /// If another thread has used something of the run.
+    #[inline]
+    pub(crate) fn attend(&self) {
+        if self.elsewhere.is_any.load(Ordering::Acquire) {
+            self.attend_now();
+        }
+    }
+
+    #[cold]
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    fn attend_now(&self) {
+        let Left { misuse, acts } = self.elsewhere.take();
+        acts.into_iter().for_each(|act| act(&mut self.lock()));
+        if let Some(text) = misuse {
+            panic!("{text}");
+        }
+    }
+}
