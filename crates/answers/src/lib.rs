@@ -40,7 +40,7 @@ pub use check::{Answered, OutcomeDocument, check};
 pub use explanation::explanation;
 pub use methods::{Kind, Measured, MeasuredMethod, MeasurementWatch, Method, cost_picture, error_in_words, explanation_with_costs, measure, methods};
 pub use notes::notes;
-pub use parts::{MOST_LINKS, access_line, ending_name, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
+pub use parts::{MOST_LINKS, access_line, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 pub use pictures::{
     AdmittanceCurve, AdmittanceWords, NamedMap, admittance_picture, admittance_words, axis_of, axis_of_key, boundary_picture, crossing_in_words,
     label, map_picture, radius_name,

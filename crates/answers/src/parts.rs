@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use cohaptic_harness::measures::MeasuredValue;
-use cohaptic_harness::{AccessSummary, Ending, LinkQuantiles, PeerSummary, Summary};
+use cohaptic_harness::{AccessSummary, LinkQuantiles, PeerSummary, Summary};
 use cohaptic_scene::Scene;
 use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
@@ -111,13 +111,4 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
 pub fn measures_of(scene: &Scene, measured: &[MeasuredValue]) -> Option<impl Serialize + use<>> {
     let named: Map<String, Value> = measured.iter().map(|measured| (measured.name.text(scene), Value::from(measured.value))).collect();
     (!named.is_empty()).then(|| document! { measures: named })
-}
-
-/// How a run ended, in one word.
-pub const fn ending_name(ending: Ending) -> &'static str {
-    match ending {
-        Ending::Complete => "complete",
-        Ending::Diverged(_) => "diverged",
-        Ending::Interrupted(_) => "interrupted",
-    }
 }

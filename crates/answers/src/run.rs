@@ -6,7 +6,7 @@ use cohaptic_scene::Scene;
 use serde::Serialize;
 
 use crate::document;
-use crate::parts::{access_line, ending_name, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
+use crate::parts::{access_line, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 
 /// What a run comes to. `wall_s`: how long it took \[s\], if that is said.
 pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s: Option<f64>) -> impl Serialize {
@@ -15,7 +15,7 @@ pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s:
         title: scene.title.clone(),
         duration_s: duration_s,
         ticks: summary.ticks,
-        ending: ending_name(summary.ending),
+        ending: summary.ending_name(),
         #[serde(flatten)]
         speed: wall_s.map(|wall_s| document! { wall_s: wall_s, realtime_factor: duration_s / wall_s }),
         peers: summary.peers.iter().map(peer).collect::<Vec<_>>(),

@@ -50,4 +50,4 @@ pub use observer::{HoldRow, InstantRow, NoObserver, Observer, PacketRow, SendRow
 pub use plan::Model;
 pub use simulation::Simulation;
 pub use size::{TooLarge, too_large};
-pub use summary::{AccessSummary, EachLink, Ending, LinkQuantiles, LinkSummaries, LinkSummary, PeerSummary, Summary};
+pub use summary::{AccessSummary, DIVERGED_DISTANCE, EachLink, Ending, LinkQuantiles, LinkSummaries, LinkSummary, PeerSummary, Summary};

@@ -31,12 +31,40 @@ pub struct Summary {
     pub max_rotation_discrepancy: Option<f64>,
 }
 
+/// Distance between two copies \[m\] beyond which a run counts as diverged: people at desktop devices move no copy farther than this. Whether the numbers of
+/// an unstable run overflow before its end depends on its duration alone, so the overflow by itself would be a poor definition.
+pub const DIVERGED_DISTANCE: f64 = 1.0;
+
+impl Summary {
+    /// Returns whether the run diverged: a position or a velocity was not finite, or two copies were more than [`DIVERGED_DISTANCE`] apart along an axis.
+    #[must_use]
+    pub fn has_diverged(&self) -> bool {
+        // A discrepancy that is no number compares as false, and counts as diverged.
+        matches!(self.ending, Ending::Diverged(_)) || !(self.max_discrepancy <= DIVERGED_DISTANCE)
+    }
+
+    /// Returns one word for how the run ended: `interrupted`, or `diverged` if the run [has diverged](Self::has_diverged), or `complete`.
+    #[must_use]
+    pub fn ending_name(&self) -> &'static str {
+        match self.ending {
+            Ending::Interrupted(_) => "interrupted",
+            Ending::Complete | Ending::Diverged(_) => {
+                if self.has_diverged() {
+                    "diverged"
+                } else {
+                    "complete"
+                }
+            }
+        }
+    }
+}
+
 /// How a run ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ending {
     /// The scene ran to its end.
     Complete,
-    /// At this tick a position or a velocity was no finite number any more: the scene diverged.
+    /// At this tick a position or a velocity was not finite: the scene diverged until its numbers overflowed, and was not simulated further.
     Diverged(Instant),
     /// The observer ended the run after this tick.
     Interrupted(Instant),

@@ -4,13 +4,10 @@
 //! two of them is that of the strategies, and its interval is narrower than those of the two means. A pair counts where both runs came to their end and both have
 //! the measure.
 //!
-//! A run counts as diverged, and for no mean, where a number was not finite any more and where two copies were farther apart than people reach: whether an unstable run
-//! leaves the range of numbers before its end is a matter of its duration, and a mean over 10³⁰ m says nothing.
-
-use cohaptic_harness::record::SANE_POSITION;
+//! A run that [diverged](cohaptic_harness::Summary::has_diverged) counts for no mean: a mean over 10³⁰ m says nothing.
 
 use super::interval::{Estimate, Share};
-use super::measured::{LARGEST, MeasuredColumn};
+use super::measured::MeasuredColumn;
 use crate::plan::{Accepted, CampaignPlan, Refused};
 use crate::table::RunColumns;
 
@@ -33,7 +30,7 @@ pub struct Comparison {
 pub struct Cell {
     /// Why the strategy refuses the scene with these values; `None` if it runs.
     pub refused: Option<String>,
-    /// Which share of the runs diverged, or had copies farther apart than [`SANE_POSITION`]; `None` if there are none.
+    /// Share of the runs that diverged; `None` if there are no runs.
     pub diverged: Option<Share>,
     /// The figures of each of [`Comparison::measures`].
     pub figures: Vec<Figures>,
@@ -51,8 +48,7 @@ pub struct Figures {
 impl Comparison {
     /// The comparison of the first key of a plan. `columns` are those of `measures`, by run.
     pub(crate) fn of(plan: &CampaignPlan, accepted: &Accepted, refused: &Refused, measures: Vec<MeasuredColumn>, columns: &RunColumns) -> Self {
-        let apart = measures.iter().zip(&columns.columns).find(|(measure, _)| measure.name == LARGEST).map(|(_, column)| column);
-        let is_whole = |run: usize| columns.complete[run] && apart.is_none_or(|apart| apart[run] <= SANE_POSITION);
+        let is_whole = |run: usize| columns.complete[run];
         let strategies: Vec<String> = plan.variations().first().map_or_else(Vec::new, |vary| vary.texts().map(str::to_owned).collect());
         let each = usize::try_from(plan.runs_of_each()).unwrap_or(usize::MAX);
         let starts = starts(plan.combinations(), accepted, each);
@@ -170,19 +166,6 @@ mod tests {
         assert_eq!(at(1, 0).difference.map(|difference| (difference.mean, difference.half_width)), Some((3.0, Some(0.0))));
         assert_eq!((at(1, 1).mean.map(|mean| mean.mean), at(1, 1).difference), (Some(7.0), None));
         assert_eq!((at(2, 1).mean.map(|mean| mean.mean), at(2, 1).difference), (Some(10.0), None));
-    }
-
-    #[test]
-    fn copies_farther_apart_than_people_reach_count_as_diverged() {
-        let (plan, accepted) = (plan(3), Accepted::new(6, 3, std::iter::empty()));
-        let mut apart = vec![0.01; 18];
-        (apart[1], apart[2], apart[8]) = (SANE_POSITION, 1.001, 1e30);
-        let columns = RunColumns { complete: vec![true; 18], columns: vec![apart, (0..18).map(f64::from).collect()] };
-        let comparison = Comparison::of(&plan, &accepted, &Refused::new(), vec![measure(LARGEST), measure("a")], &columns);
-        let count = |strategy| comparison.cell(strategy, 0).diverged.map(|share| share.count);
-        assert_eq!((count(0), count(1), count(2)), (Some(1), Some(1), Some(0)));
-        assert_eq!(comparison.cell(0, 0).figures[1].mean.map(|mean| (mean.count, mean.mean)), Some((2, 0.5)));
-        assert_eq!(comparison.cell(1, 0).figures[1].difference.map(|difference| (difference.count, difference.mean)), Some((2, 6.0)));
     }
 
     #[test]

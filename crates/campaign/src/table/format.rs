@@ -97,7 +97,7 @@ pub(crate) struct Gist {
 /// Columns of a table, by run.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct RunColumns {
-    /// Whether the run came to its end.
+    /// Whether the run came to its end without [diverging](cohaptic_harness::Summary::has_diverged).
     pub(crate) complete: Vec<bool>,
     /// The columns in the order in which they were asked for; no number where a run has none.
     pub(crate) columns: Vec<Vec<f64>>,

@@ -9,7 +9,6 @@ use cohaptic_scene::MeasureName;
 use cohaptic_units::Instant;
 use cohaptic_wan::{DropCause, LinkStats};
 
-use super::format::COMPLETE;
 use super::{Roster, Row, Value};
 use crate::vary::Varied;
 use crate::verdicts::Judgement;
@@ -38,12 +37,11 @@ pub(crate) fn row<'a>(
         }
         None => [const { Value::Absent }; 4],
     }));
-    let (ending, ended) = match summary.ending {
-        Ending::Complete => (COMPLETE, summary.duration.as_secs_f64()),
-        Ending::Diverged(at) => ("diverged", seconds(at)),
-        Ending::Interrupted(at) => ("interrupted", seconds(at)),
+    let ended = match summary.ending {
+        Ending::Complete => summary.duration.as_secs_f64(),
+        Ending::Diverged(at) | Ending::Interrupted(at) => seconds(at),
     };
-    row.push(Value::Text(Arc::from(ending)));
+    row.push(Value::Text(Arc::from(summary.ending_name())));
     row.push(Value::Number(ended));
     row.push(integer(summary.ticks));
     row.push(Value::Number(summary.max_discrepancy));

@@ -12,11 +12,11 @@ use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
 use crate::document_schema::document;
-use crate::documents::{access_line, ending_name, lateness, link_quantiles, link_totals, measures_of, micros, peer, peer_links, rotation};
+use crate::documents::{access_line, lateness, link_quantiles, link_totals, measures_of, micros, peer, peer_links, rotation};
 use crate::measures::measured_lines;
 use crate::output;
 use crate::realtime::{late, notes};
-use crate::run::answer::{length, packets};
+use crate::run::answer::{diverged, length, packets};
 
 /// The answer of `cohaptic live --json`.
 pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
@@ -33,7 +33,7 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
     document! {
         title: scene.title.as_str(),
         duration_s: summary.duration.as_secs_f64(),
-        ending: ending_name(summary.ending),
+        ending: summary.ending_name(),
         valid: report.validity.is_valid(),
         ticks: summary.ticks,
         late_ticks: report.late_ticks,
@@ -86,10 +86,10 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     let summary = &report.summary;
     let lasted = Span(summary.duration);
     match summary.ending {
-        Ending::Complete => line(format!("{lasted}, {}", Counted(summary.ticks, "tick"))),
-        Ending::Diverged(at) => line(format!("DIVERGED: at {at} a position or a velocity is no finite number any more")),
+        Ending::Complete | Ending::Diverged(_) => line(format!("{lasted}, {}", Counted(summary.ticks, "tick"))),
         Ending::Interrupted(_) => line(format!("ended after {lasted} of {}, {}", Span(scene.duration), Counted(summary.ticks, "tick"))),
     }
+    diverged(summary).into_iter().for_each(|why| line(format!("DIVERGED: {why}")));
     line(format!("the run is {}", report.validity));
     line(format!("lateness of ticks: {}", late(&report.ticks)));
     if report.releases.count > 0 {

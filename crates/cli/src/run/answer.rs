@@ -1,7 +1,6 @@
 //! A run as a JSON document and in words.
 
-use cohaptic_harness::record::SANE_POSITION;
-use cohaptic_harness::{Ending, LinkQuantiles, Summary};
+use cohaptic_harness::{DIVERGED_DISTANCE, Ending, LinkQuantiles, Summary};
 use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
 use cohaptic_wan::{DropCause, LinkStats};
@@ -38,14 +37,12 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
     }
     let simulated = Span(summary.duration);
     match summary.ending {
-        Ending::Complete => {}
-        Ending::Diverged(at) => line(format!("  DIVERGED: at {at} a position or a velocity is no finite number any more")),
+        Ending::Complete | Ending::Diverged(_) => diverged(summary).into_iter().for_each(|why| line(format!("  DIVERGED: {why}"))),
         Ending::Interrupted(_) => line(format!("  INTERRUPTED after {simulated} of {}", Span(scene.duration))),
     }
     let factor = summary.duration.as_secs_f64() / run.wall_s;
     line(format!("  {simulated} simulated, {}, in {:.3} s: {factor:.0} times real time", Counted(summary.ticks, "tick"), run.wall_s));
-    let apart = if summary.max_discrepancy > SANE_POSITION { ": they came apart" } else { "" };
-    line(format!("  largest discrepancy between two copies: {}{apart}", length(summary.max_discrepancy)));
+    line(format!("  largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
     if let Some(angle) = summary.max_rotation_discrepancy {
         line(format!("  largest angle between two copies: {}", angle_text(angle)));
     }
@@ -66,6 +63,14 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
 
 /// The summary for people names this many peers at most.
 const MOST_PEERS: usize = 8;
+
+/// Returns how a run [diverged](Summary::has_diverged), in words; `None` if the run did not diverge.
+pub(crate) fn diverged(summary: &Summary) -> Option<String> {
+    match summary.ending {
+        Ending::Diverged(at) => Some(format!("at {at} a position or a velocity is not finite")),
+        Ending::Complete | Ending::Interrupted(_) => summary.has_diverged().then(|| format!("two copies were more than {DIVERGED_DISTANCE} m apart")),
+    }
+}
 
 pub(crate) fn length(metres: f64) -> String {
     if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }

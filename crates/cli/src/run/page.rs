@@ -5,14 +5,13 @@ use std::collections::BTreeMap;
 use cohaptic_answers::OutcomeDocument;
 use cohaptic_harness::check::Outcome;
 use cohaptic_harness::measures::MeasuredValue;
-use cohaptic_harness::record::SANE_POSITION;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_picture::page::{Html, Page, Table};
 use cohaptic_scene::{Scene, scene_content_of_text};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
-use super::answer::{angle_text, length, packets};
+use super::answer::{angle_text, diverged, length, packets};
 use super::command_line;
 use crate::arguments::RunArguments;
 use crate::expectations::{BARS, cells, columns};
@@ -54,17 +53,15 @@ pub(super) fn html(
 /// A warning where the run did not come to its end.
 fn ending(scene: &Scene, summary: &Summary) -> Html {
     match summary.ending {
-        Ending::Complete => Html::default(),
-        Ending::Diverged(at) => Html::warning(format!("DIVERGED: at {at} a position or a velocity is no finite number any more.")),
+        Ending::Complete | Ending::Diverged(_) => diverged(summary).map_or_else(Html::default, |why| Html::warning(format!("DIVERGED: {why}."))),
         Ending::Interrupted(_) => Html::warning(format!("INTERRUPTED after {} of {}.", Span(summary.duration), Span(scene.duration))),
     }
 }
 
 fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[String], summary: &Summary) -> Vec<(&'a str, Html)> {
-    let apart = if summary.max_discrepancy > SANE_POSITION { ": they came apart" } else { "" };
     let mut facts = vec![
         ("Simulated", format!("{}, {}", Span(summary.duration), Counted(summary.ticks, "tick")).into()),
-        ("Largest discrepancy between two copies", format!("{}{apart}", length(summary.max_discrepancy)).into()),
+        ("Largest discrepancy between two copies", length(summary.max_discrepancy).into()),
         ("Packets", packets(summary).into()),
         ("Scene", Html::code(&output::path(input::named(&arguments.scene.scene)))),
         ("Seed", scene.seed.to_string().into()),

@@ -47,6 +47,33 @@ fn files_and_folders_may_be_mixed_and_overridden() {
     assert!(outcome.stdout.contains("ok    scenes/a.toml\nFAIL  scenes/within/b.toml\n"), "{}", outcome.stdout);
 }
 
+/// Each of these expectations would pass if the last number before the overflow counted.
+#[test]
+fn a_run_that_was_cut_short_proves_nothing_about_later_instants() {
+    let cut = |expect: &str| {
+        let text = scene(expect).replace("200ms", "60s");
+        let desk = Desk::with("scene.toml", &text);
+        let document = parse(&desk.cohaptic("check scene.toml --set coordination.stiffness=1e12 --json").stdout);
+        document["scenes"][0]["failures"].as_array().unwrap().iter().map(|line| line.as_str().unwrap().to_owned()).collect::<Vec<String>>()
+    };
+    for expect in [
+        "position = [{ peer = \"right\", at = \"59s\", min = -1e308, max = 1e308 }]",
+        "position = [{ peer = \"right\", at = \"60s\", min = -1e308 }]",
+        "position = [{ peer = \"right\", at = \"59s\", min = -1e308 }, { peer = \"right\", at = \"1s\", max = 1e308 }]",
+        "discrepancy = { min = 0.5, max = 1e308 }",
+        "loss = [{ max = \"100%\" }]",
+        "delay = [{ max = \"10s\" }]",
+    ] {
+        let failures = cut(expect);
+        assert!(!failures.is_empty() && failures.iter().all(|line| line.contains("the run diverged at ")), "{expect}: {failures:?}");
+    }
+    assert!(cut("position = [{ peer = \"right\", at = \"59s\", min = -1.0 }]")[0].contains(", before 59s"));
+    // What happened before the overflow is proven: where a copy was, and a distance that was exceeded.
+    for expect in ["position = [{ peer = \"right\", at = \"1ms\", min = -1.0, max = 1.0 }]", "discrepancy = { min = 0.5 }"] {
+        assert_eq!(cut(expect), Vec::<String>::new(), "{expect}");
+    }
+}
+
 #[test]
 fn an_expectation_that_fails_is_named_with_both_numbers() {
     for (expect, parts) in [

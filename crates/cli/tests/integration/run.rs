@@ -138,6 +138,26 @@ fn a_scene_that_diverges_says_when() {
     assert!(document["duration_s"].as_f64().unwrap() < 60.0);
 }
 
+/// The copies are far apart, and every number is finite: run, check, campaign and compare say the same.
+#[test]
+fn a_run_whose_copies_come_apart_has_diverged_in_every_command() {
+    let desk = Desk::with("two.toml", TWO);
+    let set = "--set coordination.stiffness=20000 --set scene.duration=2s";
+    let document = desk.json(&format!("run two.toml {set} --json"));
+    assert_eq!(document["ending"], "diverged");
+    assert_eq!(document["duration_s"], 2.0, "no number overflowed");
+    assert!(document["max_discrepancy_m"].as_f64().unwrap() > 1.0);
+    let text = desk.text(&format!("run two.toml {set}"));
+    assert!(text.contains("DIVERGED: two copies were more than 1 m apart\n"), "{text}");
+    let text = desk.text("campaign two.toml --set scene.duration=2s --vary coordination.stiffness=1000,20000 --out out --format csv");
+    assert!(text.contains("  1 diverged; the largest discrepancy of the others is "), "{text}");
+    let rows = desk.read("out/runs.csv");
+    assert!(rows.lines().nth(1).unwrap().contains(",complete,2.0,") && rows.lines().nth(2).unwrap().contains(",diverged,2.0,"), "{rows}");
+    let compared = desk.json("compare two.toml --strategies average-position,proportional-derivative --set scene.duration=2s --vary coordination.stiffness=1000,20000 --runs 2 --out compared --json");
+    let counts = compared["combinations"].as_array().unwrap().iter().map(|combination| combination["diverged"]["count"].as_u64());
+    assert_eq!(counts.collect::<Vec<_>>(), [Some(0), Some(2), Some(0), Some(2)], "{compared:#}");
+}
+
 /// Characters of braille patterns.
 fn dots(text: &str) -> usize {
     text.chars().filter(|letter| ('\u{2801}'..='\u{28ff}').contains(letter)).count()

@@ -12,7 +12,7 @@ use cohaptic_wan::{DropCause, LinkName, LinkStats};
 use super::Outcome;
 use crate::measures::Measures;
 use crate::observer::observe_by_field;
-use crate::{Observer, Summary, TickRow, Ticks};
+use crate::{Ending, Observer, Summary, TickRow, Ticks};
 
 /// What was seen of what expectations are about.
 #[derive(Debug)]
@@ -82,7 +82,10 @@ impl Positions {
             *seen = attitude(expected.peer).or(*seen);
         }
         for watched in self.travels.iter_mut().filter(|watched| watched.reached.is_none()) {
-            if position(watched.peer, watched.axis).is_some_and(|position| (position - watched.start).abs() >= watched.distance) {
+            // A copy whose position overflowed has not travelled there.
+            if position(watched.peer, watched.axis)
+                .is_some_and(|position| position.is_finite() && (position - watched.start).abs() >= watched.distance)
+            {
                 watched.reached = Some(at);
             }
         }
@@ -123,50 +126,95 @@ impl Watched {
     pub(crate) fn outcomes(&self, scene: &Scene, expect: &Expect, summary: &Summary) -> Vec<Outcome> {
         let name = |peer: usize| &scene.peers[peer].name;
         let (watched, measures) = &self.seen;
+        let reach = Reach::of(scene, summary);
+        let unseen = |peer: usize, at: Instant| reach.why_not(at).unwrap_or_else(|| format!("{} has not ticked by then", name(peer)));
         let mut outcomes = Vec::new();
         if let Some(bounds) = &expect.discrepancy {
-            outcomes.push(Outcome::number("discrepancy", "largest discrepancy between copies".to_owned(), "m", bounds, summary.max_discrepancy));
+            let name = "largest discrepancy between copies".to_owned();
+            outcomes.push(reach.judge_largest(Outcome::number("discrepancy", name, "m", bounds, summary.max_discrepancy)));
         }
         for (expected, watched) in expect.positions.iter().zip(&watched.positions) {
             let what = format!("position of {}'s copy along {} at {}", name(expected.peer), AXES[expected.axis], expected.at);
-            let at_the_end = expected.at >= Instant::ZERO.saturating_add(scene.duration);
-            let seen = if at_the_end { Some(summary.peers[expected.peer].position[expected.axis]) } else { watched.seen };
-            outcomes.push(match seen {
-                None => Outcome::nothing("position", what, "m", &expected.bounds, &format!("{} has not ticked by then", name(expected.peer))),
+            let seen = if expected.at >= reach.end { Some(summary.peers[expected.peer].position[expected.axis]) } else { watched.seen };
+            outcomes.push(match seen.filter(|_| reach.why_not(expected.at).is_none()) {
+                None => Outcome::nothing("position", what, "m", &expected.bounds, &unseen(expected.peer, expected.at)),
                 Some(seen) => Outcome::number("position", what, "m", &expected.bounds, seen),
             });
         }
         for (expected, watched) in expect.travel.iter().zip(&watched.travels) {
             let what = format!("time in which {}'s copy travels {} m along {}", name(expected.peer), expected.distance, AXES[expected.axis]);
             outcomes.push(match watched.reached {
-                None => Outcome::nothing("travel", what, "s", &expected.bounds, "not reached"),
+                None => Outcome::nothing("travel", what, "s", &expected.bounds, &reach.not_reached()),
                 Some(at) => Outcome::number("travel", what, "s", &expected.bounds, at.as_secs_f64()),
             });
         }
         if let (Some(bounds), Some(angle)) = (&expect.rotation_discrepancy, summary.max_rotation_discrepancy) {
-            outcomes.push(Outcome::number("rotation-discrepancy", "largest angle between copies".to_owned(), "rad", bounds, angle));
+            let name = "largest angle between copies".to_owned();
+            outcomes.push(reach.judge_largest(Outcome::number("rotation-discrepancy", name, "rad", bounds, angle)));
         }
         for (expected, seen) in expect.orientations.iter().zip(&watched.orientations) {
             let what = format!("angle of {}'s copy from the orientation expected at {}", name(expected.peer), expected.at);
-            let at_the_end = expected.at >= Instant::ZERO.saturating_add(scene.duration);
-            let seen = if at_the_end { summary.peers[expected.peer].attitude } else { *seen };
+            let seen = if expected.at >= reach.end { summary.peers[expected.peer].attitude } else { *seen };
             let bounds = Bounds { min: None, max: Some(expected.max) };
-            outcomes.push(match seen {
-                None => Outcome::nothing("orientation", what, "rad", &bounds, &format!("{} has not ticked by then", name(expected.peer))),
+            outcomes.push(match seen.filter(|_| reach.why_not(expected.at).is_none()) {
+                None => Outcome::nothing("orientation", what, "rad", &bounds, &unseen(expected.peer, expected.at)),
                 Some(seen) => Outcome::number("orientation", what, "rad", &bounds, seen.angle_to(&expected.of)),
             });
         }
-        outcomes.extend(expect.loss.iter().map(|expected| loss(scene, expected, summary)));
-        outcomes.extend(expect.delay.iter().map(|expected| delay(scene, expected, summary)));
+        outcomes.extend(expect.loss.iter().map(|expected| reach.judge(loss(scene, expected, summary))));
+        outcomes.extend(expect.delay.iter().map(|expected| reach.judge(delay(scene, expected, summary))));
         let values = measures.as_ref().map(|measures| measures.values(summary.duration)).unwrap_or_default();
         outcomes.extend(expect.measures.iter().zip(values).map(|(expected, measured)| {
             let (what, unit) = (expected.name.text(scene), expected.name.measure.unit());
-            match measured.value {
+            reach.judge(match measured.value {
                 None => Outcome::nothing("measures", what, unit, &expected.bounds, "no value"),
                 Some(value) => Outcome::number("measures", what, unit, &expected.bounds, value),
-            }
+            })
         }));
         outcomes
+    }
+}
+
+/// How far a run came: a run that ended because its numbers overflowed proves nothing about later instants, nor about the whole scene.
+struct Reach {
+    /// The first instant at which a number was not finite; `None` if the run came to its end.
+    overflow: Option<Instant>,
+    /// The end of the scene.
+    end: Instant,
+}
+
+impl Reach {
+    fn of(scene: &Scene, summary: &Summary) -> Self {
+        let overflow = match summary.ending {
+            Ending::Diverged(at) => Some(at),
+            Ending::Complete | Ending::Interrupted(_) => None,
+        };
+        Self { overflow, end: Instant::ZERO.saturating_add(scene.duration) }
+    }
+
+    /// Returns why the run says nothing about an instant; `None` if the run reached the instant.
+    fn why_not(&self, at: Instant) -> Option<String> {
+        // The state at the instant of the overflow is not finite, so that instant was not reached either.
+        let overflow = self.overflow.filter(|overflow| *overflow <= at)?;
+        Some(if overflow < at { format!("the run diverged at {overflow}, before {at}") } else { format!("the run diverged at {overflow}") })
+    }
+
+    /// What is said of a distance that no copy travelled.
+    fn not_reached(&self) -> String {
+        self.overflow.map_or_else(|| "not reached".to_owned(), |at| format!("not reached before the run diverged at {at}"))
+    }
+
+    /// Fails the outcome of a figure over the whole scene if the run did not come to its end.
+    fn judge(&self, outcome: Outcome) -> Outcome {
+        match self.why_not(self.end) {
+            None => outcome,
+            Some(why) => Outcome { passed: false, found: format!("{}, but {why}", outcome.found), ..outcome },
+        }
+    }
+
+    /// Like [`judge`](Self::judge) for the largest value over the scene: a lower bound that a part of the scene reaches holds for the whole scene too.
+    fn judge_largest(&self, outcome: Outcome) -> Outcome {
+        if outcome.high.is_none() && outcome.measured >= outcome.low { Outcome { passed: true, ..outcome } } else { self.judge(outcome) }
     }
 }
 

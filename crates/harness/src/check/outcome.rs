@@ -37,10 +37,15 @@ impl Outcome {
         (!self.passed).then(line)
     }
 
-    /// A number within bounds. `found` says it in words where there is more to say than the number and its unit.
+    /// A number within bounds, or not: a number that is not finite never passes. `found` says the number in words.
     pub(super) fn number(key: &'static str, name: String, unit: &'static str, bounds: &Bounds, measured: f64) -> Self {
         let found = if unit.is_empty() { measured.to_string() } else { format!("{measured} {unit}") };
-        Self { measured: Some(measured), passed: bounds.contain(measured), found, ..Self::nothing(key, name, unit, bounds, "") }
+        Self {
+            measured: Some(measured),
+            passed: measured.is_finite() && bounds.contain(measured),
+            found,
+            ..Self::nothing(key, name, unit, bounds, "")
+        }
     }
 
     /// Nothing came out, because of this.

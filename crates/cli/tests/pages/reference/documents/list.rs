@@ -22,9 +22,9 @@ pub(super) const DOCUMENTS: [Document; 24] = [
         ],
         rows: &[
             ("title", "of the scene"),
-            ("duration_s", "how much was simulated: the scene's duration unless it diverged or was interrupted"),
+            ("duration_s", "how much was simulated: the scene's duration, unless numbers overflowed or the run was interrupted"),
             ("ticks", "of the peer that made the most"),
-            ("ending", "`complete`, `diverged` (a position or velocity is not finite any more) or `interrupted`"),
+            ("ending", "`complete`, `diverged` (a position or a velocity was not finite, or two copies were more than 1 m apart) or `interrupted`"),
             ("wall_s, realtime_factor", "the time the run took, and `duration_s` divided by it. Only these differ from run to run"),
             (
                 "peers[].name, peers[].position_m, peers[].velocity_m_s",
@@ -175,7 +175,7 @@ pub(super) const DOCUMENTS: [Document; 24] = [
             ("combinations[].runs", "how many runs there are"),
             (
                 "combinations[].diverged.count, combinations[].diverged.share, combinations[].diverged.low, combinations[].diverged.high",
-                "runs that diverged or had copies more than 1 m apart, with Wilson's interval of 95 %; `diverged` is `null` where nothing runs",
+                "runs that diverged, with Wilson's interval of 95 %; `diverged` is `null` where nothing runs",
             ),
             (
                 "combinations[].verdict, combinations[].judged, combinations[].radius",
