@@ -377,6 +377,29 @@ fn a_measure_of_what_does_not_exist_is_refused() {
     ]);
 }
 
+/// At 500 Hz and a tick of 1 ms all samples of a sine are zero, and at 998 Hz they are those of 2 Hz.
+#[test]
+fn a_sine_is_slower_than_half_the_rate_of_ticks() {
+    let hand = |frequency: &str| SCENE.replacen("[peer]", &format!("[peer]\nhand = {{ sine = {{ amplitude = 1, frequency = {frequency} }} }}"), 1);
+    assert!(parse(&hand("499.9"), &[]).is_ok());
+    for frequency in ["500", "998", "1000", "1500"] {
+        check(
+            &hand(frequency),
+            &format!(
+                "10:46: peer.hand.sine.frequency: {frequency} is too fast for a hand that is computed once a tick of 1ms: expected below 500 Hz"
+            ),
+        );
+    }
+    check(
+        &hand("300").replacen("[peer]", "[peer]\ntick = \"2ms\"", 1),
+        "11:46: peer.hand.sine.frequency: 300 is too fast for a hand that is computed once a tick of 2ms",
+    );
+    let arm = "hand = { arm = { mass = 0.3, damping = 10, stiffness = 100 }, follows = { sine = { amplitude = 0.1, frequency = 600 } } }";
+    check(&SCENE.replacen("[peer]", &format!("[peer]\n{arm}"), 1), "peer.hand.follows.sine.frequency: 600 is too fast");
+    let change = "[[timeline]]\nat = \"1s\"\npeer = \"left\"\nset = { hand = { sine = { amplitude = 1, frequency = 700 } } }\n";
+    check(&format!("{SCENE}{change}"), "timeline.0.set.hand.sine.frequency: 700 is too fast");
+}
+
 #[test]
 fn a_probe_pushes_with_one_sine_all_the_time() {
     let scene = |frequency: &str, more: &str| {

@@ -314,8 +314,10 @@ static FORCE_SINE: Table = Table::of(&[
     &[optional("torque", vector(TORQUE), "Amplitude of a torque that sways with it")],
 ]);
 static MOTION_SINE: Table = Table::of(&[&[required("amplitude", vector(POSITION), "Amplitude")], &SINE]);
-const SINE: [Key; 2] =
-    [required("frequency", number(FREQUENCY), "Frequency"), usual("phase", number(ANGLE), "0", "Phase at the beginning of the scene")];
+const SINE: [Key; 2] = [
+    required("frequency", number(FREQUENCY), "Frequency, below half the rate of ticks"),
+    usual("phase", number(ANGLE), "0", "Phase at the beginning of the scene"),
+];
 static ARM: Table = Table::of(&[&[
     required("mass", number(ADDED_MASS), "Mass that the arm adds to the device"),
     required("damping", number(DAMPING), "Damping of the arm"),

@@ -1,10 +1,13 @@
 //! What a hand does: `hand` of a peer.
 
+use std::time::Duration;
+
 use cohaptic_linkfile::document::{Node, quote};
 use cohaptic_linkfile::reading::values::{Quantity, ReadNumber as _};
 use cohaptic_linkfile::reading::{Context, TableReader, only_one};
 use cohaptic_peer::{ArmConfig, Hand, Signal};
 use cohaptic_units::Hertz;
+use cohaptic_units::print::Span;
 
 use super::motion_file::{Columns, read_motion_file};
 use crate::context::SceneContext;
@@ -53,6 +56,25 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
         }
     };
     Some(Some(Hand::Force(signal)))
+}
+
+/// Refuses a sine that the ticks of its peer cannot show, and returns whether the hand has none. A hand is computed once a tick, so that at half the rate of ticks
+/// and above its values are those of a slower sine, or all zero (Shannon 1949).
+pub(crate) fn hand_is_sampled(hand: Option<&Hand>, tick: Duration, node: &Node, context: Context<'_>) -> bool {
+    let (signal, path): (&Signal, &[&str]) = match hand {
+        Some(Hand::Force(signal)) => (signal, &["sine", "frequency"]),
+        Some(Hand::Arm { follows, .. }) => (follows, &["follows", "sine", "frequency"]),
+        None => return true,
+    };
+    let Signal::Sine { frequency: Hertz(frequency), .. } = signal else { return true };
+    let least_refused = 0.5 / tick.as_secs_f64();
+    let is_sampled = *frequency < least_refused;
+    if !is_sampled {
+        let within = path.iter().try_fold(node, |node, key| node.as_table()?.get(key).map(|entry| &*entry.node));
+        let message = format!("{frequency} is too fast for a hand that is computed once a tick of {}: expected below {least_refused} Hz", Span(tick));
+        context.fault_at(within.unwrap_or(node), message);
+    }
+    is_sampled
 }
 
 fn read_arm(node: &Node, context: Context<'_>) -> Option<ArmConfig> {

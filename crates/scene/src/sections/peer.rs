@@ -12,7 +12,7 @@ use cohaptic_peer::{Clock, Contact, DeviceConfig, Direction, Drift, Gains, Hand}
 use cohaptic_units::print::Span;
 use cohaptic_wan::LinkModel;
 
-use super::hand::read_hand;
+use super::hand::{hand_is_sampled, read_hand};
 use super::header::read_scaling;
 use super::kind::{FALCON_DEVICE, STILL_DEVICE, read_kind};
 use super::object::{read_position, read_velocity};
@@ -85,6 +85,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
     if table.get("coupling").is_none() && needs_coupling {
         table.miss("coupling", COUPLING);
     }
+    let hand_node = table.get("hand");
     let hand = table.optional("hand", None, |node, _| read_hand(node, context));
     let torque = table.get("hand").map_or(Some(None), |node| read_hand_torque(node, context));
     let clock = table.optional("clock", (Duration::ZERO, Drift::default()), read_clock);
@@ -109,6 +110,11 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
             context.fault_at(node, format!("{phase} is out of range: expected a number of ticks below coordination.update / tick, which is {frame}"));
             return None;
         }
+    }
+    if let (Some(Some(hand)), Some(tick), Some(node)) = (&hand, tick, hand_node)
+        && !hand_is_sampled(Some(hand), tick, node, *context)
+    {
+        return None;
     }
     let (offset, drift) = clock?;
     let (device, coupling) = (device?, coupling?);

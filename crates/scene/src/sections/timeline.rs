@@ -12,7 +12,7 @@ use cohaptic_peer::rotation::Triple;
 use cohaptic_peer::{Contact, Gains, Hand, SendWhen, Signal};
 use cohaptic_units::Instant;
 
-use super::hand::read_hand;
+use super::hand::{hand_is_sampled, read_hand};
 use super::header::{ParameterChange, read_parameter_changes, read_send_when};
 use super::peer::read_contact;
 use super::rotation::{read_hand_torque, read_rotational_damping, read_rotational_stiffness};
@@ -68,7 +68,10 @@ pub(crate) fn read_timeline(
             PlannedKind::Peer { peer, contact, hand, torque } => {
                 let spec = peers?.get(peer)?;
                 complete &= contact.is_none_or(|(contact, node)| contact_is_possible(spec, contact, node, *context));
-                complete &= hand.as_ref().is_none_or(|(hand, node)| hand_is_possible(spec, hand.as_ref(), node, *context));
+                complete &= hand.as_ref().is_none_or(|(hand, node)| {
+                    let hand = hand.as_ref();
+                    hand_is_possible(spec, hand, node, *context) && hand_is_sampled(hand, spec.clock.tick, node, *context)
+                });
                 changes.extend(contact.map(|(contact, _)| Change { at, what: ChangeKind::Contact { peer, contact } }));
                 if let Some((hand, _)) = hand {
                     changes.push(Change { at, what: ChangeKind::Hand { peer, hand } });
