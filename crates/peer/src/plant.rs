@@ -53,18 +53,46 @@ pub struct StepMap<C = f64> {
     force: [C; 2],
 }
 
+/// Largest angle of an oscillation within a step, in radians, that an exact map carries: at this angle 64 roundings times the angle are 2·10⁻⁷.
+const MOST_ANGLE: f64 = 16_777_216.0;
+
 impl Plant {
-    /// The map of a step of that length.
+    /// Returns the map of a step of that length.
+    ///
+    /// Coefficients of an exact map are NaN where nothing is left of their digits: each doubling of the exponential doubles the relative error of an
+    /// oscillation, so a body that turns by more than 2²⁴ rad within the step, and is not at rest by its end, has no map. Without this rule the doubling
+    /// would end at one of its fixed points, and the body would stop.
     #[must_use]
     pub fn step(&self, span: Duration, integrator: Integrator) -> StepMap {
         let h = span.as_secs_f64();
         let increment = match integrator {
+            Integrator::Exact if self.is_lost(h) => [[f64::NAN; 3]; 3],
             Integrator::Exact => exponential_increment(self.augmented(h)),
             Integrator::SemiImplicitEuler { steps } => repeated(self.semi_implicit_euler(h / f64::from(steps)), steps),
             Integrator::RungeKutta4 { steps } => repeated(taylor(self.augmented(h / f64::from(steps)), 4), steps),
         };
         let [[e00, e01, g0], [e10, e11, g1], _] = increment;
         StepMap { state: [[e00, e01], [e10, e11]], force: [g0, g1] }
+    }
+
+    /// Returns by how much the rounding of an exact map exceeds that of a short step: 1 + b·h/m + h·√(k/m). The relative error of a coefficient is at most
+    /// 64 roundings times this factor, compared with the larger of the coefficient and its size in units of h and m.
+    #[must_use]
+    pub fn rounding_factor(&self, span: Duration) -> f64 {
+        let h = span.as_secs_f64();
+        1.0 + self.damping / self.mass * h + self.angle(h)
+    }
+
+    /// h·√(k/m): the angle by which the body turns in a step, without its damping.
+    fn angle(&self, h: f64) -> f64 {
+        h * libm::sqrt(self.stiffness / self.mass)
+    }
+
+    /// Returns whether an oscillation is left at the end of the step and rounding has destroyed its phase.
+    fn is_lost(&self, h: f64) -> bool {
+        let (decay, angle) = (self.damping / self.mass * h, self.angle(h));
+        // Beyond critical damping nothing oscillates, and each doubling halves the error again.
+        decay < 2.0 * angle && angle * libm::exp(-0.5 * decay) > MOST_ANGLE
     }
 
     /// [A B; 0 0]·h.
@@ -228,6 +256,20 @@ mod tests {
         map.advance(&mut body, 3.0);
         close(body.position, 1.0 + 2.0e-3 + 3.0 / 0.15 * 0.5e-6, 1e-15);
         close(body.velocity, 2.0 + 3.0 / 0.15 * 1e-3, 1e-15);
+    }
+
+    /// The doubling of the exponential falls to rest at angles of 10¹⁹ rad, without a warning: there is no map where the phase is lost.
+    #[test]
+    fn an_oscillation_whose_phase_is_lost_has_no_map() {
+        let map = |damping: f64, stiffness: f64| Plant { mass: 0.1, damping, stiffness }.step(TICK, Integrator::Exact);
+        let is_lost = |map: StepMap| map.coefficients().0.as_flattened().iter().all(|coefficient| coefficient.is_nan());
+        let most = (MOST_ANGLE / 1e-3).powi(2) * 0.1;
+        assert!(!is_lost(map(0.0, 0.999 * most)) && is_lost(map(0.0, 1.001 * most)) && is_lost(map(0.0, 1e45)));
+        // e^(−50) of an oscillation does not matter, and beyond critical damping nothing oscillates.
+        assert!(!is_lost(map(1e4, 1.001 * most)) && !is_lost(map(1e45, 1e45)));
+        let rest = map(1e4, 1.001 * most).coefficients().0;
+        close(rest[0][0], -1.0, 1e-15);
+        close(rest[1][1], -1.0, 1e-15);
     }
 
     /// An undamped spring: x(h) = cos(ωh), v(h) = −ω·sin(ωh) from (1, 0), up to thirty turns in one step.

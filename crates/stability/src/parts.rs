@@ -192,9 +192,7 @@ pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -
 /// The spectral radius of one step of a body: of its velocity alone if nothing ties it to ground.
 fn step_radius(map: &StepMap, plant: &Plant, span: Duration) -> Radius {
     let ([[e00, e01], [e10, e11]], _) = map.coefficients();
-    let h = span.as_secs_f64();
-    // Squaring the exponential of a step doubles its relative error for each factor of two that the step is longer than the body's own time.
-    let rounding = 32.0 * f64::EPSILON * (1.0 + plant.damping / plant.mass * h + h * (plant.stiffness / plant.mass).sqrt());
+    let rounding = 32.0 * f64::EPSILON * plant.rounding_factor(span);
     if map.is_free() {
         return Radius { value: (1.0 + e11).abs(), error: 2.0 * f64::EPSILON + rounding * e11.abs() };
     }

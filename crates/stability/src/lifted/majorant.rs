@@ -182,8 +182,8 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
 }
 
 fn advance(body: &Body, [x, v]: &mut [Size; 2], force: Size, time: f64, span: std::time::Duration) {
-    let (e, g) = body.map(span).coefficients();
-    let position = x.plus(e[0][0], *x).plus(e[0][1] / time, *v).plus(g[0], force).rounded(TICK);
-    let velocity = v.plus(e[1][0] * time, *x).plus(e[1][1], *v).plus(g[1] * time, force).rounded(TICK);
+    let (e, g, factor) = body.sizes(span);
+    let position = x.plus(e[0][0], *x).plus(e[0][1] / time, *v).plus(g[0], force).rounded(TICK * factor);
+    let velocity = v.plus(e[1][0] * time, *x).plus(e[1][1], *v).plus(g[1] * time, force).rounded(TICK * factor);
     (*x, *v) = (position, velocity);
 }

@@ -16,18 +16,42 @@ use crate::linear_form::{LawRow, LinearLaw};
 pub(crate) struct Body {
     short: (Duration, StepMap),
     long: StepMap,
+    /// Rounding of the coefficients, where it is more than a tick's own operations round.
+    coarse: Option<Coarse>,
+}
+
+/// Rounding of step maps over which a body decays or turns by more than 1.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Coarse {
+    /// Multiple of the rounding of a tick's own operations.
+    factor: f64,
+    /// Least sizes of the coefficients that the rounding is relative to: a sine or a cosine near zero is not more exact than one near 1.
+    least: ([[f64; 2]; 2], [f64; 2]),
+}
+
+impl Coarse {
+    /// Returns the rounding of the exact maps of a body over spans of up to `span`; `None` where a tick's own operations round more.
+    fn of(plant: &Plant, span: Duration) -> Option<Self> {
+        let (factor, h) = (plant.rounding_factor(span) - 1.0, span.as_secs_f64());
+        let omega = (plant.stiffness / plant.mass).sqrt();
+        let least = || ([[1.0, h], [omega, 1.0]], [h * h / plant.mass, h / plant.mass]);
+        // Of a free body only the velocity decays: its coefficients keep their relative accuracy.
+        (factor > 1.0 && plant.stiffness > 0.0).then(|| Self { factor, least: least() })
+    }
 }
 
 impl Body {
     pub(crate) fn new(plant: Plant, integrator: Integrator, clock: &Clock) -> Self {
-        Self::from_steps(clock, |span| plant.step(span, integrator))
+        let (_, long) = clock.spans();
+        let coarse = if integrator == Integrator::Exact { Coarse::of(&plant, long) } else { None };
+        Self { coarse, ..Self::from_steps(clock, |span| plant.step(span, integrator)) }
     }
 
     /// From the step over each span.
     pub(crate) fn from_steps(clock: &Clock, step: impl Fn(Duration) -> StepMap) -> Self {
         let (short, long) = clock.spans();
         let first = step(short);
-        Self { short: (short, first), long: if long == short { first } else { step(long) } }
+        Self { short: (short, first), long: if long == short { first } else { step(long) }, coarse: None }
     }
 
     /// The step map, if all spans between ticks are equal.
@@ -37,11 +61,23 @@ impl Body {
 
     /// With another step map over every span.
     pub(crate) fn with_map(&self, map: StepMap) -> Self {
-        Self { short: (self.short.0, map), long: map }
+        Self { short: (self.short.0, map), long: map, ..*self }
     }
 
     pub(crate) fn map(&self, span: Duration) -> &StepMap {
         if span == self.short.0 { &self.short.1 } else { &self.long }
+    }
+
+    /// Returns the sizes of the coefficients over a span that rounding is relative to, in the order of [`StepMap::coefficients`], and the rounding in
+    /// multiples of that of a tick's own operations: 1 unless the body decays or turns by more than 1 within the span.
+    pub(crate) fn sizes(&self, span: Duration) -> ([[f64; 2]; 2], [f64; 2], f64) {
+        let map = self.map(span).map(|coefficient| coefficient.abs());
+        let (e, g) = map.coefficients();
+        let Some(Coarse { factor, least }) = self.coarse else { return (e, g, 1.0) };
+        // NaN stays: f64::max would drop it.
+        let larger = |one: f64, other: f64| if one < other { other } else { one };
+        let rows = std::array::from_fn(|row| std::array::from_fn(|column| larger(e[row][column], least.0[row][column])));
+        (rows, std::array::from_fn(|row| larger(g[row], least.1[row])), factor)
     }
 
     /// The step map for velocities multiplied by `time` \[s\]; its forces stay in newtons.
@@ -196,10 +232,10 @@ impl Node {
         };
         let on_object = 2.0 * if self.device.is_some() { gain(self.coupling) } else { 0.0 } + coordination + wall;
         let row = |body: &Body, force: f64| {
-            let (e, g) = body.short.1.coefficients();
-            let position = 1.0 + e[0][0].abs() + e[0][1].abs() / scale.time + g[0].abs() * force;
-            let velocity = 1.0 + (e[1][0] * scale.time).abs() + e[1][1].abs() + g[1].abs() * scale.time * force;
-            position.max(velocity)
+            let (e, g, factor) = body.sizes(body.short.0);
+            let position = 1.0 + e[0][0] + e[0][1] / scale.time + g[0] * force;
+            let velocity = 1.0 + e[1][0] * scale.time + e[1][1] + g[1] * scale.time * force;
+            factor * position.max(velocity)
         };
         let device = self.device.as_ref().map_or(0.0, |body| row(body, 2.0 * gain(self.coupling)));
         let memory = |(place, row): (usize, &LawRow)| (seen(row) + remembered(row)) * self.memory_unit(place, scale);

@@ -78,6 +78,35 @@ fn the_determinant_finds_the_same() {
     }
 }
 
+/// Numbers between 10⁻³⁰⁰ and 10³⁰⁰, alone and in pairs: a bound holds, or there is none.
+#[test]
+fn no_number_is_so_absurd_that_a_bound_or_a_verdict_is_wrong() {
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/absurd.json")).unwrap();
+    let cases = cases_of(&serde_json::from_str::<Vec<Value>>(&text).unwrap());
+    assert_eq!(cases.len(), 400);
+    let mut answered = 0;
+    for case in &cases {
+        for method in [Method::Reduced, Method::Determinant, Method::Full] {
+            let analysis = analyse(&case.scene, method).unwrap();
+            let (name, radius, truth) = (&case.name, analysis.radius, case.radius);
+            let (low, high) = radius.bounds();
+            let slack = f64::EPSILON * truth;
+            // A radius above the range of doubles is infinite here too.
+            if radius.value.is_finite() {
+                assert!(low <= truth + slack && truth - slack <= high, "{name} by {method:?}: {radius:?}, but it is {truth:e}");
+            }
+            match analysis.verdict() {
+                Verdict::Stable => assert!(truth < 1.0, "{name} by {method:?}: {radius:?} is stable, but it is {truth:e}"),
+                Verdict::Unstable => assert!(truth > 1.0, "{name} by {method:?}: {radius:?} is unstable, but it is {truth:e}"),
+                Verdict::Marginal | Verdict::Overflow => continue,
+            }
+            answered += 1;
+        }
+    }
+    // Most of the scenes have a verdict: a program that always answers "overflow" would pass everything above.
+    assert!(answered > 3 * cases.len() / 2, "{answered} verdicts of {}", 3 * cases.len());
+}
+
 /// 10⁻¹⁰ on either side of 1 is told apart; what is 1, or nearer than 10⁻¹⁷, is not.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]

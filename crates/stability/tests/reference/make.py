@@ -1,4 +1,4 @@
-"""Makes radii.json, mean_square.json, admittance.json, random.json, laws.json and verdicts.json, or those named on the command line. See README.md."""
+"""Makes radii.json, mean_square.json, admittance.json, random.json, laws.json, absurd.json and verdicts.json, or those named on the command line. See README.md."""
 
 import json
 import sys
@@ -6,6 +6,7 @@ import time
 from multiprocessing import Pool
 from pathlib import Path
 
+import absurd
 import admittance
 import cases
 import laws
@@ -54,7 +55,7 @@ def write(name, entries):
 
 
 def main():
-    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance", "random", "laws", "verdicts"]
+    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance", "random", "laws", "absurd", "verdicts"]
     with Pool() as pool:
         if "radii" in wanted:
             write("radii.json", radii(pool))
@@ -66,6 +67,8 @@ def main():
             write("random.json", random_scenes.entries(pool))
         if "laws" in wanted:
             write("laws.json", laws.entries(pool))
+        if "absurd" in wanted:
+            write("absurd.json", absurd.entries(pool))
         if "verdicts" in wanted:
             (HERE / "verdicts.json").write_text(json.dumps(verdicts.entries(pool)) + "\n")
 
