@@ -34,7 +34,12 @@ pub(super) fn for_each_frame(from: impl Read + Send, mut each: impl FnMut(Frame<
     let mut header: Option<PcapHeader> = None;
     let mut capacity = BUFFER;
     let mut stalled = None;
+    // The byte order of the section of a pcapng file.
+    let mut is_big_endian = None;
     loop {
+        if is_big_endian.is_some_and(|is_big_endian| is_too_short(reader.data(), is_big_endian)) {
+            return Err(CaptureProblem::Malformed);
+        }
         match reader.next() {
             Ok((length, block)) => {
                 stalled = None;
@@ -46,7 +51,12 @@ pub(super) fn for_each_frame(from: impl Read + Send, mut each: impl FnMut(Frame<
                         let nanos = i128::from(frame.ts_sec) * 1_000_000_000 + i128::from(frame.ts_usec) * to_nanos;
                         each(Frame { nanos, link_type: header.network, data: frame.data });
                     }
-                    PcapBlockOwned::NG(block) => ng_block(&block, &mut interfaces, &mut each)?,
+                    PcapBlockOwned::NG(block) => {
+                        if let Block::SectionHeader(header) = &block {
+                            is_big_endian = Some(header.big_endian());
+                        }
+                        ng_block(&block, &mut interfaces, &mut each)?;
+                    }
                 }
                 reader.consume(length);
             }
@@ -69,6 +79,17 @@ pub(super) fn for_each_frame(from: impl Read + Send, mut each: impl FnMut(Frame<
             Err(error) => return Err(problem(&error).unwrap_or(CaptureProblem::Malformed)),
         }
     }
+}
+
+/// Whether the block at the beginning of the data says that it is shorter than its type and its two lengths.
+///
+/// The parser subtracts these 12 bytes without looking where a block tells of a process: with checks of overflow that ends the program.
+fn is_too_short(data: &[u8], is_big_endian: bool) -> bool {
+    const SECTION_HEADER: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
+    let Some((kind, rest)) = data.split_first_chunk::<4>() else { return false };
+    let Some(length) = rest.first_chunk().copied() else { return false };
+    // The next section may have the other byte order, and its header is looked at by the parser.
+    *kind != SECTION_HEADER && (if is_big_endian { u32::from_be_bytes(length) } else { u32::from_le_bytes(length) }) < 12
 }
 
 fn ng_block(block: &Block<'_>, interfaces: &mut Vec<Interface>, each: &mut impl FnMut(Frame<'_>)) -> Result<(), CaptureProblem> {

@@ -122,6 +122,26 @@ fn what_is_no_capture_is_refused() {
     assert!(matches!(refused(&capture(&[])), CaptureError::NoDatagrams { end: End::Sender, frames: 0, port: None }));
 }
 
+/// A block of a process (0x80000001, as macOS writes it) with lengths that no block has, in both byte orders.
+#[test]
+fn a_block_that_is_shorter_than_its_lengths_is_refused() {
+    let section = |word: fn(u32) -> [u8; 4], length: u32| {
+        let words = [0x0A0D_0D0A, 28, 0x1A2B_3C4D, 0, u32::MAX, u32::MAX, 28, 0x8000_0001, length, 0, length];
+        // The version is two halves, of which the parser takes any.
+        words.map(word).concat()
+    };
+    for length in 0..12 {
+        for file in [section(u32::to_le_bytes, length), section(u32::to_be_bytes, length)] {
+            let error = datagrams(End::Sender, file.as_slice(), None).unwrap_err();
+            assert_eq!(error, CaptureError::Unreadable { end: End::Sender, frames: 0, problem: CaptureProblem::Malformed }, "{length}");
+        }
+    }
+    // The shortest block, and one that has a process and nothing else.
+    assert!(
+        datagrams(End::Sender, section(u32::to_le_bytes, 16).as_slice(), None).is_err_and(|error| matches!(error, CaptureError::NoDatagrams { .. }))
+    );
+}
+
 #[test]
 fn a_frame_larger_than_the_buffer_is_read() {
     let large = vec![7; 65_507];
