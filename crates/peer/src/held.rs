@@ -25,6 +25,8 @@ pub struct Held<const A: usize> {
     motions: Option<Motions<A>>,
     /// The senders, if they are not all others with equal weights.
     heard: Option<Box<Heard>>,
+    /// Places of the senders from which the last number of all has come. [`HeldSample::next`] cannot say that nothing is newer.
+    ended: Vec<usize>,
 }
 
 /// Senders that are some of the others, or differ in weight.
@@ -73,7 +75,7 @@ impl<const A: usize> Held<A> {
     pub fn new(initial: impl IntoIterator<Item = State<A>>) -> Self {
         let samples: Vec<_> = initial.into_iter().map(|state| HeldSample { state, next: 0 }).collect();
         let sums = (samples.len() >= EXACT_FROM).then(|| Box::new(ExactMeans::new(samples.iter().map(|sample| &sample.state))));
-        let mut held = Self { samples, mean: State::REST, sums, motions: None, heard: None };
+        let mut held = Self { samples, mean: State::REST, sums, motions: None, heard: None, ended: Vec::new() };
         held.refresh();
         held
     }
@@ -171,16 +173,25 @@ impl<const A: usize> Held<A> {
     /// If there is no sender in that place.
     #[inline]
     pub fn accept(&mut self, place: usize, sequence: u64, sent: Instant, state: State<A>) -> bool {
-        let newer = sequence >= self.samples[place].next;
+        let newer = sequence >= self.samples[place].next && (sequence < u64::MAX || self.take_last(place));
         if newer {
             let state = self.weighed(place, state);
-            // A sequence number of 2^64 − 1 is the last there can be: nothing is newer.
             self.replace(place, HeldSample { state, next: sequence.saturating_add(1) });
             if let Some(motions) = &mut self.motions {
                 motions.set(place, Moving { sent, velocity: state.velocity });
             }
         }
         newer
+    }
+
+    /// Whether a sample with the number 2^64 − 1 is the first one from that sender: nothing is newer.
+    #[cold]
+    fn take_last(&mut self, place: usize) -> bool {
+        let is_first = !self.ended.contains(&place);
+        if is_first {
+            self.ended.push(place);
+        }
+        is_first
     }
 
     /// Holds that state, sampled at `sent` on the sender's clock, from that sender, as if nothing had ever arrived from it: any sample is newer.
@@ -190,6 +201,7 @@ impl<const A: usize> Held<A> {
     /// If there is no sender in that place.
     pub fn hold(&mut self, place: usize, sent: Instant, state: State<A>) {
         let state = self.weighed(place, state);
+        self.ended.retain(|ended| *ended != place);
         self.replace(place, HeldSample { state, next: 0 });
         if let Some(motions) = &mut self.motions {
             motions.set(place, Moving { sent, velocity: state.velocity });
@@ -293,6 +305,11 @@ mod tests {
         let mut held = Held::new([at(0.0)]);
         assert!(held.accept(0, u64::MAX - 1, Instant::ZERO, at(1.0)));
         assert!(held.accept(0, u64::MAX, Instant::ZERO, at(2.0)));
+        assert!(!held.accept(0, u64::MAX, Instant::ZERO, at(3.0)), "the same number twice");
+        assert_eq!(held.state(0), Some(&at(2.0)));
+        // As if nothing had ever arrived.
+        held.hold(0, Instant::ZERO, at(0.0));
+        assert!(held.accept(0, u64::MAX, Instant::ZERO, at(4.0)) && !held.accept(0, u64::MAX, Instant::ZERO, at(5.0)));
     }
 
     /// Ages 30 ms and, beyond the horizon, 33 ms: (0.030·(−1) + 0.033·(−2))/2; none below zero.
