@@ -61,7 +61,7 @@ fn one(words: &mut Words<'_>, listed: &BTreeSet<String>) -> bool {
 }
 
 /// Workspaces of this project whose tests decide about a change or run at night: the folder, from the folder of the project.
-const WORKSPACES: [&str; 2] = ["", "tests/programs"];
+const WORKSPACES: [&str; 3] = ["", "tests/programs", "fuzz"];
 
 /// All features, because `cargo metadata` leaves out packages that only a feature needs which is off.
 #[test]
@@ -87,15 +87,17 @@ fn locked(workspace: &str) -> BTreeSet<(String, String)> {
     file.split("[[package]]").filter_map(of_others).collect()
 }
 
-/// The programs of others run with the versions that the test kit is built from, unless the project itself does not have the package.
+/// The programs of others and the fuzz targets run with the versions that the project is built from, unless the project itself does not have the package.
 #[test]
-fn the_tests_of_programs_lock_the_versions_of_the_project() {
+fn other_workspaces_lock_the_versions_of_the_project() {
     let project = locked("");
-    let programs = locked("tests/programs");
     let is_of_project = |name: &str| project.iter().any(|package| package.0 == name);
-    let other: Vec<_> = programs.difference(&project).filter(|(name, _)| is_of_project(name)).collect();
-    let hint = "`cargo update PACKAGE --precise VERSION` in tests/programs brings its Cargo.lock up to date";
-    assert!(programs.len() > 100 && other.is_empty(), "not in Cargo.lock of the project: {other:?}; {hint}");
+    for workspace in WORKSPACES.into_iter().filter(|workspace| !workspace.is_empty()) {
+        let own = locked(workspace);
+        let other: Vec<_> = own.difference(&project).filter(|(name, _)| is_of_project(name)).collect();
+        let hint = format!("`cargo update PACKAGE --precise VERSION` in {workspace} brings its Cargo.lock up to date");
+        assert!(own.len() > 100 && other.is_empty(), "not in Cargo.lock of the project: {other:?}; {hint}");
+    }
 }
 
 /// An advisory that is passed over names its package and says why, and is gone when the package is.

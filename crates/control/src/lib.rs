@@ -39,6 +39,8 @@
 //! ```
 
 mod board;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod http;
 mod metrics;
 mod server;

@@ -45,6 +45,8 @@
 //! ```
 
 mod engine;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod packet;
 mod rules;
 mod run;

@@ -13,6 +13,7 @@ use hyper::server::conn::http1::Builder;
 use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 
 use super::patient::Patient;
@@ -53,6 +54,11 @@ async fn answer_within(listener: TcpListener, router: Router, limits: Limits, pa
 async fn answer(stream: TcpStream, router: Router, seat: Arc<Seat>, patience: Duration) {
     // Events are small and should not wait for one another.
     let _set: io::Result<()> = stream.set_nodelay(true);
+    converse(stream, router, seat, patience).await;
+}
+
+/// Answers what comes over a stream, until it ends.
+async fn converse(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router, seat: Arc<Seat>, patience: Duration) {
     let routes = TowerToHyperService::new(router);
     let shown = Arc::clone(&seat);
     let service = service_fn(move |mut request: Request<Incoming>| {
@@ -65,6 +71,13 @@ async fn answer(stream: TcpStream, router: Router, seat: Arc<Seat>, patience: Du
     let serving = builder.serve_connection(TokioIo::new(Patient::new(stream, patience)), service).with_upgrades();
     // Whichever way it ends, nobody is left to be told: the program at the other end has gone, spoke no HTTP, or was too slow.
     select(pin!(serving), pin!(seat.sent_away())).await;
+}
+
+/// Answers what comes over a stream from this machine that has the only place.
+#[cfg(fuzzing)]
+pub(crate) async fn answer_bytes(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router) {
+    let seat = Places::new(Limits::USUAL).take(std::net::Ipv4Addr::LOCALHOST.into());
+    converse(stream, router, seat, PATIENCE).await;
 }
 
 #[cfg(test)]

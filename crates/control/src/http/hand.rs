@@ -101,6 +101,11 @@ impl Drop for Taken {
     }
 }
 
+/// What a page may send at most.
+fn limits() -> WebSocketConfig {
+    WebSocketConfig::default().max_message_size(Some(LONGEST)).max_frame_size(Some(LONGEST)).read_buffer_size(READ_AT_ONCE)
+}
+
 /// `seat` is the place of the connection, which is taken for as long as this goes on.
 async fn talk(stage: Arc<dyn Stage>, hand: Result<Option<usize>, String>, upgrade: OnUpgrade, seat: Option<Arc<Seat>>) {
     let greeting = match &hand {
@@ -109,9 +114,8 @@ async fn talk(stage: Arc<dyn Stage>, hand: Result<Option<usize>, String>, upgrad
     };
     let taken = hand.ok().flatten().map(|hand| Taken { stage: Arc::clone(&stage), hand });
     let Ok(upgraded) = upgrade.await else { return };
-    let config = WebSocketConfig::default().max_message_size(Some(LONGEST)).max_frame_size(Some(LONGEST)).read_buffer_size(READ_AT_ONCE);
     let stream = Counted::new(TokioIo::new(upgraded));
-    let socket: WebSocketStream<Counted<TokioIo<Upgraded>>> = WebSocketStream::from_raw_socket(stream, End::Server, Some(config)).await;
+    let socket: WebSocketStream<Counted<TokioIo<Upgraded>>> = WebSocketStream::from_raw_socket(stream, End::Server, Some(limits())).await;
     let (mut out, incoming) = socket.split();
     if send(&mut out, greeting.to_string()).await {
         // Whichever ends first ends the other.
@@ -135,6 +139,13 @@ async fn listen(taken: &Option<Taken>, mut incoming: impl Incoming<Item = Result
             return;
         }
     }
+}
+
+/// Moves a hand by the bytes of a page, until they end or say something that no page says.
+#[cfg(fuzzing)]
+pub(crate) async fn hear(stage: Arc<dyn Stage>, hand: usize, stream: impl tokio::io::AsyncRead + tokio::io::AsyncWrite + Unpin) {
+    let (_, incoming) = WebSocketStream::from_raw_socket(Counted::new(stream), End::Server, Some(limits())).await.split();
+    listen(&Some(Taken { stage, hand }), incoming).await;
 }
 
 /// Shows each new picture of the motion until the page takes no more.

@@ -5,7 +5,7 @@ mod change;
 mod connection;
 mod frames;
 mod guard;
-mod hand;
+pub(crate) mod hand;
 mod pace;
 mod page;
 mod patient;
@@ -30,6 +30,8 @@ use tokio::sync::{Mutex, OwnedMutexGuard, Semaphore};
 use crate::ticket::Ticket;
 use crate::{Board, LinkEditor, Stage, Token};
 
+#[cfg(fuzzing)]
+pub(crate) use connection::answer_bytes;
 pub(crate) use connection::{PATIENCE, answer_all};
 pub(crate) use pace::Pace;
 pub(crate) use shown::Shown;
