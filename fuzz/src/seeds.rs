@@ -30,14 +30,6 @@ fn every_seed_passes() {
     }
 }
 
-/// `COHAPTIC_FUZZ_INPUT=FILE cargo test --lib -- one_input --nocapture` repeats a crash of the target `COHAPTIC_FUZZ_TARGET`.
-#[test]
-fn one_input() {
-    let (Ok(target), Ok(input)) = (std::env::var("COHAPTIC_FUZZ_TARGET"), std::env::var("COHAPTIC_FUZZ_INPUT")) else { return };
-    let (_, run) = TARGETS.into_iter().find(|(name, _)| *name == target).unwrap_or_else(|| panic!("there is no target {target}"));
-    run(&fs::read(&input).unwrap_or_else(|error| panic!("{input}: {error}")));
-}
-
 #[test]
 fn every_target_has_a_program() {
     let named: Vec<String> = files(&folder().join("targets")).iter().map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
