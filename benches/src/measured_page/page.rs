@@ -60,6 +60,7 @@ const ALONE: [(&str, &str, &str); 8] = [
     ),
     ("measured-build.md", "how long a first build and the tests take", "benches/build-times > docs/measured-build.md"),
     ("measured-first.md", "how long a new user waits for the first result, with and without Rust", "benches/first-result > docs/measured-first.md"),
+    ("measured-fuzz.md", "how often each fuzz target was run, and how much of the code it reached", "fuzz/run --runs 10000000 --page"),
 ];
 
 #[derive(Clone, PartialEq, Debug, Default)]

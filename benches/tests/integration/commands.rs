@@ -9,6 +9,7 @@
 //! | of `benches/realtime` | not run here: they wait by the wall clock, for an hour even. Package, program and arguments are looked up |
 //! | the ignored test of `crates/cli/tests/cluster` | not run here: it takes minutes, and schedulers. Its text is known |
 //! | `benches/first-result` | not run here: it compiles the project several times, and downloads. Its rows are looked up |
+//! | `fuzz/run` | not run here: `.ci/nightly` runs it. Its targets are looked up |
 //! | of `benches/peers` | not run here: a workspace of its own with the crates of others, which CI does not build. Folder, programs and scripts are looked up |
 
 use std::process::Command;
@@ -34,6 +35,8 @@ enum Kind {
     Elsewhere(&'static str, Vec<String>),
     /// A script that measures how long users wait, for a first result or for a build.
     Waiting,
+    /// The script that runs the fuzz targets.
+    Fuzz,
     /// An ignored test of the command line, which is where the program and schedulers can be had.
     IgnoredTest,
 }
@@ -45,6 +48,9 @@ fn kind(command: &str) -> Option<Kind> {
     }
     if ["benches/first-result > docs/measured-first.md", "benches/build-times > docs/measured-build.md"].contains(&command) {
         return Some(Kind::Waiting);
+    }
+    if command == "fuzz/run --runs 10000000 --page" {
+        return Some(Kind::Fuzz);
     }
     if command.starts_with("cohaptic ") {
         return Some(Kind::Cohaptic);
@@ -143,7 +149,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
                 // That the script starts this program is tested in script.rs.
                 Kind::Script => program == "measured-page",
                 Kind::Elsewhere(of, others) => *of == folder && others.contains(&program),
-                Kind::Cohaptic | Kind::Accuracy | Kind::Waiting | Kind::IgnoredTest => false,
+                Kind::Cohaptic | Kind::Accuracy | Kind::Waiting | Kind::Fuzz | Kind::IgnoredTest => false,
             });
             assert!(found, "{program} of {name} is on no page");
         }
@@ -152,7 +158,7 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
         let (folder, used) = match kind {
             Kind::Table { program, .. } => ("benches", std::slice::from_ref(program)),
             Kind::Elsewhere(folder, used) => (*folder, &used[..]),
-            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Waiting | Kind::IgnoredTest => continue,
+            Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Waiting | Kind::Fuzz | Kind::IgnoredTest => continue,
         };
         assert!(used.iter().all(|program| programs(folder).contains(program)), "{command}");
     }
@@ -176,6 +182,17 @@ fn the_rows_of_first_result_are_those_of_its_page() {
     }
 }
 
+/// The page has a row for each target, and no other.
+#[test]
+fn the_rows_of_the_fuzz_targets_are_those_of_their_folder() {
+    let manifest = std::fs::read_to_string(root().join("fuzz/Cargo.toml")).unwrap();
+    let targets: Vec<&str> = manifest.split("[[bin]]\nname = \"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    let page = std::fs::read_to_string(root().join("docs/measured-fuzz.md")).unwrap();
+    let rows: Vec<&str> =
+        page.lines().filter_map(|line| line.strip_prefix("| ")?.split(" |").next()).filter(|name| !["target", "---"].contains(name)).collect();
+    assert!(targets.len() > 10 && rows == targets, "{rows:?} {targets:?}");
+}
+
 #[test]
 fn what_is_not_a_command_of_ours_is_not_known() {
     for command in [
@@ -186,6 +203,7 @@ fn what_is_not_a_command_of_ours_is_not_known() {
         "cargo run --profile dist -p cohaptic-benches-realtime --bin soak -- 2h --out docs/measured-soak.md",
         "benches/first-result programmer > docs/measured-first.md",
         "cargo run --profile dist -p cohaptic-accuracy -- --json --out elsewhere",
+        "fuzz/run --page",
         "rm -r docs",
     ] {
         assert_eq!(kind(command), None, "{command}");
@@ -197,7 +215,14 @@ pub(crate) fn prints_its_page(path: &str, program: &str) {
     let all = all();
     let of_program = all.iter().find_map(|(_, _, kind)| match kind {
         Kind::Table { program: of, page, .. } if of == program => Some(page.clone()),
-        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Accuracy | Kind::Elsewhere(..) | Kind::Waiting | Kind::IgnoredTest => None,
+        Kind::Table { .. }
+        | Kind::Script
+        | Kind::Cohaptic
+        | Kind::Accuracy
+        | Kind::Elsewhere(..)
+        | Kind::Waiting
+        | Kind::Fuzz
+        | Kind::IgnoredTest => None,
     });
     let page = of_program.unwrap_or_else(|| panic!("{program} is on no page"));
     let output = Command::new(path).arg("--smoke").output().unwrap();

@@ -30,6 +30,7 @@ const PAGES: [&str; 15] = [
     "measured-soak.md",
     "measured-build.md",
     "measured-first.md",
+    "measured-fuzz.md",
 ];
 
 /// Name and text of each.

@@ -196,7 +196,7 @@ mod tests {
         ("jitter", "{ sd = \"2ms\", distribution = { empirical = \"/etc/shadow\" } }", "/etc/shadow"),
         ("slots", "{ delay = \"9ms\", jitter = { sd = \"2ms\", distribution = { empirical = \"slots.csv\" } } }", "desk/slots.csv"),
         ("netem", "\"delay 20ms 5ms distribution /etc/law\"", "/etc/law.dist"),
-        ("netem", "\"delay 20ms slot distribution 2ms 1ms law\"", "desk/law.dist"),
+        ("netem", "\"delay 20ms slot distribution law 2ms 1ms\"", "desk/law.dist"),
         ("modulated", "{ by = \"cell\", bad = { trace = \"bad.trace\" } }", "desk/bad.trace"),
         ("modulated", "{ by = \"cell\", bad = { jitter = { sd = \"1ms\", distribution = { table = \"bad.dist\" } } } }", "desk/bad.dist"),
     ];
