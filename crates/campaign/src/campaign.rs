@@ -389,7 +389,7 @@ pub trait Watch: Sync {
     /// This number of runs was done since the last call.
     fn ran(&self, _runs: u64) {}
 
-    /// A file that a campaign goes on from is not as it was written. `fault`: what is wrong with it and what is computed again, in words.
+    /// A file that a campaign goes on from is not as it was written. `fault`: the difference, and the work that is done again, in words.
     fn damaged(&self, _file: &Path, _fault: &str) {}
 
     /// A part was put away, which has this number of runs.

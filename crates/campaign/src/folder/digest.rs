@@ -38,7 +38,7 @@ pub(crate) struct Label<'a> {
     pub(crate) campaign: &'a str,
 }
 
-/// What is wrong with a part, in words.
+/// The difference between a part and the part that was written, in words.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Fault(pub(crate) String);
 

@@ -133,12 +133,13 @@ fn a_search_ends_after_the_values_that_it_may_look_at_and_says_so() {
 #[test]
 fn a_search_that_is_ended_says_what_it_has_found() {
     let desk = Desk::with("paper.toml", PAPER);
-    let line = "stability boundary paper.toml --along link.delay=1ms..40ms --samples 100000 --tolerance 0.0001";
+    // A delay is read anew for each value: a million of them take far longer than a second on any machine.
+    let line = "stability boundary paper.toml --along link.delay=1ms..40ms --samples 1000000 --values 1000000 --tolerance 0.0001";
     let (error, child) = crate::integration::stability_point::running(&desk, line, "note: ");
     let outcome = crate::integration::stability_point::ended(child);
     let said = std::fs::read_to_string(error).unwrap();
     assert_eq!(outcome.status, Some(130), "{said}");
-    assert!(said.contains("the search ends after 100000 at the latest") && said.contains("looked at: nothing is kept"), "{said}");
+    assert!(said.contains("the search ends after 1000000 at the latest") && said.contains("looked at: nothing is kept"), "{said}");
     assert!(outcome.stdout.contains("stable") && outcome.stdout.contains("NOT SETTLED: it was ended before"), "{}", outcome.stdout);
 }
 

@@ -75,7 +75,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     if is_interrupted {
         let ended = interrupted(&found, rows, &known, kept);
         if found.samples > 0 {
-            // What is known so far says that it is not settled.
+            // The crossings found so far are an answer, which says that it is not settled.
             say(&order, arguments, &found, &[])?;
         }
         return Err(ended);
@@ -163,7 +163,8 @@ fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic
             let words = estimate(all * OPERATIONS_A_SECOND);
             let _ = writeln!(
                 std::io::stderr(),
-                "note: {} looked at in {:.0} s: the search ends after {most} at the latest, {words} in all; --values sets another limit, and what is found is said at Ctrl-C",
+                "note: {} looked at in {:.0} s: the search ends after {most} at the latest, {words} in all; --values sets another limit, and Ctrl-C ends the \
+                 search with the crossings found by then",
                 Counted(count, "value"),
                 passed.as_secs_f64()
             );
