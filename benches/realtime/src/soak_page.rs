@@ -30,10 +30,10 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         }
     })?;
     let command = arguments.join(" ");
-    let every = every.unwrap_or(Duration::from_secs(if is_flooded { 1 } else { 60 }));
+    let every = every.unwrap_or_else(|| Duration::from_secs(if is_flooded { 1 } else { 60 }));
     let judgements = if is_flooded {
         let plan = FloodedPlan { duration, every, program: flooded::program_beside_this_one()?, rate: RATE, priority: true };
-        let outcome = flooded::run(&plan, &interrupted, |row| print(row))?;
+        let outcome = flooded::run(&plan, &interrupted, print)?;
         let judgements = flooded::judge(&outcome);
         let lines: Vec<String> = verdicts(&judgements).collect();
         let command = format!("{BUILD} && {RUN} -- {command}");
@@ -43,7 +43,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     } else {
         println!("{HEADER}");
         let plan = SoakPlan::new(duration, every);
-        let outcome = run(&plan, &interrupted, |row| print(row))?;
+        let outcome = run(&plan, &interrupted, print)?;
         let judgements = judge(&outcome);
         let page = page(&plan, &outcome, &judgements, &command)?;
         out.map_or(Ok(()), |file| write(&file, |_, section| if section.is_empty() { page } else { format!("{page}\n{section}") }))?;

@@ -59,7 +59,7 @@ fn is_of_processes(folder: &Path) -> bool {
     fs::canonicalize(folder).is_ok_and(|folder| folder.starts_with("/proc"))
 }
 
-/// Standard output or standard error, if a file is what one of them goes to. Opened anew the file would be written from its beginning, over what is printed.
+/// Standard output or standard error, if a file is what one of them goes to. Opened anew the file would be written from its beginning, over the printed text.
 #[cfg(unix)]
 fn standard_stream(about: &Metadata) -> Option<File> {
     use std::os::fd::AsFd as _;
@@ -74,7 +74,7 @@ fn standard_stream(_: &Metadata) -> Option<File> {
     None
 }
 
-/// Opens what is no regular file. A socket is connected to: it cannot be opened.
+/// Opens a device or a pipe, and connects to a socket, which cannot be opened.
 #[cfg(unix)]
 fn open_stream(path: &Path, about: &Metadata) -> io::Result<File> {
     use std::os::{fd::OwnedFd, unix::fs::FileTypeExt as _, unix::net::UnixStream};

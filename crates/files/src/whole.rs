@@ -25,7 +25,7 @@ pub struct WholeFile {
 enum Place {
     /// Into a new file, which takes the name of the target.
     Beside { partial: PathBuf, target: PathBuf },
-    /// Into what is there.
+    /// Into the device, the pipe, the socket or the open file that has the name.
     Within,
 }
 

@@ -395,9 +395,9 @@ fn a_sine_is_slower_than_half_the_rate_of_ticks() {
         "11:46: peer.hand.sine.frequency: 300 is too fast for a hand that is computed once a tick of 2ms",
     );
     let arm = "hand = { arm = { mass = 0.3, damping = 10, stiffness = 100 }, follows = { sine = { amplitude = 0.1, frequency = 600 } } }";
-    check(&SCENE.replacen("[peer]", &format!("[peer]\n{arm}"), 1), "peer.hand.follows.sine.frequency: 600 is too fast");
+    check(&SCENE.replacen("[peer]", &format!("[peer]\n{arm}"), 1), "10:113: peer.hand.follows.sine.frequency: 600 is too fast");
     let change = "[[timeline]]\nat = \"1s\"\npeer = \"left\"\nset = { hand = { sine = { amplitude = 1, frequency = 700 } } }\n";
-    check(&format!("{SCENE}{change}"), "timeline.0.set.hand.sine.frequency: 700 is too fast");
+    check(&format!("{SCENE}{change}"), "21:54: timeline.0.set.hand.sine.frequency: 700 is too fast");
 }
 
 #[test]

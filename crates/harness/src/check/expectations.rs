@@ -199,7 +199,7 @@ impl Reach {
         Some(if overflow < at { format!("the run diverged at {overflow}, before {at}") } else { format!("the run diverged at {overflow}") })
     }
 
-    /// What is said of a distance that no copy travelled.
+    /// Returns the words for a distance that no copy travelled.
     fn not_reached(&self) -> String {
         self.overflow.map_or_else(|| "not reached".to_owned(), |at| format!("not reached before the run diverged at {at}"))
     }

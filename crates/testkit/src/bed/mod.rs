@@ -190,7 +190,7 @@ impl Testbed {
     }
 
     /// How many bytes the run may hold that were sent and neither read nor lost, on links, in buffers of sockets and in streams of TCP; a gibibyte if it is not
-    /// said. Each packet counts with 200 bytes beside those that it carries, for its places in queues. A run that comes to hold more fails, and names the host, the
+    /// said. Each packet counts 200 bytes more than its content, for its places in queues. A run that comes to hold more fails, and names the host, the
     /// socket and the task that sent last: a loop that only sends would take all memory otherwise. `u64::MAX` is no limit.
     pub const fn byte_limit(mut self, bytes: u64) -> Self {
         self.settings.byte_limit = bytes;

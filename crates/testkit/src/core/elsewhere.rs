@@ -1,4 +1,4 @@
-//! Who may use what belongs to a run: its own thread while it goes on, and anybody once it has ended, to drop it.
+//! Access to the state of a run: by the thread of the run while the run goes on, and by any thread after its end, to drop values of the run.
 //!
 //! A socket that another thread uses would act at an instant that depends on the machine. Its thread would also have to wait until the thread of the run has time, for ever if a
 //! task waits for that other thread. So such a use is an error at once, and the run fails with the same words.
@@ -26,7 +26,7 @@ struct Left {
     acts: Vec<Act>,
 }
 
-/// What is to be done with the state.
+/// An act on the state.
 type Act = Box<dyn FnOnce(&mut Core) + Send>;
 
 impl Elsewhere {

@@ -54,7 +54,7 @@ pub(crate) struct Shared {
     returned: Condvar,
     /// What other threads have left for the thread of the run.
     pub(super) elsewhere: Elsewhere,
-    /// The run is over: whoever has something of it may have the state, to let it go.
+    /// The run is over: a value of the run, such as a socket, may lock the state from any thread to be let go.
     has_ended: AtomicBool,
     names: Arc<Names>,
     /// Which run it is of.

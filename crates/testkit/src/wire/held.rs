@@ -35,7 +35,7 @@ impl Held {
         Self { links: 0, buffers: 0, streams: 0, limit }
     }
 
-    /// What a packet counts that carries so many bytes.
+    /// Returns the bytes that a packet with a content of `len` bytes counts.
     #[inline(always)]
     pub(crate) const fn cost(len: usize) -> u64 {
         len as u64 + PACKET_COST
@@ -73,21 +73,21 @@ impl Held {
         self.total() > self.limit
     }
 
-    /// Fails the run, which holds [too much](Held::is_too_much): `who` has sent last.
+    /// Fails the run, which holds [too much](Held::is_too_much): `sender` has sent last.
     ///
     /// # Panics
     ///
     /// Unless this thread panics already: a value that is dropped while it unwinds may send again.
     #[cold]
     #[inline(never)]
-    #[expect(clippy::panic, reason = "the run would take all memory; says who sends, and the way out")]
-    pub(crate) fn fail(&self, who: impl fmt::Display) {
+    #[expect(clippy::panic, reason = "the run would take all memory; names the sender, and the way out")]
+    pub(crate) fn fail(&self, sender: impl fmt::Display) {
         if std::thread::panicking() {
             return;
         }
         panic!(
-            "too many bytes are on their way: {who} has sent, and the test bed now holds {} bytes that were sent and neither read nor lost, where its limit is {}: {} on \
-             links, {} in buffers of sockets, {} in streams, with {PACKET_COST} for each packet beside what it carries. Let the sender wait, for an answer or by \
+            "too many bytes are on their way: {sender} has sent, and the test bed now holds {} bytes that were sent and neither read nor lost, where its limit is {}: {} on \
+             links, {} in buffers of sockets, {} in streams, where each packet counts {PACKET_COST} more than its content. Let the sender wait, for an answer or by \
              `sleep(..).await`, and let receivers read; `byte_limit` of the test bed sets another limit",
             self.total(),
             self.limit,
