@@ -83,8 +83,13 @@ impl Line {
 
     /// How long a packet waits for its turn that finds that much work: the times on the line are rounded up to nanoseconds each, their bits are not.
     fn turn(self, work: u64) -> Duration {
-        let Some(inside) = work.div_ceil(self.service().max(1)).checked_sub(1) else { return Duration::ZERO };
-        let since = (inside + 1) * self.service() - work;
+        let service = self.service();
+        // A packet without a time on the line leaves no work behind, so nothing waits for it.
+        if service == 0 || work == 0 {
+            return Duration::ZERO;
+        }
+        let inside = work.div_ceil(service) - 1;
+        let since = (inside + 1) * service - work;
         let first = self.bits.saturating_sub(self.rate.bits_sent(Duration::from_nanos(since)));
         self.rate.transmission_time(first + u128::from(inside) * self.bits)
     }
@@ -126,6 +131,20 @@ mod tests {
         }
         pass(&mut stage, Instant::MAX, &mut fates);
         fates
+    }
+
+    /// A limit of no time and packets of no bits: the line is free at once, and nothing is dropped.
+    #[test]
+    fn packets_of_no_bits_never_wait() {
+        let rate = Rate::bits_per_sec(8_000_000).unwrap();
+        let limit = Some(QueueLimit::Time(Duration::ZERO));
+        let bottleneck = Bottleneck { service: Service::Rate(rate), framing: Framing::default(), limit, discipline: Discipline::TailDrop };
+        let queue = EqualPackets::new(&bottleneck, Bytes::new(0)).unwrap();
+        let mut departure = Instant::ZERO;
+        let offered = [Instant::ZERO; 3];
+        let fates: Vec<Option<Instant>> = offered.iter().map(|now| queue.offer(*now, &mut departure)).collect();
+        assert_eq!(fates, [Some(Instant::ZERO); 3]);
+        assert_eq!(fates, by_stage(&bottleneck, Bytes::new(0), &offered));
     }
 
     proptest! {
