@@ -27,7 +27,7 @@ const NOT_YET: &str = "Not measured yet:";
 const OTHERS: &str = "## Written by other commands";
 
 /// Pages that need a quiet machine or privileges: what they say, and what writes them.
-const ALONE: [(&str, &str, &str); 8] = [
+const ALONE: [(&str, &str, &str); 9] = [
     (
         "measured-relay.md",
         "how late the relay and how fast",

@@ -39,8 +39,7 @@ impl Summary {
     /// Returns whether the run diverged: a position or a velocity was not finite, or two copies were more than [`DIVERGED_DISTANCE`] apart along an axis.
     #[must_use]
     pub fn has_diverged(&self) -> bool {
-        // A discrepancy that is no number compares as false, and counts as diverged.
-        matches!(self.ending, Ending::Diverged(_)) || !(self.max_discrepancy <= DIVERGED_DISTANCE)
+        matches!(self.ending, Ending::Diverged(_)) || self.max_discrepancy.is_nan() || self.max_discrepancy > DIVERGED_DISTANCE
     }
 
     /// Returns one word for how the run ended: `interrupted`, or `diverged` if the run [has diverged](Self::has_diverged), or `complete`.
