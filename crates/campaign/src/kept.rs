@@ -69,7 +69,7 @@ impl Campaign {
         }
     }
 
-    /// Puts a part away, and then its digest: alone, or as a worker of that name among others, which leaves a part alone that another worker has put away.
+    /// Puts a part away with its digest: alone, or as a worker of that name among others, which leaves a part alone that another worker has put away.
     pub(crate) fn keep(&self, worker: Option<&str>, part: u64, rows: &[Row]) -> Result<(), CampaignError> {
         let path = self.folder.part(part, self.plan.format());
         // All workers make the same bytes.
@@ -77,20 +77,14 @@ impl Campaign {
             return Ok(());
         }
         let about = self.manifest.text();
-        let mut hashed = None;
         let write = |file: &mut WholeFile| {
             // The bytes are hashed on their way to the disk, not read back from it.
             let mut to = HashingWriter::new(file);
             self.plan.format().write(&mut to, self.head(&about), rows)?;
-            hashed = Some(to.finish());
-            Ok(())
+            // The digest has its name before the part has: a process that is killed in between leaves no part without a digest.
+            write_digest(self.label(part), &path, to.finish(), |path, text| whole_by(worker, path, |file| Ok(file.write_all(text)?)))
         };
-        whole_by(worker, &path, write).map_err(|error| unwritten(&path, error))?;
-        let Some(hashed) = hashed else { return Ok(()) };
-        write_digest(self.label(part), &path, hashed, |path, text| {
-            let written = whole_by(worker, path, |file| Ok(file.write_all(text)?));
-            written.map_err(|error| unwritten(path, error))
-        })
+        whole_by(worker, &path, write).map_err(|error| unwritten(&path, error))
     }
 
     /// Puts the parts together, each checked once more right before its bytes are copied.

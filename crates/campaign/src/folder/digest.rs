@@ -5,7 +5,7 @@
 //! 9b74…  part-00000.parquet
 //! ```
 //!
-//! `sha256sum --check part-*.sha256` checks the same. The digest gets its name after its part: a part without a digest is not known to be whole, and is computed again.
+//! `sha256sum --check part-*.sha256` checks the same. The digest gets its name before its part. A part without a digest, as earlier versions of the program wrote it, is computed again.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, Write};
@@ -130,7 +130,7 @@ impl<W: Write> Write for HashingWriter<W> {
     }
 }
 
-/// Writes the digest of a part that is written: of these bytes and this hash. `write_whole` writes a file of that name.
+/// Writes the digest of a part of this number of bytes and this hash. `write_whole` writes a file of that name.
 pub(crate) fn write<E>(
     label: Label<'_>,
     path: &Path,

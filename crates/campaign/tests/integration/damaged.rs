@@ -112,7 +112,7 @@ fn a_part_under_the_name_of_another_and_a_shorter_one_are_computed_again() {
             kept.assert_mended(|folder| fs::write(folder.join(&second), &bytes[..length]).unwrap(), 1, what);
         }
         kept.assert_mended(|folder| fs::write(folder.join(&second), [bytes.as_slice(), b"\n"].concat()).unwrap(), 1, "a byte more");
-        // As a program left it that knew no digests, or a kill between a part and its digest.
+        // As a program left it that knew no digests.
         let fault = kept.assert_mended(|folder| fs::remove_file(folder.join(digest(&second))).unwrap(), 1, "no digest");
         assert!(fault.contains("it has no digest"), "{fault}");
     }
