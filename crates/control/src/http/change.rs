@@ -10,6 +10,7 @@ use axum::response::Response;
 use serde_json::{Map, Value, json};
 
 use super::App;
+use super::apart::apart;
 use super::read::{named, with_keys};
 use super::{Refusal, body as bodies, json as answer};
 use crate::typed;
@@ -39,7 +40,7 @@ pub(super) async fn all(State(app): State<Arc<App>>, body: Body) -> Result<Respo
 /// On a thread of its own, because keys may name files: others are answered meanwhile.
 async fn change(app: &App, links: Vec<usize>, keys: Vec<(String, String)>) -> Result<(), Refusal> {
     let mut editor = app.editor().await;
-    let changed = tokio::task::spawn_blocking(move || editor.change(&links, &keys)).await;
+    let changed = apart(move || editor.change(&links, &keys)).await;
     changed.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the change broke off"))?.map_err(unprocessable)
 }
 

@@ -1,5 +1,6 @@
 //! The routes and their answers.
 
+mod apart;
 mod body;
 mod change;
 mod connection;

@@ -10,6 +10,7 @@ use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 use serde_json::Value;
 
+use super::apart::apart;
 use super::{App, Refusal, body as bodies, hand, json as answer, page};
 use crate::{Role, Stage};
 
@@ -42,7 +43,7 @@ async fn begin_anew(State(app): State<Arc<App>>, body: Body) -> Result<Response,
     let wish: Value = serde_json::from_slice(&body).map_err(|error| unprocessable(format!("expected a JSON object: {error}")))?;
     let stage = stage(&app)?;
     // The scene is read anew, and the files that it names.
-    let begun = tokio::task::spawn_blocking(move || stage.begin_anew(&wish).map(|()| stage.facts(Role::Host))).await;
+    let begun = apart(move || stage.begin_anew(&wish).map(|()| stage.facts(Role::Host))).await;
     let begun = begun.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the new part broke off"))?;
     Ok(answer(&begun.map_err(unprocessable)?))
 }
@@ -51,7 +52,7 @@ async fn begin_anew(State(app): State<Arc<App>>, body: Body) -> Result<Response,
 async fn compare(State(app): State<Arc<App>>) -> Result<Response, Refusal> {
     let stage = stage(&app)?;
     let _one = app.comparing.try_acquire().map_err(|_| Refusal::new(StatusCode::CONFLICT, "a comparison is running: wait for its result"))?;
-    let compared = tokio::task::spawn_blocking(move || stage.compare()).await;
+    let compared = apart(move || stage.compare()).await;
     let compared = compared.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the comparison broke off"))?;
     Ok(answer(&compared.map_err(|reason| Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, reason))?))
 }
@@ -62,7 +63,7 @@ async fn file(State(app): State<Arc<App>>, axum::Extension(role): axum::Extensio
         return Err(Refusal::new(StatusCode::FORBIDDEN, "only the person who started the run may have its record: this token is that of a guest"));
     }
     let stage = stage(&app)?;
-    let read = tokio::task::spawn_blocking(move || stage.file(&name)).await;
+    let read = apart(move || stage.file(&name)).await;
     let Ok(Some(file)) = read else { return Err(Refusal::new(StatusCode::NOT_FOUND, "there is no such file: compare first")) };
     let headers =
         [(header::CONTENT_TYPE, HeaderValue::from_static(file.kind)), (header::CONTENT_DISPOSITION, HeaderValue::from_static("attachment"))];
