@@ -40,7 +40,7 @@ const ALONE: [(&str, &str, &str); 9] = [
     ),
     (
         "measured-floods.md",
-        "how long a host waits for its page while strangers and guests flood the server",
+        "how long a host waits for its page while strangers and guests flood the server, and which peers come in while hellos and noise flood a session",
         "cargo run --profile dist -p cohaptic-benches-realtime --bin floods-table > docs/measured-floods.md",
     ),
     (

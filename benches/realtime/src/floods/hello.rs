@@ -164,8 +164,8 @@ pub fn section(honest: u32) -> Result<String, Box<dyn Error>> {
     writeln!(
         text,
         "A session with two simulated peers, one that is in from the beginning, and a free place. The flood goes to the port of the session. Its hellos ask for the\n\
-         free place, at which {honest} honest peers knock one after another, each for at most {} s. *Longest* is the time from the first hello of a peer to the\n\
-         first sample of another peer that it hears, of which the link takes 24 ms. *In before* are samples of the peer that is in, which the session took, of\n\
+         free place, at which {honest} honest peers knock one after another, each for at most {} s. *Longest* is the longest time from the first hello of a peer to the\n\
+         first sample of another peer that it hears. *In before* are samples of the peer that is in, which the session took, of\n\
          its datagrams, hellos included. *Processor* is the share of one core that the session's thread used.\n",
         PATIENCE.as_secs()
     )?;

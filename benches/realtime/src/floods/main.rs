@@ -22,7 +22,7 @@ const HONEST: u32 = 20;
 fn main() -> Result<(), Box<dyn Error>> {
     let seconds = std::env::args().nth(1).map_or(Ok(5), |text| text.parse())?;
     println!("# Floods\n");
-    println!("Sessions under more requests than they can answer, from strangers and from guests. This page is written by\n");
+    println!("Servers and sessions under more requests and datagrams than anybody honest sends. This page is written by\n");
     println!("    cargo run --profile dist -p cohaptic-benches-realtime --bin floods-table > docs/measured-floods.md\n");
     println!("and measured on: {}. All rows run one after the other in one process, with", machine::name());
     println!("the flood in it, on the same cores; a row of requests takes {seconds} s.\n");
@@ -31,6 +31,6 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// A row ends when the last honest peer has come in, or has given up.
 fn hellos(_row: Duration) -> Result<(), Box<dyn Error>> {
-    print!("\n{}", hello_floods::section(HONEST)?);
+    print!("{}", hello_floods::section(HONEST)?);
     Ok(())
 }

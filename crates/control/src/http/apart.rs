@@ -18,7 +18,6 @@ pub(super) async fn apart<T: Send + 'static>(work: impl FnOnce() -> T + Send + '
 ///
 /// None: a panic of the work is one of the target.
 #[cfg(fuzzing)]
-#[expect(clippy::unused_async, reason = "the same as without fuzzing")]
 pub(super) async fn apart<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, JoinError> {
     Ok(work())
 }
