@@ -14,7 +14,7 @@ fn root() -> PathBuf {
 }
 
 /// The pages whose every command is looked at.
-const PAGES: [&str; 15] = [
+const PAGES: [&str; 16] = [
     "measured.md",
     "measured-speed.md",
     "measured-cluster.md",
