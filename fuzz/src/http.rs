@@ -25,7 +25,7 @@ impl LinkEditor for Editor {
         assert!(!links.is_empty() && !keys.is_empty() && links.iter().all(|link| *link < LINKS));
         for (key, value) in keys {
             assert!(!key.is_empty() && key.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_'), "{key:?}");
-            // One value and nothing behind it that would be another key.
+            // The text is a single value, without a second key after it.
             let table: toml::Table = toml::from_str(&format!("{key} = {value}")).unwrap_or_else(|error| panic!("{value:?}: {error}"));
             assert!(table.len() == 1 && table.contains_key(key), "{key} = {value}");
         }

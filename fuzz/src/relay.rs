@@ -61,7 +61,7 @@ fn config(input: &mut Input<'_>) -> (RelayConfig, bool) {
     (RelayConfig { seed: 5, form, limits, changes }, is_undamaged)
 }
 
-/// What the datagrams in flight are compared with.
+/// Model that the datagrams in flight are compared with.
 struct World {
     engine: Engine,
     is_undamaged: bool,

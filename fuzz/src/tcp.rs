@@ -25,7 +25,7 @@ fn octets(from: i64, length: usize) -> Vec<u8> {
     [&vec![0; before], &pattern[start..start + length - before]].concat()
 }
 
-/// One end, the program on it, and the segments that it has sent.
+/// An end of the connection, the program on it, and the segments that the end has sent.
 struct Side {
     end: Connection,
     /// The number of the first octet of its stream.

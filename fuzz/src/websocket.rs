@@ -10,7 +10,7 @@ use crate::Input;
 
 const HAND: usize = 3;
 
-/// What the hand was told.
+/// Calls that the hand received.
 #[derive(Default)]
 struct Told {
     moves: Vec<Option<[f64; 3]>>,

@@ -9,7 +9,7 @@ use std::path::Path;
 ///
 /// # Errors
 ///
-/// What the system says; [`ErrorKind::InvalidInput`] for a link or a device. No process begins such a file, and the file that a link leads to would be cut off.
+/// The error of the system; [`ErrorKind::InvalidInput`] for a link or a device. No process begins such a file, and the file that a link leads to would be cut off.
 pub fn open_continued(path: &Path, whole: u64) -> io::Result<File> {
     if fs::symlink_metadata(path).is_ok_and(|about| !about.is_file()) {
         return Err(io::Error::new(ErrorKind::InvalidInput, "it is no regular file: expected one, or none"));

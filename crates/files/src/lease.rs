@@ -151,7 +151,7 @@ impl Lease {
     ///
     /// # Errors
     ///
-    /// What the system says.
+    /// The error of the system.
     pub fn take(path: &Path, owner: &Owner) -> io::Result<Taking> {
         loop {
             if let Some(lease) = Self::make(path, owner)? {
@@ -191,7 +191,7 @@ impl Lease {
     ///
     /// # Errors
     ///
-    /// What the system says.
+    /// The error of the system.
     pub fn renew(&mut self) -> io::Result<bool> {
         if !self.is_mine()? {
             return Ok(false);
@@ -259,7 +259,7 @@ fn take_away(path: &Path, owner: &Owner, stale: &Holder) -> io::Result<()> {
 ///
 /// # Errors
 ///
-/// What the system says.
+/// The error of the system.
 pub fn leases(folder: &Path, reader: &Owner, is_lease: impl Fn(&str) -> bool) -> io::Result<Vec<(String, Holder)>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder)? {

@@ -77,7 +77,7 @@ pub fn open(path: &Path, most: u64) -> io::Result<File> {
 ///
 /// # Errors
 ///
-/// What the system says; and [`io::ErrorKind::FileTooLarge`] beyond [`MOST_BYTES`].
+/// The error of the system; and [`io::ErrorKind::FileTooLarge`] beyond [`MOST_BYTES`].
 pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     read_bytes_up_to(path, MOST_BYTES)
 }
@@ -86,7 +86,7 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 ///
-/// What the system says; and [`io::ErrorKind::FileTooLarge`] beyond the limit.
+/// The error of the system; and [`io::ErrorKind::FileTooLarge`] beyond the limit.
 pub fn read_bytes_up_to(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let mut from = LimitedFile::open(path, most)?;
     let mut bytes = Vec::new();
@@ -125,7 +125,7 @@ impl LimitedFile {
     ///
     /// # Errors
     ///
-    /// What the system says; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer.
+    /// The error of the system; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer.
     pub fn open(path: &Path, most: u64) -> io::Result<Self> {
         Self::of(File::open(path)?, most)
     }
@@ -143,7 +143,7 @@ impl LimitedFile {
     ///
     /// # Errors
     ///
-    /// What the system says; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer, or if more was read.
+    /// The error of the system; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer, or if more was read.
     pub fn limited_to(self, most: u64) -> io::Result<Self> {
         let about = self.file.metadata()?;
         let read = self.most - self.left;

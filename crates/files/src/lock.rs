@@ -23,7 +23,7 @@ impl Lock {
     ///
     /// # Errors
     ///
-    /// What the system says, also that its file system has no locks.
+    /// The error of the system, also that its file system has no locks.
     pub fn take(path: &Path) -> io::Result<Option<Self>> {
         Ok(locked(path)?.map(|file| Self { path: path.to_path_buf(), file: Some(file) }))
     }

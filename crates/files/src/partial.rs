@@ -22,7 +22,7 @@ pub(crate) fn create(beside: &Path) -> io::Result<(File, PathBuf)> {
         let path = name(beside, number);
         match File::options().read(true).write(true).create_new(true).open(&path) {
             Ok(file) if lock::hold(&file, &path)? => return Ok((file, path)),
-            // Another process took the new file for one that was left, before it was locked, and removes it: the name is free again.
+            // Before the new file was locked, another process took it for a left one and removed it: the name is free again.
             Ok(_) => {}
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
                 if lock::remove_left(&path) {

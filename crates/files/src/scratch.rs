@@ -30,7 +30,7 @@ impl ScratchFile {
     ///
     /// # Errors
     ///
-    /// What the system says.
+    /// The error of the system.
     pub fn create(beside: &Path, what: &str) -> io::Result<Self> {
         let mut path = beside.as_os_str().to_owned();
         path.push(format!(".{what}"));

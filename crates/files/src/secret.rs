@@ -10,7 +10,7 @@ use std::io;
 ///
 /// # Errors
 ///
-/// What the system says when it is asked for the permissions.
+/// The error of the system when it is asked for the permissions.
 #[cfg(unix)]
 pub fn open_to_others(file: &File) -> io::Result<Option<u32>> {
     use std::os::unix::fs::PermissionsExt as _;

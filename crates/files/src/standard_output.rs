@@ -6,7 +6,7 @@ use std::io::{self, Write as _};
 ///
 /// # Errors
 ///
-/// What the system says, also of a standard output that is open for reading alone. The standard library takes one for a place that swallows everything.
+/// The error of the system, also of a standard output that is open for reading alone. The standard library takes one for a place that swallows everything.
 #[cfg(unix)]
 pub fn print(bytes: &[u8]) -> io::Result<()> {
     use std::os::fd::AsFd as _;
@@ -20,7 +20,7 @@ pub fn print(bytes: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 ///
-/// What the system says.
+/// The error of the system.
 #[cfg(not(unix))]
 pub fn print(bytes: &[u8]) -> io::Result<()> {
     let mut out = io::stdout().lock();

@@ -21,7 +21,7 @@ impl Target {
     ///
     /// # Errors
     ///
-    /// What the system says; [`ErrorKind::IsADirectory`] for a folder.
+    /// The error of the system; [`ErrorKind::IsADirectory`] for a folder.
     pub(crate) fn of(path: &Path) -> io::Result<Self> {
         match fs::metadata(path) {
             Ok(about) if about.is_dir() => Err(ErrorKind::IsADirectory.into()),

@@ -34,7 +34,7 @@ impl WholeFile {
     ///
     /// # Errors
     ///
-    /// What the system says of the name, and of the file beside it.
+    /// The error of the system about the name, or about the file beside it.
     pub fn create(path: impl Into<PathBuf>) -> io::Result<Self> {
         Self::begin(path.into(), "")
     }
@@ -80,7 +80,7 @@ impl WholeFile {
     ///
     /// # Errors
     ///
-    /// What the system says. The file stays under the other name.
+    /// The error of the system. The file stays under the other name.
     pub fn finish(mut self) -> io::Result<()> {
         self.give_name()
     }
@@ -106,7 +106,7 @@ impl WholeFile {
     /// Removes the beginning of a file that could not be written.
     fn abandon(self) {
         if let Place::Beside { partial, .. } = &self.place {
-            // That it could not be written is the error to report, not that its beginning is still there.
+            // The error to report is the failure to write, not a beginning that stays.
             let _ = fs::remove_file(partial);
         }
     }

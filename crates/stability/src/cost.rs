@@ -12,7 +12,7 @@ pub const MOST_MEMORY: u64 = 8 << 30;
 /// How many matrices of its size the eigenvalues of a part take at once, with the enclosure of their errors; measured, of 759 and of 1509 states.
 const MATRICES: f64 = 16.0;
 
-/// What a part of a scene costs, told before it is begun.
+/// Estimated cost of the analysis of a part, told before the analysis begins.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PartCost {
     /// How many states the part has: of bodies, of forces that wait to be applied, and of samples that are held or on the way.

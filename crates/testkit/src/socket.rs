@@ -15,7 +15,7 @@ use crate::address::ToSocketAddrs;
 use crate::context;
 use crate::core::{Guard, Inlet, Shared, SocketId};
 
-/// What messages call it.
+/// Name of this kind of socket in messages.
 const KIND: &str = "a UDP socket";
 
 /// A UDP socket of a host of the running test bed: the methods of tokio's, with the same meaning.

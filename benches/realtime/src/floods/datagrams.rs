@@ -14,9 +14,9 @@ use cohaptic_live::{Entropy as _, EntropyError, Nonce, Place, SessionKey, System
 /// Content and source addresses of a flood.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Flood {
-    /// One recorded hello, from one address.
+    /// A recorded hello, always from the same address.
     Recorded,
-    /// One recorded hello, from [`ADDRESSES`] addresses in turn.
+    /// A recorded hello, from [`ADDRESSES`] addresses in turn.
     RecordedFromMany,
     /// Random bytes of random lengths, from one address.
     Noise,

@@ -33,7 +33,7 @@ const BETWEEN: Duration = Duration::from_millis(150);
 /// An honest peer gives up after this.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What came of one flood.
+/// Figures of one flood.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// The flood; `None`: none.
@@ -88,7 +88,7 @@ pub fn run(flood: Option<Flood>, rate: u32, honest: u32) -> Result<Row, Box<dyn 
     }
     let offered = flooding.map(Flooding::end).transpose()?.map_or(0.0, |sent| sent.per_second());
     visitor.hush();
-    // What was sent last is read at the next tick.
+    // The session reads the last datagrams at its next tick.
     std::thread::sleep(Duration::from_millis(50));
     stop.store(true, Ordering::Release);
     let (report, processor) = thread.join().map_err(|_| "the session panicked")??;

@@ -42,7 +42,7 @@ impl Flood {
             let before = offered;
             for place in &mut open {
                 let stream = place.take().map_or_else(|| self.open(address, &mut offered), Ok);
-                // One that was ended is opened again in the next round.
+                // A connection that the server ended is opened again in the next round.
                 *place = stream.and_then(|mut stream| self.attend(&mut stream, &mut offered).map(|()| stream)).ok();
             }
             if (before.connections, before.bytes) == (offered.connections, offered.bytes) {

@@ -65,7 +65,7 @@ impl Label<'_> {
             Err(error) => return Err(error),
         };
         let mut file = cohaptic_files::open(path, cohaptic_files::MOST_CAPTURE_BYTES)?;
-        // Another length or another part is told without reading the part.
+        // A wrong length or a wrong part is found without reading the part.
         let head = self.head(file.metadata()?.len());
         let Some(rest) = digest.strip_prefix(head.as_bytes()) else {
             let found = digest.split(|byte| *byte == b'\n').next().unwrap_or_default();

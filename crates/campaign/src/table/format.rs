@@ -36,7 +36,7 @@ impl Format {
         }
     }
 
-    /// One file with the rows of all parts, one after the other.
+    /// Writes a file with the rows of all parts, in the order of the parts.
     pub(crate) fn merge(
         self,
         file: &mut WholeFile,

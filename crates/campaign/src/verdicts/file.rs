@@ -31,7 +31,7 @@ pub(crate) struct Journal {
     file: File,
 }
 
-/// What a journal holds.
+/// Content of a journal.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     /// The judgements, each with its combination.
@@ -43,7 +43,7 @@ pub(crate) struct Lines {
 }
 
 impl Journal {
-    /// What a journal holds; nothing if there is none. `campaign`: the hash of the campaign's manifest.
+    /// Reads the content of a journal; nothing if there is no journal. `campaign`: the hash of the campaign's manifest.
     pub(crate) fn read(path: &Path, campaign: &str, combinations: u64) -> Result<Lines, CampaignError> {
         let bytes = match fs::read(path) {
             Ok(bytes) => bytes,
@@ -211,7 +211,7 @@ mod tests {
             journal.add(8, &judgements[0].1).unwrap();
             assert_eq!(Journal::read(&path, "c0ffee", 9).unwrap().known.len(), lines + 1, "{end}");
         }
-        // One of another campaign.
+        // A journal of another campaign.
         fs::write(&path, &whole).unwrap();
         let other = Journal::read(&path, "decaf", 9).unwrap();
         assert_eq!((other.known, other.damaged), (Vec::new(), 3));

@@ -25,7 +25,7 @@ pub(crate) struct ControlFiles {
 }
 
 impl ControlFiles {
-    /// Those that the command line allows.
+    /// Reads the folder that the command line allows.
     pub(crate) fn of(arguments: &RealTimeArguments) -> Result<Self, Failure> {
         let Some(path) = &arguments.control_files else { return Ok(Self::default()) };
         let refused = |error: io::Error| Failure::Input(format!("--control-files {}: {error}: expected a folder", path.display()));

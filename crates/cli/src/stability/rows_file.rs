@@ -268,7 +268,7 @@ mod tests {
             fs::write(&path, flipped).unwrap();
             let (mut file, known) = RowsFile::open(path.clone(), &header()).unwrap();
             assert!(known.len() < 2 && known.iter().all(|row| rows.contains(row)), "bit {bit}: {known:?}");
-            // What is added behind it is kept.
+            // Rows that are added after the damaged row are kept.
             file.add(3, &[7.0]).unwrap();
             assert_eq!(RowsFile::open(path.clone(), &header()).unwrap().1.last(), Some(&(3, vec![7.0])), "bit {bit}");
         }

@@ -68,7 +68,7 @@ fn a_run_that_was_cut_short_proves_nothing_about_later_instants() {
         assert!(!failures.is_empty() && failures.iter().all(|line| line.contains("the run diverged at ")), "{expect}: {failures:?}");
     }
     assert!(cut("position = [{ peer = \"right\", at = \"59s\", min = -1.0 }]")[0].contains(", before 59s"));
-    // What happened before the overflow is proven: where a copy was, and a distance that was exceeded.
+    // The run proves what happened before the overflow: the place of a copy, and a distance that was exceeded.
     for expect in ["position = [{ peer = \"right\", at = \"1ms\", min = -1.0, max = 1.0 }]", "discrepancy = { min = 0.5 }"] {
         assert_eq!(cut(expect), Vec::<String>::new(), "{expect}");
     }

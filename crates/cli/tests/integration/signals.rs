@@ -63,7 +63,7 @@ impl Blocked {
         }
     }
 
-    /// What the command printed, once it has ended.
+    /// Returns the output of the command, once the command has ended.
     fn printed(&mut self) -> String {
         let mut text = String::new();
         self.stdout.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -152,7 +152,7 @@ fn a_check_says_which_scenes_were_checked() {
 fn a_relay_reports_what_its_links_did() {
     let desk = Desk::new();
     let mut relay = Blocked::begin(&desk, "relay --listen 127.0.0.1:0 --to 127.0.0.1:9 --json --no-priority delay 30ms");
-    // It listens, and says so, when its ports are open.
+    // The command says that it listens when its ports are open.
     let mut said = String::new();
     relay.stderr.read_line(&mut said).unwrap();
     assert!(said.starts_with("listening on "), "{said}");
@@ -179,7 +179,7 @@ fn a_device_that_was_watched_is_described() {
     assert!(has_content(&desk, "samples.csv"));
 }
 
-/// Those that keep what is finished say so, in a document as in words.
+/// Commands that keep finished results say so, in a document as in words.
 #[test]
 fn a_campaign_and_a_map_say_what_they_keep() {
     let desk = Desk::with("two.toml", TWO);

@@ -128,7 +128,7 @@ fn a_search_ends_after_the_values_that_it_may_look_at_and_says_so() {
     desk.cohaptic(&format!("{line} --values 5 --samples 6")).assert_refused(2, &["--samples 6: expected from 2 to 5"]);
 }
 
-/// What is found so far is the answer of a search that is ended.
+/// The answer of a search that is ended has the crossings found by then.
 #[cfg(unix)]
 #[test]
 fn a_search_that_is_ended_says_what_it_has_found() {

@@ -90,7 +90,7 @@ fn a_file_that_is_no_text_is_refused_in_words() {
     let no_text = |header: &str| [header.as_bytes(), b"\n1,\xff\xfe\x80"].concat();
     desk.write("bin", no_text("t,delay"));
     desk.write("log", no_text("sequence,copy,offered_ns,size,at_ns,fate,marked,damaged"));
-    // Another fault of a file with a token.
+    // A token file that is open to others would be refused for that fault first.
     desk.set_mode("bin", 0o600);
     for line in [
         "run two.toml --inputs bin",

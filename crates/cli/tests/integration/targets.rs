@@ -33,7 +33,7 @@ fn succeeds(desk: &Desk, line: &str) {
     assert_eq!(outcome.status, Some(0), "{line}: {}", outcome.stderr);
 }
 
-/// What comes out of a pipe that stands in the place of a file.
+/// Returns the bytes that come out of a pipe in the place of a file.
 fn through_pipe(desk: &Desk, name: &str, line: &str) -> (Outcome, Vec<u8>) {
     let pipe = desk.path(name);
     let _ = fs::remove_file(&pipe);

@@ -89,7 +89,7 @@ fn of_two_that_write_one_file_the_last_is_there_whole() {
     }
 }
 
-/// What a killed process left is told by its end, and removed by the next that writes the file.
+/// The partial file of a killed process is known by the end of its name, and the next process that writes the file removes it.
 #[test]
 fn a_partial_file_of_a_killed_process_does_not_stay() {
     let desk = Desk::new();

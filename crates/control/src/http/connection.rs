@@ -40,7 +40,7 @@ async fn answer_within(listener: TcpListener, router: Router, limits: Limits, pa
                 // Connections whose request has come already are read before the next connection may take their place.
                 tokio::task::yield_now().await;
             }
-            // It was given up before it was taken.
+            // The client gave the connection up before the server took it.
             Err(error) if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) => {}
             Err(_) => {
                 places.send_one_away();

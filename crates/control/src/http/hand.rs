@@ -101,7 +101,7 @@ impl Drop for Taken {
     }
 }
 
-/// What a page may send at most.
+/// Limits of a WebSocket: sizes of messages and frames from a page.
 fn limits() -> WebSocketConfig {
     WebSocketConfig::default().max_message_size(Some(LONGEST)).max_frame_size(Some(LONGEST)).read_buffer_size(READ_AT_ONCE)
 }

@@ -76,7 +76,7 @@ impl Flooded {
         let mut stream = TcpStream::connect(self.address()).unwrap();
         stream.set_read_timeout(Some(SOON)).unwrap();
         stream.set_write_timeout(Some(Duration::from_millis(50))).unwrap();
-        // Whoever is sent away at once has said nothing.
+        // A client that is sent away at once has said nothing.
         let _said = stream.write_all(text.as_bytes());
         stream
     }

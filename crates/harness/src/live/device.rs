@@ -144,7 +144,7 @@ impl<const A: usize> core::fmt::Debug for HandDevice<A> {
 mod tests {
     use super::*;
 
-    /// It always shows this.
+    /// A device that always shows this state.
     struct Fixed(State<3>);
 
     impl LiveDevice for Fixed {

@@ -127,7 +127,7 @@ impl Inputs {
                 continue;
             }
             last_line = line;
-            // What they say of their scene is for [`RecordedScene`](super::RecordedScene).
+            // [`RecordedScene`](super::RecordedScene) reads the rows about the scene.
             if rows.is_empty() && closed.is_none() && is_about_the_scene(row) {
                 continue;
             }

@@ -20,9 +20,9 @@ const SAMPLES: u64 = 5;
 /// Sender and source addresses of the hellos of a flood.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Flood {
-    /// One recorded hello, from the address of the attacker.
+    /// A recorded hello, from the address of the attacker.
     Recorded,
-    /// One recorded hello, from another false address each time.
+    /// A recorded hello, each time from another false address.
     FromFalseAddresses,
     /// The hello of the peer that joins, from the address of that peer: by somebody on the path.
     OnThePath,

@@ -21,7 +21,7 @@ pub use kernel::Kernel;
 
 /// About how many points are looked at for each step of delay, on all circles together: measured, of delays of 250 to 4000 frames.
 const POINTS_A_STEP: f64 = 60.0;
-/// What an entry of the matrix of a point takes beside products: the kernels, lengths and allocations.
+/// Operations for an entry of the matrix of a point besides products: kernels, lengths and allocations.
 const OF_AN_ENTRY: f64 = 20.0;
 
 /// x(t+1) = now·x(t) + Σ matrix·(what a kernel makes of x at t and before): the characteristic function is
@@ -111,7 +111,7 @@ impl DelayedLoop {
         POINTS_A_STEP * count(usize::try_from(self.steps()).unwrap_or(usize::MAX)) * self.operations_of_a_point()
     }
 
-    /// Those of the characteristic matrix at one point, its inverse and the distances that follow from it.
+    /// Returns the operations for the characteristic matrix at one point, its inverse and the distances that follow from the inverse.
     fn operations_of_a_point(&self) -> f64 {
         let size = count(self.now.rows());
         // A multiplication of complex numbers is four; a product with each term beside the inverse.

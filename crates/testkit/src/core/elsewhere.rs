@@ -12,7 +12,7 @@ use cohaptic_wan::NodeId;
 use super::{Core, Guard, Shared};
 use crate::context;
 
-/// What other threads have left for the thread of a run.
+/// Acts that other threads have left for the thread of a run.
 #[derive(Default)]
 pub(super) struct Elsewhere {
     is_any: AtomicBool,
@@ -21,7 +21,7 @@ pub(super) struct Elsewhere {
 
 #[derive(Default)]
 struct Left {
-    /// What was used on another thread first, in words.
+    /// The first value of the run that another thread used, in words.
     misuse: Option<String>,
     acts: Vec<Act>,
 }

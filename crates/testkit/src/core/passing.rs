@@ -40,7 +40,7 @@ impl Core {
         } else {
             self.send_any(id, to, bytes, ecn_capable)?;
         }
-        // What arrives at once and is read or lost counts no more.
+        // A packet that arrives at once and is read or lost counts no more.
         if self.wire.held.is_too_much() {
             self.fail_for(self.sockets.get(id).name());
         }

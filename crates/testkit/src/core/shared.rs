@@ -52,7 +52,7 @@ pub(crate) struct Shared {
     home: Mutex<Option<Box<Core>>>,
     /// Somebody has put the state into `home`.
     returned: Condvar,
-    /// What other threads have left for the thread of the run.
+    /// Acts that other threads have left for the thread of the run.
     pub(super) elsewhere: Elsewhere,
     /// The run is over: a value of the run, such as a socket, may lock the state from any thread to be let go.
     has_ended: AtomicBool,
@@ -257,7 +257,7 @@ impl Shared {
         };
         #[cfg(feature = "tokio")]
         if !self.is_synced()
-            // Another test bed may have its clock here by then.
+            // By then this thread may have the clock of another test bed.
             && !self.has_ended()
             && let Clock::Tokio { origin } = self.clock
         {

@@ -8,7 +8,7 @@ use super::Core;
 use crate::address::AddressPlan;
 use crate::context;
 
-/// What a message says of a socket.
+/// Name of a socket in messages.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SocketName {
     /// The protocol, and perhaps what the socket does.

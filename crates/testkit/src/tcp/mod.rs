@@ -18,7 +18,7 @@ mod traits;
 
 use std::net::SocketAddr;
 
-/// What messages call the sockets of this module.
+/// Name of these sockets in messages.
 const KIND: &str = "a TCP socket";
 
 pub use cohaptic_tcp::{ConfigError, CongestionControl, EcnFallback, Flags, Info, Keepalive, State, TcpConfig};

@@ -50,7 +50,7 @@ pub(crate) struct Runner {
 }
 
 impl Runner {
-    /// One of the tasks in words: where it was spawned, and on which host it lives.
+    /// Returns a task in words: the place where it was spawned, and its host.
     pub(crate) fn words(self, hosts: &[String]) -> String {
         match self.host.and_then(|host| hosts.get(host.index())) {
             Some(host) => format!("the task of host `{host}` that was spawned at {}", self.origin),
@@ -94,7 +94,7 @@ impl Pulse {
         (self.turns.load(Ordering::Relaxed), self.running.load(Ordering::Relaxed))
     }
 
-    /// What runs now. While a panic unwinds, the task that panicked is the one.
+    /// Returns the task that runs now. While a panic unwinds, that is the task that panicked.
     pub(crate) fn running(&self) -> Option<Runner> {
         self.runner(self.now().1)
     }

@@ -5,7 +5,7 @@ use std::fmt;
 /// How many bytes a run may hold unless the test says another number: a gibibyte.
 pub(crate) const BYTE_LIMIT: u64 = 1 << 30;
 
-/// What a packet takes beside the bytes that it carries \[byte\]: its box, its allocation, and its places in the queues of events and of sockets, which have up to
+/// Memory of a packet besides its content \[byte\]: its box, its allocation, and its places in the queues of events and of sockets, which have up to
 /// twice as many places as packets. So packets without a byte count too.
 pub(crate) const PACKET_COST: u64 = 200;
 

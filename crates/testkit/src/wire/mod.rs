@@ -84,7 +84,7 @@ pub(crate) struct Wire<A> {
     changes: VecDeque<LinkChange>,
     /// The ways that are cut.
     cut: BTreeSet<Path>,
-    /// What the run holds, here and with sockets and nodes.
+    /// Bytes that the run holds, on links and with sockets and nodes.
     pub(crate) held: Held,
     /// Whether packets are hit or recorded.
     is_watched: bool,

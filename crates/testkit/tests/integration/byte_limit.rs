@@ -1,4 +1,4 @@
-//! What piles up is named before it takes all memory; what was read or lost counts no more.
+//! A sender whose bytes pile up is named before they take all memory; bytes that were read or lost count no more.
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,7 +9,7 @@ use cohaptic_testkit::{Bed, Instant, Testbed, time};
 
 const LIMIT: u64 = 1 << 20;
 
-/// What it says when it gives up.
+/// Returns the message of a run that reaches its limit.
 fn complaint(act: impl FnOnce()) -> String {
     *catch_unwind(AssertUnwindSafe(act)).expect_err("it gives up").downcast::<String>().expect("the message has numbers")
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use cohaptic_testkit::{Bed, Host, TcpListener, TcpSocket, TcpStream, Testbed, ToSocketAddrs, UdpSocket, time};
 
-/// What a run has left.
+/// Sockets, listeners and streams that a run has left.
 struct Left {
     udp: UdpSocket,
     listener: TcpListener,
@@ -117,7 +117,7 @@ fn after_the_run_all_that_sockets_are_asked_is_an_error_that_names_the_host() {
         }
         let name = "b:7".to_socket_addr().unwrap_err().to_string();
         assert_eq!(name, "only inside a running test bed the name `b` of a host means something: call it within `Testbed::run`, on its thread");
-        // It can be looked at and dropped still.
+        // The value can still be looked at and dropped.
         assert!(format!("{:?} {:?} {:?} {:?} {:?}", left.udp, left.listener, left.stream, left.host, left.bed).contains("0.0.0.0:7"));
         drop(left);
     }
@@ -151,7 +151,7 @@ fn in_another_test_bed_sockets_and_hosts_of_an_ended_one_are_refused() {
     }
 }
 
-/// What a run says that fails.
+/// Returns the message of a run that fails.
 fn complaint(act: impl FnOnce()) -> String {
     let payload = catch_unwind(AssertUnwindSafe(act)).expect_err("it fails");
     payload.downcast_ref::<String>().cloned().or_else(|| payload.downcast_ref::<&str>().map(|text| (*text).to_owned())).unwrap()
@@ -172,7 +172,7 @@ fn a_socket_on_another_thread_fails_the_test_and_does_not_end_the_process() {
         });
         assert!(text.contains("a UDP socket of host `b` was used on another thread"), "{text}");
         assert!(text.contains("the sockets of a test bed belong to the thread that runs it"), "{text}");
-        // What gives no error panics on that thread, and the run fails with the same words.
+        // A call without an error to return panics on that thread, and the run fails with the same words.
         let text = complaint(|| {
             bed.run(|bed| async move {
                 let host = bed.host("b");

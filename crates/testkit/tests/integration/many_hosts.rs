@@ -1,4 +1,4 @@
-//! What a test bed costs grows with its hosts and with those that talk, not with all pairs.
+//! Memory and time of a test bed grow with its hosts and with pairs that talk, not with all pairs.
 
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -9,7 +9,7 @@ const CHILD: &str = "COHAPTIC_TESTKIT_CHILD_HAS_MANY_HOSTS";
 
 const HOSTS: usize = 10_000;
 
-/// What the child may hold at most \[kibibyte\]: 6.7 kB for each host, where 3.9 were measured. A link for each pair took 6.4 GB, and a mark for each pair that says
+/// Most memory of the child \[kibibyte\]: 6.7 kB for each host, where 3.9 were measured. A link for each pair took 6.4 GB, and a mark for each pair that says
 /// whether its way is cut 100 MB.
 const MOST: u64 = 64 << 10;
 

@@ -64,7 +64,7 @@ fn what_takes_no_time_does_not_let_it_pass() {
             for part in parts {
                 assert!(text.contains(part), "no {part:?} in {text:?}");
             }
-            // It is the program itself, and its sockets are of host `a`.
+            // The task is the program itself, and its sockets are of host `a`.
             assert!(text.contains(". It is the task that was spawned at crates/testkit/tests/integration/misuse.rs:"), "{text}");
             assert_eq!(text.ends_with(", which called the UDP socket 0.0.0.0:49152 of host `a` last"), way == 2 || way == 3, "{text}");
         }

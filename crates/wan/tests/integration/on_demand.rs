@@ -50,7 +50,7 @@ proptest! {
                 events.extend(drain_network(&mut network));
             }
             if way != Way::Single {
-                // What happens at the instant of a broadcast is told in the order of receivers only where an engine waits for it.
+                // Events at the instant of a broadcast come in the order of receivers only where an engine waits for them.
                 events.sort_by_key(|event: &PacketEvent<Payload, Path>| (event.at, event.path, event.sequence, event.copy));
             }
             let stats: Vec<_> = paths(&plan).map(|Path { from, to }| (network.offered(from, to), network.link_stats(from, to))).collect();

@@ -20,14 +20,14 @@ pub(super) struct Connections {
     thread: JoinHandle<Connected>,
 }
 
-/// What the flood came to.
+/// Counts of the flood of connections.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Connected {
     /// Connections that were made.
     pub made: u64,
-    /// Those that were given an answer.
+    /// Connections that the server answered.
     pub answered: u64,
-    /// Those that were let in without a token: none, or the server is open to anybody.
+    /// Connections that the server let in without a token: none, or the server is open to anybody.
     pub let_in: u64,
     /// For how long.
     pub elapsed: Duration,
@@ -56,7 +56,7 @@ impl Connections {
     }
 }
 
-/// One connection of the three kinds, in turn.
+/// Opens a connection of one of the three kinds, in turn.
 fn connect(target: SocketAddr, connected: &mut Connected, silent: &mut std::collections::VecDeque<TcpStream>) {
     let Ok(mut stream) = TcpStream::connect_timeout(&target, PATIENCE) else { return };
     connected.made += 1;

@@ -32,7 +32,7 @@ use process::Process;
 /// The processes that are looked at, in the order of [`Row::processes`].
 pub const PROCESSES: [&str; 3] = ["live", "relay", "peer and floods"];
 
-/// What to do.
+/// Length, interval and programs of a soak under floods.
 #[derive(Clone, Debug)]
 pub struct FloodedPlan {
     /// For how long the session runs.
@@ -104,7 +104,7 @@ pub struct Sample {
     pub files: usize,
 }
 
-/// What was seen at one look.
+/// Samples of all processes at one instant.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Row {
     /// Since the floods began.
@@ -113,14 +113,14 @@ pub struct Row {
     pub processes: [Sample; PROCESSES.len()],
 }
 
-/// What came of it.
+/// Outcome of a soak under floods.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What was seen at each look.
+    /// Samples in the order of time.
     pub rows: Vec<Row>,
     /// The documents of `cohaptic live` and `cohaptic relay`.
     pub documents: [Value; 2],
-    /// What the peer from outside did.
+    /// Figures of the peer from outside.
     pub visits: Visits,
     /// Each flood of datagrams, by where it went, and what it came to.
     pub floods: Vec<(String, Sent)>,
@@ -213,7 +213,7 @@ pub fn run(plan: &FloodedPlan, interrupted: &AtomicBool, mut show: impl FnMut(&R
     Ok(Outcome { rows, documents: [live.end()?, relay.end()?], visits, floods, connections })
 }
 
-/// What a flood and its target are called in one.
+/// Returns the name of a flood with its target.
 fn name(to: &'static str, flood: Flood) -> String {
     format!("{}, to {to}", flood.name())
 }

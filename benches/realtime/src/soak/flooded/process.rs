@@ -29,7 +29,7 @@ pub(super) struct Process {
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(super) struct Ports {
     pub(super) udp: Vec<SocketAddr>,
-    /// Those that listen.
+    /// Sockets that listen.
     pub(super) tcp: Vec<SocketAddr>,
 }
 
@@ -98,7 +98,7 @@ impl Process {
 impl Drop for Process {
     fn drop(&mut self) {
         if let Some(mut child) = self.child.take() {
-            // It may have ended meanwhile.
+            // The process may have ended meanwhile.
             let _ = child.kill();
             let _ = child.wait();
         }

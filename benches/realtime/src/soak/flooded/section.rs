@@ -51,7 +51,7 @@ pub fn section(plan: &FloodedPlan, outcome: &Outcome, verdicts: &[String], comma
     Ok(text)
 }
 
-/// One look, as a row of the table.
+/// Returns the samples of one instant as a row of the table.
 fn line(row: &Row) -> String {
     let seconds = row.at.as_secs();
     let processes = row.processes.map(|process| format!("{}, {}", process.memory, process.files));

@@ -1,4 +1,4 @@
-//! What an outcome of the soak under floods is worth.
+//! Rules that the outcome of a soak under floods keeps or breaks.
 
 use serde_json::Value;
 
