@@ -36,7 +36,7 @@ class Campaign:
         """
     def table(self, /, rows: "list[list[int | float | str | None]]") -> "Table":
         """
-        The rows of all runs as one table.
+        The rows of all runs as one table. The column of a key that was varied has the name of the key, and the unit of its values.
         """
 
 @final
@@ -99,7 +99,7 @@ class Link:
     @property
     def next(self, /) -> float | None:
         """
-        When something happens next \\[s\\]; `None` if nothing is on the way.
+        When something happens next \\[s\\]: `poll` of this number gives it. `None` if nothing is on the way.
         """
     def poll(self, /, now: "float") -> "list[tuple[typing.Any, int, int, float, float, str, int, bool, bool]]":
         """
@@ -224,6 +224,10 @@ class Table:
     def names(self, /) -> list[str]:
         """
         The names of the columns.
+        """
+    def unit(self, /, name: str) -> str:
+        """
+        The unit of a column; empty if it has none.
         """
 
 def admittance(scene: "Scene", peer: "str", frequencies: "list[float] | typing.Callable[[float], list[float]]", axis: "str | None", seen: "str | None") -> "dict[str, typing.Any]":

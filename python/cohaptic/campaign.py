@@ -34,10 +34,11 @@ def campaign(
     executor: Executor | Callable[[], Executor] | None = None,
     piece: int | None = None,
 ) -> Table:
-    """Runs a scene over values of keys and over seeds, and gives one row a run: the table of ``cohaptic campaign`` for the same keys.
+    """Runs a scene over values of keys and over seeds, and gives one row a run: the rows of ``cohaptic campaign`` for the same keys.
 
     ``vary`` maps keys to their values, or has texts as for ``--vary``, such as ``"coordination.stiffness=500..1500/3"``. Every combination is run with
-    ``runs`` seeds, which count up from that of the scene.
+    ``runs`` seeds, which count up from that of the scene. The column of a key has the name of the key, and :meth:`Table.unit` its unit, where the
+    program's table has both in one name: ``link.delay_ms``.
 
     ``executor`` is any ``concurrent.futures.Executor``, whose workers have this package, or a callable that makes one; without it threads of this
     process are taken. ``piece`` runs are asked for at a time. Runs that a worker lost are asked for again, up to three times. An executor that broke is

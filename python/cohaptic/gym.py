@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any, SupportsFloat
 
 import gymnasium
+import numpy as np
 
 from cohaptic.link import Link
 
@@ -16,7 +18,11 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     back, where the agent sees the newest one that has arrived. Until the first action is there, ``idle`` is done; until the first observation
     is there, the one of the reset is seen. ``info`` has ``action_age`` and ``observation_age`` [s].
 
-    ``period`` is the time of a step [s]. Links begin anew at each reset, with the seed of the reset if it has one.
+    Observations and actions are copied when they are sent and when they are handed out: an environment that writes the next observation into the
+    same array, and an agent that changes what it sees, change nothing on the way.
+
+    ``period`` is the time of a step [s]. Links begin anew at each reset. With a seed, their seed is that of the reset, and without one until then
+    ``seed``. A reset without a seed begins another episode, whose links have a seed made from the last seed and the number of episodes since.
     """
 
     def __init__(
@@ -31,8 +37,9 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         seed: int = 1,
     ) -> None:
         super().__init__(env)
-        self._period, self._idle, self._size, self._seed = period, idle, size, seed
+        self._period, self._idle, self._size = period, deepcopy(idle), size
         self._specs = {"action": actions, "observation": observations}
+        self._seed, self._episode = seed, -1
         self._begin(seed, None)
 
     def _begin(self, seed: int, observation: Any) -> None:
@@ -41,14 +48,18 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
             what: Link(self._specs[what], seed, sender=sender, receiver=receiver)
             for what, (sender, receiver) in names.items()
         }
-        self._held = {"action": (0.0, self._idle), "observation": (0.0, observation)}
+        self._held = {"action": (0.0, self._idle), "observation": (0.0, deepcopy(observation))}
         self._steps = 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begins anew; the agent sees the beginning at once."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._begin(self._seed if seed is None else seed, observation)
-        return observation, info
+        if seed is None:
+            self._episode += 1
+        else:
+            self._seed, self._episode = seed, 0
+        self._begin(_seed_of(self._seed, self._episode), observation)
+        return deepcopy(observation), info
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         """One step of the environment, with what has arrived."""
@@ -66,8 +77,13 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     def _over(self, what: str, now: float, payload: Any) -> Any:
         """Sends something, and gives the newest of its kind that has arrived."""
         link = self._links[what]
-        link.handle_packet(now, self._size, payload)
+        link.handle_packet(now, self._size, deepcopy(payload))
         for event in link.poll(now):
             if event.fate == "delivered" and event.offered >= self._held[what][0]:
                 self._held[what] = (event.offered, event.payload)
-        return self._held[what][1]
+        return deepcopy(self._held[what][1])
+
+
+def _seed_of(seed: int, episode: int) -> int:
+    """The seed of an episode's links: that of the reset itself, and then others that have nothing to do with each other."""
+    return seed if episode == 0 else int(np.random.SeedSequence([seed, episode]).generate_state(1, np.uint64)[0])

@@ -50,7 +50,7 @@ class Law(Protocol):
 
     The answer depends on the calls made so far and on nothing else. All that is remembered from tick to tick stands in an attribute ``memory``, an array
     or a list of always as many numbers, which the analysis reads and sets; a law without it remembers nothing. A method
-    ``set_gains(stiffness, damping)``, if there is one, hears of gains that the timeline changes.
+    ``set_gains(stiffness, damping)`` [N/m, N·s/m], if there is one, hears of gains that the timeline changes.
     """
 
     def command(self, own: State, held: Held, t: float) -> Any:

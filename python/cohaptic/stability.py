@@ -161,7 +161,7 @@ class Map:
     keys: tuple[str, str]
     """The keys along x and y."""
     units: tuple[str, str]
-    """What stands after their numbers: ``ms``, ``%``, or nothing."""
+    """The units of their numbers: ``ms`` or ``%`` as in the range, ``N/m`` of a stiffness; empty where there is none."""
     x: np.ndarray
     """The values of the first key."""
     y: np.ndarray
@@ -227,7 +227,7 @@ class Boundary:
     key: str
     """The key."""
     unit: str
-    """What stands after its numbers."""
+    """The unit of its numbers, as in :attr:`Map.units`."""
     criterion: str
     """``spectral-radius`` or ``mean-square``."""
     first: str

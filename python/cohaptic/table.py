@@ -64,6 +64,25 @@ class Table:
         names = self.categories(name)
         return self[name] if names is None else np.array(names, dtype=object)[self[name]]
 
+    def unit(self, name: str) -> str:
+        """The unit of the column of a key that was varied: ``ms`` or ``%`` as its values have it, ``N/m`` of a stiffness; empty for other columns."""
+        return self._native.unit(name)
+
+    def to_pandas(self) -> Any:
+        """The table as a ``pandas.DataFrame``, which must be installed: a copy, in which columns of names are categorical.
+
+        ``frame.attrs["units"]`` maps columns to their units.
+        """
+        import pandas  # type: ignore[import-untyped]
+
+        def column(name: str) -> Any:
+            names = self.categories(name)
+            return self[name] if names is None else pandas.Categorical.from_codes(self[name], categories=names)
+
+        frame = pandas.DataFrame({name: column(name) for name in self}, copy=True)
+        frame.attrs["units"] = {name: unit for name in self if (unit := self.unit(name))}
+        return frame
+
     def address(self, name: str) -> int:
         """Where the numbers of a column begin in memory: those of the NumPy array, and those that Arrow gets."""
         return self._native.address(name)

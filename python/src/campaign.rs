@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use arrow_array::{ArrayRef, Float64Array, Int64Array};
 use cohaptic_campaign::{CampaignError, CampaignPlan, Format, Kind, PlanSpec, Row, SpreadCampaign, Value, Variation, Watch};
+use cohaptic_scene::schema::FileSchema;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
@@ -96,9 +97,10 @@ impl Campaign {
         self.stop.ask();
     }
 
-    /// The rows of all runs as one table.
+    /// The rows of all runs as one table. The column of a key that was varied has the name of the key, and the unit of its values.
     #[pyo3(signature = (rows: "list[list[int | float | str | None]]") -> "Table")]
     fn table(&self, rows: Vec<Vec<Bound<'_, PyAny>>>) -> PyResult<Table> {
+        let variations = self.campaign.variations();
         let columns = self.campaign.columns().iter().enumerate().map(|(place, column)| {
             let cells = || rows.iter().map(move |row| &row[place]);
             let array: ArrayRef = match column.kind {
@@ -112,10 +114,18 @@ impl Campaign {
                     coded(texts.collect::<PyResult<Vec<String>>>()?)
                 }
             };
-            Ok((column.name.clone(), array))
+            let varied = variations.iter().find(|varied| varied.column() == column.name);
+            Ok((varied.map_or_else(|| column.name.clone(), |varied| varied.key().to_owned()), array))
         });
-        Table::new(columns.collect::<PyResult<Vec<_>>>()?)
+        let unit =
+            |name: &str| variations.iter().find(|varied| varied.key() == name).map(|varied| unit_of(varied.key(), varied.unit())).unwrap_or_default();
+        Table::with_units(columns.collect::<PyResult<Vec<_>>>()?, unit)
     }
+}
+
+/// The unit of values of a key: the one that all of them carry, or the one in which the key takes plain numbers; empty if there is none.
+pub(crate) fn unit_of(key: &str, carried: &str) -> String {
+    if carried.is_empty() { FileSchema::Scene.unit_of(key) } else { carried }.to_owned()
 }
 
 /// Texts, each of which is kept once, in the order of their first appearance.

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::matrix;
+use crate::campaign::unit_of;
 use crate::drawing::Drawing;
 use crate::errors::{of_analysis, of_scene, of_value};
 use crate::interrupt::on_threads;
@@ -78,7 +79,7 @@ pub(crate) fn map_of<'py>(
     };
     said.set_item("drawing", drawing)?;
     said.set_item("keys", keys.iter().map(|key| key.key.clone()).collect::<Vec<_>>())?;
-    said.set_item("units", keys.iter().map(|key| key.unit.clone()).collect::<Vec<_>>())?;
+    said.set_item("units", keys.iter().map(|key| unit_of(&key.key, &key.unit)).collect::<Vec<_>>())?;
     said.set_item("criterion", criterion(&family))?;
     let contours = map.contour().into_iter().map(|line| {
         let (points, count) = (line.points.iter().flat_map(|(x, y)| [*x, *y]).collect(), line.points.len());
@@ -121,7 +122,7 @@ pub(crate) fn boundary_of<'py>(
     };
     said.set_item("drawing", drawing)?;
     said.set_item("key", &key.key)?;
-    said.set_item("unit", &key.unit)?;
+    said.set_item("unit", unit_of(&key.key, &key.unit))?;
     said.set_item("criterion", criterion(&family))?;
     said.set_item("first", found.first.word())?;
     let crossings = found.crossings.iter().map(|crossing| (crossing.value, crossing.from.word(), crossing.to.word()));

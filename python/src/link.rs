@@ -78,9 +78,21 @@ impl Fates {
 /// An instant of that many seconds, to the nearest nanosecond; `None` before the beginning and beyond the end of time.
 #[inline]
 fn instant(seconds: f64) -> Option<Instant> {
-    let nanos = seconds * 1e9;
-    // 2^64 and everything above it is no instant, and a comparison with NaN is false.
-    (nanos >= 0.0 && nanos < 18_446_744_073_709_551_616.0).then(|| Instant::from_nanos((nanos + 0.5) as u64))
+    // 2^64 ns and everything above it is no instant, and a comparison with NaN is false.
+    if !(0.0..18_446_744_073.709_551_616).contains(&seconds) {
+        return None;
+    }
+    // The product of seconds since 1970 with 10⁹ would be rounded to 256 ns; whole seconds and the rest are exact.
+    let whole = seconds as u64;
+    let rest = (seconds - seconds.trunc()) * 1e9;
+    Some(Instant::from_nanos(whole.checked_mul(1_000_000_000)?.checked_add((rest + 0.5) as u64)?))
+}
+
+/// The number of seconds nearest to an instant or, where its own [`instant`] is before that one, the number above it: seconds since 1970 are 238 ns apart.
+/// `None` within the last microseconds of time, which no such number reaches.
+fn seconds(at: Instant) -> Option<f64> {
+    let nearest = at.as_secs_f64();
+    [nearest, nearest.next_up()].into_iter().find(|seconds| instant(*seconds).is_some_and(|reached| reached >= at))
 }
 
 fn no_instant(seconds: f64) -> PyErr {
@@ -167,10 +179,10 @@ impl Link {
         Ok(happened)
     }
 
-    /// When something happens next \[s\]; `None` if nothing is on the way.
+    /// When something happens next \[s\]: `poll` of this number gives it. `None` if nothing is on the way.
     #[getter]
     fn next(&self) -> Option<f64> {
-        self.live().poll_timeout().map(Instant::as_secs_f64)
+        self.live().poll_timeout().and_then(seconds)
     }
 
     /// Replaces the model from now \[s\] on, with its packets on the way.

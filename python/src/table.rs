@@ -15,6 +15,9 @@ use pyo3::types::PyCapsule;
 use crate::arrays::view;
 use crate::errors::of_value;
 
+/// The key of a field's metadata under which its unit stands.
+const UNIT: &str = "unit";
+
 /// Columns of one length. A column of NumPy is a view of the memory that Arrow gets.
 #[pyclass(frozen, module = "cohaptic._native")]
 #[derive(Debug)]
@@ -33,8 +36,17 @@ pub(crate) fn names(codes: Vec<i32>, names: impl IntoIterator<Item = String>) ->
 impl Table {
     /// Columns with their names, all of one length.
     pub(crate) fn new(columns: Vec<(String, ArrayRef)>) -> PyResult<Self> {
-        let fields: Vec<Field> = columns.iter().map(|(name, column)| Field::new(name, column.data_type().clone(), column.null_count() > 0)).collect();
-        let schema = Arc::new(Schema::new(fields));
+        Self::with_units(columns, |_| String::new())
+    }
+
+    /// Columns with their names, all of one length, and the unit of each by its name: empty if it has none. Arrow gets it as metadata of the field.
+    pub(crate) fn with_units(columns: Vec<(String, ArrayRef)>, unit: impl Fn(&str) -> String) -> PyResult<Self> {
+        let field = |(name, column): &(String, ArrayRef)| {
+            let field = Field::new(name, column.data_type().clone(), column.null_count() > 0);
+            let unit = unit(name);
+            if unit.is_empty() { field } else { field.with_metadata([(UNIT.to_owned(), unit)]) }
+        };
+        let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()));
         let columns = columns.into_iter().map(|(_, column)| column).collect();
         Ok(Self { batch: RecordBatch::try_new(schema, columns).map_err(|error| of_value(&error))? })
     }
@@ -54,6 +66,13 @@ impl Table {
 
     fn __len__(&self) -> usize {
         self.batch.num_rows()
+    }
+
+    /// The unit of a column; empty if it has none.
+    fn unit(&self, name: &str) -> PyResult<String> {
+        self.find(name)?;
+        let schema = self.batch.schema();
+        Ok(schema.field_with_name(name).ok().and_then(|field| field.metadata().get(UNIT).cloned()).unwrap_or_default())
     }
 
     /// The numbers of a column without a copy; of a column of names their codes.

@@ -1,6 +1,7 @@
 """The examples, and the environment behind links."""
 
 import importlib.util
+import itertools
 from types import ModuleType
 
 import gymnasium
@@ -90,3 +91,57 @@ def test_overtaken_actions_are_not_done() -> None:
     assert len(set(done)) < done[-1]
     with pytest.raises(ValueError, match="netem"):
         RemoteEnv(Counting(), period=0.1, idle=0, actions="delay")
+
+
+class InPlace(gymnasium.Env):
+    """Writes its observation into one array, and spoils the action that it has taken."""
+
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (2,))
+    action_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,))
+
+    def __init__(self) -> None:
+        self.state = np.zeros(2)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.state[:] = 0.0
+        return self.state, {}
+
+    def step(self, action):
+        self.state[:] = (self.state[0] + 1.0, action[0])
+        action[0] = np.nan
+        return self.state, 0.0, False, False, {}
+
+
+def test_what_is_on_the_way_does_not_change() -> None:
+    remote = RemoteEnv(InPlace(), period=0.1, idle=np.array([-1.0]), actions="delay 200ms", observations="delay 100ms")
+    first, _ = remote.reset()
+    action = np.zeros(1)
+    seen = []
+    for number in range(5):
+        action[0] = number
+        observation = remote.step(action)[0]
+        seen.append(observation.tolist())
+        # An agent that works in place.
+        observation[:] = 7.0
+    assert seen == [[0, 0], [1, -1], [2, -1], [3, 0], [4, 1]]
+    assert first.tolist() == [0, 0]
+    assert remote.reset()[0].tolist() == [0, 0]
+    assert remote.step(action)[0].tolist() == [0, 0]
+
+
+def test_each_episode_has_a_network_of_its_own() -> None:
+    def episode(remote: RemoteEnv, seed: int | None = None) -> list[float]:
+        remote.reset(seed=seed)
+        return [remote.step(0)[4]["action_age"] for _ in range(100)]
+
+    def remote() -> RemoteEnv:
+        return RemoteEnv(Counting(), period=0.01, idle=0, actions="delay 20ms 15ms", seed=5)
+
+    one, other = remote(), remote()
+    episodes = [episode(one) for _ in range(4)]
+    assert episodes == [episode(other) for _ in range(4)], "the same seed, the same networks"
+    assert all(a != b for a, b in itertools.combinations(episodes, 2))
+    # A seed begins the same row of networks anew, whatever came before.
+    assert [episode(one, 5), episode(one), episode(one)] == episodes[:3]
+    assert episode(one, 6) not in episodes

@@ -2,6 +2,7 @@
 
 import csv
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -91,6 +92,22 @@ def test_step_by_step_it_does_the_same(spec: str) -> None:
     assert np.array_equal(sent.arrived, arrived, equal_nan=True)
     assert sum(event.copy > 0 for event in ends) == len(sent.copies.packet)
     assert all(first.at <= second.at for first, second in itertools.pairwise(events))
+
+
+@pytest.mark.parametrize("epoch", [0.0, 1.0, 1e6, 2.0**33, 1_700_000_000.123, 1_796_000_000.987, 1.8e10])
+def test_what_comes_next_is_delivered_when_it_is_asked_for(epoch: float) -> None:
+    link = Link("delay 2s 5ms distribution normal", seed=4)
+    for place in range(200):
+        link.handle_packet(epoch + place * 0.003)
+    delivered = 0
+    while (at := link.next) is not None:
+        # Numbers are more than a nanosecond apart from 2^23 s on: there the one before is too early.
+        if epoch > 2.0**23:
+            assert link.poll(math.nextafter(at, 0.0)) == []
+        happened = link.poll(at)
+        assert happened, f"nothing at {at!r}, which was next"
+        delivered += len(happened)
+    assert delivered == 200
 
 
 def test_the_seed_and_the_ends_are_the_address() -> None:

@@ -10,7 +10,7 @@ import pyarrow
 import pytest
 from conftest import TWO
 
-from cohaptic import Scene, Table
+from cohaptic import Scene, Table, campaign
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +106,35 @@ def test_a_picture_is_saved_as_it_is_shown(tmp_path) -> None:
     assert run._repr_svg_() == run.plot("positions").svg
     with pytest.raises(ValueError, match="expected one of positions, forces, network"):
         run.plot("views")
+
+
+def test_a_frame_of_pandas_has_the_same_numbers_and_names(trajectory: Table) -> None:
+    frame = trajectory.to_pandas()
+    assert list(frame) == list(trajectory)
+    for name in trajectory:
+        assert frame[name].tolist() == trajectory.decode(name).tolist()
+    frame.iloc[0, 0] = frame.iloc[1, 0]
+    assert frame.attrs["units"] == {}
+    names = Scene(TWO).run().packets.to_pandas()["link"]
+    assert isinstance(names.dtype, pandas.CategoricalDtype)
+
+
+def test_a_column_is_named_by_the_key_that_was_varied_and_has_its_unit() -> None:
+    scene = Scene(TWO).set("scene.duration", "100ms")
+    vary = {
+        "link.delay": ["8ms", "16ms"],
+        "link.loss": ["0%", "10%"],
+        "coordination.stiffness": [500, 1000],
+        "coordination.damping": [2.5],
+    }
+    table = campaign(scene, vary=vary)
+    assert set(vary) < set(table)
+    assert sorted(set(table["link.delay"].tolist())) == [8.0, 16.0]
+    assert sorted(set(table["coordination.stiffness"].tolist())) == [500, 1000]
+    units = {"link.delay": "ms", "link.loss": "%", "coordination.stiffness": "N/m", "coordination.damping": "N·s/m"}
+    assert {name: table.unit(name) for name in vary} == units
+    assert table.unit("run") == ""
+    assert table.to_pandas().attrs["units"] == units
+    assert pyarrow.table(table).schema.field("link.delay").metadata == {b"unit": b"ms"}
+    with pytest.raises(KeyError):
+        table.unit("link.delay_ms")

@@ -6,6 +6,7 @@ use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts};
 use crate::table::{Column, Roster, Row, columns};
+use crate::vary::Variation;
 use crate::work::{Chunk, Scenes, Work};
 
 /// The table of a plan, any rows of which can be had in any process: they are those of [`Campaign::run`](crate::Campaign::run).
@@ -56,6 +57,12 @@ impl SpreadCampaign {
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns
+    }
+
+    /// The keys that are varied, with their values.
+    #[must_use]
+    pub fn variations(&self) -> &[Variation] {
+        self.plan.variations()
     }
 
     /// How many rows the table has.

@@ -6,7 +6,7 @@ mod scene;
 #[cfg(test)]
 mod tests;
 
-use cohaptic_linkfile::schema::{self, Table};
+use cohaptic_linkfile::schema::{self, Form, Table};
 use serde_json::Value;
 
 /// A kind of file.
@@ -44,9 +44,29 @@ impl FileSchema {
         }
     }
 
+    /// The unit in which the value of a key is a plain number: `"N/m"` of `coordination.stiffness` and of `peers.anna.coupling.stiffness`. Empty for a key
+    /// whose values carry their units (`link.delay`), are no numbers or have no unit, and for what is no key.
+    #[must_use]
+    pub fn unit_of(self, key: &str) -> &'static str {
+        let mut parts = key.split('.');
+        let Some(first) = parts.next().and_then(|name| form_of(self.root(), name)) else { return "" };
+        parts.try_fold(first, |form, name| form_of(form.table()?, name)).map_or("", unit)
+    }
+
     /// The catalogue as a JSON Schema of draft 7.
     #[must_use]
     pub fn json(self) -> Value {
         schema::json_schema(self.root(), self.title())
     }
+}
+
+/// What stands under a name of a table.
+fn form_of(table: &'static Table, name: &str) -> Option<&'static Form> {
+    table.keys().find(|key| key.name == name).map(|key| &key.form).or(table.others)
+}
+
+/// The unit of a number that may stand there.
+fn unit(form: &'static Form) -> &'static str {
+    let Form::AnyOf(forms) = form else { return form.unit() };
+    forms.iter().map(unit).find(|unit| !unit.is_empty()).unwrap_or_default()
 }

@@ -283,3 +283,24 @@ fn the_reference_has_the_keys_of_the_catalogue() {
     }
     assert_eq!(named, listed);
 }
+
+#[test]
+fn numbers_have_the_units_of_mechanics_and_texts_have_none() {
+    for (key, unit) in [
+        ("coordination.stiffness", "N/m"),
+        ("coordination.damping", "N·s/m"),
+        ("object.mass", "kg"),
+        ("peer.coupling.stiffness", "N/m"),
+        ("peers.anna.coupling.damping", "N·s/m"),
+        ("link.delay", ""),
+        ("link.loss", ""),
+        ("links.anna.bob.delay", ""),
+        ("coordination.strategy", ""),
+        ("scene.seed", ""),
+        ("scene", ""),
+        ("coordination.stifness", ""),
+        ("", ""),
+    ] {
+        assert_eq!(FileSchema::Scene.unit_of(key), unit, "{key}");
+    }
+}
