@@ -10,25 +10,52 @@ use toml::de::{DeTable, DeValue};
 
 use crate::document::{BEGINNING, FileError, Node, Sources, Table, Value, key_text, value_text};
 use crate::link::read_link;
-use crate::reading::{FileReader, Modulators, parse_with};
+use crate::reading::{Context, FileReader, Modulators, parse_with, values};
 
 /// The link of these keys: texts `KEY=VALUE`, such as `delay=24ms` and `loss={ gilbert-elliott = { p = 0.01, r = 0.1 } }`, as in `[link]` of a scene.
 /// Files that they name are looked for in the current folder.
+///
+/// Unlike in a scene, `loss=1` is refused: these texts stand where words of `tc` may stand too, and there `loss 1` is 1 %. `loss=100%` and `loss=0` are read.
 ///
 /// # Errors
 ///
 /// [`FileError`], whose [`override_text`](crate::Diagnostic::override_text) is `link.` and the text with the fault.
 pub fn link_from_keys(keys: &[String]) -> Result<LinkModel, FileError> {
     let overrides: Vec<String> = keys.iter().map(|key| format!("link.{key}")).collect();
-    read_overrides(&overrides, Path::new("link.toml"), &Arc::default(), FileReader::ANY)
+    read_overrides(&overrides, Path::new("link.toml"), &Arc::default(), FileReader::ANY, refuse_fractions)
 }
 
-/// The link that overrides of the keys of `link` make.
-fn read_overrides(overrides: &[String], file: &Path, modulators: &Arc<Modulators>, reader: FileReader<'_>) -> Result<LinkModel, FileError> {
+/// Refuses the number of a chance, where a word of `tc` of the same name takes a number for hundredths.
+fn refuse_fractions(link: &Node, context: Context<'_>) {
+    let entries = link.as_table().map_or(&[][..], |table| &table.0);
+    for entry in entries.iter().filter(|entry| ["loss", "duplicate", "corrupt", "reorder"].contains(&entry.name.as_str())) {
+        let node = &entry.node;
+        let (Value::Integer(_) | Value::Float(_)) = node.value else { continue };
+        let Some(probability) = values::probability(node, context).filter(|probability| probability.get() != 0.0) else { continue };
+        let number = values::written(node);
+        // The digits of the product beyond the twelfth come from rounding to binary.
+        let percent = (probability.get() * 1e12).round() / 1e10;
+        let name = &entry.name;
+        context.fault_at(
+            node,
+            format!("{number} has no unit: a scene reads {percent} %, and tc reads {name} {number} as {number} %: expected {percent}% or {number}%"),
+        );
+    }
+}
+
+/// The link that overrides of the keys of `link` make, of which `check` has reported what it refuses.
+fn read_overrides(
+    overrides: &[String],
+    file: &Path,
+    modulators: &Arc<Modulators>,
+    reader: FileReader<'_>,
+    check: fn(&Node, Context<'_>),
+) -> Result<LinkModel, FileError> {
     let parsed = parse_with(Sources { file, text: "", overrides }, reader, |document, context| {
         let context = context.with_modulators(Some(modulators));
         let nothing = Node::empty_table(BEGINNING, "link".to_owned());
         let link = document.as_table().and_then(|table| table.get("link")).map_or(&nothing, |entry| &*entry.node);
+        check(link, context);
         read_link(link, context, &[])
     })?;
     Ok(parsed.whole)
@@ -87,7 +114,7 @@ impl LinkKeys {
     /// As [`model`](Self::model). [`FileError::bare_message`] of an error quotes nothing of these files.
     pub fn model_with(&self, folder: &Path, reader: FileReader<'_>) -> Result<LinkModel, FileError> {
         let overrides: Vec<String> = self.iter().map(|(key, value)| format!("link.{key}={value}")).collect();
-        read_overrides(&overrides, &folder.join("link.toml"), &self.modulators, reader)
+        read_overrides(&overrides, &folder.join("link.toml"), &self.modulators, reader, |_, _| ())
     }
 
     /// The keys in the display form of others, in the scene of these. `None` if the text is no table of keys and values; whether they make sense is told
@@ -155,6 +182,26 @@ mod tests {
         let expected = LinkConfig { delay, loss: Loss::Independent(Probability::new(0.01).unwrap()), ..LinkConfig::default() };
         assert_eq!(link(&["delay=24ms", "jitter={ sd = \"2ms\" }", "loss=1%"]).unwrap(), expected.into());
         assert_eq!(link(&[]).unwrap(), LinkModel::default());
+    }
+
+    #[test]
+    fn a_chance_without_unit_is_refused_with_both_readings() {
+        for (text, parts) in [
+            ("loss=1", ["a scene reads 100 %", "tc reads loss 1 as 1 %", "expected 100% or 1%"]),
+            ("loss=0.07", ["a scene reads 7 %", "tc reads loss 0.07 as 0.07 %", "expected 7% or 0.07%"]),
+            ("duplicate=0.5", ["a scene reads 50 %", "tc reads duplicate 0.5 as 0.5 %", "expected 50% or 0.5%"]),
+            ("corrupt=1", ["a scene reads 100 %", "tc reads corrupt 1 as 1 %", "expected 100% or 1%"]),
+            ("reorder=0.25", ["a scene reads 25 %", "tc reads reorder 0.25 as 0.25 %", "expected 25% or 0.25%"]),
+        ] {
+            let error = link(&["delay=9ms", text]).unwrap_err();
+            assert_eq!(error.diagnostic().unwrap().override_text(), Some(format!("link.{text}").as_str()));
+            assert!(parts.iter().all(|part| error.to_string().contains(part)), "{error}");
+        }
+        for text in ["loss=0", "loss=0.0", "loss=100%", "loss={ bursts = { loss = 0.02, length = 4 } }", "corrupt={ probability = 0.01 }"] {
+            assert!(link(&[text]).is_ok(), "{text}");
+        }
+        // Keys of a scene stand where no words may.
+        assert!(LinkKeys::default().with("loss", "1").model(Path::new(".")).is_ok());
     }
 
     #[test]
@@ -229,7 +276,7 @@ mod tests {
         let keys = LinkKeys::default().with("delay", "8ms").with("loss", "0.1").with("delay", "\"9ms\"");
         assert_eq!(keys.to_string(), "{ loss = 0.1, delay = \"9ms\" }");
         let folder = Path::new("");
-        assert_eq!(keys.model(folder).unwrap(), link(&["loss=0.1", "delay=9ms"]).unwrap());
+        assert_eq!(keys.model(folder).unwrap(), link(&["loss=10%", "delay=9ms"]).unwrap());
         let text = keys.with("delay", "4 \"µs\"\n");
         assert_eq!(LinkKeys::default().read(&text.to_string()).unwrap().get("delay"), Some(r#""4 \"µs\"""#));
         let error = keys.with("delay", "4 parsecs").model(folder).unwrap_err();

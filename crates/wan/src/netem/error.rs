@@ -44,6 +44,15 @@ pub enum NetemErrorKind {
         /// What would have been right.
         expected: &'static str,
     },
+    /// A number without a unit, where another notation or another version of `tc` reads something else. Zero is the same everywhere and needs none.
+    NoUnit {
+        /// The option.
+        option: &'static str,
+        /// The word.
+        word: String,
+        /// What each notation reads, and what would have been right.
+        readings: String,
+    },
     /// The end, where an option lacks a value.
     Missing {
         /// The option.
@@ -68,6 +77,7 @@ impl fmt::Display for NetemErrorKind {
                 "unknown word \"{word}\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, slot, seed or the end"
             ),
             Self::Value { option, word, expected } => write!(f, "\"{word}\" is not what {option} takes here: expected {expected}"),
+            Self::NoUnit { option, word, readings } => write!(f, "\"{word}\" of {option} has no unit: {readings}"),
             Self::Missing { option, expected } => write!(f, "{option} ends too early: expected {expected} after it"),
             Self::Repeated { option } => write!(f, "{option} is said twice: expected it once"),
             Self::Contradiction(error) => fmt::Display::fmt(error, f),
@@ -106,6 +116,7 @@ impl NetemError {
     fn advice(&self) -> String {
         match &self.kind {
             NetemErrorKind::Value { expected, .. } => format!("expected {expected}"),
+            NetemErrorKind::NoUnit { readings, .. } => format!("no unit: {readings}"),
             NetemErrorKind::Missing { expected, .. } => format!("expected {expected} after this"),
             NetemErrorKind::UnknownWord { .. } | NetemErrorKind::Repeated { .. } | NetemErrorKind::Contradiction(_) => self.kind.to_string(),
         }

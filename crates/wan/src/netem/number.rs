@@ -3,6 +3,8 @@
 //! A number is what C's `strtod` reads of decimals (sign, point, exponent), the rest is its unit; units ignore case. Not read, though `strtod` does:
 //! hexadecimal floats, `inf` and `nan`. Integers are what `strtol` reads: octal after `0`, hexadecimal after `0x`.
 
+use alloc::format;
+use alloc::string::String;
 use core::num::NonZeroU64;
 use core::time::Duration;
 
@@ -69,6 +71,34 @@ enum Scaled {
     Real(f64),
 }
 
+/// What notations read where a number has no unit, and what would have been right; `None` for a number with a unit, for zero and for what is no number.
+///
+/// `tc` changed the unit of a delay between versions, and a number in a scene is a fraction where the same word of `tc` is a percentage.
+pub(super) fn without_unit(text: &str, kind: Plain) -> Option<String> {
+    let number = number(text).filter(|number| number.unit.is_empty() && number.value != 0.0)?;
+    Some(match kind {
+        Plain::Percentage => {
+            // The digits of the product beyond the twelfth come from rounding to binary.
+            let fraction = libm::rint(number.value * 1e12) / 1e10;
+            format!("tc reads {text} %, a scene would read the fraction {text}, which is {fraction} %: expected {text}%")
+        }
+        Plain::Delay => {
+            format!(
+                "tc reads {text} us up to version 6.8 and {text} ns from 6.9 on, and a scene reads no time without its unit: expected {text}us or {text}ns"
+            )
+        }
+        Plain::Slot => format!("tc reads {text} ns, and a scene reads no time without its unit: expected {text}ns"),
+    })
+}
+
+/// What a number without unit stands for.
+#[derive(Clone, Copy)]
+pub(super) enum Plain {
+    Percentage,
+    Delay,
+    Slot,
+}
+
 /// Every scale is below 2⁵³ or has few bits set.
 #[expect(clippy::cast_precision_loss, reason = "the scales of the tables below are exact")]
 fn real(scale: u64) -> f64 {
@@ -83,19 +113,10 @@ fn truncated(value: f64) -> Option<u64> {
     (0.0..TWO_POW_32 * TWO_POW_32).contains(&value).then_some(value as u64)
 }
 
-/// What a number without unit means as a time.
-#[derive(Clone, Copy)]
-pub(super) enum Bare {
-    /// In `delay`, up to iproute2 6.8.
-    Microseconds,
-    /// In `slot`.
-    Nanoseconds,
-}
-
 pub(super) const TIME: &str = "a time such as 10ms, 250us or 1.5s, below 292 years (units: s, ms, us, ns)";
 
-/// Reads a time, rounded to the nearest nanosecond.
-pub(super) fn time(text: &str, bare: Bare) -> Option<Duration> {
+/// Reads a time, rounded to the nearest nanosecond. Of numbers without unit only zero is a time: see [`without_unit`].
+pub(super) fn time(text: &str) -> Option<Duration> {
     const S: u64 = 1_000_000_000;
     const MS: u64 = 1_000_000;
     const US: u64 = 1_000;
@@ -115,13 +136,7 @@ pub(super) fn time(text: &str, bare: Bare) -> Option<Duration> {
         ("ns", 1),
         ("nsec", 1),
         ("nsecs", 1),
-        (
-            "",
-            match bare {
-                Bare::Microseconds => US,
-                Bare::Nanoseconds => 1,
-            },
-        ),
+        ("", 1),
     ];
     let number = number(text)?;
     let nanos = match number.times(number.scale(&units)?) {
@@ -133,7 +148,7 @@ pub(super) fn time(text: &str, bare: Bare) -> Option<Duration> {
 
 pub(super) const PERCENT: &str = "a percentage from 0 to 100";
 
-/// Reads a percentage, with or without its sign.
+/// Reads a percentage, with or without its sign: see [`without_unit`].
 pub(super) fn percent(text: &str) -> Option<Percent> {
     let number = number(text)?;
     matches!(number.unit, "" | "%").then_some(())?;

@@ -8,8 +8,9 @@ use alloc::vec::Vec;
 use core::iter::Peekable;
 use core::num::NonZeroU32;
 use core::ops::Range;
+use core::time::Duration;
 
-use super::number::{self, Bare, PERCENT, RATE, TIME};
+use super::number::{self, PERCENT, Plain, RATE, TIME};
 use super::{
     CellSpec, ChanceSpec, Contradiction, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, NetemError, NetemErrorKind,
     Percent, RateSpec, ReorderSpec, SlotGap, SlotSpec, StateSpec,
@@ -49,9 +50,9 @@ impl Netem {
     /// Reads the options of a netem, in any order: what stands behind `netem` in a command for `tc`.
     ///
     /// Stricter than `tc`: nothing may be said twice, negative times, sizes and counts are refused, and so are zero where it would switch off
-    /// an impairment (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, and chains whose ways out of a state sum to more than 1. More lenient:
-    /// `packets` and `bytes` of a slot may stand in either order, and `ns` is a unit of `delay` (as in iproute2 from 6.9 on; there a delay without
-    /// unit is nanoseconds, here it is microseconds as in 6.6).
+    /// an impairment (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, chains whose ways out of a state sum to more than 1, and times and
+    /// percentages without a unit, but for zero: `delay 20` is 20 µs for iproute2 6.6 and 20 ns from 6.9 on, and `loss 1` is 1 % where the number 1 in a scene is
+    /// 100 %. More lenient: `packets` and `bytes` of a slot may stand in either order, and `ns` is a unit of `delay` (as in iproute2 from 6.9 on).
     ///
     /// # Errors
     ///
@@ -148,17 +149,17 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
     }
 
     fn delay(&mut self) -> Result<DelaySpec, NetemError> {
-        let time = |text: &str| number::time(text, Bare::Microseconds);
-        let mut delay = DelaySpec { time: self.value("delay", TIME, time)?, jitter: None };
-        if let Some(jitter) = self.optional("delay", TIME, time)? {
-            delay.jitter = Some(JitterSpec { time: jitter, correlation: self.optional("delay", PERCENT, number::percent)?, distribution: None });
+        let mut delay = DelaySpec { time: self.time("delay", TIME, Plain::Delay)?, jitter: None };
+        if self.number_follows() {
+            let jitter = self.time("delay", TIME, Plain::Delay)?;
+            delay.jitter = Some(JitterSpec { time: jitter, correlation: self.optional_percent("delay")?, distribution: None });
         }
         Ok(delay)
     }
 
     fn chance(&mut self, option: Keyword) -> Result<ChanceSpec, NetemError> {
-        let percent = self.value(option, PERCENT, number::percent)?;
-        Ok(ChanceSpec { percent, correlation: self.optional(option, PERCENT, number::percent)? })
+        let percent = self.percent(option)?;
+        Ok(ChanceSpec { percent, correlation: self.optional_percent(option)? })
     }
 
     fn loss(&mut self) -> Result<LossSpec, NetemError> {
@@ -184,9 +185,9 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
     /// The first is required, the others follow as long as there are numbers.
     fn probabilities<const N: usize>(&mut self) -> Result<[Option<Percent>; N], NetemError> {
         let mut said = [None; N];
-        said[0] = Some(self.value("loss", PERCENT, number::percent)?);
+        said[0] = Some(self.percent("loss")?);
         for (index, percent) in said.iter_mut().enumerate().skip(1) {
-            *percent = self.optional("loss", PERCENT, number::percent)?;
+            *percent = self.optional_percent("loss")?;
             if percent.is_none() {
                 break;
             }
@@ -213,17 +214,16 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
     }
 
     fn slot(&mut self) -> Result<SlotSpec, NetemError> {
-        let time = |text: &str| number::time(text, Bare::Nanoseconds);
         let gap = if self.words.peek().is_some_and(|word| word.text == "distribution") {
             self.skip();
             let distribution = self.value("slot", NAME, Distribution::named)?;
-            let delay = self.value("slot", TIME, time)?;
-            let jitter = self.value("slot", TIME, time)?;
+            let delay = self.time("slot", TIME, Plain::Slot)?;
+            let jitter = self.time("slot", TIME, Plain::Slot)?;
             self.mark(Place::SlotJitter);
             SlotGap::Drawn { distribution, delay, jitter }
         } else {
-            let min = self.value("slot", SLOT, time)?;
-            let max = self.optional("slot", TIME, time)?;
+            let min = self.time("slot", SLOT, Plain::Slot)?;
+            let max = if self.number_follows() { Some(self.time("slot", TIME, Plain::Slot)?) } else { None };
             self.mark(Place::SlotMax);
             SlotGap::Range { min, max }
         };
@@ -255,10 +255,32 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         read(word.text).ok_or_else(|| NetemError { kind: NetemErrorKind::Value { option, word: word.text.to_string(), expected }, span: word.span })
     }
 
-    /// The next word if it begins with a digit; then it must be right.
-    fn optional<V>(&mut self, option: Keyword, expected: &'static str, read: impl Fn(&str) -> Option<V>) -> Result<Option<V>, NetemError> {
-        let follows = self.words.peek().is_some_and(|word| word.text.starts_with(|c: char| c.is_ascii_digit()));
-        if follows { self.value(option, expected, read).map(Some) } else { Ok(None) }
+    /// The next word as a time, with its unit.
+    fn time(&mut self, option: Keyword, expected: &'static str, kind: Plain) -> Result<Duration, NetemError> {
+        self.with_unit(option, expected, kind, number::time)
+    }
+
+    /// The next word as a percentage, with its sign.
+    fn percent(&mut self, option: Keyword) -> Result<Percent, NetemError> {
+        self.with_unit(option, PERCENT, Plain::Percentage, number::percent)
+    }
+
+    /// The next word as a percentage if it begins with a digit.
+    fn optional_percent(&mut self, option: Keyword) -> Result<Option<Percent>, NetemError> {
+        if self.number_follows() { self.percent(option).map(Some) } else { Ok(None) }
+    }
+
+    /// The next word, which must be there, must be right, and must have a unit where notations differ.
+    fn with_unit<V>(&mut self, option: Keyword, expected: &'static str, kind: Plain, read: impl Fn(&str) -> Option<V>) -> Result<V, NetemError> {
+        let text = self.words.peek().map_or("", |word| word.text);
+        let value = self.value(option, expected, read)?;
+        let no_unit = |readings| NetemError { kind: NetemErrorKind::NoUnit { option, word: text.to_string(), readings }, span: self.last.clone() };
+        number::without_unit(text, kind).map_or(Ok(value), |readings| Err(no_unit(readings)))
+    }
+
+    /// Whether the next word begins with a digit, as optional values do.
+    fn number_follows(&mut self) -> bool {
+        self.words.peek().is_some_and(|word| word.text.starts_with(|c: char| c.is_ascii_digit()))
     }
 
     /// The next word if it begins with a digit or a minus; then it must be right.

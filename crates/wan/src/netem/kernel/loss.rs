@@ -167,13 +167,13 @@ mod tests {
     fn chains_have_the_numbers_that_tc_sends() {
         let [p13, p31, p32, p23, p14] = [0x028f_5c29, 0x051e_b852, 0x07ae_147b, 0x0a3d_70a4, 0x0ccc_cccd];
         let said = FourState { p13, p31, p32, p23: p14.min(0x0a3d_70a4), p14 };
-        assert_eq!(four_state("loss state 1 2 3 4 5"), FourState { p23, ..said });
-        assert_eq!(four_state("loss state 12.3"), FourState { p13: 0x1f7c_ed91, p31: 0xe083_126e, p32: 0, p23: u32::MAX, p14: 0 });
-        assert_eq!(four_state("loss state 10").p31, 0xe666_6666);
+        assert_eq!(four_state("loss state 1% 2% 3% 4% 5%"), FourState { p23, ..said });
+        assert_eq!(four_state("loss state 12.3%"), FourState { p13: 0x1f7c_ed91, p31: 0xe083_126e, p32: 0, p23: u32::MAX, p14: 0 });
+        assert_eq!(four_state("loss state 10%").p31, 0xe666_6666);
         let said = GilbertElliott { p: 0x028f_5c29, r: 0x1999_999a, h: 0x4ccc_cccd, k1: 0x0041_8937 };
-        assert_eq!(gilbert_elliott("loss gemodel 1 10 70 0.1"), said);
-        assert_eq!(gilbert_elliott("loss gemodel 10"), GilbertElliott { p: 0x1999_999a, r: 0xe666_6666, h: 0, k1: 0 });
-        assert_eq!(gilbert_elliott("loss gemodel 1 1 10").h, 0xe666_6665);
+        assert_eq!(gilbert_elliott("loss gemodel 1% 10% 70% 0.1%"), said);
+        assert_eq!(gilbert_elliott("loss gemodel 10%"), GilbertElliott { p: 0x1999_999a, r: 0xe666_6666, h: 0, k1: 0 });
+        assert_eq!(gilbert_elliott("loss gemodel 1% 1% 10%").h, 0xe666_6665);
     }
 
     #[test]
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn two_halves_that_round_up_switch_the_burst_off() {
-        let chain = four_state("loss state 50 50 0 100 50");
+        let chain = four_state("loss state 50% 50% 0% 100% 50%");
         assert_eq!(chain.p13.wrapping_add(chain.p14), 0);
         let mut prng = Prng::new(1);
         let mut state = State::ReceivedInGap;

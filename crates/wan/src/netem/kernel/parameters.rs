@@ -108,9 +108,9 @@ mod tests {
     #[test]
     fn delays_go_through_ticks_as_in_tc() {
         let recorded = [
-            ("delay 1.9", 15),
+            ("delay 1.9us", 15),
             ("delay 0.9us", 0),
-            ("delay 5", 78),
+            ("delay 5us", 78),
             ("delay 1ms", 15_625),
             ("delay 1e3us", 15_625),
             ("delay 10Secs", 156_250_000),

@@ -6,7 +6,7 @@ use crate::netem::{Contradiction, DelaySpec, LossSpec, Netem, NetemErrorKind, Pe
 const REFUSED: &[(&str, &str)] = &[
     ("foo", "foo"),
     ("delay 1ms jitter 5", "jitter"),
-    ("delay 1ms 1ms 1% 3", "3"),
+    ("delay 1ms 1ms 1% 3%", "3%"),
     ("Delay 1ms", "Delay"),
     ("delay", "delay"),
     ("loss random", "random"),
@@ -26,7 +26,7 @@ const REFUSED: &[(&str, &str)] = &[
     ("loss 1%%", "1%%"),
     ("loss 5% 150", "150"),
     ("loss rand 5%", "rand"),
-    ("loss gemodel 1 150", "150"),
+    ("loss gemodel 1% 150", "150"),
     ("limit -1", "-1"),
     ("limit 5000000000", "5000000000"),
     ("limit 1t", "1t"),
@@ -47,7 +47,7 @@ const REFUSED: &[(&str, &str)] = &[
     ("seed -1", "-1"),
     ("seed 0x10", "0x10"),
     ("seed 18446744073709551616", "18446744073709551616"),
-    ("slot 5 -5", "-5"),
+    ("slot 5ns -5", "-5"),
     ("slot packets 5", "packets"),
     ("slot 1us packets -1", "-1"),
     ("slot 1us packets 0", "0"),
@@ -70,9 +70,44 @@ const REFUSED: &[(&str, &str)] = &[
     ("loss state 60% 10% 10% 10% 50%", "50%"),
     ("loss state 10% 60% 50%", "50%"),
     ("slot 100us 50us", "50us"),
-    ("slot 1us 5", "5"),
+    ("slot 1us 5ns", "5ns"),
     ("slot distribution normal 1ms 0", "0"),
 ];
+
+/// Words with a number that notations read differently, the word to blame, and both readings. iproute2 6.6 (`get_time`, `get_percent`): µs in `delay`, ns in `slot`,
+/// hundredths. iproute2 6.9 (`get_time64`): ns in `delay`. A number in a scene is a fraction.
+const WITHOUT_UNIT: &[(&str, &str, &[&str])] = &[
+    ("loss 1", "1", &["tc reads 1 %", "fraction 1, which is 100 %", "expected 1%"]),
+    ("loss 0.07", "0.07", &["tc reads 0.07 %", "which is 7 %", "expected 0.07%"]),
+    ("loss random 1% 25", "25", &["tc reads 25 %", "2500 %", "expected 25%"]),
+    ("loss gemodel 1% 10 70%", "10", &["tc reads 10 %"]),
+    ("loss state 1% 2% 3", "3", &["tc reads 3 %"]),
+    ("duplicate 1 ", "1", &["duplicate", "tc reads 1 %"]),
+    ("corrupt 1", "1", &["corrupt", "tc reads 1 %"]),
+    ("delay 1ms reorder 25 50%", "25", &["reorder", "tc reads 25 %"]),
+    ("delay 20", "20", &["tc reads 20 us up to version 6.8 and 20 ns from 6.9 on", "expected 20us or 20ns"]),
+    ("delay 20ms 1e3", "1e3", &["tc reads 1e3 us", "expected 1e3us or 1e3ns"]),
+    ("delay 20ms 5ms 25", "25", &["tc reads 25 %"]),
+    ("slot 800", "800", &["tc reads 800 ns", "expected 800ns"]),
+    ("slot 1us 800", "800", &["tc reads 800 ns"]),
+    ("slot distribution normal 1ms 5", "5", &["tc reads 5 ns"]),
+];
+
+#[test]
+fn a_number_without_unit_is_refused_with_both_readings() {
+    for (words, blamed, parts) in WITHOUT_UNIT {
+        let error = Netem::parse(words).expect_err(words);
+        assert!(matches!(error.kind, NetemErrorKind::NoUnit { .. }) && words[error.span.clone()] == **blamed, "{words}: {error:?}");
+        for part in *parts {
+            assert!(error.to_string().contains(part), "no {part:?} in {error}");
+        }
+        assert!(error.excerpt(words).contains("^ no unit: tc reads "), "{}", error.excerpt(words));
+    }
+    // Zero is the same in all of them, and what has no unit in any of them needs none.
+    for words in ["loss 0 0", "delay 0 0 0%", "slot 0 0 packets 5 bytes 100", "limit 10", "rate 1000", "loss gemodel 0 0 0 0", "seed 5"] {
+        assert!(Netem::parse(words).is_ok(), "{words}");
+    }
+}
 
 #[test]
 fn every_error_points_at_the_word_to_blame() {
