@@ -3,19 +3,13 @@
 use cohaptic_answers::OutcomeDocument;
 use cohaptic_picture::Gauge;
 use cohaptic_picture::page::{Html, Mark, Table};
-use cohaptic_units::print::Number;
-
-use crate::output::six_digits;
 
 /// The cells of a row: verdict, expectation, what was expected, what came out, and both as a bar.
 pub(crate) fn cells(outcome: &OutcomeDocument) -> [Html; 5] {
     let OutcomeDocument { name, low, high, measured, passed, expected, found, .. } = outcome;
     let gauge = Gauge { low: *low, high: *high, measured: *measured, passed: *passed };
     let bar = if low.is_some() || high.is_some() { Html::gauge(&gauge) } else { Html::text("no number") };
-    // A table of a page has no room for all digits, which are in the JSON.
-    let found =
-        measured.map_or_else(|| found.clone(), |measured| found.replacen(&measured.to_string(), &Number(six_digits(measured)).to_string(), 1));
-    [verdict(*passed), name.as_str().into(), expected.as_str().into(), found.into(), bar]
+    [verdict(*passed), name.as_str().into(), expected.as_str().into(), found.as_str().into(), bar]
 }
 
 /// A verdict that is read without colours too.

@@ -86,11 +86,6 @@ pub(crate) fn are(number: usize, one: &str) -> String {
     format!("{} {}", cohaptic_units::print::Counted(number, one), if number == 1 { "is" } else { "are" })
 }
 
-/// A number to six digits: for pictures and pages, beside which a table or a document has all digits.
-pub(crate) fn six_digits(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
-}
-
 /// A figure with `digits` digits behind the point; in powers of ten where these would be most of it, or not enough: from 10⁶ on and below 10⁻⁴.
 pub(crate) fn figure(value: f64, digits: usize) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());

@@ -33,8 +33,8 @@ pub(crate) fn draw(bands: &Bands, scale: f64, unit: &str) -> String {
     let mut text = String::new();
     for (row, line) in dots.iter().enumerate() {
         let label = match row {
-            0 => format!("{:9.3}", range.end * scale),
-            _ if row == HEIGHT - 1 => format!("{:9.3}", range.start * scale),
+            0 => label(range.end * scale),
+            _ if row == HEIGHT - 1 => label(range.start * scale),
             _ if row == HEIGHT / 2 => format!("{unit:>9}"),
             _ => " ".repeat(9),
         };
@@ -47,6 +47,11 @@ pub(crate) fn draw(bands: &Bands, scale: f64, unit: &str) -> String {
         text.push_str("          what goes far beyond is cut off\n");
     }
     text
+}
+
+/// A number at the axis, nine characters wide.
+fn label(value: f64) -> String {
+    if value.abs() < 1e4 { format!("{value:9.3}") } else { format!("{value:9.2e}") }
 }
 
 /// The bit of each dot, by row and column, in a braille pattern.

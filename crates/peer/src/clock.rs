@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use cohaptic_units::Instant;
+use cohaptic_units::print::SixDigits;
 
 /// How fast a clock runs: a signed number of parts per billion, positive for a fast clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -10,7 +11,7 @@ pub struct Drift(i64);
 
 /// Why a drift is refused.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[error("a clock drift of {fraction} is out of range: expected at most 0.1 either way, 10 %")]
+#[error("a clock drift of {} is out of range: expected at most 0.1 either way, 10 %", SixDigits(*fraction))]
 pub struct DriftError {
     /// The drift asked for.
     pub fraction: f64,

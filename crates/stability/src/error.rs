@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{SixDigits, Span};
 
 use crate::cost::Memory;
 
@@ -114,10 +114,8 @@ pub enum AnalysisError {
          `cohaptic check`; or expected a scene without it"
     )]
     DeadBands,
-    /// Ages of samples between clocks that differ.
-    #[error(
-        "{strategy} coordination uses the ages of samples, which do not repeat where clocks differ: expected one tick, offset and drift for all peers"
-    )]
+    /// Ages of samples between clocks that drift apart.
+    #[error("{strategy} coordination uses the ages of samples, which do not repeat where clocks drift apart: expected one drift for all peers")]
     AgesByClocks {
         /// Its name.
         strategy: &'static str,
@@ -126,7 +124,7 @@ pub enum AnalysisError {
     #[error("the scene is not linear: there is one matrix for each combination of contacts; expected contact = \"grasp\" or \"none\"")]
     SeveralModes,
     /// More is offered to a line than it carries.
-    #[error("{line} is offered {load:.0} bit/s and carries {rate:.0}: its queue never settles; expected a higher rate, or fewer or rarer samples")]
+    #[error("{line} is offered {} bit/s and carries {}: its queue never settles; expected a higher rate, or fewer or rarer samples", SixDigits(*load), SixDigits(*rate))]
     Overloaded {
         /// Which line.
         line: String,

@@ -19,7 +19,7 @@ use crate::cost::{PartCost, pushed_operations};
 use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
-use crate::structure::{Contacts, Structure, common_time, count, has_equal_clocks, linear_law};
+use crate::structure::{Contacts, Structure, common_time, count, has_one_drift, linear_law};
 use crate::timetable::{Event, Instants, NodeClock, Timetable, UseOfHeld};
 use crate::unseen::felt;
 use crate::{AnalysisError, Matrix, StateName, Watch};
@@ -121,7 +121,7 @@ fn compliance(scene: &Scene, peer: usize, time: f64) -> f64 {
     time * scene.peers[peer].clock.tick.as_secs_f64() / scene.copy_mass()
 }
 
-/// What all clocks show when a frame begins, so that samples of the frames before were sent at instants too.
+/// What a clock without an offset shows when a frame begins, so that samples of the frames before were sent at instants too.
 const EARLIER: Instant = Instant::from_nanos(1 << 60);
 
 type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;
@@ -181,7 +181,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         if kind == SampleKind::Energy {
             return Err(AnalysisError::NoAnalysis { strategy: scene.coordination.strategy.name() });
         }
-        if members.iter().any(|member| member.strategy().horizon().is_some()) && !has_equal_clocks(scene) {
+        if members.iter().any(|member| member.strategy().horizon().is_some()) && !has_one_drift(scene) {
             return Err(AnalysisError::AgesByClocks { strategy: scene.coordination.strategy.name() });
         }
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
@@ -197,7 +197,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let wave = scene.coordination.update.as_secs_f64() * (time / scene.copy_mass()).sqrt();
         let (extra, remembered) = if kind == SampleKind::Wave { (vec![wave; peers], wave) } else { (compliance.clone(), 1.0) };
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
-        let instants = Instants::of(&timetable, peers);
+        let instants = Instants::of(&timetable);
         Ok(Self {
             samples: vec![Vec::new(); peers],
             extras: vec![Vec::new(); peers],
@@ -361,7 +361,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
     /// A peer holds a sample of another; whether its strategy is handed what the sample carries beyond the state.
     fn hold(&mut self, (to, from, sample): (usize, usize, i64), begin_local: Instant, accepts: bool) {
         let state = *self.sample(from, sample);
-        let after = self.instants.sent_at(from, sample, self.timetable.frame);
+        let after = self.instants.local(from, self.instants.sent_at(from, sample, self.timetable.frame));
         let sent = Instant::from_nanos(begin_local.as_nanos().saturating_add_signed(after));
         let among_others = |one: usize, other: usize| if one < other { one } else { one - 1 };
         self.members[to].hold(among_others(from, to), sent, state);
@@ -385,8 +385,9 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let layout = &self.layout;
         for (place, member) in self.members.iter_mut().enumerate() {
             let first = layout.first[place];
-            let first_tick = self.instants.ticks[place].first().copied().unwrap_or(0);
-            member.set_local_time(begin_local.saturating_add_nanos(first_tick));
+            let first_tick = self.instants.ticks[place].first().map_or(0, |at| i64::try_from(*at).unwrap_or(i64::MAX));
+            let shown = begin_local.as_nanos().saturating_add_signed(self.instants.local(place, first_tick));
+            member.set_local_time(Instant::from_nanos(shown));
             member.device_mut().set_state(state(&z[first..], self.time));
             member.object_mut().set_state(state(&z[first + 2 * A..], self.time));
             let mut next = first + 4 * A;

@@ -199,7 +199,12 @@ pub(crate) fn has_equal_clocks(scene: &Scene) -> bool {
     scene.peers.iter().all(|spec| spec.clock == scene.peers[0].clock)
 }
 
-/// Refuses laws that have no linear form, and laws that use the ages of samples between clocks that differ: ages then do not repeat from frame to frame.
+/// Whether all peers have the same drift: then their clocks are as far apart in every frame.
+pub(crate) fn has_one_drift(scene: &Scene) -> bool {
+    scene.peers.iter().all(|spec| spec.clock.drift == scene.peers[0].clock.drift)
+}
+
+/// Refuses laws that have no linear form, and laws that use the ages of samples between clocks that drift apart: ages then do not repeat from frame to frame.
 pub(crate) fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     let strategy = scene.coordination.strategy.name();
     let (first, peers) = (&scene.peers[0], scene.peers.len());
@@ -211,7 +216,7 @@ pub(crate) fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
             if scene.sample_kind() == SampleKind::Energy { AnalysisError::NoAnalysis { strategy } } else { AnalysisError::OtherStrategy { strategy } }
         };
         let law = linear_law(scene, peer).ok_or_else(none)?;
-        if law.horizon.is_some() && !has_equal_clocks(scene) {
+        if law.horizon.is_some() && !has_one_drift(scene) {
             return Err(AnalysisError::AgesByClocks { strategy });
         }
     }

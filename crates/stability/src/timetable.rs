@@ -66,6 +66,16 @@ impl NodeClock {
         offset + (local * 1_000_000_000).div_euclid(i128::try_from(self.speed()).unwrap_or(i128::MAX))
     }
 
+    /// What the clock shows at a tick of its own, at the instant to which [`instant`](Self::instant) rounds that tick \[ns\].
+    fn local(&self, at: i128) -> i64 {
+        let tick = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX);
+        let offset = i128::try_from(self.clock.offset.as_nanos()).unwrap_or(i128::MAX);
+        let speed = i128::try_from(self.speed()).unwrap_or(i128::MAX);
+        // Ticks are much further apart than the nanosecond by which an instant is rounded.
+        let number = (2 * (at - offset) * speed / 1_000_000_000 + tick).div_euclid(2 * tick);
+        i64::try_from(number * tick).unwrap_or(i64::MAX)
+    }
+
     /// The first tick at or after an instant.
     fn first_tick(&self, at: i128) -> i128 {
         let span = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX) * 1_000_000_000;
@@ -109,6 +119,8 @@ pub(crate) struct Timetable {
     pub(crate) depth: Vec<usize>,
     /// What each node holds of each other at the beginning of the frame, if it is used before the first delivery: (to, from, sample).
     pub(crate) held: Vec<(usize, usize, i64)>,
+    /// The clocks of the nodes.
+    pub(crate) clocks: Vec<NodeClock>,
 }
 
 /// At which events nodes use the samples that they hold.
@@ -185,7 +197,14 @@ impl Timetable {
         }
         events.sort_unstable_by_key(|(at, step, node, to, sample, _)| (*at, *step, *node, *to, *sample));
         let events = events.into_iter().map(|(.., event)| event).collect();
-        Ok(Self { frame: Duration::from_nanos(u64::try_from(frame).map_err(|_| AnalysisError::NoFrame)?), events, sent, depth, held })
+        Ok(Self {
+            frame: Duration::from_nanos(u64::try_from(frame).map_err(|_| AnalysisError::NoFrame)?),
+            events,
+            sent,
+            depth,
+            held,
+            clocks: clocks.to_vec(),
+        })
     }
 }
 
@@ -194,10 +213,12 @@ impl Timetable {
 pub(crate) struct Instants {
     pub(crate) sends: Vec<Vec<u64>>,
     pub(crate) ticks: Vec<Vec<u64>>,
+    pub(crate) clocks: Vec<NodeClock>,
 }
 
 impl Instants {
-    pub(crate) fn of(timetable: &Timetable, nodes: usize) -> Self {
+    pub(crate) fn of(timetable: &Timetable) -> Self {
+        let nodes = timetable.clocks.len();
         let (mut sends, mut ticks) = (vec![Vec::new(); nodes], vec![Vec::new(); nodes]);
         let mut sampled = vec![false; nodes];
         for event in &timetable.events {
@@ -213,13 +234,20 @@ impl Instants {
                 }
             }
         }
-        Self { sends, ticks }
+        Self { sends, ticks, clocks: timetable.clocks.clone() }
     }
 
-    /// The age of a sample at an instant of the frame \[s\].
+    /// The age of a sample at an instant of the frame at which its holder ticks \[s\]: what the clock of the holder shows less what that of the sender showed,
+    /// and at least zero. Clocks of one drift show the same ages in every frame.
     #[expect(clippy::cast_precision_loss, reason = "a span of at most some frames is far below 2^53 ns")]
-    pub(crate) fn age(&self, node: usize, sample: i64, at: u64, frame: Duration) -> f64 {
-        i64::try_from(at).unwrap_or(i64::MAX).saturating_sub(self.sent_at(node, sample, frame)).max(0) as f64 * 1e-9
+    pub(crate) fn age(&self, (to, from): (usize, usize), sample: i64, at: u64, frame: Duration) -> f64 {
+        let now = self.local(to, i64::try_from(at).unwrap_or(i64::MAX));
+        now.saturating_sub(self.local(from, self.sent_at(from, sample, frame))).max(0) as f64 * 1e-9
+    }
+
+    /// What the clock of a node shows at a tick of its own, counted from the beginning of the frame, before which the clock shows less than zero \[ns\].
+    pub(crate) fn local(&self, node: usize, at: i64) -> i64 {
+        self.clocks[node].local(i128::from(at))
     }
 
     /// When a sample of a node was sent, before the beginning of the frame too \[ns\]: from 0 if it is of this frame, −1 is the last one of the frame before.

@@ -71,6 +71,22 @@ impl fmt::Display for Number {
     }
 }
 
+/// The number of six decimal digits that is nearest to a number.
+#[must_use]
+pub fn six_digits(number: f64) -> f64 {
+    format!("{number:.5e}").parse().unwrap_or(number)
+}
+
+/// A number as messages say it: to six digits, as [`Number`]. `0.0311812`, `1.83285e189`.
+#[derive(Clone, Copy, Debug)]
+pub struct SixDigits(pub f64);
+
+impl fmt::Display for SixDigits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&Number(six_digits(self.0)), f)
+    }
+}
+
 /// A field of a file of comma-separated values, quoted where it must be (RFC 4180).
 #[must_use]
 pub fn csv_field(text: &str) -> String {
@@ -118,6 +134,14 @@ mod tests {
         assert_eq!([print(0.45), print(1000.0), print(-2.5), print(0.0)], ["0.45", "1000", "-2.5", "0"]);
         assert_eq!([print(1e300), print(-1.5e-9), print(1e15), print(f64::INFINITY)], ["1e300", "-1.5e-9", "1e15", "inf"]);
         assert_eq!([print(999_999_999_999_999.0), print(1e-6)], ["999999999999999", "0.000001"]);
+    }
+
+    #[test]
+    fn messages_have_six_digits() {
+        let print = |number| format!("{}", SixDigits(number));
+        assert_eq!([print(0.031_181_185_153), print(1000.0), print(-7.692_307_692_3), print(0.0)], ["0.0311812", "1000", "-7.69231", "0"]);
+        assert_eq!([print(1.832_847e189), print(-1.234_567_89e-300), print(123_456_789.0)], ["1.83285e189", "-1.23457e-300", "123457000"]);
+        assert_eq!([print(f64::INFINITY), print(f64::MAX)], ["inf", "1.79769e308"]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use cohaptic_picture::{Axis, Line, Look, Panel};
 use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange};
+use cohaptic_units::print::six_digits;
 
 use super::axis::{axis_of, radius_name};
 
@@ -10,7 +11,6 @@ use super::axis::{axis_of, radius_name};
 pub fn boundary_picture(title: &str, range: &KeyRange, criterion: Criterion, found: &Boundary) -> cohaptic_picture::Picture {
     let samples: Vec<(f64, f64)> = found.known.iter().map(|(value, cell)| (*value, cell.radius.value)).collect();
     // `samples.csv` has all digits.
-    let six_digits = |value: f64| format!("{value:.5e}").parse().unwrap_or(value);
     let named = |crossing: &Crossing| crossing_in_words(range, &Crossing { value: six_digits(crossing.value), ..*crossing });
     let crossings: Vec<(f64, String)> = found.crossings.iter().map(|crossing| (crossing.value, named(crossing))).collect();
     let picture = Picture {

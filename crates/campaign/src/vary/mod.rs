@@ -5,6 +5,7 @@ mod grid;
 mod group;
 mod list;
 
+use cohaptic_units::print::SixDigits;
 use grid::Grid;
 use list::List;
 
@@ -99,7 +100,11 @@ pub enum VaryError {
         high: String,
     },
     /// The lower end is not below the upper one.
-    #[error("the range of \"{text}\" is empty: {low} is not below {high}; expected a range whose first end is below its second")]
+    #[error(
+        "the range of \"{text}\" is empty: {} is not below {}; expected a range whose first end is below its second",
+        SixDigits(*low),
+        SixDigits(*high)
+    )]
     Empty {
         /// The text as given.
         text: String,
@@ -109,7 +114,7 @@ pub enum VaryError {
         high: f64,
     },
     /// Equal ratios need ends above zero.
-    #[error("{low} in \"{text}\" is not above zero: expected ends above zero for equal ratios (:log)")]
+    #[error("{} in \"{text}\" is not above zero: expected ends above zero for equal ratios (:log)", SixDigits(*low))]
     NoRatio {
         /// The text as given.
         text: String,

@@ -8,7 +8,7 @@ use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_picture::page::{Html, Page, Table};
 use cohaptic_scene::{Scene, scene_content_of_text};
-use cohaptic_units::print::{Counted, Number, Span};
+use cohaptic_units::print::{Counted, SixDigits, Span};
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
 use super::answer::{angle_text, diverged, length, packets};
@@ -16,7 +16,6 @@ use super::command_line;
 use crate::arguments::RunArguments;
 use crate::expectations::{BARS, cells, columns};
 use crate::failure::Failure;
-use crate::output::six_digits;
 use crate::{input, output};
 
 /// More rows of a table stand in a file of the folder only.
@@ -99,7 +98,7 @@ fn measures(scene: &Scene, measured: &[MeasuredValue]) -> Html {
     }
     let head = Table::new().column("measure").number("value").column("unit").column("meaning");
     let table = measured.iter().take(MOST_ROWS).fold(head, |table, MeasuredValue { name, value }| {
-        let value = value.map_or_else(|| "–".to_owned(), |value| Number(six_digits(value)).to_string());
+        let value = value.map_or_else(|| "–".to_owned(), |value| SixDigits(value).to_string());
         table.row([Html::code(&name.text(scene)), value.into(), name.measure.unit().into(), name.measure.about().into()])
     });
     Html::heading(2, "Measures").and(Html::table(&table))

@@ -201,3 +201,24 @@ fn what_has_no_end_is_read_up_to_a_limit() {
     let _ = fill.wait();
     assert!(outcome.status == Some(3) && outcome.stderr.contains(limit) && outcome.stderr.contains("link.trace"), "{outcome:?}");
 }
+
+/// A table of a scene that is the size of a galaxy fits on a screen, and no text for people has a number of more than 16 digits in a row.
+#[test]
+fn numbers_beyond_all_measure_are_said_in_a_few_digits() {
+    let desk = Desk::with("two.toml", TWO);
+    for (line, part) in [
+        ("run two.toml --set peers.left.hand.force=1e300 --measure all", "e"),
+        ("run two.toml --set coordination.stiffness=1e22", "e"),
+        ("explain two.toml --set peer.device.mass=1.2345e-300", "1.2345e-300 kg"),
+        ("explain two.toml --set object.mass=1e300", "e299 kg"),
+        ("stability boundary two.toml --along coordination.stiffness=1e300..1e3", "1e300 is not below 1000"),
+        ("campaign two.toml --vary coordination.stiffness=1e300..1e3/5 --out out", "1e300 is not below 1000"),
+        ("check two.toml --set 'expect.position=[{ peer = \"left\", at = \"0.1s\", max = -1e300 }]'", "expected at most -1e300 m"),
+        ("check two.toml --set 'expect.discrepancy={ max = 1.5e-300 }'", "expected at most 1.5e-300 m"),
+    ] {
+        let outcome = desk.cohaptic(line);
+        let text = outcome.stdout + &outcome.stderr;
+        let digits = text.split(|c: char| !c.is_ascii_digit()).map(str::len).max();
+        assert!(digits <= Some(16) && text.contains(part), "{line}: {text}");
+    }
+}

@@ -11,6 +11,7 @@ use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
 use super::Outcome;
 use crate::measures::Measures;
+use crate::measures::travel::Travelled;
 use crate::observer::observe_by_field;
 use crate::{Ending, Observer, Summary, TickRow, Ticks};
 
@@ -43,8 +44,7 @@ struct WatchedTravel {
     peer: usize,
     axis: usize,
     distance: f64,
-    start: f64,
-    reached: Option<Instant>,
+    travelled: Travelled,
 }
 
 impl Observer for Watched {
@@ -54,15 +54,14 @@ impl Observer for Watched {
 }
 
 impl Positions {
-    fn new(scene: &Scene, expect: &Expect) -> Self {
+    fn new(expect: &Expect) -> Self {
         let position =
             |expected: &cohaptic_scene::ExpectPosition| WatchedPosition { peer: expected.peer, axis: expected.axis, at: expected.at, seen: None };
         let travel = |expected: &cohaptic_scene::ExpectTravel| WatchedTravel {
             peer: expected.peer,
             axis: expected.axis,
             distance: expected.distance,
-            start: scene.peers[expected.peer].position[expected.axis],
-            reached: None,
+            travelled: Travelled::default(),
         };
         Self {
             positions: expect.positions.iter().map(position).collect(),
@@ -81,12 +80,9 @@ impl Positions {
         for (expected, seen) in self.expected.iter().zip(&mut self.orientations).filter(|(expected, _)| at <= expected.at) {
             *seen = attitude(expected.peer).or(*seen);
         }
-        for watched in self.travels.iter_mut().filter(|watched| watched.reached.is_none()) {
-            // A copy whose position overflowed has not travelled there.
-            if position(watched.peer, watched.axis)
-                .is_some_and(|position| position.is_finite() && (position - watched.start).abs() >= watched.distance)
-            {
-                watched.reached = Some(at);
+        for watched in &mut self.travels {
+            if let Some(position) = position(watched.peer, watched.axis) {
+                watched.travelled.see(at, position, watched.distance);
             }
         }
     }
@@ -119,7 +115,7 @@ impl Watched {
     pub(crate) fn new(scene: &Scene, expect: &Expect) -> Self {
         let names: Vec<MeasureName> = expect.measures.iter().map(|expected| expected.name).collect();
         let measures = (!names.is_empty()).then(|| Measures::new(scene, &names, &scene.measure_settings()));
-        Self { seen: (Positions::new(scene, expect), measures) }
+        Self { seen: (Positions::new(expect), measures) }
     }
 
     /// What came out of each expectation, in the order of the file's sections.
@@ -143,7 +139,7 @@ impl Watched {
         }
         for (expected, watched) in expect.travel.iter().zip(&watched.travels) {
             let what = format!("time in which {}'s copy travels {} m along {}", name(expected.peer), expected.distance, AXES[expected.axis]);
-            outcomes.push(match watched.reached {
+            outcomes.push(match watched.travelled.reached() {
                 None => Outcome::nothing("travel", what, "s", &expected.bounds, &reach.not_reached()),
                 Some(at) => Outcome::number("travel", what, "s", &expected.bounds, at.as_secs_f64()),
             });

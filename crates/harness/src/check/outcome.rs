@@ -1,6 +1,7 @@
 //! What came out of one expectation, as numbers and as words.
 
 use cohaptic_scene::Bounds;
+use cohaptic_units::print::{Number, SixDigits};
 
 /// What was expected, what came out, and whether that is as expected.
 #[derive(Clone, PartialEq, Debug)]
@@ -39,7 +40,11 @@ impl Outcome {
 
     /// A number within bounds, or not: a number that is not finite never passes. `found` says the number in words.
     pub(super) fn number(key: &'static str, name: String, unit: &'static str, bounds: &Bounds, measured: f64) -> Self {
-        let found = if unit.is_empty() { measured.to_string() } else { format!("{measured} {unit}") };
+        // Six digits, but where these would say that a number lies within bounds from which it differs later.
+        let rounded = SixDigits(measured).to_string();
+        let says_the_same = rounded.parse().is_ok_and(|rounded| bounds.contain(rounded) == bounds.contain(measured));
+        let said = if says_the_same { rounded } else { Number(measured).to_string() };
+        let found = if unit.is_empty() { said } else { format!("{said} {unit}") };
         Self {
             measured: Some(measured),
             passed: measured.is_finite() && bounds.contain(measured),
@@ -81,9 +86,9 @@ pub struct Finding {
 fn range(bounds: &Bounds, unit: &str) -> String {
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     match (bounds.min, bounds.max) {
-        (Some(min), Some(max)) => format!("{min} to {max}{unit}"),
-        (Some(min), None) => format!("at least {min}{unit}"),
-        (None, Some(max)) => format!("at most {max}{unit}"),
+        (Some(min), Some(max)) => format!("{} to {}{unit}", Number(min), Number(max)),
+        (Some(min), None) => format!("at least {}{unit}", Number(min)),
+        (None, Some(max)) => format!("at most {}{unit}", Number(max)),
         (None, None) => "any number".into(),
     }
 }

@@ -381,7 +381,7 @@ fn describe(peer: &PeerSpec) -> String {
         Some(Hand::Force(_)) => "a hand force sampled at each tick",
         Some(Hand::Arm { .. }) => "an arm, its spring and damper part of the plant",
     };
-    format!("device of {} kg that {contact}, {hand}", peer.device.mass)
+    format!("device of {} kg that {contact}, {hand}", Number(peer.device.mass))
 }
 
 /// The configurations that links between different peers have, and how many links have each.

@@ -32,7 +32,7 @@ mod impedance;
 mod quantiles;
 mod settling;
 mod traffic;
-mod travel;
+pub(crate) mod travel;
 
 use std::convert::Infallible;
 use std::time::Duration;

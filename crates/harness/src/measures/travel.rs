@@ -8,12 +8,35 @@ use cohaptic_units::Instant;
 use super::{Accumulator, Asked, Rows};
 use crate::TickRow;
 
-/// As `travel` in `[expect]`: the first tick at which the copy is at least that far from where it began.
+/// The first tick at which a copy is at least that far from where it was at its first one. A client of a server begins where the server does, whatever position
+/// the scene has for its peer.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct Travelled {
+    start: Option<f64>,
+    reached: Option<Instant>,
+}
+
+impl Travelled {
+    /// Takes in a position at a tick. A position that overflowed is not that far away.
+    #[inline]
+    pub(crate) fn see(&mut self, at: Instant, position: f64, distance: f64) {
+        let start = *self.start.get_or_insert(position);
+        if self.reached.is_none() && position.is_finite() && (position - start).abs() >= distance {
+            self.reached = Some(at);
+        }
+    }
+
+    /// When it was that far away first.
+    pub(crate) const fn reached(self) -> Option<Instant> {
+        self.reached
+    }
+}
+
+/// As `travel` in `[expect]`.
 #[derive(Clone, Debug)]
 pub(super) struct Travel {
     travel: MeasureTravel,
-    start: f64,
-    reached: Option<Instant>,
+    travelled: Travelled,
 }
 
 impl Accumulator for Travel {
@@ -23,19 +46,69 @@ impl Accumulator for Travel {
     const ROWS: Rows = Rows { ticks: true, ..Rows::NONE };
 
     fn new(asked: &Asked<'_>) -> Self {
-        let travel = asked.settings.travel;
-        Self { travel, start: asked.scene.peers[travel.peer].position[travel.axis], reached: None }
+        Self { travel: asked.settings.travel, travelled: Travelled::default() }
     }
 
     #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         let MeasureTravel { peer, axis, distance } = self.travel;
-        if row.peer == peer && self.reached.is_none() && (row.object.position[axis] - self.start).abs() >= distance {
-            self.reached = Some(row.at);
+        if row.peer == peer {
+            self.travelled.see(row.at, row.object.position[axis], distance);
         }
     }
 
     fn value(&self, _figure: (), _peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
-        self.reached.map(Instant::as_secs_f64)
+        self.travelled.reached().map(Instant::as_secs_f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use cohaptic_scene::Scene;
+
+    use crate::check::check_with;
+    use crate::measures::Measures;
+    use crate::{Model, Observer, Simulation, TickRow};
+
+    /// The instants and positions of one peer's copy.
+    struct Copy(usize, Vec<(f64, f64)>);
+
+    impl Observer for Copy {
+        type Error = std::convert::Infallible;
+
+        fn wants_ticks(&self) -> bool {
+            true
+        }
+
+        fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Self::Error> {
+            if row.peer == self.0 {
+                self.1.push((row.at.as_secs_f64(), row.object.position[0]));
+            }
+            Ok(())
+        }
+    }
+
+    /// The user of a client is 5 cm away from the object, which is the server's and begins at 0. To travel 2 cm takes the client's copy as long as the recorded
+    /// positions say, and not no time at all.
+    #[test]
+    fn the_copy_of_a_client_travels_from_where_it_begins() {
+        let text = "scene.duration = \"2s\"\nobject.mass = 0.45\nlink.delay = \"8ms\"\ncoordination = { strategy = \"client-server\", stiffness = 0.0, update = \"8ms\" }\n\
+            peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 100.0, damping = 5.0 } }\n\
+            peers = [{ name = \"server\", contact = \"none\" }, { name = \"left\", position = 0.05, hand = { force = 1.5 } }]\n\
+            measure.names = [\"travel_s\"]\nmeasure.travel = { peer = \"left\", distance = 0.02 }\n\
+            expect.travel = [{ peer = \"left\", distance = 0.02, min = \"50ms\" }]\n";
+        let scene = Scene::parse(text, Path::new("client.toml"), &[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut copy = Copy(1, Vec::new());
+        let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut copy);
+        let (_, first) = copy.1[0];
+        assert_eq!(first, 0.0, "the copy begins where the server's does");
+        let (reached, _) = copy.1.iter().find(|(_, position)| (position - first).abs() >= 0.02).unwrap();
+        let (_, measured) = Measures::run(&scene, Model::Least);
+        assert_eq!(measured.iter().map(|measure| measure.value).collect::<Vec<_>>(), [Some(*reached)]);
+        let outcome = check_with(&scene, Model::Least, |_, _| unreachable!("stability is not expected"), || true).outcomes.remove(0);
+        assert_eq!(outcome.measured, Some(*reached), "{outcome:?}");
+        assert!(*reached > 0.05, "{reached}");
     }
 }

@@ -7,7 +7,7 @@ use cohaptic_linkfile::reading::values::{Quantity, ReadNumber as _};
 use cohaptic_linkfile::reading::{Context, TableReader, only_one};
 use cohaptic_peer::{ArmConfig, Hand, Signal};
 use cohaptic_units::Hertz;
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{SixDigits, Span};
 
 use super::motion_file::{Columns, read_motion_file};
 use crate::context::SceneContext;
@@ -71,7 +71,12 @@ pub(crate) fn hand_is_sampled(hand: Option<&Hand>, tick: Duration, node: &Node, 
     let is_sampled = *frequency < least_refused;
     if !is_sampled {
         let within = path.iter().try_fold(node, |node, key| node.as_table()?.get(key).map(|entry| &*entry.node));
-        let message = format!("{frequency} is too fast for a hand that is computed once a tick of {}: expected below {least_refused} Hz", Span(tick));
+        let message = format!(
+            "{} is too fast for a hand that is computed once a tick of {}: expected below {} Hz",
+            SixDigits(*frequency),
+            Span(tick),
+            SixDigits(least_refused)
+        );
         context.fault_at(within.unwrap_or(node), message);
     }
     is_sampled

@@ -4,6 +4,7 @@ use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{TableReader, values};
 use cohaptic_peer::Enclosure;
+use cohaptic_units::print::SixDigits;
 
 use super::rotation::{ObjectRotation, read_object_rotation};
 use crate::context::SceneContext;
@@ -48,7 +49,11 @@ fn read_enclosure(node: &Node, context: SceneContext<'_>) -> Option<Enclosure> {
     let axes = context.axes?.count();
     if let Some(axis) = (0..axes).find(|&axis| min[axis] >= max[axis]) {
         let name = ["x", "y", "z"][axis];
-        let message = format!("the end at {} on axis {name} is not above min, {}: expected max above min on each axis", max[axis], min[axis]);
+        let message = format!(
+            "the end at {} on axis {name} is not above min, {}: expected max above min on each axis",
+            SixDigits(max[axis]),
+            SixDigits(min[axis])
+        );
         context.fault_at(max_node?, message);
         return None;
     }

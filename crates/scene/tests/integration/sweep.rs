@@ -11,7 +11,7 @@ use crate::every_key::path;
 /// What the standard library says of texts that it does not read, and how it shows its own types.
 const RAW: &str = include_str!("raw_texts.txt");
 
-const VALUES: [&str; 30] = [
+const VALUES: [&str; 32] = [
     "abc",
     "''",
     "' '",
@@ -21,6 +21,8 @@ const VALUES: [&str; 30] = [
     "1.5",
     "1e300",
     "1e-300",
+    "-1e300",
+    "1.2345678901234567e-300",
     "nan",
     "inf",
     "99999999999999999999999999999999999999999999999",
@@ -44,7 +46,13 @@ const VALUES: [&str; 30] = [
     "'a\u{202e}b'",
 ];
 
+/// The longest run of digits in a text.
+fn digits(text: &str) -> usize {
+    text.split(|c: char| !c.is_ascii_digit()).map(str::len).max().unwrap_or(0)
+}
+
 fn assert_in_words(what: &str, message: &str) {
+    assert!(digits(message) <= digits(what).max(20), "{what}: more digits than anybody reads in {message}");
     for raw in RAW.lines().chain(["Some(", "Err("]) {
         assert!(!message.contains(raw), "{what}: {raw:?} in {message}");
     }

@@ -46,7 +46,7 @@ impl Turned {
         let radius = mode_of(&together, Method::Reduced, watch)?.radius;
         let structure = &together.structure;
         let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
-        let ticks = Instants::of(&structure.timetable, structure.classes.len()).ticks.swap_remove(pushed);
+        let ticks = Instants::of(&structure.timetable).ticks.swap_remove(pushed);
         let (time, mut seen) = (together.time(), VecDeque::new());
         let mut looks = |node: usize, _: u64, device: &[cohaptic_peer::Motion]| {
             if node == pushed {

@@ -1,6 +1,7 @@
 //! Why there is no family of scenes, or no radius in it.
 
 use cohaptic_scene::SceneError;
+use cohaptic_units::print::SixDigits;
 
 use crate::AnalysisError;
 
@@ -42,7 +43,7 @@ pub enum FamilyError {
         keys: usize,
     },
     /// A value is not in the range of its key.
-    #[error("{key} = {value} is out of its range: expected a number from {low} to {high}")]
+    #[error("{key} = {} is out of its range: expected a number from {} to {}", SixDigits(*value), SixDigits(*low), SixDigits(*high))]
     Outside {
         /// The key.
         key: String,

@@ -140,7 +140,7 @@ impl Lifted<'_> {
         // What each row of a node's law hears.
         let law_rows = 1 + self.nodes.iter().map(|node| node.law.memory.len()).max().unwrap_or(0);
         let mut heard = Matrix::zeros(nodes * law_rows, columns);
-        let instants = self.ages_matter().then(|| Instants::of(self.timetable, nodes));
+        let instants = self.ages_matter().then(|| Instants::of(self.timetable));
         let mut stale = vec![true; nodes];
         let mut scratch = Scratch::default();
         scratch.resize(columns);
@@ -181,7 +181,7 @@ impl Lifted<'_> {
                         (0..law_rows).for_each(|row| heard.row_mut(node * law_rows + row).fill(0.0));
                         for from in 0..nodes {
                             let Some((first, sample)) = held[node * nodes + from] else { continue };
-                            let age = instants.as_ref().map_or(0.0, |instants| instants.age(from, sample, at, self.timetable.frame));
+                            let age = instants.as_ref().map_or(0.0, |instants| instants.age((node, from), sample, at, self.timetable.frame));
                             for channel in 0..channels {
                                 for (row, by) in self.nodes[node].heard(self.sampling, channel, age, self.time).enumerate() {
                                     let weight = self.weights[(node, from)] * by;

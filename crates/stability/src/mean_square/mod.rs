@@ -44,7 +44,7 @@ use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
 use crate::pieces::{refuse_topology, split};
-use crate::structure::{Contacts, Structure, count, linear_law};
+use crate::structure::{Contacts, Structure, count, has_equal_clocks, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
 use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, PartCost, Radius, Verdict, Watch};
 
@@ -326,7 +326,7 @@ struct Alike {
 impl Alike {
     fn of(scene: &Scene, network: &NominalNetwork, notes: &mut Vec<String>) -> Result<Self, AnalysisError> {
         let timetable = Timetable::new(&[NodeClock::of(scene, 0)], &[])?;
-        let instants = Instants::of(&timetable, 1);
+        let instants = Instants::of(&timetable);
         let hazards = hazards(scene, network, (0, 1), timetable.frame, &instants.sends[0], &instants.ticks[0], notes)?;
         Ok(Self { timetable, instants, hazards })
     }
@@ -451,11 +451,14 @@ fn one_by_one(
     let cost = frame_cost(scene, &timetable, pairs.len());
     // Joint states make it more, never less.
     within(cost, limits)?;
-    let instants = Instants::of(&timetable, peers);
+    let instants = Instants::of(&timetable);
     let horizon = linear_law(scene, 0).and_then(|law| law.horizon);
-    if horizon.is_some_and(|horizon| timetable.oldest() > horizon) {
+    let beyond = horizon.is_some_and(|horizon| timetable.oldest() > horizon).then_some(BEYOND_HORIZON);
+    // What is older or younger by a difference of clocks may be beyond the horizon, or sent later than now.
+    let apart = (horizon.is_some() && !has_equal_clocks(scene)).then_some(AGES_BY_CLOCKS);
+    if let Some(why) = beyond.or(apart) {
         let link = format!("{} → {}", scene.peers[0].name, scene.peers[1].name);
-        return Err(AnalysisError::ChanceWithoutMoments { link, why: BEYOND_HORIZON });
+        return Err(AnalysisError::ChanceWithoutMoments { link, why });
     }
     let (mut lines, mut held) = (Vec::new(), NOTHING);
     let mut tied = structure.tied;
@@ -512,6 +515,8 @@ fn one_by_one(
 
 /// The probability that a sample is held beyond the horizon of a law that extrapolates which counts as none.
 const NEVER: f64 = 1e-9;
+const AGES_BY_CLOCKS: &str = "the strategy uses the ages of its samples by clocks that differ: expected one tick, offset and drift for all peers";
+
 const BEYOND_HORIZON: &str = "its samples may be held for longer than the strategy extrapolates them: expected a longer horizon";
 
 /// Whether a link whose samples arrive within `depth` frames, and on which nothing arrives in a frame with the probability `stays`, brings a newer sample

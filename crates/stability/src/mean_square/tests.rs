@@ -365,7 +365,7 @@ fn the_mean_of_many_runs_is_what_the_operator_says() {
     let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
     let timetable = Timetable::new(&[NodeClock::of(&scene, 0), NodeClock::of(&scene, 1)], &[]).unwrap();
-    let instants = Instants::of(&timetable, 2);
+    let instants = Instants::of(&timetable);
     let line = |from: usize, to: usize| {
         let found = hazards(&scene, &network, (from, to), timetable.frame, &instants.sends[from], &instants.ticks[to], &mut Vec::new());
         Line { from, to, chance: Some((found.unwrap().unwrap().0, None)) }

@@ -174,7 +174,7 @@ impl Plan {
     /// The steps of a timetable. `heard` says whether anything is heard at all, `ages` whether the ages of samples matter.
     fn of(timetable: &Timetable, heard: bool, ages: bool) -> Self {
         let nodes = timetable.sent.len();
-        let instants = ages.then(|| Instants::of(timetable, nodes));
+        let instants = ages.then(|| Instants::of(timetable));
         let mut oldest = 0.0_f64;
         let mut held: Vec<BTreeMap<usize, i64>> = vec![BTreeMap::new(); nodes];
         if heard {
@@ -204,7 +204,7 @@ impl Plan {
                     if steps.last().is_none_or(|step| step.ticks.iter().any(|tick| tick.node == node) || !step.ticks.is_empty() && step.at != at) {
                         steps.push(Step::default());
                     }
-                    let age = |(from, sample)| instants.as_ref().map_or(0.0, |instants| instants.age(from, sample, at, timetable.frame));
+                    let age = |(from, sample)| instants.as_ref().map_or(0.0, |instants| instants.age((node, from), sample, at, timetable.frame));
                     let held: Vec<_> = held[node].iter().map(|(from, sample)| ((*from, *sample), age((*from, *sample)))).collect();
                     oldest = held.iter().fold(oldest, |oldest, (_, age)| oldest.max(*age));
                     if let Some(step) = steps.last_mut() {

@@ -158,7 +158,7 @@ impl Turning<'_> {
             samples.push(earlier.rev().collect());
             next += depth * SAMPLE;
         }
-        let instants = Instants::of(self.timetable, nodes);
+        let instants = Instants::of(self.timetable);
         let mut held: Vec<Option<i64>> = vec![None; nodes * nodes];
         for (to, from, sample) in &self.timetable.held {
             held[to * nodes + from] = Some(*sample);
@@ -172,7 +172,7 @@ impl Turning<'_> {
                     let mut drawn = [0.0; 6];
                     for from in 0..nodes {
                         let Some(number) = held[to * nodes + from] else { continue };
-                        let age = instants.age(from, number, at, self.timetable.frame).min(node.horizon);
+                        let age = instants.age((to, from), number, at, self.timetable.frame).min(node.horizon);
                         let earlier = i64::try_from(self.timetable.depth[from]).unwrap_or(0);
                         let sample = &samples[from][usize::try_from(earlier + number).unwrap_or(0)];
                         for (axis, force) in drawn.iter_mut().enumerate() {

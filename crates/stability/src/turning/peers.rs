@@ -47,7 +47,7 @@ impl Bases {
             samples.push(earlier.rev().map(|(sample, base)| copy_of(sample, base, node, time)).collect::<Vec<_>>());
             next += bases.len() * SAMPLE;
         }
-        let instants = Instants::of(timetable, nodes.len());
+        let instants = Instants::of(timetable);
         let hold = |members: &mut [Member], samples: &[Vec<(State<3>, Attitude)>], (to, from, sample): (usize, usize, i64)| {
             let earlier = i64::try_from(timetable.depth[from]).unwrap_or(0);
             let (state, attitude) = samples[from][usize::try_from(earlier + sample).unwrap_or(0)];

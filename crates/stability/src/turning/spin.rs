@@ -119,7 +119,7 @@ impl Spin {
     /// How long before the frame a peer sent its latest sample but `number` − 1 \[s\].
     fn age(&self, place: usize, number: usize) -> f64 {
         let timetable = &self.together.structure.timetable;
-        let sent = Instants::of(timetable, self.together.nodes.len()).sent_at(place, -i64::try_from(number).unwrap_or(0), timetable.frame);
+        let sent = Instants::of(timetable).sent_at(place, -i64::try_from(number).unwrap_or(0), timetable.frame);
         -1e-9 * approximate(sent)
     }
 

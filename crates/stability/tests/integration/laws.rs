@@ -1,10 +1,10 @@
 //! The laws that remember, extrapolate or look back, against values that were computed apart from this program: see `tests/reference/README.md`.
 
-use cohaptic_stability::{Method, analyse};
+use cohaptic_stability::{AnalysisError, Method, analyse};
 use serde_json::Value;
 
 use crate::reference::{Case, cases_of, compare};
-use crate::{admittance, mean_square};
+use crate::{admittance, anchors, mean_square};
 
 fn entries(kind: &str) -> Vec<Value> {
     let all: Value = serde_json::from_str(include_str!("../reference/laws.json")).unwrap();
@@ -66,4 +66,24 @@ fn the_admittances_of_laws_are_those_of_long_arithmetic() {
     let entries = entries("admittance");
     assert!(entries.len() >= 30, "{}", entries.len());
     admittance::compare(&entries);
+}
+
+/// A clock that is late by 300 µs shows another age at every tick, the same in every frame; the second moment is not followed then. Clocks that drift apart show
+/// another age in every frame.
+#[test]
+fn ages_by_clocks_are_followed_until_clocks_drift_apart() {
+    let extrapolated = |keys: &[&str]| anchors::scene(&[&["coordination.strategy=extrapolated"], keys].concat());
+    let late = ["peers.peer2.clock.offset=300us"];
+    assert!(analyse(&extrapolated(&late), Method::Reduced).is_ok());
+    let lossy = extrapolated(&[late[0], "link.loss=10%"]);
+    assert!(
+        matches!(cohaptic_stability::mean_square(&lossy), Err(AnalysisError::ChanceWithoutMoments { why, .. }) if why.contains("clocks that differ"))
+    );
+    // All clocks run fast alike: the numbers of ticks are what counts.
+    let [fast, regular] = [&["peer.clock.drift=0.01", "link.delay=0s"], &["peer.clock.drift=0", "link.delay=0s"]].map(|keys| extrapolated(keys));
+    assert!(analyse(&fast, Method::Reduced).is_ok() && analyse(&regular, Method::Reduced).is_ok());
+    let apart = extrapolated(&["peers.peer2.clock.drift=0.0625"]);
+    for method in [Method::Reduced, Method::Full] {
+        assert!(matches!(analyse(&apart, method), Err(AnalysisError::AgesByClocks { strategy: "extrapolated" })), "{method:?}");
+    }
 }

@@ -121,6 +121,33 @@ def radii_of_extrapolated():
     yield Case(f"{strategy}-every-different-cut", extrapolated(3, 400.0, "14ms", **different), "some links never beyond the horizon, some always, some at times")
     shifted = ['clock = { offset = "300us" }', 'clock = { offset = "300us" }; phase = 3']
     yield Case(f"{strategy}-offset", extrapolated(2, 600.0, "9ms", delay="4ms", peers=shifted), "one offset of all clocks: ages do not see it")
+    offsets = [f'clock = {{ offset = "{offset}" }}' for offset in ("0s", "300us", "1700us")]
+    yield Case(f"{strategy}-offsets", extrapolated(3, 500.0, "1s", delay="4ms", peers=offsets), "clocks that show other times: ages differ from link to link")
+    behind = ["", 'clock = { offset = "6ms" }']
+    yield Case(
+        f"{strategy}-offsets-of-the-future",
+        extrapolated(2, 500.0, "1s", delay="1ms", peers=behind),
+        "to the clock of one the samples of the other were sent later than now: age 0, for most ticks",
+    )
+    ticks = ['tick = "1ms"', 'tick = "2ms"', 'tick = "500us"']
+    yield Case(f"{strategy}-ticks", extrapolated(3, 500.0, "14ms", delay="8ms", peers=ticks), "ticks of 0.5, 1 and 2 ms")
+    yield Case(
+        f"{strategy}-everything-different",
+        extrapolated(
+            3,
+            300.0,
+            "17ms",
+            delay="12.5ms",
+            bo=0.3,
+            peers=[
+                EVERY_DIFFERENT[0] + '; clock = { offset = "123456ns" }',
+                EVERY_DIFFERENT[1].replace("phase = 5", "phase = 3") + '; tick = "2ms"; compute-delay = 1',
+                EVERY_DIFFERENT[2] + '; clock = { offset = "3ms" }; tick = "500us"',
+            ],
+            links=[(0, 2, 'delay = "31ms"'), (2, 0, 'delay = "1ns"')],
+        ),
+        "ticks, offsets, phases, plants and delays",
+    )
     yield Case(f"{strategy}-n20", extrapolated(20, 500.0, delay="11.3ms"), "twenty equal peers: two blocks", "modes")
     yield Case(f"{strategy}-n20-cut", extrapolated(20, 50.0, "12ms", bo=0.5, bt=3.0, delay="8ms", contact="none"), "twenty, no device, cut in the frame", "modes")
 

@@ -71,7 +71,7 @@ class Frame:
         held = {pair: (unit("held x", pair), unit("held v", pair)) for pair in pairs}
         moving = scene.horizon is not None and outcomes is not None
         ageing = scene.horizon is not None and outcomes is None
-        assert scene.horizon is None or len({p.offset for p in scene.peers}) == 1, "ages are those of clocks that show the same"
+        assert not moving or len({p.offset for p in scene.peers}) == 1, "a sample that moves on does so by time that passes, not by what clocks show"
         since = {pair: timing.held(*pair) for pair in pairs} if ageing else {}
         present = timing.t0
 
@@ -86,7 +86,11 @@ class Frame:
             return instant
 
         def seen(pair):
-            return moved_on(held[pair], min(instant - since[pair], scene.horizon)) if ageing else held[pair]
+            """What a peer extrapolates: the age is what its own clock shows less what the sender's showed, at least zero."""
+            if not ageing:
+                return held[pair]
+            sent_at, now = (at - scene.peers[peer].offset for peer, at in zip(pair, (since[pair], instant)))
+            return moved_on(held[pair], min(max(now - sent_at, 0), scene.horizon))
 
         sample = {}
         for pair in pairs:

@@ -178,7 +178,7 @@ impl Link {
                 }
             }
         }
-        Timetable { frame: nominal.frame, events, sent: nominal.sent.clone(), depth: vec![0], held: Vec::new() }
+        Timetable { frame: nominal.frame, events, sent: nominal.sent.clone(), depth: vec![0], held: Vec::new(), clocks: nominal.clocks.clone() }
     }
 
     /// The inequalities for a growth.

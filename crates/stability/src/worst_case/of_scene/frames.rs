@@ -145,5 +145,5 @@ fn timetable(nominal: &Timetable, links: &[Link], deliveries: &[Delivery], depth
         }
     }
     let held = links.iter().map(|link| (link.to, link.from, number(depth[link.from] + 1 + link.to))).collect();
-    Timetable { frame: nominal.frame, events, sent: nominal.sent.clone(), depth: depth.to_vec(), held }
+    Timetable { frame: nominal.frame, events, sent: nominal.sent.clone(), depth: depth.to_vec(), held, clocks: nominal.clocks.clone() }
 }

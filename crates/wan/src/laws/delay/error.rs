@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use cohaptic_units::print::SixDigits;
+
 /// Why a law, or a correlation of one, is refused. Numbers are in the caller's unit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum LawError {
@@ -67,21 +69,24 @@ pub enum LawError {
 
 impl fmt::Display for LawError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotFinite { quantity, found } => write!(f, "the {quantity} is {found}: expected a finite number"),
-            Self::NegativeDeviation { sd } => write!(f, "the standard deviation is {sd}: expected zero or more"),
-            Self::FloorAboveMean { mean, floor } => write!(f, "the mean is {mean}, below the floor of {floor}: expected a mean at or above it"),
-            Self::ReachesBelowFloor { law, mean, sd, least, floor, largest_sd } => write!(
-                f,
-                "the {law} law with mean {mean} and standard deviation {sd} begins at {least}, below the floor of {floor}: the deviation can be at most {largest_sd}"
-            ),
-            Self::TooVaried { law, above_floor, sd, largest_sd } => write!(
-                f,
-                "the {law} law has its mean {above_floor} above the floor and a standard deviation of {sd}: the deviation can be at most {largest_sd}"
-            ),
-            Self::NotACorrelation { found } => write!(f, "the correlation is {found}: expected a number from -1 to 1"),
+        let six = SixDigits;
+        match *self {
+            Self::NotFinite { quantity, found } => write!(f, "the {quantity} is {}: expected a finite number", six(found)),
+            Self::NegativeDeviation { sd } => write!(f, "the standard deviation is {}: expected zero or more", six(sd)),
+            Self::FloorAboveMean { mean, floor } => {
+                write!(f, "the mean is {}, below the floor of {}: expected a mean at or above it", six(mean), six(floor))
+            }
+            Self::ReachesBelowFloor { law, mean, sd, least, floor, largest_sd } => {
+                write!(f, "the {law} law with mean {} and standard deviation {} begins at {}, below ", six(mean), six(sd), six(least))?;
+                write!(f, "the floor of {}: the deviation can be at most {}", six(floor), six(largest_sd))
+            }
+            Self::TooVaried { law, above_floor, sd, largest_sd } => {
+                write!(f, "the {law} law has its mean {} above the floor and a standard deviation of {}: ", six(above_floor), six(sd))?;
+                write!(f, "the deviation can be at most {}", six(largest_sd))
+            }
+            Self::NotACorrelation { found } => write!(f, "the correlation is {}: expected a number from -1 to 1", six(found)),
             Self::TooNegative { asked, least } => {
-                write!(f, "two delays with this law cannot have the correlation {asked}: expected at least {least}")
+                write!(f, "two delays with this law cannot have the correlation {}: expected at least {}", six(asked), six(least))
             }
         }
     }
