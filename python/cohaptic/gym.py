@@ -34,7 +34,7 @@ class RemoteEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         actions: str = "",
         observations: str = "",
         size: int = 64,
-        seed: int = 1,
+        seed: int = 0,
     ) -> None:
         super().__init__(env)
         self._period, self._idle, self._size = period, deepcopy(idle), size

@@ -97,7 +97,7 @@ class Link:
     """
 
     def __init__(
-        self, spec: str | Iterable[str], seed: int = 1, *, sender: str = "sender", receiver: str = "receiver"
+        self, spec: str | Iterable[str], seed: int = 0, *, sender: str = "sender", receiver: str = "receiver"
     ) -> None:
         self._native = _native.Link(_keys(spec), seed, sender, receiver)
 

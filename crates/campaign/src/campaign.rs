@@ -62,6 +62,22 @@ impl Campaign {
         Ok(campaign)
     }
 
+    /// The plan of the campaign in a folder, for a program of that name and version: what it is in the folder, the scene's text as it was when the campaign began.
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError::NoCampaign`] if the folder has none; [`CampaignError`] if the folder cannot be read or what says which campaign it is makes no sense;
+    /// [`CampaignError::Other`] for a comparison, which leaves combinations out and whose command knows why.
+    pub fn plan_in(folder: &Path, program: &str) -> Result<CampaignPlan, CampaignError> {
+        if !Folder::has_campaign(folder)? {
+            return Err(CampaignError::NoCampaign { path: folder.to_path_buf() });
+        }
+        let manifest = Manifest::read(&folder.join(crate::folder::MANIFEST))?;
+        let plan = manifest.plan(folder, program)?;
+        let differences = manifest.differences(&plan);
+        if differences.is_empty() { Ok(plan) } else { Err(CampaignError::Other { path: folder.to_path_buf(), differences }) }
+    }
+
     /// [`Campaign::open`] of one whose runs are all done, by shards or otherwise, to put the table together.
     ///
     /// # Errors
@@ -95,6 +111,7 @@ impl Campaign {
         let manifest = match new {
             // Unless somebody else began one meanwhile.
             Some(manifest) if !folder.manifest().exists() => {
+                let manifest = manifest.of_file(plan.file(), folder.path());
                 if let Err(error) = manifest.write(&folder.manifest(), worker) {
                     folder.give_up();
                     return Err(error);
@@ -111,7 +128,7 @@ impl Campaign {
         let accepted = manifest.accepted(&plan);
         let parts = manifest.parts(accepted.runs());
         let columns = columns(plan.variations(), plan.has_verdicts(), &manifest.roster);
-        let hash = hash(manifest.text().as_bytes());
+        let hash = hash(manifest.about().as_bytes());
         Self { plan, manifest, accepted, parts, columns, hash, folder, judgements: Arc::from([]) }
     }
 

@@ -76,7 +76,7 @@ impl Campaign {
         if worker.is_some() && path.exists() && self.open_part(part)?.is_ok() {
             return Ok(());
         }
-        let about = self.manifest.text();
+        let about = self.manifest.about();
         let write = |file: &mut WholeFile| {
             // The bytes are hashed on their way to the disk, not read back from it.
             let mut to = HashingWriter::new(file);
@@ -102,7 +102,7 @@ impl Campaign {
                 Err(error) => Err(of_part(TableError::Content(error.to_string()))),
             }
         });
-        let about = self.manifest.text();
+        let about = self.manifest.about();
         let path = self.folder.table(format);
         let merged = write_whole(&path, |file| format.merge(file, self.head(&about), parts));
         merged.map_err(|error| match error {

@@ -53,8 +53,6 @@ mod variants;
 
 use std::process::ExitCode;
 
-use clap::Parser as _;
-
 use arguments::{Arguments, Command};
 #[cfg(not(target_os = "linux"))]
 use elsewhere::{falcon, live, play, relay, router};
@@ -63,10 +61,13 @@ fn main() -> ExitCode {
     if std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json") {
         output::want_json();
     }
-    let arguments = match Arguments::try_parse() {
+    let arguments = match Arguments::of(std::env::args_os()) {
         Ok(arguments) => arguments,
         Err(error) => return report::wrong_usage(&report::visible(error)),
     };
+    if arguments.quiet {
+        output::be_quiet();
+    }
     interrupt::listen();
     let done = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),

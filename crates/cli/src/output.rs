@@ -17,6 +17,19 @@ static WANTS_JSON: AtomicBool = AtomicBool::new(false);
 /// Whether there is something on standard output already.
 static ANSWERED: AtomicBool = AtomicBool::new(false);
 
+/// Whether standard error is for what goes wrong alone.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Keeps progress and the names of files that were written from standard error.
+pub(crate) fn be_quiet() {
+    QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether standard error is for what goes wrong alone.
+pub(crate) fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
 /// Has errors answered by a JSON document.
 pub(crate) fn want_json() {
     WANTS_JSON.store(true, Ordering::Relaxed);
@@ -69,6 +82,9 @@ pub(crate) fn raw(content: &[u8]) -> Result<(), Failure> {
 
 /// Says on standard error which files were written: one a line, for people. A JSON document names them itself.
 pub(crate) fn wrote(files: impl IntoIterator<Item = impl AsRef<Path>>) {
+    if is_quiet() {
+        return;
+    }
     let mut to = io::stderr().lock();
     for file in files {
         // What cannot be said was written all the same.

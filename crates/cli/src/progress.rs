@@ -6,12 +6,14 @@ use std::time::Duration;
 use cohaptic_units::{Instant, Visible};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::output;
+
 pub(crate) struct Progress(ProgressBar);
 
 impl Progress {
     /// Progress up to a length, zero where nobody knows it, shown as a template of indicatif says.
     pub(crate) fn new(length: u64, template: &str) -> Self {
-        let target = if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target = if std::io::stderr().is_terminal() && !output::is_quiet() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         Self(ProgressBar::with_draw_target(Some(length), target).with_style(style))
     }

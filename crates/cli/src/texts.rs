@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Command, CommandFactory as _};
+use clap::Command;
 use clap_mangen::Man;
 use cohaptic_scene::schema::FileSchema;
 
@@ -25,7 +25,7 @@ pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
 
 /// Prints the page of a command, or writes all pages into a folder.
 pub(crate) fn man(arguments: &ManArguments) -> Result<ExitCode, Failure> {
-    let mut program = Arguments::command().disable_help_subcommand(true);
+    let mut program = Arguments::program().disable_help_subcommand(true);
     // Gives the commands their full names.
     program.build();
     let Some(folder) = &arguments.out else {
@@ -65,7 +65,7 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
 /// Prints what a shell needs to complete commands and options.
 pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<ExitCode, Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Arguments::command(), "cohaptic", &mut script);
+    clap_complete::generate(arguments.shell, &mut Arguments::program(), "cohaptic", &mut script);
     output::raw(&script)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -66,7 +66,7 @@ impl Strategies {
     ///
     /// [`StrategiesError`], which says what was expected. Whether values are such as their keys take is found out when the campaign is planned.
     pub fn parse(text: &str) -> Result<Self, StrategiesError> {
-        let texts = split_at_commas(text);
+        let texts: Vec<String> = split_at_commas(text).iter().map(|text| with_long_name(text)).collect();
         for text in &texts {
             check(text)?;
         }
@@ -114,7 +114,7 @@ impl Strategies {
     #[must_use]
     pub fn registered(&self, place: usize) -> (&'static str, Vec<(String, &'static str)>) {
         let name = name(self.variation.value_text(place));
-        let strategy = Coordination::ALL.iter().find(|strategy| strategy.name() == name).expect("names are looked up when they are read");
+        let strategy = Coordination::named(name).expect("names are looked up when they are read");
         let parameters = strategy.parameters().iter().map(|parameter| (format!("coordination.{name}.{}", parameter.key), parameter.default));
         (strategy.about(), parameters.collect())
     }
@@ -132,11 +132,18 @@ fn name(text: &str) -> &str {
     text.split('{').next().unwrap_or_default().trim().trim_matches(['"', '\''])
 }
 
+/// A strategy as it is written, by its long name if it has a short one: `AP` and `average-position` are the same.
+fn with_long_name(text: &str) -> String {
+    let short = name(text);
+    let long = Coordination::named(short).map_or(short, |strategy| strategy.name());
+    text.replacen(short, long, usize::from(!short.is_empty()))
+}
+
 /// That a strategy and the parameters within its braces exist.
 fn check(text: &str) -> Result<(), StrategiesError> {
     let settings = text.split_once('{').map_or("", |(_, settings)| settings);
     let name = name(text);
-    let Some(strategy) = Coordination::ALL.iter().find(|strategy| strategy.name() == name) else {
+    let Some(strategy) = Coordination::named(name) else {
         let expected = one_of(Coordination::ALL.iter().map(|strategy| strategy.name()), name);
         return Err(StrategiesError::Unknown { name: name.to_owned(), expected });
     };

@@ -1,14 +1,15 @@
 //! What a campaign is, as a file in its folder: the same command goes on, another one is refused.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
 use cohaptic_files::{WholeFile, write_whole, write_whole_by};
 use serde::{Deserialize, Serialize};
 
 use crate::error::CampaignError;
-use crate::plan::{Accepted, CampaignPlan, Checked, Parts, Refused};
-use crate::table::Roster;
+use crate::plan::{Accepted, CampaignPlan, Checked, Parts, PlanSpec, Refused};
+use crate::table::{Format, Roster};
+use crate::vary::Variation;
 
 /// How files of a campaign are laid out. Another layout is another number.
 const LAYOUT: u32 = 1;
@@ -19,6 +20,10 @@ const LAYOUT: u32 = 1;
 pub(crate) struct Manifest {
     layout: u32,
     program: String,
+    /// Where the scene's file is, from the folder of the campaign; absent of a scene that came from standard input, and of campaigns of earlier versions. It is
+    /// no part of what the campaign is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
     /// The text of the scene.
     scene: String,
     /// Of the scenes, with what the files say that they name.
@@ -48,6 +53,7 @@ impl Manifest {
         Self {
             layout: LAYOUT,
             program: plan.program().to_owned(),
+            file: None,
             scene: plan.text().to_owned(),
             fingerprint: format!("{fingerprint:016x}"),
             set: plan.set().to_vec(),
@@ -75,6 +81,32 @@ impl Manifest {
             return Err(damaged("parts of 0 runs".to_owned()));
         }
         Ok(manifest)
+    }
+
+    /// The same with where the scene's file is from that folder, which exists.
+    pub(crate) fn of_file(self, file: &Path, folder: &Path) -> Self {
+        Self { file: from_folder(file, folder), ..self }
+    }
+
+    /// The plan of which this is the campaign, in that folder.
+    pub(crate) fn plan(&self, folder: &Path, program: &str) -> Result<CampaignPlan, CampaignError> {
+        let damaged = |message: String| CampaignError::Damaged {
+            path: folder.join(super::MANIFEST),
+            message,
+            way_out: "name the scene and the options of the campaign",
+        };
+        let format = [Format::Parquet, Format::Csv].into_iter().find(|format| format.name() == self.format);
+        let format = format.ok_or_else(|| damaged(format!("the format {:?}", self.format)))?;
+        let variations = self.vary.iter().map(|text| Variation::parse(text)).collect::<Result<_, _>>().map_err(|error| damaged(error.to_string()))?;
+        let file = folder.join(self.file.as_deref().unwrap_or("scene.toml"));
+        let spec = PlanSpec { text: &self.scene, file: &file, set: &self.set, variations, runs: self.runs, format, part: self.part, program };
+        let plan = CampaignPlan::new(spec)?;
+        Ok(if self.verdicts { plan.with_verdicts() } else { plan })
+    }
+
+    /// What the campaign is, as the file says it, without where its scene is: tables have it, which are the same wherever they are made.
+    pub(crate) fn about(&self) -> String {
+        Self { file: None, ..self.clone() }.text()
     }
 
     /// Writes the file, which other workers may be writing too if this is one of them.
@@ -137,6 +169,18 @@ impl Manifest {
     pub(crate) fn has_fingerprint(&self, fingerprint: u64) -> bool {
         self.fingerprint == format!("{fingerprint:016x}")
     }
+}
+
+/// The way from a folder to a file, both of which exist; `None` if there is none, as between drives.
+fn from_folder(file: &Path, folder: &Path) -> Option<String> {
+    let (file, folder) = (file.canonicalize().ok()?, folder.canonicalize().ok()?);
+    let shared = file.components().zip(folder.components()).take_while(|(one, other)| one == other).count();
+    if shared == 0 {
+        return None;
+    }
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    let way: PathBuf = up.chain(file.components().skip(shared)).collect();
+    way.to_str().map(|way| way.replace('\\', "/"))
 }
 
 /// What every layout has.

@@ -40,7 +40,7 @@ pub(crate) use manifest::Manifest;
 
 use digest::DIGEST;
 
-const MANIFEST: &str = "campaign.json";
+pub(crate) const MANIFEST: &str = "campaign.json";
 /// How the names of files of judgements end as they are made.
 const JOURNAL: &str = "part.csv";
 

@@ -115,6 +115,11 @@ impl CampaignPlan {
         Self { fallback: Some(fallback), ..self }
     }
 
+    /// The file of the scene.
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
+    }
+
     /// Whether each combination is judged.
     #[must_use]
     pub const fn has_verdicts(&self) -> bool {

@@ -118,7 +118,7 @@ pub(crate) struct SimulateArguments {
     #[arg(long = "for", value_name = "TIME", value_parser = some_time, default_value = "6s")]
     pub(crate) length: Duration,
     /// The seed of faults and of what encoders show before they are homed
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 0)]
     pub(crate) seed: u64,
     /// Print one JSON document and nothing else
     #[arg(long)]

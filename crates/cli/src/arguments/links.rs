@@ -26,7 +26,7 @@ pub(crate) struct LinkArguments {
     #[arg(long, value_name = "SIZE", default_value = "64B", value_parser = cohaptic_units::parse::size)]
     pub(crate) size: cohaptic_units::Bytes,
     /// The seed of all random numbers
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 0)]
     pub(crate) seed: u64,
     /// What words of tc-netem mean: what they say, or what Linux 6.6 does
     #[arg(long, value_enum, default_value_t = Profile::Exact)]

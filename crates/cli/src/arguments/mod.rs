@@ -7,6 +7,7 @@ mod links;
 mod numbers;
 mod pages;
 mod paper;
+mod program;
 mod realtime;
 mod scenes;
 mod shards;
@@ -39,6 +40,9 @@ pub(crate) use stability::{
 #[derive(Debug, Parser)]
 #[command(name = "cohaptic", version, after_help = examples::of_program())]
 pub(crate) struct Arguments {
+    /// Say nothing on standard error but what goes wrong: no progress, and not which files were written
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
     #[command(subcommand)]
     pub(crate) command: Command,
 }

@@ -91,8 +91,14 @@ pub(crate) struct ExplainArguments {
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::CAMPAIGN))]
 pub(crate) struct CampaignArguments {
+    /// The scene, a TOML file; - reads it from standard input. With --merge and --status it may be left out: the folder knows its campaign
+    #[arg(required_unless_present_any = ["merge", "status"])]
+    pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) scene: SceneArguments,
+    pub(crate) overrides: Overrides,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
     /// Vary a key: --vary coordination.stiffness=0..6000/13 (13 values, both ends among them), --vary coordination.stiffness=10..1000/5:log (equal ratios),
     /// --vary link.delay=8ms,24ms (these values). Again and again: every combination is run, the last key varying fastest
     #[arg(long, value_name = "KEY=VALUES")]

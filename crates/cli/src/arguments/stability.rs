@@ -20,7 +20,7 @@ pub(crate) struct StabilityArguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum StabilityCommand {
-    /// The verdict for the scene as it stands
+    /// The verdict for the scene as it stands: cohaptic stability FILE means this too
     Point(PointArguments),
     /// The region of two keys in which the scene is stable
     Map(MapArguments),

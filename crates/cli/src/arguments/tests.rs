@@ -1,6 +1,6 @@
 //! The help of every command, read as a user and as a program would.
 
-use clap::{Command, CommandFactory as _, Parser as _};
+use clap::Command;
 
 use super::Arguments;
 
@@ -13,7 +13,7 @@ fn commands() -> Vec<(String, Command)> {
         }
     }
     let mut all = Vec::new();
-    walk("cohaptic", &Arguments::command().disable_help_subcommand(true), &mut all);
+    walk("cohaptic", &Arguments::program().disable_help_subcommand(true), &mut all);
     all
 }
 
@@ -56,7 +56,7 @@ fn every_command_has_examples_and_each_can_be_typed() {
             "{name}"
         );
         for example in &examples {
-            Arguments::try_parse_from(words(example)).unwrap_or_else(|error| panic!("{example}: {error}"));
+            Arguments::of(words(example).into_iter().map(Into::into)).unwrap_or_else(|error| panic!("{example}: {error}"));
         }
         assert!(examples.iter().any(|example| example.starts_with(&name)), "no example of {name}");
     }

@@ -44,22 +44,23 @@ struct Finished {
 /// Does the runs that are missing, all or those of a shard, and says what came out.
 pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failure> {
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
-    let plan = plan(arguments)?;
-    let refused = |error: CampaignError| failure(error, &arguments.scene.scene, &[]);
+    let plan = plan(arguments, sharing)?;
+    let scene = scene_file(arguments);
+    let refused = |error: CampaignError| failure(error, scene, &[]);
     match sharing {
         Sharing::Whole(_) | Sharing::Merge(_) => {}
         Sharing::Shard(shard, out) => {
             let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge(shard, &ByAnalysis, watch);
             let done = pool(arguments.threads, || sharing::shard(plan, shard, out, judge))?;
-            return shard::answer(arguments.scene.json, &done.map_err(|ended| ended.unwrap_or_else(refused))?);
+            return shard::answer(arguments.json, &done.map_err(|ended| ended.unwrap_or_else(refused))?);
         }
-        Sharing::Status(out) => return sharing::status(arguments.scene.json, plan, out).map_err(|ended| ended.unwrap_or_else(refused)),
+        Sharing::Status(out) => return sharing::status(arguments.json, plan, out).map_err(|ended| ended.unwrap_or_else(refused)),
     }
     let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
     let report = pool(arguments.threads, || execute(sharing, out, plan.clone()))?.map_err(|ended| ended.unwrap_or_else(refused))?;
     let wall_s = start.elapsed().as_secs_f64();
-    let title = plan.scene(0).map_or_else(|_| output::path(input::named(&arguments.scene.scene)), |scene| scene.title);
+    let title = plan.scene(0).map_or_else(|_| output::path(input::named(scene)), |scene| scene.title);
     let notes = judge::notes(&report);
     let files = std::iter::once(report.file.clone()).chain(report.verdicts.clone()).collect();
     let mut finished = Finished { plan, title, report, wall_s, notes, files };
@@ -68,7 +69,7 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
         finished.files.extend(files);
         finished.notes.extend(notes);
     }
-    output::answer(arguments.scene.json, DocumentSchema::CAMPAIGN, &answer::of(&finished, out), || answer::describe(&finished), &finished.files)?;
+    output::answer(arguments.json, DocumentSchema::CAMPAIGN, &answer::of(&finished, out), || answer::describe(&finished), &finished.files)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -81,12 +82,23 @@ pub(crate) fn pool<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Sen
     }
 }
 
-fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
-    let refused = |error: CampaignError| failure(error, &arguments.scene.scene, &[]);
+/// The file of the scene, for messages about it; that of the folder if none was named.
+fn scene_file(arguments: &CampaignArguments) -> &Path {
+    arguments.scene.as_deref().unwrap_or(Path::new("campaign.json"))
+}
+
+fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignPlan, Failure> {
+    let refused = |error: CampaignError| failure(error, scene_file(arguments), &[]);
+    let Some(file) = &arguments.scene else {
+        let CampaignArguments { overrides, vary, measure, verdicts, .. } = arguments;
+        if !overrides.set.is_empty() || !vary.is_empty() || measure.word().is_some() || *verdicts {
+            return Err(Failure::Input("the options of a campaign stand beside no scene: expected its scene too, or none of them".to_owned()));
+        }
+        return Campaign::plan_in(sharing.folder().unwrap_or(Path::new(".")), PROGRAM).map_err(refused);
+    };
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
-    let set: Vec<String> = arguments.scene.overrides.set.iter().cloned().chain(arguments.measure.override_text()).collect();
-    let file = &arguments.scene.scene;
+    let set: Vec<String> = arguments.overrides.set.iter().cloned().chain(arguments.measure.override_text()).collect();
     let (text, file) = (input::text(file)?, input::named(file));
     let format = match arguments.format {
         TableFormat::Parquet => Format::Parquet,

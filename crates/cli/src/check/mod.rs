@@ -121,7 +121,7 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
                 return Checked { expects: scene.expect.is_some(), ..Checked::interrupted(file) };
             }
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
-            let (file, expects) = (output::path(input::named(file)), scene.expect.is_some());
+            let (file, expects) = (output::path(input::named(file)), !expectations.is_empty());
             Checked { file, passed: failures.is_empty(), failures, expectations, notes, expects, status }
         }
     }

@@ -44,7 +44,7 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
         (
             "campaign",
             &[
-                "<SCENE>",
+                "[SCENE]",
                 "--set <KEY=VALUE>",
                 "--json",
                 "--vary <KEY=VALUES>",

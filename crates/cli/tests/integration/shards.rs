@@ -68,6 +68,29 @@ fn shards_of_everything_that_is_shared_give_the_files_of_one_process() {
     }
 }
 
+/// The folder has the scene's text, the way to its file and so to the files that it names, and the options. Another working folder changes nothing.
+#[test]
+fn a_folder_knows_its_campaign() {
+    let desk = desk();
+    desk.write("scenes/hand.csv", "t,fx\n0,0.5\n0.3,1.5\n");
+    desk.write("scenes/two.toml", TWO.replace("hand = { force = 1.5 }", "hand = { file = \"hand.csv\" }"));
+    for (scene, out) in [("two.toml", "here"), ("scenes/two.toml", "deep/there")] {
+        let line = format!("campaign {scene} --vary link.delay=8ms,24ms --runs 6 --part 4 --verdicts --format csv");
+        desk.text(&format!("{line} --out {out}-whole"));
+        for index in [2, 1] {
+            desk.text(&format!("{line} --out {out} --shard {index}/2"));
+        }
+        let status = desk.text(&format!("campaign --status {out}"));
+        assert_eq!(status, desk.text(&format!("{line} --status {out}")));
+        let merged = desk.text(&format!("campaign --merge {out}"));
+        assert!(merged.contains("12 runs of 2 combinations"), "{merged}");
+        assert_same(&desk, out, &format!("{out}-whole"));
+    }
+    desk.cohaptic("campaign --merge here --vary link.delay=8ms,24ms").assert_refused(2, &["expected its scene too"]);
+    desk.cohaptic("campaign --merge nowhere").assert_refused(2, &["nowhere holds no campaign"]);
+    desk.cohaptic("campaign --out here").assert_refused(2, &["<SCENE>"]);
+}
+
 #[test]
 fn while_anything_is_missing_a_merge_says_what_and_by_which_shard_it_is_done() {
     let desk = desk();

@@ -26,8 +26,8 @@ fn help(command: &[String]) -> Option<Help> {
 fn ask(command: &[String]) -> Option<Help> {
     let output = Command::new(env!("CARGO_BIN_EXE_cohaptic")).args(command).arg("--help").output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    let parts = text.split_once("Commands:\n").map(|(_, list)| list.lines().take_while(|line| line.starts_with("  ")));
-    let parts = parts.into_iter().flatten().filter(|line| !line.starts_with("    ")).filter_map(|line| line.split_whitespace().next());
+    let lists = text.split("\nCommands").skip(1).map(|list| list.lines().skip(1).take_while(|line| line.starts_with("  ")));
+    let parts = lists.flatten().filter(|line| !line.starts_with("    ")).filter_map(|line| line.split_whitespace().next());
     let parts = parts.filter(|part| *part != "help").map(str::to_owned).collect();
     output.status.success().then(|| Help { options: text.lines().flat_map(options).collect(), parts })
 }

@@ -15,16 +15,28 @@ use super::names::Names;
 use crate::document::{Diagnostic, FileError, Node, Place, Sources};
 use crate::fingerprint::Fingerprint;
 
-/// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier.
+/// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier. What is missing
+/// stands nowhere and comes last: `mas = 0.45` in a file without a `[coordination]` is told first.
 #[derive(Debug, Default)]
-pub(crate) struct Faults(RefCell<Option<(Place, FileError)>>);
+pub(crate) struct Faults(RefCell<Option<((Kind, Place), FileError)>>);
+
+/// Whether something is wrong or missing, in the order in which that is told.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum Kind {
+    Wrong,
+    Missing,
+}
 
 impl Faults {
     /// Keeps the fault if none stands before it. Of several at one place the first one reported stays.
     fn report(&self, place: Place, error: impl FnOnce() -> FileError) {
+        self.report_kind((Kind::Wrong, place), error);
+    }
+
+    fn report_kind(&self, order: (Kind, Place), error: impl FnOnce() -> FileError) {
         let mut first = self.0.borrow_mut();
-        if first.as_ref().is_none_or(|(earlier, _)| place < *earlier) {
-            *first = Some((place, error()));
+        if first.as_ref().is_none_or(|(earlier, _)| order < *earlier) {
+            *first = Some((order, error()));
         }
     }
 
@@ -95,6 +107,12 @@ impl<'a> Context<'a> {
     /// Reports what is wrong at a place.
     pub fn fault(&self, place: Place, key: &str, message: impl Into<String>) {
         self.faults.report(place, || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), message.into()))));
+    }
+
+    /// Reports that a key is missing in the table at a place.
+    pub(super) fn missing(&self, place: Place, key: &str, expected: &str) {
+        let error = || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), format!("missing key: expected {expected}"))));
+        self.faults.report_kind((Kind::Missing, place), error);
     }
 
     /// Reports what is wrong with a value.

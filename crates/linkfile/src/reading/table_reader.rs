@@ -97,7 +97,7 @@ impl<'a> TableReader<'a> {
         }
         if unknown.is_empty() && !self.context.partial {
             for (key, expected) in &self.missing {
-                self.context.fault(self.node.place, &join(&self.node.path, key), format!("missing key: expected {expected}"));
+                self.context.missing(self.node.place, &join(&self.node.path, key), expected);
             }
         }
     }

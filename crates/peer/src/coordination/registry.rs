@@ -38,6 +38,22 @@ macro_rules! registry {
                 }
             }
 
+            /// The strategy of this name in a scene file, or of a [short one](Self::short_name).
+            #[must_use]
+            pub fn named(name: &str) -> Option<Self> {
+                Self::ALL.iter().find(|strategy| strategy.name() == name || strategy.short_name() == Some(name)).copied()
+            }
+
+            /// The name of the two laws of Rakhsha & Constantinescu (2015) there, which a scene file takes too: `AP` and `PD`.
+            #[must_use]
+            pub const fn short_name(self) -> Option<&'static str> {
+                match self {
+                    Self::AveragePosition => Some("AP"),
+                    Self::ProportionalDerivative => Some("PD"),
+                    _ => None,
+                }
+            }
+
             /// Where it draws each copy, in words.
             #[must_use]
             pub const fn about(self) -> &'static str {

@@ -73,7 +73,10 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<(Co
     let mut table = TableReader::new(node, context, "a table such as [coordination]")?;
     let strategies: Vec<_> = Coordination::ALL.iter().map(|strategy| (strategy.name(), *strategy)).collect();
     let names = strategies.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-    let strategy = table.required("strategy", &format!("one of {names}"), |node, context| values::choice(node, context, &strategies));
+    let strategy = table.required("strategy", &format!("one of {names}"), |node, context| {
+        let short = node.as_text().and_then(Coordination::named).filter(|strategy| strategy.short_name() == node.as_text());
+        short.or_else(|| values::choice(node, context, &strategies))
+    });
     let scaling = table.optional("scaling", Scaling::None, read_scaling);
     let pulls = [("mean", Pull::Mean), ("sum", Pull::Sum)];
     let pull = table.optional("pull", Pull::Mean, |node, context| values::choice(node, context, &pulls));

@@ -1,6 +1,7 @@
 //! A key of a scene that is left open, and between which values.
 
 use cohaptic_linkfile::{number_and_unit, text_of_quantity};
+use cohaptic_units::print::SixDigits;
 
 /// A key of a scene, and the values that it takes.
 #[derive(Clone, PartialEq, Debug)]
@@ -49,7 +50,7 @@ pub enum KeyRangeError {
         high: String,
     },
     /// The lower end is not below the upper one.
-    #[error("{low} is not below {high} in \"{text}\": expected a range whose first end is below its second")]
+    #[error("{} is not below {} in \"{text}\": expected a range whose first end is below its second", SixDigits(*low), SixDigits(*high))]
     Empty {
         /// The text as given.
         text: String,

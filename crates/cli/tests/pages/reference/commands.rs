@@ -35,7 +35,8 @@ fn list(of: &[&Entry]) -> String {
 
 /// The name of an option without its value.
 fn option(entry: &Entry) -> String {
-    format!("`{}`", entry.name.split([' ', '[']).next().unwrap_or_default())
+    let long = entry.name.split_once(", ").map_or(entry.name.as_str(), |(_, long)| long);
+    format!("`{}`", long.split([' ', '[']).next().unwrap_or_default())
 }
 
 /// The whole page.

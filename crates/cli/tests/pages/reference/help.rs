@@ -50,7 +50,7 @@ impl Help {
             let begins = match words.split(' ').next() {
                 Some("Usage:") => Some(Place::Usage),
                 Some("Arguments:" | "Options:") => Some(Place::Entries),
-                Some("Commands:") => Some(Place::Parts),
+                Some("Commands:" | "Commands") => Some(Place::Parts),
                 Some("Examples:") => Some(Place::Examples),
                 Some("Exit") => Some(Place::Rest),
                 _ => None,
