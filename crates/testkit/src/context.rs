@@ -2,6 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::io;
+use std::panic::Location;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -98,18 +99,53 @@ pub(crate) fn host() -> Option<NodeId> {
     HOST.get()
 }
 
-/// The running test bed, and the host on which the task lives that is being polled. `what` such a task may do, and `how` others may.
-///
-/// # Errors
-///
-/// [`io::ErrorKind::NotFound`] if there is none.
-pub(crate) fn here(outside_of: &str, what: &str, how: &str) -> io::Result<(Arc<Shared>, NodeId)> {
-    let shared = shared().ok_or_else(|| outside(outside_of))?;
-    let host = host().ok_or_else(|| {
-        let text = format!("this task lives on no host, so it is not clear where to {what}; spawn it with `Host::spawn`, or {how}");
-        io::Error::new(io::ErrorKind::NotFound, text)
-    })?;
-    Ok((shared, host))
+/// A call that makes a socket, where a test has written it. The call needs a running test bed and a host.
+#[derive(Clone, Copy)]
+pub(crate) struct Call {
+    name: &'static str,
+    place: &'static Location<'static>,
+}
+
+impl Call {
+    /// The call of that name at the place of the caller.
+    ///
+    /// # Panics
+    ///
+    /// If no test bed runs on this thread.
+    #[track_caller]
+    pub(crate) fn here(name: &'static str) -> Self {
+        let call = Self { name, place: Location::caller() };
+        if shared().is_none() {
+            call.is_outside();
+        }
+        call
+    }
+
+    /// Returns the running test bed, and the host on which the task lives that is being polled. `how` a task that lives on no host does the same.
+    ///
+    /// # Panics
+    ///
+    /// If there is no test bed or no host. An error would be swallowed by a program that tries again until it succeeds.
+    #[track_caller]
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    pub(crate) fn host(self, how: &str) -> (Arc<Shared>, NodeId) {
+        let Some(shared) = shared() else { self.is_outside() };
+        if let Some(host) = host() {
+            return (shared, host);
+        }
+        let Self { name, place } = self;
+        let text = format!("`{name}` at {place} is called by a task that lives on no host: spawn the task with `Host::spawn`, or {how}");
+        // Tokio catches the panic of its own tasks, and the run is to fail all the same.
+        shared.note_fault(&text);
+        panic!("{text}");
+    }
+
+    #[cold]
+    #[track_caller]
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    fn is_outside(self) -> ! {
+        panic!("`{}` at {} is called outside of a test bed: call it within `Testbed::run`, on its thread", self.name, self.place);
+    }
 }
 
 /// Does something as a task of that host.

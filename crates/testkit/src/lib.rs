@@ -82,12 +82,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
 mod address;
+mod again;
 mod artefacts;
 #[cfg(feature = "axum")]
 pub mod axum;
 mod bed;
 mod context;
 mod core;
+mod failure;
 mod file;
 pub mod hit;
 mod host;

@@ -11,6 +11,11 @@ pub trait ToLink {
     ///
     /// If words say nothing that a link can do, with the place of the error.
     fn to_link(&self) -> LinkModel;
+
+    /// The words of `tc-netem` that say the same link, for the test that a failure prints; none at all for the ideal link, `None` for a link that has no words.
+    fn words(&self) -> Option<String> {
+        None
+    }
 }
 
 impl ToLink for LinkModel {
@@ -47,16 +52,28 @@ impl ToLink for str {
         let netem = Netem::parse(self).unwrap_or_else(|error| panic!("this is no link: {error}\n{}", error.excerpt(self)));
         netem.to_link_config(&mut |_| None).unwrap_or_else(|error| panic!("`{self}` is no link: {error}")).into()
     }
+
+    fn words(&self) -> Option<String> {
+        Some(self.trim().to_owned())
+    }
 }
 
 impl ToLink for String {
     fn to_link(&self) -> LinkModel {
         (**self).to_link()
     }
+
+    fn words(&self) -> Option<String> {
+        ToLink::words(&**self)
+    }
 }
 
 impl<T: ToLink + ?Sized> ToLink for &T {
     fn to_link(&self) -> LinkModel {
         (**self).to_link()
+    }
+
+    fn words(&self) -> Option<String> {
+        ToLink::words(&**self)
     }
 }

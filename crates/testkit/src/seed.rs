@@ -13,6 +13,8 @@ pub const SEED_VARIABLE: &str = "COHAPTIC_TEST_SEED";
 pub(crate) struct Seed {
     pub(crate) value: u64,
     pub(crate) test: String,
+    /// It is that of the place, so that the test that has failed fails again as it stands.
+    pub(crate) is_of_place: bool,
 }
 
 impl Seed {
@@ -32,7 +34,8 @@ impl Seed {
             environment.map(|text| number(text).unwrap_or_else(|| panic!("{SEED_VARIABLE} is `{text}`; expected a number from 0 to {}", u64::MAX)));
         // The main thread has the name of no test.
         let test = thread.filter(|name| *name != "main").unwrap_or(&place.function);
-        Self { value: asked.or(said).unwrap_or_else(|| hash(place.to_string().as_bytes())), test: test.to_owned() }
+        let said = asked.or(said);
+        Self { value: said.unwrap_or_else(|| hash(place.to_string().as_bytes())), test: test.to_owned(), is_of_place: said.is_none() }
     }
 
     /// What to do to see it again.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use cohaptic_wan::NodeId;
 
 use crate::address::ToSocketAddrs;
-use crate::context;
+use crate::context::Call;
 use crate::core::{Guard, Inlet, Shared, SocketId};
 
 /// Name of this kind of socket in messages.
@@ -31,7 +31,8 @@ const KIND: &str = "a UDP socket";
 ///   link: by the next call, or by the call that waits to receive.
 /// - A socket at `[::]` hears IPv6 only.
 /// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out. So does every method once the run of its test bed has
-///   ended, also within the run of another test bed.
+///   ended, also within the run of another test bed: a task or a destructor may outlive the run. To bind a socket where there is no host is a fault of the test,
+///   and panics.
 /// - It belongs to the thread that runs the test bed. On another thread every method gives [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct UdpSocket {
     shared: Arc<Shared>,
@@ -47,11 +48,18 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// As tokio's: the address is taken, or is not the host's. [`io::ErrorKind::NotFound`] if the task lives on no host.
-    #[expect(clippy::unused_async, reason = "as tokio's")]
-    pub async fn bind(address: impl ToSocketAddrs) -> io::Result<Self> {
-        let (shared, host) = context::here("a socket can be bound", "bind", "bind with `Host::bind`")?;
-        Self::bind_on(shared, host, address)
+    /// As tokio's: the address is taken, or is not the host's.
+    ///
+    /// # Panics
+    ///
+    /// Outside of a running test bed, and if the task lives on no host.
+    #[track_caller]
+    pub fn bind(address: impl ToSocketAddrs) -> impl Future<Output = io::Result<Self>> {
+        let call = Call::here("UdpSocket::bind");
+        async move {
+            let (shared, host) = call.host("bind with `Host::bind`");
+            Self::bind_on(shared, host, address)
+        }
     }
 
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {

@@ -102,16 +102,12 @@ impl Artefacts {
         !self.folders.is_empty()
     }
 
-    /// Tells on standard error that a run has failed: in which task, if a task has panicked, where what happened is, how to run it again, and which laws hit
-    /// nothing. Whatever goes wrong is told too, and no more: the test has failed for another reason.
-    #[expect(clippy::print_stderr, reason = "a test that fails says how to see it again")]
-    pub(crate) fn report(&self, seed: &Seed, task: Option<&str>, hits: &[HitCount], record: impl FnOnce() -> Record) {
-        if let Some(task) = task {
-            eprintln!("{task} has panicked");
-        }
-        for line in self.lines(seed, hits, record) {
-            eprintln!("{line}");
-        }
+    /// The lines about a run that has failed: in which task, if a task has panicked, a test that does the same again, where what happened is, how to run it again, and
+    /// which laws hit nothing. Whatever goes wrong is told too, and no more: the test has failed for another reason.
+    pub(crate) fn report(&self, task: Option<String>, again: String, record: Record) -> Vec<String> {
+        let (hits, seed) = (record.hits().to_vec(), record.seed().clone());
+        let task = task.map(|task| format!("{task} has panicked"));
+        task.into_iter().chain((!again.is_empty()).then_some(again)).chain(self.lines(&seed, &hits, || record)).collect()
     }
 
     /// Writes the record, and gives the lines of the report.
@@ -125,6 +121,8 @@ impl Artefacts {
                     Err(error) => lines.push(format!("what happened could not be written: {error}")),
                 }
             }
+        } else {
+            lines.push(format!("{ARTEFACTS_VARIABLE}=FOLDER writes what happens: its trace, and all packets"));
         }
         for nothing in hits.iter().filter(|count| count.hit == 0) {
             lines.push(format!("note: {}", nothing.words()));
@@ -140,7 +138,7 @@ mod tests {
 
     #[test]
     fn the_environment_names_a_folder_beside_that_of_the_test() {
-        let seed = Seed { value: 1, test: "links::it works".into() };
+        let seed = Seed { value: 1, test: "links::it works".into(), is_of_place: true };
         assert!(!Artefacts::of(None, None, &seed).is_wanted());
         assert!(!Artefacts::of(Some(OsStr::new("")), None, &seed).is_wanted());
         let both = Artefacts::of(Some(OsStr::new("/tmp/all")), Some("mine".into()), &seed);

@@ -3,7 +3,7 @@
 use std::panic::Location;
 
 use super::{Names, Testbed};
-use crate::hit::{Hits, Laws, PacketLaw, PathHit, SentPacket, Verdict, WordsLaw};
+use crate::hit::{Hits, Laws, PacketLaw, PathHit, SentPacket, Verdict};
 use crate::words::hits_on;
 
 impl Testbed {
@@ -90,14 +90,12 @@ pub(crate) fn add_law(laws: &mut Laws, names: &Names, ends: [&str; 2], law: impl
 pub(crate) fn add_words(laws: &mut Laws, names: &Names, ends: [&str; 2], words: &str) {
     let path = checked(names, ends);
     let hits = hits_on(words).unwrap_or_else(|error| panic!("these are no words of hits: {error}"));
-    for hit in hits {
-        laws.add(path, hit.to_string(), WordsLaw::new(hit));
-    }
+    hits.into_iter().for_each(|hit| laws.add_hit(path, hit));
 }
 
 #[track_caller]
 pub(crate) fn add_all(laws: &mut Laws, names: &Names, hits: &[PathHit]) {
     for PathHit { from, to, hit } in hits {
-        laws.add(checked(names, [from, to]), hit.to_string(), WordsLaw::new(hit.clone()));
+        laws.add_hit(checked(names, [from, to]), hit.clone());
     }
 }

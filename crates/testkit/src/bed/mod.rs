@@ -1,5 +1,6 @@
 //! The test bed: what it is made of, and its run.
 
+mod again;
 mod hitting;
 mod names;
 #[cfg(feature = "strategies")]
@@ -26,10 +27,12 @@ pub use running::Bed;
 use crate::artefacts::Artefacts;
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
+use crate::failure;
 use crate::file::{LinkChange, LinkFile};
 use crate::hit::Laws;
 use crate::link::ToLink;
 use crate::record::Record;
+use crate::runtime::limits::Limits;
 use crate::runtime::own::Executor;
 use crate::seed::{Place, Seed};
 use crate::task::Tasks;
@@ -106,6 +109,8 @@ impl Testbed {
                 keeps_packets: false,
                 patience: PATIENCE,
                 byte_limit: BYTE_LIMIT,
+                limits: Limits::default(),
+                said: Arc::default(),
                 laws: Laws::default(),
             },
             #[cfg(feature = "tcp")]
@@ -144,6 +149,7 @@ impl Testbed {
     /// If the words are none.
     pub fn links(mut self, link: impl ToLink) -> Self {
         self.every = link.to_link();
+        Arc::make_mut(&mut self.settings.said).set_every(&link);
         self
     }
 
@@ -156,6 +162,7 @@ impl Testbed {
         let path = self.names.path(from, to);
         assert!(path.from != path.to, "host `{from}` has no link to itself");
         self.links.insert(path, link.to_link());
+        Arc::make_mut(&mut self.settings.said).set(path, &link);
         self
     }
 
@@ -165,8 +172,7 @@ impl Testbed {
     ///
     /// As [`Testbed::link`].
     pub fn link_both(self, one: &str, other: &str, link: impl ToLink) -> Self {
-        let model = link.to_link();
-        self.link(one, other, &model).link(other, one, &model)
+        self.link(one, other, &link).link(other, one, &link)
     }
 
     /// The seed of all chance in the links, unless the environment says another one ([`SEED_VARIABLE`](crate::SEED_VARIABLE)). Without it, the seed is made of
@@ -186,6 +192,20 @@ impl Testbed {
     /// How often tasks may be polled at one instant before the run is given up, because time does not pass; a million if it is not said.
     pub const fn patience(mut self, polls: u64) -> Self {
         self.settings.patience = polls;
+        self
+    }
+
+    /// Until when the program may run, in its own time; an hour if it is not said. A run that goes on is given up, with the network, each task, and what the task
+    /// waits for since when: a program that asks again and again over a network that answers nothing would never end. [`Duration::MAX`] is no limit.
+    pub const fn time_limit(mut self, limit: Duration) -> Self {
+        self.settings.limits.time = limit;
+        self
+    }
+
+    /// How often the tasks of a run may be polled; twenty million times if it is not said, which takes some seconds. A run that goes on is given up as with
+    /// [`Testbed::time_limit`]. `u64::MAX` is no limit.
+    pub const fn step_limit(mut self, polls: u64) -> Self {
+        self.settings.limits.steps = polls;
         self
     }
 
@@ -241,8 +261,8 @@ impl Testbed {
     ///
     /// # Panics
     ///
-    /// If the program or one of its tasks does, with the task and the seed on standard error; if nothing will ever happen any more, time does not pass, or more
-    /// than [`Testbed::byte_limit`] is on its way; if another thread uses a socket of the run; inside another test bed or runtime.
+    /// If the program or one of its tasks does, with the task and the seed on standard error; if nothing will ever happen any more, time does not pass, the run
+    /// goes on beyond [`Testbed::time_limit`] or [`Testbed::step_limit`], or more than [`Testbed::byte_limit`] is on its way; if another thread uses a socket of the run; inside another test bed or runtime.
     #[track_caller]
     pub fn run<T, F>(self, program: impl FnOnce(Bed) -> F) -> T
     where
@@ -302,6 +322,7 @@ impl Testbed {
         T: 'static,
     {
         let artefacts = Artefacts::new(self.artefacts.clone(), seed);
+        let again = self.again(seed, origin);
         let mut settings = self.settings.clone();
         settings.keeps_packets |= artefacts.is_wanted();
         settings.traces |= artefacts.is_wanted();
@@ -317,23 +338,35 @@ impl Testbed {
         #[cfg(not(feature = "tokio"))]
         let kind = Kind::Own;
         let watched = Watched::begin(kind, &self.names, self.stall_limit, seed, &artefacts);
-        let outcome = catch_unwind(AssertUnwindSafe(|| {
+        let run = || {
             #[cfg(feature = "tokio")]
             if self.is_tokio {
                 return crate::runtime::on_tokio::run(core, self.names.len(), program, origin, &watched, &mut recorded);
             }
             on_own(core, self.names.len(), program, origin, &watched, &mut recorded)
-        }));
+        };
+        let outcome = catch_unwind(AssertUnwindSafe(|| failure::__rust_begin_short_backtrace(run)));
         // While a panic is reported nothing is watched any more.
         let panicked = watched.pulse.running().map(|runner| runner.words(&self.names));
         drop(watched);
-        let recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(Arc::clone(&self.names)), ..Recorded::default() });
+        let mut recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(Arc::clone(&self.names)), ..Recorded::default() });
+        let drawn = std::mem::take(&mut recorded.drawn);
         let record = Record::new(seed.clone(), recorded);
         match outcome {
-            Ok(outcome) => (outcome, record),
+            Ok(outcome) => {
+                failure::note_run(|| {
+                    let record = record.clone();
+                    Box::new(move || artefacts.report(None, again.test(&drawn, false), record))
+                });
+                (outcome, record)
+            }
             Err(panic) => {
-                let hits = record.hits().to_vec();
-                artefacts.report(seed, panicked.as_deref(), &hits, || record);
+                // A test whose seed or links it does not get from elsewhere fails again as it stands.
+                let differs = failure::is_searching() || !seed.is_of_place && again.has_chance();
+                failure::report(Box::new(move || {
+                    let test = if differs { again.test(&drawn, true) } else { String::new() };
+                    artefacts.report(panicked, test, record)
+                }));
                 resume_unwind(panic)
             }
         }
@@ -345,6 +378,8 @@ impl From<LinkFile> for Testbed {
         let LinkFile { hosts, every, links, changes, hits, seed } = file;
         let mut bed = Self::new(hosts);
         add_all(&mut bed.settings.laws, &bed.names, &hits);
+        let paths = links.keys().map(|(from, to)| Path { from: NodeId::new(*from), to: NodeId::new(*to) });
+        Arc::make_mut(&mut bed.settings.said).set_models(every == LinkModel::default(), paths);
         let links = links.into_iter().map(|((from, to), link)| (Path { from: NodeId::new(from), to: NodeId::new(to) }, link)).collect();
         Self { every, links, changes, seed, ..bed }
     }
@@ -359,7 +394,7 @@ pub(crate) struct Recorder<'a> {
 
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {
-        *self.recorded = Some(self.shared.lock().wire.recorded());
+        *self.recorded = Some(self.shared.lock().recorded());
         // Tasks hold the state, and the state their wakers.
         self.tasks.stop_all();
         self.shared.end();

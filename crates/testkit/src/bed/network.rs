@@ -1,5 +1,7 @@
 //! Test beds with the networks that strategies draw.
 
+use std::sync::Arc;
+
 use cohaptic_wan::{LinkModel, Path};
 
 use super::Testbed;
@@ -15,7 +17,11 @@ impl Testbed {
     pub fn network(mut self, network: &ImpairedNetwork) -> Self {
         let hosts = self.names.len();
         assert!(network.hosts() == hosts, "a network of {} hosts for a test bed of {hosts}: expected as many", network.hosts());
-        self.links.extend(network.links().map(|(from, to, link)| (Path { from, to }, link.model())));
+        let said = Arc::make_mut(&mut self.settings.said);
+        for (from, to, link) in network.links() {
+            said.set(Path { from, to }, link);
+            self.links.insert(Path { from, to }, link.model());
+        }
         self
     }
 }
@@ -23,5 +29,9 @@ impl Testbed {
 impl ToLink for ImpairedLink {
     fn to_link(&self) -> LinkModel {
         self.model()
+    }
+
+    fn words(&self) -> Option<String> {
+        Some(if self.is_ideal() { String::new() } else { self.to_string() })
     }
 }

@@ -21,7 +21,7 @@ pub(super) struct Elsewhere {
 
 #[derive(Default)]
 struct Left {
-    /// The first value of the run that another thread used, in words.
+    /// The first fault of the test, in words: a value of the run that another thread used, or a socket that a task without a host has made.
     misuse: Option<String>,
     acts: Vec<Act>,
 }
@@ -88,10 +88,21 @@ impl Shared {
              they have through a channel",
             std::thread::current().name().map_or_else(String::new, |name| format!(" (`{name}`)"))
         );
-        self.elsewhere.leave(|left| {
-            left.misuse.get_or_insert_with(|| text.clone());
-        });
+        self.note_fault(&text);
         text
+    }
+
+    /// Notes a fault of the test, with which the run fails once its task has returned.
+    pub(crate) fn note_fault(&self, text: &str) {
+        self.elsewhere.leave(|left| {
+            left.misuse.get_or_insert_with(|| text.to_owned());
+        });
+    }
+
+    /// Whether [`Shared::attend`] has something to do.
+    #[cfg(feature = "tokio")]
+    pub(crate) fn is_left_something(&self) -> bool {
+        self.elsewhere.is_any.load(Ordering::Acquire)
     }
 
     /// Lets go of something: now, or, on a thread that may not have the state, when the task that the run's thread polls has returned.

@@ -1,5 +1,8 @@
 //! Random bytes for programs that want them: others in every run of another seed, the same in every run of the same one.
 
+use std::collections::BTreeMap;
+
+use cohaptic_wan::NodeId;
 use cohaptic_wan::random::{Purpose, Stream};
 
 /// The label of the stream of programs. Links have labels of their own: see [`cohaptic_wan::LinkName`].
@@ -15,13 +18,8 @@ pub(crate) struct Entropy {
 }
 
 impl Entropy {
-    #[cfg(any(test, feature = "quinn"))]
-    pub(super) fn new(seed: u64) -> Self {
-        Self::labelled(seed, LABEL)
-    }
-
     /// A stream of its own: its draws move no draw of another one.
-    pub(super) fn labelled(seed: u64, label: &[u8]) -> Self {
+    fn labelled(seed: u64, label: &[u8]) -> Self {
         Self { stream: Stream::new(seed, label), asked: 0 }
     }
 
@@ -42,9 +40,63 @@ impl Entropy {
     }
 }
 
+/// Random bytes for the programs of each host, and for those of no host. Each host has a stream of its own, by its name: what other hosts ask for, and which hosts there
+/// are besides, changes none of the bytes.
+#[derive(Debug)]
+pub(crate) struct ByHost {
+    seed: u64,
+    label: &'static [u8],
+    streams: BTreeMap<Option<NodeId>, Entropy>,
+}
+
+impl ByHost {
+    #[cfg(feature = "quinn")]
+    pub(super) const fn of_programs(seed: u64) -> Self {
+        Self::labelled(seed, LABEL)
+    }
+
+    pub(super) const fn labelled(seed: u64, label: &'static [u8]) -> Self {
+        Self { seed, label, streams: BTreeMap::new() }
+    }
+
+    /// The bytes of a host; `names` are those of all hosts.
+    pub(crate) fn of(&mut self, host: Option<NodeId>, names: &[String]) -> &mut Entropy {
+        let Self { seed, label, streams } = self;
+        streams.entry(host).or_insert_with(|| {
+            let name = host.map_or_else(String::new, |host| format!(" of {}", names[host.index()]));
+            Entropy::labelled(*seed, &[*label, name.as_bytes()].concat())
+        })
+    }
+
+    /// Whether any were asked for.
+    pub(super) fn was_asked(&self) -> bool {
+        !self.streams.is_empty()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl Entropy {
+        fn new(seed: u64) -> Self {
+            Self::labelled(seed, LABEL)
+        }
+    }
+
+    #[test]
+    fn the_bytes_of_a_host_depend_on_its_name_and_not_on_what_other_hosts_ask_for() {
+        let names = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let (few, many) = (names(&["a", "b"]), names(&["b", "x", "a"]));
+        let (mut one, mut other) = (ByHost::labelled(1, LABEL), ByHost::labelled(1, LABEL));
+        assert!(!one.was_asked());
+        let _: [u8; 8] = other.of(Some(NodeId(1)), &many).bytes();
+        let first: [u8; 8] = one.of(Some(NodeId(0)), &few).bytes();
+        assert_eq!(other.of(Some(NodeId(2)), &many).bytes(), first);
+        assert_ne!(one.of(Some(NodeId(1)), &few).bytes(), first);
+        assert_ne!(one.of(None, &few).bytes(), first);
+        assert!(one.was_asked());
+    }
 
     #[test]
     fn the_bytes_depend_on_the_seed_and_on_what_was_asked_before_and_on_nothing_else() {

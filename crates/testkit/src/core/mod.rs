@@ -27,7 +27,7 @@ use crate::address::{self, AddressPlan};
 use crate::bed::Names;
 use crate::file::LinkChange;
 use crate::trace::Happening;
-use crate::wire::{self, Settings, Wire};
+use crate::wire::{self, Recorded, Settings, Wire};
 use ends::{Ends, Kind};
 use face::Face;
 use sockets::Sockets;
@@ -50,7 +50,7 @@ pub(crate) struct Core {
     pub(crate) wire: Wire<Ends>,
     pub(crate) timers: Timers,
     #[cfg(feature = "quinn")]
-    pub(crate) entropy: entropy::Entropy,
+    entropy: entropy::ByHost,
     hosts: Vec<HostState>,
     sockets: Sockets,
     spare: octets::Spare,
@@ -83,7 +83,7 @@ impl Core {
             settings,
             timers: Timers::default(),
             #[cfg(feature = "quinn")]
-            entropy: entropy::Entropy::new(seed),
+            entropy: entropy::ByHost::of_programs(seed),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
             spare: octets::Spare::default(),
@@ -155,6 +155,23 @@ impl Core {
     #[cold]
     fn lose_patience(&self, socket: SocketName) -> ! {
         self.face.lose_patience(Some(&socket.words(&self.plan)))
+    }
+
+    /// Random bytes for a program of a host.
+    #[cfg(feature = "quinn")]
+    pub(crate) fn entropy(&mut self, host: Option<NodeId>) -> &mut entropy::Entropy {
+        self.entropy.of(host, self.plan.names())
+    }
+
+    /// What was recorded so far.
+    pub(crate) fn recorded(&self) -> Recorded {
+        #[cfg_attr(not(any(feature = "quinn", feature = "tcp")), expect(unused_mut, reason = "nothing but links draws"))]
+        let mut recorded = self.wire.recorded();
+        #[cfg(feature = "quinn")]
+        let () = recorded.drawn.has_drawn |= self.entropy.was_asked();
+        #[cfg(feature = "tcp")]
+        let () = recorded.drawn.has_drawn |= self.tcp.has_drawn();
+        recorded
     }
 
     pub(crate) fn set_link(&mut self, path: Path, link: LinkModel) {

@@ -181,7 +181,7 @@ impl Shared {
 
     /// What was recorded so far, unless the state is held.
     pub(crate) fn try_recorded(&self) -> Option<Recorded> {
-        if self.stays { self.try_home(|core| core.wire.recorded()) } else { Some(Recorded { ended: self.face.now(), ..Recorded::default() }) }
+        if self.stays { self.try_home(Core::recorded) } else { Some(Recorded { ended: self.face.now(), ..Recorded::default() }) }
     }
 
     /// Tries for half a second of the wall clock: a loop of tokio takes the state again and again, each time for a moment, on a thread that may have to wait for a processor.

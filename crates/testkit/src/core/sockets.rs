@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::task::{Poll, Waker};
 
 use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
 use cohaptic_wan::{NodeId, Ring};
 
 use super::waking::{Waiters, Woken};
@@ -84,6 +85,12 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
+    /// Whether a task with that waker waits for a datagram.
+    fn is_awaited_by(&self, waker: &Waker) -> bool {
+        // A reader that waits again is known to the inlet alone.
+        self.readers.has(waker) || self.inlet.is_waited_for() && self.readers.first().is_some_and(|first| first.will_wake(waker))
+    }
+
     /// Takes a datagram into the buffer, which holds this number of bytes.
     #[inline(always)]
     pub(super) fn keep(
@@ -265,11 +272,8 @@ impl Core {
     #[cold]
     fn refuse_dead(&self, socket: &SocketState, at: Instant) -> io::Result<()> {
         let name = &self.plan.names()[socket.host.index()];
-        let text = format!(
-            "host `{name}` crashed at {} s, and this socket ({}) with it; after `Host::restart`, bind a new one",
-            cohaptic_units::print::Seconds(at),
-            socket.local
-        );
+        let text =
+            format!("host `{name}` crashed at {} s, and this socket ({}) with it; after `Host::restart`, bind a new one", Seconds(at), socket.local);
         Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
     }
 
@@ -308,6 +312,16 @@ impl Core {
         #[cfg(feature = "tcp")]
         let lines = lines.chain(self.tcp_waits());
         lines.collect()
+    }
+
+    /// What a task with that waker waits for, in words; empty if sockets and timers do not know the task.
+    pub(crate) fn awaited_by(&self, waker: &Waker) -> Vec<String> {
+        let sockets = self.sockets.places.iter().flatten().filter(|socket| socket.is_awaited_by(waker));
+        let mut awaited: Vec<String> = sockets.map(|socket| format!("a datagram at UDP {}", socket.local)).collect();
+        #[cfg(feature = "tcp")]
+        awaited.extend(self.tcp_awaited_by(waker));
+        awaited.extend(self.timers.deadline_of(waker).map(|deadline| format!("{} s of the run", Seconds(deadline))));
+        awaited
     }
 
     pub(crate) fn may_broadcast(&mut self, id: SocketId) -> &mut bool {

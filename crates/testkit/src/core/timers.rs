@@ -94,6 +94,14 @@ impl Timers {
         earlier(self.ordered.front().map(|(id, _)| deadline(id)), self.others.first_key_value().map(|(id, _)| deadline(id)))
     }
 
+    /// The first deadline for which that waker waits.
+    pub(super) fn deadline_of(&self, waker: &Waker) -> Option<Instant> {
+        let is_of = |other: Option<&Waker>| other.is_some_and(|other| other.will_wake(waker));
+        let ordered = self.ordered.iter().find(|(_, other)| is_of(other.as_ref())).map(|((deadline, _), _)| *deadline);
+        let other = self.others.iter().find(|(_, other)| is_of(Some(other))).map(|((deadline, _), _)| *deadline);
+        earlier(ordered, other)
+    }
+
     /// Takes out those that are due.
     #[inline]
     pub(crate) fn fire(&mut self, now: Instant, woken: &mut Woken) {

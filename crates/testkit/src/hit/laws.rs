@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use cohaptic_wan::Path;
 use cohaptic_wan::random::Draws;
 
-use super::{PacketLaw, SentPacket, Verdict};
+use super::{Hit, PacketLaw, SentPacket, Verdict, WordsLaw};
 
 /// The laws of a test bed, in the order in which they were given.
 #[derive(Clone, Debug, Default)]
@@ -19,6 +19,8 @@ pub(crate) struct Given {
     pub(crate) path: Path,
     /// Its words, or where it was given.
     pub(crate) name: String,
+    /// The hit, if it was said in words.
+    hit: Option<Hit>,
     fresh: Arc<Fresh>,
 }
 
@@ -27,7 +29,15 @@ type Fresh = dyn Fn() -> Box<dyn PacketLaw + Send> + Send + Sync + UnwindSafe + 
 impl Laws {
     pub(crate) fn add(&mut self, path: Path, name: String, law: impl PacketLaw + Clone + Send + 'static) {
         let law = Mutex::new(law);
-        self.0.push(Given { path, name, fresh: Arc::new(move || Box::new(lock(&law).clone())) });
+        self.0.push(Given { path, name, hit: None, fresh: Arc::new(move || Box::new(lock(&law).clone())) });
+    }
+
+    /// Words as a law.
+    pub(crate) fn add_hit(&mut self, path: Path, hit: Hit) {
+        self.add(path, hit.to_string(), WordsLaw::new(hit.clone()));
+        if let Some(given) = self.0.last_mut() {
+            given.hit = Some(hit);
+        }
     }
 
     /// A function as a law.
@@ -41,6 +51,11 @@ impl Laws {
 }
 
 impl Given {
+    /// The hit, if it was said in words.
+    pub(crate) const fn words(&self) -> Option<&Hit> {
+        self.hit.as_ref()
+    }
+
     /// The law as it begins.
     pub(crate) fn fresh(&self) -> Box<dyn PacketLaw + Send> {
         (self.fresh)()

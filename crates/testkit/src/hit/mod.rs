@@ -81,7 +81,7 @@ pub(crate) use seen::Seen;
 pub(crate) use words::Hit;
 pub(crate) use words::parse;
 #[cfg(feature = "strategies")]
-pub(crate) use words::{Action, Which};
+pub(crate) use words::{Action, Which, push_number};
 
 /// The fate that a law wants for a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]

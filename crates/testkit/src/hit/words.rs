@@ -68,6 +68,28 @@ const EXPECTED_KINDS: &str = if cfg!(feature = "tcp") {
     "packet or retransmission (segment, SYN, FIN and RST need the feature `tcp` of cohaptic-testkit)"
 };
 
+impl Hit {
+    /// Drops packets of these numbers, which ascend.
+    pub(crate) fn dropping(numbers: impl IntoIterator<Item = u64>) -> Self {
+        let mut ranges = Vec::new();
+        numbers.into_iter().for_each(|number| push_number(&mut ranges, number));
+        Self { action: Action::Drop, which: Which::Numbers(ranges) }
+    }
+
+    /// Whether what becomes of a packet that is hit is random.
+    pub(crate) const fn draws(&self) -> bool {
+        matches!(self.action, Action::Corrupt)
+    }
+}
+
+/// Adds a number that is greater than all others.
+pub(crate) fn push_number(ranges: &mut Vec<RangeInclusive<u64>>, number: u64) {
+    match ranges.last_mut() {
+        Some(last) if last.end() + 1 == number => *last = *last.start()..=number,
+        _ => ranges.push(number..=number),
+    }
+}
+
 /// Reads a part of a line: at least one hit, parted by semicolons.
 pub(crate) fn parse(line: &str, part: Range<usize>) -> Result<Vec<Hit>, Fault> {
     let end = part.start + line[part.clone()].trim_end().len();

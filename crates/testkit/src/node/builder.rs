@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_wan::{LinkModel, NodeId, Path};
@@ -13,6 +14,7 @@ use crate::file::{LinkChange, LinkFile};
 use crate::hit::Laws;
 use crate::link::ToLink;
 use crate::record::Record;
+use crate::runtime::limits::Limits;
 use crate::seed::{Place, Seed};
 use crate::watch::LIMIT;
 use crate::wire::{BYTE_LIMIT, Settings};
@@ -61,6 +63,8 @@ impl Nodes {
                 keeps_packets: false,
                 patience: PATIENCE,
                 byte_limit: BYTE_LIMIT,
+                limits: Limits::default(),
+                said: Arc::default(),
                 digests: true,
                 laws: Laws::default(),
             },
@@ -88,6 +92,7 @@ impl Nodes {
     /// If the words are none.
     pub fn links(mut self, link: impl ToLink) -> Self {
         self.every = link.to_link();
+        Arc::make_mut(&mut self.settings.said).set_every(&link);
         self
     }
 
@@ -100,6 +105,7 @@ impl Nodes {
         let path = self.names.path(from, to);
         assert!(path.from != path.to, "node `{from}` has no link to itself");
         self.links.insert(path, link.to_link());
+        Arc::make_mut(&mut self.settings.said).set(path, &link);
         self
     }
 
@@ -109,8 +115,7 @@ impl Nodes {
     ///
     /// As [`Nodes::link`].
     pub fn link_both(self, one: &str, other: &str, link: impl ToLink) -> Self {
-        let model = link.to_link();
-        self.link(one, other, &model).link(other, one, &model)
+        self.link(one, other, &link).link(other, one, &link)
     }
 
     /// All links, what becomes of them, and the seed, as a file says: see [`LinkFile`]. Its hosts are nodes that have been added.
@@ -130,6 +135,8 @@ impl Nodes {
         let links = links.into_iter().map(|((from, to), link)| (Path { from: nodes[from], to: nodes[to] }, link)).collect();
         let changes =
             changes.into_iter().map(|change| LinkChange { from: nodes[change.from].index(), to: nodes[change.to].index(), ..change }).collect();
+        let links: BTreeMap<Path, LinkModel> = links;
+        Arc::make_mut(&mut self.settings.said).set_models(every == LinkModel::default(), links.keys().copied());
         Self { every, links, changes, seed: seed.or(self.seed), ..self }
     }
 

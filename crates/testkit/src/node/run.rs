@@ -3,6 +3,7 @@
 use std::any::{Any, type_name};
 use std::collections::VecDeque;
 use std::fmt;
+use std::panic::Location;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -13,8 +14,10 @@ use cohaptic_wan::{LinkModel, LinkStats, NodeId};
 use super::deadlines::Deadlines;
 use super::passing::Does;
 use super::{Node, Nodes, Packet};
+use crate::again::Again;
 use crate::artefacts::Artefacts;
 use crate::bed::Names;
+use crate::failure;
 use crate::record::Record;
 use crate::seed::Seed;
 use crate::watch::{Kind, Watched};
@@ -41,7 +44,7 @@ pub struct NodeRun {
     pub(super) done: u64,
     pub(super) patience: u64,
     time_limit: Duration,
-    seed: Seed,
+    again: Again,
     artefacts: Artefacts,
     pub(super) watched: Arc<Watched>,
 }
@@ -77,6 +80,7 @@ impl NodeRun {
     pub(super) fn new(nodes: Nodes, seed: Seed, link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static) -> Self {
         let Nodes { names, nodes, changes, mut settings, time_limit, artefacts, stall_limit, .. } = nodes;
         let artefacts = Artefacts::new(artefacts, &seed);
+        let said = std::mem::take(&mut settings.said);
         settings.traces |= artefacts.is_wanted();
         settings.keeps_packets |= artefacts.is_wanted();
         let names = Arc::new(names);
@@ -93,7 +97,7 @@ impl NodeRun {
             done: 0,
             patience: settings.patience,
             time_limit,
-            seed,
+            again: Again { names: Arc::clone(&names), said, laws: settings.laws.clone(), seed, others: Vec::new(), place: Location::caller() },
             artefacts,
             watched,
             names,
@@ -243,7 +247,7 @@ impl NodeRun {
     #[must_use]
     pub fn record(&self) -> Record {
         assert!(self.wire.recording().traces, "nothing was recorded; `Nodes::recorded` asks for it");
-        Record::new(self.seed.clone(), self.wire.recorded())
+        Record::new(self.again.seed.clone(), self.wire.recorded())
     }
 
     fn is_late(&self) -> bool {
@@ -287,7 +291,15 @@ pub(super) fn is_another<T>(name: &str) -> ! {
 impl Drop for NodeRun {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            self.artefacts.report(&self.seed, None, &self.wire.hit_counts(), || self.record());
+            let mut recorded = self.wire.recorded();
+            let network = self.again.network(&std::mem::take(&mut recorded.drawn));
+            let text = if network.is_empty() {
+                String::new()
+            } else {
+                format!("nodes with this network meet the same again:\n    {}\n", network.join("\n    "))
+            };
+            let (artefacts, record) = (self.artefacts.clone(), Record::new(self.again.seed.clone(), recorded));
+            failure::report(Box::new(move || artefacts.report(None, text, record)));
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The executors: they poll tasks and let time pass.
 
+pub(crate) mod limits;
 #[cfg(feature = "tokio")]
 pub(crate) mod on_tokio;
 pub(crate) mod own;

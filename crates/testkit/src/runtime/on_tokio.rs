@@ -27,10 +27,12 @@ use std::time::Duration;
 use cohaptic_units::Instant;
 use tokio::task::LocalSet;
 
-use super::own::{Executor, is_any_ready, nothing_will_happen, time_stands_still};
+use super::limits::{goes_on, nothing_will_happen};
+use super::own::{Executor, is_any_ready, time_stands_still};
 use crate::bed::{Bed, Recorder};
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
+use crate::failure::__rust_begin_short_backtrace;
 use crate::task::Tasks;
 use crate::watch::Watched;
 use crate::wire::Recorded;
@@ -55,13 +57,24 @@ struct Idle {
     is_wanted: AtomicBool,
     /// Where the hook has left the clock \[ns\], if nothing runs between it and the executor that could move it; else [`NO_INSTANT`].
     moved: AtomicU64,
+    /// The time when tokio parked last \[ns\].
+    parked: AtomicU64,
+    /// Tokio jumps to where nothing will ever have happened: in several jumps, since its timers do not reach so far.
+    is_idle: AtomicBool,
     /// Wakes the pump, and the executor.
     main: Mutex<Option<Waker>>,
 }
 
 impl Default for Idle {
     fn default() -> Self {
-        Self { armed: AtomicU64::new(NO_INSTANT - 1), is_wanted: AtomicBool::new(true), moved: AtomicU64::new(NO_INSTANT), main: Mutex::new(None) }
+        Self {
+            armed: AtomicU64::new(NO_INSTANT - 1),
+            is_wanted: AtomicBool::new(true),
+            moved: AtomicU64::new(NO_INSTANT),
+            parked: AtomicU64::new(0),
+            is_idle: AtomicBool::new(false),
+            main: Mutex::new(None),
+        }
     }
 }
 
@@ -74,9 +87,24 @@ impl Idle {
         }
     }
 
+    /// Whether the run is beyond its time limit: tasks of tokio alone may keep it going, which the executor does not see.
+    fn must_end(&self, core: &mut Core) -> bool {
+        let now = core.now();
+        let jumped = now.as_nanos().saturating_sub(self.parked.swap(now.as_nanos(), Ordering::Relaxed));
+        if u128::from(jumped) > NEVER.as_nanos() / 2 && core.next_event().is_none() {
+            self.is_idle.store(true, Ordering::Relaxed);
+        }
+        !self.is_idle.load(Ordering::Relaxed) && core.settings.limits.reached(now, 0).is_some()
+    }
+
     /// Tokio is about to park its thread: all wait.
     fn notice(&self, shared: &Shared) {
         let mut core = shared.lock();
+        if self.must_end(&mut core) || shared.is_left_something() {
+            let now = core.now();
+            drop(core);
+            return self.wake(now);
+        }
         loop {
             let (now, next) = (core.now(), core.next_event());
             // Tokio has jumped over it, or it was moved to.
@@ -197,21 +225,26 @@ where
         }));
         let mut pump = pin!(pump(&shared, &tasks, &idle, origin_of_time));
         let mut woken: Option<Arc<SetWaker>> = None;
-        poll_fn(|cx| {
+        let limits = shared.lock().settings.limits;
+        let mut steps = 0;
+        let mut turn = |cx: &mut Context<'_>| {
             let woken = woken.get_or_insert_with(|| {
                 executor.begin(Some(cx.waker()));
                 *idle.main.lock().unwrap_or_else(PoisonError::into_inner) = Some(cx.waker().clone());
                 Arc::new(SetWaker { is_woken: AtomicBool::new(true), main: cx.waker().clone() })
             });
             let moved = idle.moved.swap(NO_INSTANT, Ordering::Relaxed);
+            idle.is_idle.store(false, Ordering::Relaxed);
             let synced = shared.sync((moved != NO_INSTANT).then(|| Instant::from_nanos(moved)));
+            shared.attend();
             let mut left = POLLS;
-            let all_wait = executor.run_some(|| {
+            let all_wait = executor.run_some(shared.now(), || {
                 shared.attend();
                 if let Some(patience) = shared.count_poll() {
                     time_stands_still(&shared, patience, executor.last().as_deref());
                 }
                 left -= 1;
+                steps += 1;
                 left > 0 && tokio::task::coop::has_budget_remaining()
             });
             if main.is_finished() && main.as_mut().poll(cx).is_ready() {
@@ -223,14 +256,17 @@ where
             } else {
                 cx.waker().wake_by_ref();
             }
+            if let Some(limit) = limits.reached(shared.now(), steps) {
+                goes_on(&shared, &tasks, limit);
+            }
             drop(synced);
             if woken.is_woken.swap(false, Ordering::Relaxed) {
                 // Without tasks it is over, until there is one.
                 let _: Poll<()> = Pin::new(&mut set).poll(&mut Context::from_waker(&Arc::clone(woken).into()));
             }
             Poll::Pending
-        })
-        .await;
+        };
+        poll_fn(|cx| __rust_begin_short_backtrace(|| turn(cx))).await;
         outcome.take().unwrap_or_else(|| panic!("the program was stopped before it was over: do not abort it, or the runtime"))
     })
 }

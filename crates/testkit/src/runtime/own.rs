@@ -4,17 +4,19 @@
 //! packets arrive first, then timers go off, in the order in which they were set.
 
 use std::cell::{Cell, RefCell};
-use std::fmt::Write as _;
 use std::ops::Deref;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
+use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 
+use super::limits::{goes_on, nothing_will_happen};
 use crate::core::Shared;
 use crate::task::{Spawner, Task, Tasks};
+use crate::wire::Settings;
 
 thread_local! {
     static HERE: Here = const { Here { executor: Cell::new(0), ready: RefCell::new(Vec::new()), main: RefCell::new(None), waits: Cell::new(false) } };
@@ -220,14 +222,15 @@ impl Executor {
     ///
     /// # Panics
     ///
-    /// If nothing will ever happen any more, or if time cannot pass because tasks are polled again and again.
+    /// If nothing will ever happen any more, if time cannot pass because tasks are polled again and again, or at a limit of the run.
     pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
-        let patience = shared.lock().settings.patience;
-        let (mut polls, mut batch) = (0, Batch::default());
+        let Settings { patience, limits, .. } = shared.lock().settings;
+        let (mut polls, mut steps, mut batch) = (0, 0, Batch::default());
+        let mut now = shared.now();
         self.begin(None);
         loop {
             // A task that is polled tells by itself that the executor does not stand.
-            if let Some(polled) = self.poll_one(&mut batch) {
+            if let Some(polled) = self.poll_one(&mut batch, now) {
                 shared.attend();
                 polls += 1;
                 if polls > patience {
@@ -244,10 +247,15 @@ impl Executor {
                 drop(core);
                 nothing_will_happen(shared, tasks);
             };
-            if next > core.now() {
-                polls = 0;
+            if next > now {
+                steps += std::mem::take(&mut polls);
+                if let Some(limit) = limits.reached(next, steps) {
+                    drop(core);
+                    goes_on(shared, tasks, limit);
+                }
             }
             core.pass(next);
+            now = core.now();
         }
     }
 
@@ -267,10 +275,10 @@ impl Executor {
 
     /// Polls tasks until none can go on, or `goes_on` says no after one of them; says whether none can.
     #[cfg(feature = "tokio")]
-    pub(crate) fn run_some(&self, mut goes_on: impl FnMut() -> bool) -> bool {
+    pub(crate) fn run_some(&self, now: Instant, mut goes_on: impl FnMut() -> bool) -> bool {
         let mut batch = self.batch.take();
         let mut all_wait = true;
-        while self.poll_one(&mut batch).is_some() {
+        while self.poll_one(&mut batch, now).is_some() {
             if !goes_on() {
                 batch.give_back();
                 all_wait = false;
@@ -291,14 +299,14 @@ impl Executor {
 
     /// Polls the task that has waited longest, if there is one; says whether it is over.
     #[inline(always)]
-    fn poll_one(&self, batch: &mut Batch) -> Option<Poll<()>> {
+    fn poll_one(&self, batch: &mut Batch, now: Instant) -> Option<Poll<()>> {
         let number = batch.take().or_else(|| self.next_batch(batch))?;
         self.last.set(number);
         // The task may start others while it is polled, which get other places.
         let Some(slot) = self.slots.borrow().get(number).and_then(Clone::clone) else { return Some(Poll::Pending) };
         slot.place.is_queued.store(false, Ordering::Relaxed);
         // A place that was given to another task wakes that one in vain, once.
-        let polled = slot.task.poll(&mut Context::from_waker(&slot.waker));
+        let polled = slot.task.poll(now, &mut Context::from_waker(&slot.waker));
         if polled.is_ready() {
             self.forget(number);
         }
@@ -346,38 +354,6 @@ pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>
     panic!(
         "time stands still at {} s: tasks were polled {polls} times without waiting for it to pass, {who} the last. It wakes itself, or others, again and again: let \
          it wait for a socket or a `sleep`",
-        Seconds(now)
-    );
-}
-
-/// Tells that nothing will ever happen any more.
-///
-/// # Panics
-///
-/// Always.
-#[expect(clippy::panic, reason = "the program waits for ever; says who does, and the way out")]
-pub(crate) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
-    const SHOWN: usize = 8;
-    let (now, sockets) = {
-        let core = shared.lock();
-        (core.now(), core.waits())
-    };
-    let waiting = tasks.waiting();
-    let mut text = String::new();
-    for task in waiting.iter().take(SHOWN) {
-        let _ = write!(text, "\n  {}", task.words(shared.names()));
-    }
-    if waiting.len() > SHOWN {
-        let _ = write!(text, "\n  and {} more", waiting.len() - SHOWN);
-    }
-    for socket in sockets.iter().take(SHOWN) {
-        let _ = write!(text, "\n  {socket}");
-    }
-    if sockets.len() > SHOWN {
-        let _ = write!(text, "\n  and {} more sockets", sockets.len() - SHOWN);
-    }
-    panic!(
-        "nothing will ever happen after {} s: no packet is on its way, no timer is set, and these wait for what never comes. A lost packet needs a `timeout`:{text}",
         Seconds(now)
     );
 }

@@ -9,7 +9,7 @@ use proptest::test_runner::TestRunner;
 
 use super::grid::Dice;
 use super::shrink::{Number, Search, Space};
-use crate::hit::{Action, Hit, Hits, PathHit, Which};
+use crate::hit::{Action, Hit, Hits, PathHit, Which, push_number};
 use crate::words::hits_on;
 
 /// Sets of packets that are hit, among the first `packets` of every path between these hosts. Each is hit by one of the actions, which are the words that stand before
@@ -125,10 +125,7 @@ impl SetSpace {
         let mut numbers: BTreeMap<(usize, usize, usize), Vec<RangeInclusive<u64>>> = BTreeMap::new();
         for (&(from, to, number), &action) in set {
             let ranges = numbers.entry((from, to, action)).or_default();
-            match ranges.last_mut() {
-                Some(last) if last.end() + 1 == number => *last = *last.start()..=number,
-                _ => ranges.push(number..=number),
-            }
+            push_number(ranges, number);
         }
         let hit = |((from, to, action), numbers): ((usize, usize, usize), Vec<_>)| PathHit {
             from: self.hosts[from].clone(),

@@ -13,9 +13,12 @@ use std::task::{Context, Poll, Waker};
 pub(crate) use join::joined;
 pub use join::{JoinHandle, TaskStopped};
 
+use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
 use cohaptic_wan::NodeId;
 
 use crate::context;
+use crate::core::Core;
 use crate::watch::{Pulse, Runner};
 
 /// What a task runs.
@@ -28,6 +31,8 @@ pub(crate) struct Task {
     /// What the pulse knows it by.
     number: usize,
     program: RefCell<Option<Program>>,
+    /// When it was polled last: since then it waits.
+    polled: Cell<Instant>,
     /// It was stopped while it was polled.
     is_doomed: Cell<bool>,
     /// Its waker, the same in each poll.
@@ -42,6 +47,7 @@ impl Task {
             pulse: Arc::clone(pulse),
             number,
             program: RefCell::new(Some(program)),
+            polled: Cell::new(Instant::ZERO),
             is_doomed: Cell::new(false),
             waker: RefCell::new(None),
         })
@@ -52,9 +58,10 @@ impl Task {
         *self.waker.borrow_mut() = Some(waker);
     }
 
-    /// Polls the program; ready when it is over, or was stopped.
+    /// Polls the program at that instant; ready when it is over, or was stopped.
     #[inline]
-    pub(crate) fn poll(&self, cx: &mut Context<'_>) -> Poll<()> {
+    pub(crate) fn poll(&self, now: Instant, cx: &mut Context<'_>) -> Poll<()> {
+        self.polled.set(now);
         let mut program = self.program.borrow_mut();
         let Some(future) = program.as_mut() else { return Poll::Ready(()) };
         self.pulse.begins(self.number);
@@ -91,6 +98,13 @@ impl Task {
 
     fn is_over(&self) -> bool {
         self.program.try_borrow().is_ok_and(|program| program.is_none())
+    }
+
+    /// The task in words, since when it waits, and what for.
+    pub(crate) fn waits(&self, core: &Core) -> String {
+        let awaited = self.waker.borrow().as_ref().map(|waker| core.awaited_by(waker)).unwrap_or_default();
+        let awaited = if awaited.is_empty() { "another task, or something that is not of the test bed".to_owned() } else { awaited.join(", or ") };
+        format!("{} waits since {} s for {awaited}", self.words(core.plan.names()), Seconds(self.polled.get()))
     }
 
     /// The task in words: see [`Runner::words`].

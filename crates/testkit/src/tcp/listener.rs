@@ -11,7 +11,7 @@ use cohaptic_wan::NodeId;
 
 use super::{KIND, TcpStream};
 use crate::address::ToSocketAddrs;
-use crate::context;
+use crate::context::Call;
 use crate::core::{Guard, HoldId, Inherited, ListenId, Shared};
 
 /// How many connections may wait at a listener that does not say it; Linux lets one more wait.
@@ -40,11 +40,18 @@ impl TcpListener {
     ///
     /// # Errors
     ///
-    /// As tokio's: the address is taken by another listener, or is not the host's. [`io::ErrorKind::NotFound`] if the task lives on no host.
-    #[expect(clippy::unused_async, reason = "as tokio's")]
-    pub async fn bind(address: impl ToSocketAddrs) -> io::Result<Self> {
-        let (shared, host) = context::here("a socket can be bound", "listen", "listen with `Host::listen`")?;
-        Self::bind_on(shared, host, address)
+    /// As tokio's: the address is taken by another listener, or is not the host's.
+    ///
+    /// # Panics
+    ///
+    /// Outside of a running test bed, and if the task lives on no host.
+    #[track_caller]
+    pub fn bind(address: impl ToSocketAddrs) -> impl Future<Output = io::Result<Self>> {
+        let call = Call::here("TcpListener::bind");
+        async move {
+            let (shared, host) = call.host("listen with `Host::listen`");
+            Self::bind_on(shared, host, address)
+        }
     }
 
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {

@@ -9,7 +9,7 @@ use std::time::Duration;
 use cohaptic_wan::NodeId;
 
 use super::{KIND, TcpConfig, TcpListener, TcpStream};
-use crate::context;
+use crate::context::Call;
 use crate::core::{HoldId, Shared};
 
 /// A TCP socket that is neither connected nor listening: the methods of tokio's, with the same meaning.
@@ -52,9 +52,14 @@ impl TcpSocket {
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::NotFound`] if the task lives on no host, [`io::ErrorKind::NetworkDown`] if that is down.
+    /// [`io::ErrorKind::NetworkDown`] if the host is down.
+    ///
+    /// # Panics
+    ///
+    /// Outside of a running test bed, and if the task lives on no host.
+    #[track_caller]
     pub fn new_v4() -> io::Result<Self> {
-        Self::new(false)
+        Self::new(Call::here("TcpSocket::new_v4"), false)
     }
 
     /// A socket of version 6 on the host of the task that is running.
@@ -62,12 +67,18 @@ impl TcpSocket {
     /// # Errors
     ///
     /// As [`TcpSocket::new_v4`].
+    ///
+    /// # Panics
+    ///
+    /// As [`TcpSocket::new_v4`].
+    #[track_caller]
     pub fn new_v6() -> io::Result<Self> {
-        Self::new(true)
+        Self::new(Call::here("TcpSocket::new_v6"), true)
     }
 
-    fn new(is_six: bool) -> io::Result<Self> {
-        let (shared, host) = context::here("a socket can be made", "make a socket", "wrap it in `Host::scope`")?;
+    #[track_caller]
+    fn new(call: Call, is_six: bool) -> io::Result<Self> {
+        let (shared, host) = call.host("wrap the call in `Host::scope`");
         let core = shared.lock();
         core.check_up(host)?;
         let config = core.tcp_config(host).clone();

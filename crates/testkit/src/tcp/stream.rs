@@ -12,7 +12,7 @@ use cohaptic_wan::NodeId;
 
 use super::{Info, KIND, TcpConfig};
 use crate::address::ToSocketAddrs;
-use crate::context;
+use crate::context::Call;
 use crate::core::{ConnId, Guard, HoldId, Shared};
 
 /// A TCP connection of a host of the running test bed: the methods of tokio's, with the same meaning.
@@ -66,13 +66,20 @@ impl TcpStream {
     /// # Errors
     ///
     /// [`io::ErrorKind::ConnectionRefused`] if nobody listens there, a round trip later; [`io::ErrorKind::TimedOut`] after 127 s without an answer;
-    /// [`io::ErrorKind::HostUnreachable`] if no host ever had that address; [`io::ErrorKind::NotFound`] if the task lives on no host.
-    pub async fn connect(address: impl ToSocketAddrs) -> io::Result<Self> {
-        let how = "wrap it in `Host::scope`; `Host::connect` and, for hyper, `Connector` name the host";
-        let (shared, host) = context::here("a connection can be opened", "connect from", how)?;
-        let address = address.to_socket_addr()?;
-        let config = shared.lock().tcp_config(host).clone();
-        Self::connect_on(shared, host, None, address, config)?.established().await
+    /// [`io::ErrorKind::HostUnreachable`] if no host ever had that address.
+    ///
+    /// # Panics
+    ///
+    /// Outside of a running test bed, and if the task lives on no host.
+    #[track_caller]
+    pub fn connect(address: impl ToSocketAddrs) -> impl Future<Output = io::Result<Self>> {
+        let call = Call::here("TcpStream::connect");
+        async move {
+            let (shared, host) = call.host("wrap the call in `Host::scope`; `Host::connect` and, for hyper, `Connector` name the host");
+            let address = address.to_socket_addr()?;
+            let config = shared.lock().tcp_config(host).clone();
+            Self::connect_on(shared, host, None, address, config)?.established().await
+        }
     }
 
     /// Sends the SYN. `bound`: the port that is held, and the address of that socket.

@@ -12,7 +12,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{Fate, LinkModel, LinkStats, MereArrival, Network, NetworkConfig, NodeId, PacketInfo, Path};
+use cohaptic_wan::{DropCause, Fate, LinkModel, LinkStats, MereArrival, Network, NetworkConfig, NodeId, PacketInfo, Path};
 
 use exits::{Out, counted};
 pub(crate) use held::{BYTE_LIMIT, Held, Where};
@@ -20,10 +20,12 @@ pub(crate) use hitting::HitCount;
 use hitting::Hitting;
 pub(crate) use recording::{Recorded, Recording, Seen};
 
+use crate::again::{Drawn, MOST_LOST, Said};
 use crate::bed::Names;
 use crate::core::Octets;
 use crate::file::LinkChange;
 use crate::hit::{Laws, Verdict};
+use crate::runtime::limits::Limits;
 use crate::seed::hash;
 use crate::trace::{Happening, Lost, PacketName};
 
@@ -42,6 +44,10 @@ pub(crate) struct Settings {
     pub(crate) patience: u64,
     /// How many bytes the run may hold.
     pub(crate) byte_limit: u64,
+    /// When a run is given up that does not end.
+    pub(crate) limits: Limits,
+    /// The network in the words of the test.
+    pub(crate) said: Arc<Said>,
     /// Which packets are hit.
     pub(crate) laws: Laws,
 }
@@ -91,6 +97,8 @@ pub(crate) struct Wire<A> {
     /// Where packets are hit.
     hitting: Option<Box<Hitting<A>>>,
     recording: Recording,
+    /// What chance has done.
+    drawn: Drawn,
 }
 
 impl<A: Clone + Send + Sync + 'static> Wire<A> {
@@ -114,6 +122,7 @@ impl<A: Clone + Send + Sync + 'static> Wire<A> {
             held: Held::new(settings.byte_limit),
             is_watched,
             recording,
+            drawn: Drawn::default(),
         }
     }
 }
@@ -248,7 +257,12 @@ impl<A: Clone> Wire<A> {
                     }
                     return Some(Arrival { packet, at, parcel, marked, is_cut });
                 }
-                Fate::Dropped(cause) => self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) }),
+                Fate::Dropped(cause) => {
+                    if cause == DropCause::Loss && self.drawn.lost.len() < MOST_LOST {
+                        self.drawn.lost.push(packet);
+                    }
+                    self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) });
+                }
                 Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
             }
         }
@@ -274,6 +288,8 @@ impl<A: Clone> Wire<A> {
     pub(crate) fn set_link(&mut self, at: Instant, path: Path, link: LinkModel) {
         let changed = self.network.set_link(at, path.from, path.to, link);
         debug_assert_eq!(changed, Ok(()), "hosts are checked, and time does not go back");
+        // What the new link draws is not in the words with which the run began.
+        self.drawn.has_drawn = true;
         self.recording.note(at, Happening::Relinked(path));
     }
 
@@ -311,7 +327,7 @@ impl<A: Clone> Wire<A> {
     pub(crate) fn recorded(&self) -> Recorded {
         let exits = self.hitting.as_ref().map(|hitting| hitting.exits.clone()).unwrap_or_default();
         let (packets, ended) = (self.recording.followed_through(&self.network, exits, self.now), self.now);
-        Recorded { trace: self.recording.trace().clone(), packets, ended, hits: self.hit_counts() }
+        Recorded { trace: self.recording.trace().clone(), packets, ended, hits: self.hit_counts(), drawn: self.drawn.clone() }
     }
 
     /// What each law did.

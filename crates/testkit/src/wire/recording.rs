@@ -8,6 +8,7 @@ use cohaptic_wan::{Fate, Network, PacketEvent, Path};
 
 use super::exits::{Exits, Out};
 use super::{HitCount, Parcel, Settings};
+use crate::again::Drawn;
 use crate::bed::Names;
 use crate::trace::{Happening, Trace};
 
@@ -33,6 +34,7 @@ pub(crate) struct Recorded {
     pub(crate) ended: Instant,
     /// What each law did.
     pub(crate) hits: Vec<HitCount>,
+    pub(crate) drawn: Drawn,
 }
 
 /// No link holds a packet for longer than this many of its events.

@@ -1,6 +1,8 @@
 //! Tests of the test kit.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::missing_panics_doc, clippy::cast_possible_truncation, reason = "tests")]
 
+#[cfg(feature = "strategies")]
+mod again;
 mod artefacts;
 mod byte_limit;
 #[cfg(feature = "strategies")]
@@ -11,6 +13,8 @@ mod equivalence;
 mod faults;
 mod hits;
 mod like_tokio;
+#[cfg(feature = "strategies")]
+mod limits;
 mod link_files;
 mod many_hosts;
 mod misuse;

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use cohaptic_testkit::hit::{Hits, Verdict};
-use cohaptic_testkit::{Bed, Testbed, UdpSocket, time};
+use cohaptic_testkit::{Bed, Testbed, UdpSocket, net, time};
 
 fn bed() -> Testbed {
     Testbed::new(["a", "b"]).links("delay 1ms").seed(1)
@@ -138,11 +138,23 @@ fn test_beds_and_runtimes_are_not_nested() {
 #[test]
 fn outside_of_a_test_bed_nothing_can_be_bound_and_no_time_passes() {
     says(|| drop(time::sleep(Duration::ZERO)), &["only inside a running test bed time passes: call it within `Testbed::run`, on its thread"]);
-    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-    let error = runtime.block_on(UdpSocket::bind("0.0.0.0:0")).unwrap_err().to_string();
-    assert_eq!(error, "only inside a running test bed a socket can be bound: call it within `Testbed::run`, on its thread");
-    let error = bed().run(|_| async { UdpSocket::bind("0.0.0.0:0").await.unwrap_err().to_string() });
-    assert!(error.contains("this task lives on no host") && error.contains("`Host::spawn`"), "{error}");
+    let place = "at crates/testkit/tests/integration/misuse.rs:";
+    let parts = ["`UdpSocket::bind` ", place, " is called outside of a test bed: call it within `Testbed::run`, on its thread"];
+    says(|| drop(UdpSocket::bind("0.0.0.0:0")), &parts);
+    says(|| drop(net::lookup_host("a:7")), &["`lookup_host` ", place, " is called outside of a test bed"]);
+    let parts = ["`UdpSocket::bind` ", place, " is called by a task that lives on no host", "`Host::spawn`, or bind with `Host::bind`"];
+    for bed in [bed(), bed().on_tokio()] {
+        says(|| bed.run(|_| async { drop(UdpSocket::bind("0.0.0.0:0").await) }), &parts);
+    }
+    // Tokio keeps the panics of its tasks to itself, and the run fails all the same.
+    let of_tokio = |_| async {
+        drop(tokio::spawn(async { drop(UdpSocket::bind("0.0.0.0:0").await) }));
+        time::sleep(Duration::from_secs(1)).await;
+    };
+    says(|| bed().on_tokio().run(of_tokio), &parts);
+    // A name that is wrong lets no time pass, however often it is looked up.
+    let again = |bed: Bed| async move { while bed.host("a").bind("c:0").is_err() {} };
+    says(|| bed().patience(1000).run(again), &["time stands still at 0 s"]);
     let error = bed().run(|bed| async move { bed.host("a").bind("c:0").unwrap_err().to_string() });
     assert!(error.starts_with("there is no host `c`; the hosts are a, b; the task that was spawned at "), "{error}");
 }

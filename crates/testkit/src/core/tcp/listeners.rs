@@ -88,7 +88,7 @@ impl Core {
         if self.is_own(host, remote.ip()) {
             config.mtu = LOOPBACK_MTU;
         }
-        let (now, sequence) = (self.now(), self.tcp.initial_sequence());
+        let (now, sequence) = (self.now(), self.tcp.initial_sequence(host, self.plan.names()));
         let machine =
             Connection::connect(now, config, local, remote, sequence).map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
         let id = self.tcp.insert(host, machine);
@@ -117,7 +117,7 @@ impl Core {
         if self.is_own(host, syn.source.ip()) {
             config.mtu = LOOPBACK_MTU;
         }
-        let (now, sequence) = (self.now(), self.tcp.initial_sequence());
+        let (now, sequence) = (self.now(), self.tcp.initial_sequence(host, self.plan.names()));
         let machine = Connection::accept(now, config, syn, sequence).expect("the constants were checked when they were set");
         let conn = self.tcp.insert(host, machine);
         let end = self.tcp.end_mut(conn);

@@ -21,7 +21,7 @@ use cohaptic_tcp::{Connection, TcpConfig};
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
-use super::entropy::Entropy;
+use super::entropy::ByHost;
 use super::waking::Waiters;
 use super::{Core, SocketName};
 use crate::wire::Where;
@@ -52,7 +52,7 @@ type Route = (NodeId, u16, IpAddr, SocketAddr);
 pub(super) struct Tcp {
     /// By host.
     configs: Vec<TcpConfig>,
-    entropy: Entropy,
+    entropy: ByHost,
     connections: Slots<Box<End>>,
     listeners: Slots<Listener>,
     routes: BTreeMap<Route, ConnId>,
@@ -121,7 +121,7 @@ impl Tcp {
     pub(super) fn new(seed: u64, hosts: usize) -> Self {
         Self {
             configs: vec![TcpConfig::default(); hosts],
-            entropy: Entropy::labelled(seed, LABEL),
+            entropy: ByHost::labelled(seed, LABEL),
             connections: Slots::default(),
             listeners: Slots::default(),
             routes: BTreeMap::new(),
@@ -173,8 +173,13 @@ impl Tcp {
         }
     }
 
-    fn initial_sequence(&mut self) -> u32 {
-        u32::from_le_bytes(self.entropy.bytes())
+    fn initial_sequence(&mut self, host: NodeId, names: &[String]) -> u32 {
+        u32::from_le_bytes(self.entropy.of(Some(host), names).bytes())
+    }
+
+    /// Whether any connection has drawn a number.
+    pub(super) fn has_drawn(&self) -> bool {
+        self.entropy.was_asked()
     }
 }
 

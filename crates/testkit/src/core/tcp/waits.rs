@@ -1,10 +1,21 @@
 //! What sockets wait for, in words: for programs that wait for ever.
 
+use std::task::Waker;
+
 use cohaptic_tcp::State;
 
 use super::Core;
 
 impl Core {
+    /// What a task with that waker waits for at sockets of TCP, in words.
+    pub(in crate::core) fn tcp_awaited_by(&self, waker: &Waker) -> impl Iterator<Item = String> {
+        let listeners = self.tcp.listeners.iter().map(|(_, listener)| listener).filter(|listener| listener.wakers.has(waker));
+        let listeners = listeners.map(|listener| format!("a connection at the TCP listener {}", listener.local));
+        let ends = self.tcp.connections.iter().filter(|(_, end)| end.readers.has(waker) || end.writers.has(waker));
+        let ends = ends.map(|(_, end)| format!("TCP {} to {} ({:?})", end.machine.local_addr(), end.machine.peer_addr(), end.machine.info().state));
+        listeners.chain(ends)
+    }
+
     /// A line for each socket of TCP that a task waits for, or whose data waits for the program of the peer.
     pub(in crate::core) fn tcp_waits(&self) -> impl Iterator<Item = String> {
         let names = self.plan.names();

@@ -20,6 +20,8 @@ use numbers::Numbers;
 
 pub(super) use numbers::Number;
 
+use crate::failure::Searching;
+
 /// What can be made of a value.
 pub(super) trait Space: fmt::Debug {
     type Value: Clone + PartialEq + fmt::Debug;
@@ -70,6 +72,7 @@ pub(super) struct Search<S: Space> {
     /// Whether anything was accepted since the phases began anew.
     progress: bool,
     round: u32,
+    _searching: Searching,
 }
 
 #[derive(Clone, Debug)]
@@ -83,7 +86,16 @@ enum Phase<S: Space> {
 impl<S: Space> Search<S> {
     pub(super) fn new(space: S, value: S::Value) -> Self {
         let parts = Parts::new(space.parts(&value, 0));
-        Self { space, best: value, trial: None, phase: Phase::Parts { level: 0, parts }, passed: Vec::new(), progress: false, round: 0 }
+        Self {
+            space,
+            best: value,
+            trial: None,
+            phase: Phase::Parts { level: 0, parts },
+            passed: Vec::new(),
+            progress: false,
+            round: 0,
+            _searching: Searching::begin(),
+        }
     }
 
     /// Takes the next value to try, skipping those that are known to pass.
@@ -149,6 +161,7 @@ impl<S: Space> ValueTree for Search<S> {
     }
 
     fn simplify(&mut self) -> bool {
+        Searching::failed();
         if let Some(failed) = self.trial.take() {
             self.best = failed;
             self.progress = true;

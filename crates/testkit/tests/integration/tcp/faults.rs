@@ -8,12 +8,12 @@ use cohaptic_testkit::{TcpListener, time};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 use crate::tcp::ends::pair;
-use crate::tcp::{R, beds, millis};
+use crate::tcp::{DAY, R, beds, millis};
 
 #[test]
 fn a_crash_is_silent_and_the_sockets_of_the_host_say_so() {
     for bed in beds() {
-        bed.run_twice(|bed| async move {
+        bed.time_limit(DAY).run_twice(|bed| async move {
             let (mut client, mut server, listener) = pair(&bed).await;
             bed.host("b").crash();
             assert!(time::timeout(Duration::from_secs(10_000), client.read(&mut [0; 1])).await.is_err(), "nobody tells it");
@@ -31,7 +31,7 @@ fn a_crash_is_silent_and_the_sockets_of_the_host_say_so() {
 #[test]
 fn keep_alive_finds_a_crash() {
     for bed in beds() {
-        bed.run_twice(|bed| async move {
+        bed.time_limit(DAY).run_twice(|bed| async move {
             let (mut client, _server, _listener) = pair(&bed).await;
             client.set_keepalive_times(Some(Keepalive::default())).unwrap();
             bed.host("b").crash();

@@ -2,6 +2,7 @@
 
 use std::io::{self, ErrorKind};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::pin::Pin;
 
 use cohaptic_testkit::tcp::TcpConfig;
 use cohaptic_testkit::{Bed, TcpListener, TcpSocket, TcpStream, Testbed, time};
@@ -41,17 +42,37 @@ fn a_task_that_lives_on_no_host_is_told_the_way_out() {
     for bed in beds() {
         bed.run(|bed| async move {
             let _listener = bed.host("b").listen("0.0.0.0:80").unwrap();
-            let error = said(TcpStream::connect("b:80").await);
-            assert!(["no host", "`Host::scope`", "`Host::connect`", "`Connector`"].iter().all(|part| error.contains(part)), "{error}");
-            assert!(said(TcpListener::bind("0.0.0.0:80").await).contains("listen with `Host::listen`"));
-            assert!(said(TcpSocket::new_v4()).contains("wrap it in `Host::scope`"));
             let stream = bed.host("a").scope(TcpStream::connect("b:80")).await.unwrap();
             assert_eq!(stream.local_addr().unwrap().ip(), bed.host("a").ip());
         });
     }
-    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-    let error = runtime.block_on(TcpStream::connect("10.0.0.1:80")).unwrap_err().to_string();
-    assert_eq!(error, "only inside a running test bed a connection can be opened: call it within `Testbed::run`, on its thread");
+    let told = |program: fn() -> Pin<Box<dyn Future<Output = ()>>>, parts: &[&str]| {
+        for bed in beds() {
+            let panic = catch_unwind(AssertUnwindSafe(|| bed.run(|_| program()))).unwrap_err();
+            let text = panic.downcast_ref::<String>().unwrap();
+            assert!(parts.iter().all(|part| text.contains(part)) && text.contains(" at crates/testkit/tests/integration/tcp/limits.rs:"), "{text}");
+        }
+    };
+    // A program that tries again swallows an error.
+    told(
+        || Box::pin(async { while TcpStream::connect("b:80").await.is_err() {} }),
+        &["`TcpStream::connect` at ", "no host", "`Host::scope`", "`Host::connect`", "`Connector`"],
+    );
+    told(|| Box::pin(async { drop(TcpListener::bind("0.0.0.0:80").await) }), &["`TcpListener::bind` at ", "listen with `Host::listen`"]);
+    told(|| Box::pin(async { drop(TcpSocket::new_v4()) }), &["`TcpSocket::new_v4` at ", "wrap the call in `Host::scope`"]);
+}
+
+#[test]
+fn outside_of_a_run_nothing_is_opened_and_the_place_is_told() {
+    for act in [|| drop(TcpStream::connect("b:80")), || drop(TcpListener::bind("0.0.0.0:80")), || drop(TcpSocket::new_v6())] {
+        let panic = catch_unwind(act).unwrap_err();
+        let text = panic.downcast_ref::<String>().unwrap();
+        assert!(
+            text.contains(" at crates/testkit/tests/integration/tcp/limits.rs:")
+                && text.ends_with(" is called outside of a test bed: call it within `Testbed::run`, on its thread"),
+            "{text}"
+        );
+    }
 }
 
 #[test]

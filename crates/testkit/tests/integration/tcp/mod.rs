@@ -20,6 +20,9 @@ fn beds() -> [Testbed; 2] {
     [bed.clone(), bed.on_tokio()]
 }
 
+/// For programs that wait for longer than a test bed lets them, such as for keep-alive.
+const DAY: Duration = Duration::from_secs(86_400);
+
 const R: Duration = Duration::from_millis(100);
 
 const fn millis(milliseconds: u64) -> Instant {

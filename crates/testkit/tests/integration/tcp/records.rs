@@ -8,7 +8,7 @@ use cohaptic_testkit::{Bed, Testbed};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 use crate::tcp::ends::pair;
-use crate::tcp::{beds, octets, read_all, send_all};
+use crate::tcp::{DAY, beds, octets, read_all, send_all};
 
 #[test]
 fn the_trace_shows_flags_relative_numbers_and_windows() {
@@ -177,7 +177,7 @@ fn two_ends_that_write_and_do_not_read_are_stuck_and_named() {
 #[test]
 fn idle_connections_that_are_kept_alive_are_stuck_too() {
     for bed in beds() {
-        let text = complaint(bed, async |bed| {
+        let text = complaint(bed.time_limit(DAY), async |bed| {
             let (mut client, server, _listener) = pair(&bed).await;
             for stream in [&client, &server] {
                 stream.set_keepalive_times(Some(Keepalive::default())).unwrap();
@@ -192,7 +192,7 @@ fn idle_connections_that_are_kept_alive_are_stuck_too() {
 fn a_closed_window_is_no_reason_to_give_up_while_a_program_waits_for_time() {
     let config = TcpConfig { receive_buffer: 20_000, ..TcpConfig::default() };
     for bed in beds() {
-        bed.tcp(config.clone()).run(|bed| async move {
+        bed.tcp(config.clone()).time_limit(DAY).run(|bed| async move {
             let (mut client, mut server, _listener) = pair(&bed).await;
             let writing = bed.host("a").spawn(async move { send_all(&mut client, 200_000).await });
             if tokio::runtime::Handle::try_current().is_ok() {

@@ -1,0 +1,154 @@
+//! A test that fails again: the network of a failure, its chance replaced by the packets that were lost or kept by its seed, and the program.
+
+mod program;
+mod said;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::panic::Location;
+use std::sync::Arc;
+
+use cohaptic_wan::{NodeId, Path};
+
+pub(crate) use said::Said;
+use said::{Chance, Words};
+
+use crate::bed::Names;
+use crate::hit::{Hit, Laws};
+use crate::seed::Seed;
+use crate::trace::PacketName;
+
+/// What a run needs to be the same again.
+#[derive(Clone, Debug)]
+pub(crate) struct Again {
+    pub(crate) names: Arc<Names>,
+    pub(crate) said: Arc<Said>,
+    pub(crate) laws: Laws,
+    pub(crate) seed: Seed,
+    /// What else the test has said: lines of the builder.
+    pub(crate) others: Vec<String>,
+    /// The call of the run.
+    pub(crate) place: &'static Location<'static>,
+}
+
+/// What chance did in a run.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Drawn {
+    /// The packets that links lost by chance, the first [`MOST_LOST`].
+    pub(crate) lost: Vec<PacketName>,
+    /// Programs or connections of TCP have drawn random numbers.
+    pub(crate) has_drawn: bool,
+}
+
+/// How many packets are named at most: with more, the seed is shorter.
+pub(crate) const MOST_LOST: usize = 64;
+
+impl Again {
+    /// The calls of a builder that make the network, one a line: with the seed, or with the packets that chance has lost in place of chance.
+    pub(crate) fn network(&self, drawn: &Drawn) -> Vec<String> {
+        let seeded = self.lines(None, self.needs_seed(drawn));
+        let Some(lost) = self.lost(drawn) else { return seeded };
+        let hit = self.lines(Some(&lost), false);
+        let len = |lines: &[String]| lines.iter().map(|line| line.len() + 1).sum::<usize>();
+        if len(&hit) < len(&seeded) { hit } else { seeded }
+    }
+
+    /// The whole test, with the program as it stands in its source. `has_failed`: in the run, and not afterwards.
+    pub(crate) fn test(&self, drawn: &Drawn, has_failed: bool) -> String {
+        let call = program::call(self.place);
+        let (method, program) = match &call {
+            Some(program::Call { method, program }) => (&**method, program.clone()),
+            None => ("run", format!("/* the program of the call at {} */", self.place)),
+        };
+        let last = self.seed.test.rsplit("::").next().unwrap_or_default();
+        let name: String = last.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+        // Writing to a `String` cannot fail.
+        let mut text = format!("#[test]\nfn {name}_again() {{\n    ");
+        if !has_failed {
+            text.push_str("let outcome = ");
+        }
+        let _ = write!(text, "Testbed::new([{}])", self.names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "));
+        for line in self.network(drawn) {
+            let _ = write!(text, "\n        {line}");
+        }
+        for line in &self.others {
+            let _ = write!(text, "\n        {line}");
+        }
+        let _ = write!(text, "\n        .{method}({program});\n");
+        if !has_failed {
+            text.push_str("    // What the test expects of the outcome is not met.\n");
+        }
+        text.push_str("}\n");
+        text
+    }
+
+    fn words(&self) -> impl Iterator<Item = &Words> {
+        std::iter::once(self.said.every()).chain(self.said.links().map(|(_, words)| words))
+    }
+
+    /// Whether anything but the losses depends on the seed.
+    fn has_other_chance(&self, drawn: &Drawn) -> bool {
+        // A law may draw: one that is no words, or one that flips a bit.
+        let draws = self.laws.iter().any(|law| law.words().is_none_or(Hit::draws));
+        drawn.has_drawn || draws || self.words().any(|words| words.chance() == Chance::Other)
+    }
+
+    /// Whether links draw.
+    pub(crate) fn has_chance(&self) -> bool {
+        self.words().any(|words| words.chance() != Chance::Nothing)
+    }
+
+    fn needs_seed(&self, drawn: &Drawn) -> bool {
+        self.has_other_chance(drawn) || self.has_chance()
+    }
+
+    /// The packets that were lost, by path, if they are all that chance did.
+    fn lost(&self, drawn: &Drawn) -> Option<BTreeMap<Path, Vec<u64>>> {
+        let is_known = drawn.lost.len() < MOST_LOST && !self.has_other_chance(drawn) && self.needs_seed(drawn);
+        is_known.then(|| {
+            let mut lost: BTreeMap<Path, Vec<u64>> = BTreeMap::new();
+            drawn.lost.iter().for_each(|packet| lost.entry(packet.path).or_default().push(packet.sequence));
+            lost
+        })
+    }
+
+    /// The calls, with these packets lost in place of chance.
+    fn lines(&self, lost: Option<&BTreeMap<Path, Vec<u64>>>, with_seed: bool) -> Vec<String> {
+        let shown = |words: &Words| match (words, words.chance()) {
+            (Words::Model, _) => None,
+            (_, Chance::Losses(rest)) if lost.is_some() => Some(rest),
+            (Words::Known(words), _) => Some(words.clone()),
+        };
+        let name = |host: NodeId| self.names.get(host.index()).map_or("?", |name| name);
+        let mut lines = Vec::new();
+        let every = shown(self.said.every());
+        match &every {
+            None => lines.push("// .links(…): a model without words, as the test says it.".to_owned()),
+            Some(words) if !words.is_empty() => lines.push(format!(".links({words:?})")),
+            Some(_) => {}
+        }
+        for (path, words) in self.said.links() {
+            let (from, to) = (name(path.from), name(path.to));
+            match shown(words) {
+                None => lines.push(format!("// .link({from:?}, {to:?}, …): a model without words, as the test says it.")),
+                words if words == every => {}
+                Some(words) => lines.push(format!(".link({from:?}, {to:?}, {words:?})")),
+            }
+        }
+        // They come before other laws, of which one might delay a packet that was lost.
+        for (path, numbers) in lost.into_iter().flatten() {
+            lines.push(format!(".hit({:?}, {:?}, {:?})", name(path.from), name(path.to), Hit::dropping(numbers.iter().copied()).to_string()));
+        }
+        for law in self.laws.iter() {
+            let (from, to) = (name(law.path.from), name(law.path.to));
+            match law.words() {
+                Some(words) => lines.push(format!(".hit({from:?}, {to:?}, {:?})", words.to_string())),
+                None => lines.push(format!("// {} of {from} -> {to}, as the test says it.", law.name)),
+            }
+        }
+        if with_seed {
+            lines.push(format!(".seed({})", self.seed.value));
+        }
+        lines
+    }
+}

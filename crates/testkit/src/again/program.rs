@@ -1,0 +1,194 @@
+//! The program of a test, as it stands in the source of the test.
+
+use std::fs;
+use std::panic::Location;
+use std::path::{Path, PathBuf};
+
+/// A call of a program, in the words of its source: the method, and what stands between the parentheses.
+pub(super) struct Call {
+    pub(super) method: String,
+    pub(super) program: String,
+}
+
+/// The call at a place; `None` if the source is not there, or something else stands at that place, as in the code of a macro.
+pub(super) fn call(place: &Location<'_>) -> Option<Call> {
+    let text = fs::read_to_string(source(place.file())?).ok()?;
+    let line = text.lines().nth((place.line() as usize).checked_sub(1)?)?;
+    let column: usize = line.chars().take((place.column() as usize).checked_sub(1)?).map(char::len_utf8).sum();
+    let begin = line.as_ptr().addr() - text.as_ptr().addr() + column;
+    read(&text[begin..])
+}
+
+/// The source file: its path is one from the folder in which the compiler ran, that of a workspace, and a test runs in that of its package.
+fn source(file: &str) -> Option<PathBuf> {
+    let here = std::env::current_dir().ok()?;
+    here.ancestors().map(|folder| folder.join(Path::new(file))).find(|path| path.is_file())
+}
+
+/// Reads a call from its method on.
+fn read(text: &str) -> Option<Call> {
+    let (method, rest) = text.split_once('(')?;
+    let method = method.trim();
+    if !["run", "run_recorded", "run_twice"].contains(&method) {
+        return None;
+    }
+    let (end, has_long_text) = closing(rest)?;
+    let program = rest[..end].trim().trim_end_matches(',').trim_end();
+    // Within a text of several lines blanks mean something.
+    let program = if has_long_text { program.to_owned() } else { indented(program) };
+    Some(Call { method: method.to_owned(), program })
+}
+
+/// How deep a call stands in the test that is printed.
+const INDENT: usize = 8;
+
+/// The lines after the first, moved so that the outermost of them stand as deep as the call does.
+fn indented(program: &str) -> String {
+    let depth = |line: &str| line.len() - line.trim_start().len();
+    let least = program.lines().skip(1).filter(|line| !line.trim().is_empty()).map(depth).min().unwrap_or(0);
+    let mut lines = program.lines();
+    let mut text = lines.next().unwrap_or_default().to_owned();
+    for line in lines {
+        text.push('\n');
+        if !line.trim().is_empty() {
+            text.push_str(&" ".repeat(INDENT));
+            text.push_str(&line[least..]);
+        }
+    }
+    text
+}
+
+/// Where the parenthesis closes that has opened before the text, and whether a string of several lines stands before.
+fn closing(text: &str) -> Option<(usize, bool)> {
+    let bytes = text.as_bytes();
+    let (mut place, mut depth, mut has_long_text) = (0, 0_usize, false);
+    while place < bytes.len() {
+        let rest = &text[place..];
+        let len = match bytes[place] {
+            b'(' | b'[' | b'{' => {
+                depth += 1;
+                1
+            }
+            b')' if depth == 0 => return Some((place, has_long_text)),
+            b')' | b']' | b'}' => {
+                depth = depth.checked_sub(1)?;
+                1
+            }
+            b'/' if rest.starts_with("//") => rest.find('\n').unwrap_or(rest.len()),
+            b'/' if rest.starts_with("/*") => comment(rest)?,
+            b'"' => string(rest)?,
+            b'r' if is_raw(text, place) => raw_string(rest)?,
+            b'\'' => character(rest),
+            _ => 1,
+        };
+        has_long_text |= matches!(bytes[place], b'"' | b'r') && len > 1 && rest.get(..len).is_some_and(|string| string.contains('\n'));
+        place += len;
+        while !text.is_char_boundary(place) {
+            place += 1;
+        }
+    }
+    None
+}
+
+/// The length of a comment, within which others may stand.
+fn comment(text: &str) -> Option<usize> {
+    let (mut depth, mut place) = (0_usize, 0);
+    loop {
+        let rest = text.as_bytes().get(place..)?;
+        if rest.starts_with(b"/*") {
+            (depth, place) = (depth + 1, place + 2);
+        } else if rest.starts_with(b"*/") {
+            (depth, place) = (depth - 1, place + 2);
+            if depth == 0 {
+                return Some(place);
+            }
+        } else if rest.is_empty() {
+            return None;
+        } else {
+            place += 1;
+        }
+    }
+}
+
+/// The length of a string in quotation marks.
+fn string(text: &str) -> Option<usize> {
+    let mut is_escaped = false;
+    for (place, byte) in text.bytes().enumerate().skip(1) {
+        match byte {
+            _ if is_escaped => is_escaped = false,
+            b'\\' => is_escaped = true,
+            b'"' => return Some(place + 1),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// Whether a raw string begins at that place, and not a name that has an `r` in it.
+fn is_raw(text: &str, place: usize) -> bool {
+    let before = text[..place].chars().next_back();
+    let is_word = before.is_some_and(|before| before.is_alphanumeric() || before == '_') && !text[..place].ends_with('b');
+    !is_word && text[place + 1..].trim_start_matches('#').starts_with('"')
+}
+
+/// The length of a raw string.
+fn raw_string(text: &str) -> Option<usize> {
+    let hashes = text[1..].bytes().take_while(|byte| *byte == b'#').count();
+    let begin = hashes + 2;
+    let end = format!("\"{}", "#".repeat(hashes));
+    Some(begin + text.get(begin..)?.find(&end)? + end.len())
+}
+
+/// The length of a character in quotation marks; one for the mark of a lifetime.
+fn character(text: &str) -> usize {
+    let mut characters = text.char_indices().skip(1);
+    match characters.next() {
+        // The character after the stroke may be a mark itself.
+        Some((_, '\\')) => text.get(3..).and_then(|rest| rest.find('\'')).map_or(1, |end| end + 4),
+        Some(_) => characters.next().filter(|(_, mark)| *mark == '\'').map_or(1, |(place, _)| place + 1),
+        None => 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn program(text: &str) -> Option<String> {
+        read(text).map(|call| call.program)
+    }
+
+    #[test]
+    fn a_program_ends_where_its_call_closes() {
+        for (text, expected) in [
+            ("run(ten_questions);", "ten_questions"),
+            ("run(\n    ask::<(), 3>, // )\n) + (1)", "ask::<(), 3>, // )"),
+            ("run(|bed| async move { ask(&bed, \")\").await }).len()", "|bed| async move { ask(&bed, \")\").await }"),
+            ("run(|_: Bed<'static>| f(')', '\\'', '\\u{29}', b')', 'é')), x", "|_: Bed<'static>| f(')', '\\'', '\\u{29}', b')', 'é')"),
+            ("run(f(r#\"\")\"#, br\")\", for_(\"\\\")\"), /* ) /* ) */ ) */ 1))", "f(r#\"\")\"#, br\")\", for_(\"\\\")\"), /* ) /* ) */ ) */ 1)"),
+            (
+                "run_twice(|bed| async {\n            x\n                .y()\n        })",
+                "|bed| async {\n            x\n                .y()\n        }",
+            ),
+            ("run(|bed| {\n    x\n})", "|bed| {\n            x\n        }"),
+            ("run(|bed| {\n    f(\"a\n  b\")\n})", "|bed| {\n    f(\"a\n  b\")\n}"),
+        ] {
+            assert_eq!(program(text).as_deref(), Some(expected), "{text}");
+        }
+        for text in ["", "run", "walk(x)", "run(x", "run(\"x)", "run(])", "run(/* x)", "run(r#\"x\")"] {
+            assert_eq!(program(text), None, "{text}");
+        }
+    }
+
+    #[track_caller]
+    fn run<T>(_program: T) -> &'static Location<'static> {
+        Location::caller()
+    }
+
+    #[test]
+    fn the_source_of_a_call_is_found_from_the_folder_of_the_package() {
+        let place = run(|bed: u8| bed + 1);
+        let call = call(place).unwrap();
+        assert_eq!((&*call.method, &*call.program), ("run", "|bed: u8| bed + 1"));
+    }
+}

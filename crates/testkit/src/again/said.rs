@@ -1,0 +1,149 @@
+//! A network in the words with which a test has said it, and what of it is chance.
+
+use std::collections::BTreeMap;
+
+use cohaptic_wan::netem::{ChanceSpec, LossSpec, Netem, Percent, SlotGap};
+use cohaptic_wan::{NodeId, Path};
+
+use crate::link::ToLink;
+
+/// The links of a test bed in words, as far as they have words.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Said {
+    every: Words,
+    links: BTreeMap<Path, Words>,
+}
+
+/// A link in the words of `tc-netem`, none of which are the ideal link; or one that has no words.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) enum Words {
+    Known(String),
+    Model,
+}
+
+impl Default for Words {
+    fn default() -> Self {
+        Self::Known(String::new())
+    }
+}
+
+impl Words {
+    fn of(link: &impl ToLink) -> Self {
+        link.words().map_or(Self::Model, Self::Known)
+    }
+
+    /// How the words are shown.
+    fn shown(&self) -> &str {
+        match self {
+            Self::Known(words) => words,
+            Self::Model => "a model without words",
+        }
+    }
+
+    /// What of the link is chance, and the words without it.
+    pub(super) fn chance(&self) -> Chance {
+        let Self::Known(words) = self else { return Chance::Other };
+        if words.is_empty() {
+            return Chance::Nothing;
+        }
+        Netem::parse(words).map_or(Chance::Other, |netem| Chance::of(&netem))
+    }
+}
+
+/// What of a link is chance.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) enum Chance {
+    Nothing,
+    /// Losses alone; the words without them.
+    Losses(String),
+    Other,
+}
+
+impl Chance {
+    fn of(netem: &Netem) -> Self {
+        let happens = |chance: Option<&ChanceSpec>| chance.is_some_and(|chance| chance.percent > Percent::ZERO);
+        let jitters = netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).is_some_and(|jitter| !jitter.time.is_zero());
+        let slots = netem.slot.as_ref().is_some_and(|slot| !matches!(slot.gap, SlotGap::Range { max: None, .. }));
+        let others = [netem.corrupt.as_ref(), netem.duplicate.as_ref(), netem.reorder.as_ref().map(|reorder| &reorder.chance)];
+        // A packet that is marked in place of being lost is not lost.
+        if jitters || slots || netem.ecn || others.into_iter().any(happens) {
+            return Self::Other;
+        }
+        match &netem.loss {
+            None => Self::Nothing,
+            Some(LossSpec::Random(chance)) if !happens(Some(chance)) => Self::Nothing,
+            Some(_) => Self::Losses(Netem { loss: None, ..netem.clone() }.to_string()),
+        }
+    }
+}
+
+impl Said {
+    /// What every link is that is not said by itself.
+    pub(crate) fn set_every(&mut self, link: &impl ToLink) {
+        self.every = Words::of(link);
+    }
+
+    pub(crate) fn set(&mut self, path: Path, link: &impl ToLink) {
+        self.links.insert(path, Words::of(link));
+    }
+
+    /// A file or the like has said all links, by models.
+    pub(crate) fn set_models(&mut self, every_is_ideal: bool, links: impl Iterator<Item = Path>) {
+        self.every = if every_is_ideal { Words::default() } else { Words::Model };
+        self.links = links.map(|path| (path, Words::Model)).collect();
+    }
+
+    pub(super) const fn every(&self) -> &Words {
+        &self.every
+    }
+
+    /// The links that differ from all others, in the order of their hosts.
+    pub(super) fn links(&self) -> impl Iterator<Item = (Path, &Words)> {
+        self.links.iter().map(|(path, words)| (*path, words)).filter(|(_, words)| **words != self.every)
+    }
+
+    /// A line for each link that is not ideal, one for all that are not named.
+    pub(crate) fn lines(&self, hosts: &[String]) -> Vec<String> {
+        let name = |host: NodeId| hosts.get(host.index()).map_or("?", |name| name);
+        let links = self.links().map(|(path, words)| {
+            let shown = if words.shown().is_empty() { "ideal" } else { words.shown() };
+            format!("{} -> {}: {shown}", name(path.from), name(path.to))
+        });
+        let every = (self.every != Words::default()).then(|| format!("all: {}", self.every.shown()));
+        every.into_iter().chain(links).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chance_is_told_from_what_is_certain() {
+        let chance = |words: &str| Words::Known(words.to_owned()).chance();
+        for words in ["", "delay 20ms", "rate 1mbit limit 10", "loss 0%", "delay 5ms 0ms", "slot 5ms", "delay 1ms duplicate 0%"] {
+            assert_eq!(chance(words), Chance::Nothing, "{words}");
+        }
+        assert_eq!(chance("loss 3%"), Chance::Losses(String::new()));
+        assert_eq!(chance("delay 20ms loss gemodel 1% 10% rate 1mbit"), Chance::Losses("delay 20ms rate 1mbit".to_owned()));
+        for words in ["delay 5ms 1ms", "loss 3% ecn", "loss 3% corrupt 1%", "duplicate 1%", "delay 5ms reorder 10%", "slot 5ms 9ms"] {
+            assert_eq!(chance(words), Chance::Other, "{words}");
+        }
+        assert_eq!(Words::Model.chance(), Chance::Other);
+    }
+
+    #[test]
+    fn a_network_is_told_link_by_link() {
+        let path = |from, to| Path { from: NodeId::new(from), to: NodeId::new(to) };
+        let hosts = ["a", "b"].map(String::from);
+        let mut said = Said::default();
+        said.set(path(0, 1), &"");
+        assert_eq!(said.lines(&hosts), [""; 0]);
+        said.set_every(&" delay 1ms ");
+        said.set(path(1, 0), &"loss 1%".to_owned());
+        assert_eq!(said.lines(&hosts), ["all: delay 1ms", "a -> b: ideal", "b -> a: loss 1%"]);
+        said.set(path(0, 1), &"delay 1ms");
+        said.set(path(1, 0), &cohaptic_wan::LinkModel::default());
+        assert_eq!(said.lines(&hosts), ["all: delay 1ms", "b -> a: a model without words"]);
+    }
+}

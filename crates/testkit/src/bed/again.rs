@@ -1,0 +1,44 @@
+//! What a run needs to be the same again.
+
+use std::panic::Location;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::{RECEIVE_BUFFER, Testbed};
+use crate::again::Again;
+use crate::runtime::limits::Limits;
+use crate::seed::Seed;
+use crate::wire::Settings;
+
+impl Testbed {
+    /// What the run needs to be the same again.
+    pub(super) fn again(&self, seed: &Seed, place: &'static Location<'static>) -> Again {
+        let Settings { receive_buffer, limits, said, laws, .. } = &self.settings;
+        let default = Limits::default();
+        let nanos = |span: Duration| format!("std::time::Duration::from_nanos({})", u64::try_from(span.as_nanos()).unwrap_or(u64::MAX));
+        #[cfg(feature = "tokio")]
+        let is_tokio = self.is_tokio;
+        #[cfg(not(feature = "tokio"))]
+        let is_tokio = false;
+        #[cfg(feature = "tcp")]
+        let has_constants = !self.tcp.is_empty();
+        #[cfg(not(feature = "tcp"))]
+        let has_constants = false;
+        let others = [
+            (*receive_buffer != RECEIVE_BUFFER).then(|| format!(".receive_buffer({receive_buffer})")),
+            (limits.time != default.time).then(|| format!(".time_limit({})", nanos(limits.time))),
+            (limits.steps != default.steps).then(|| format!(".step_limit({})", limits.steps)),
+            has_constants.then(|| "// The constants of TCP, as the test says them.".to_owned()),
+            (!self.changes.is_empty()).then(|| "// The changes of links, as the file of the test says them.".to_owned()),
+            is_tokio.then(|| ".on_tokio()".to_owned()),
+        ];
+        Again {
+            names: Arc::clone(&self.names),
+            said: Arc::clone(said),
+            laws: laws.clone(),
+            seed: seed.clone(),
+            others: others.into_iter().flatten().collect(),
+            place,
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Failures of properties: while a value of a [strategy](crate::strategies) may shrink, its property fails again and again. Each failure replaces the one before, and the
+//! last is printed when the search is over, before proptest says the message of the panic and the smallest input.
+
+use std::backtrace::{Backtrace, BacktraceStatus};
+use std::cell::{Cell, RefCell};
+use std::fmt::Write as _;
+use std::marker::PhantomData;
+use std::panic::{self, PanicHookInfo};
+use std::sync::Once;
+use std::thread;
+
+use super::{Lines, print};
+
+thread_local! {
+    /// How many values of strategies this thread has that may shrink.
+    static SEARCHES: Cell<usize> = const { Cell::new(0) };
+    static KEPT: RefCell<Kept> = const { RefCell::new(Kept::NOTHING) };
+}
+
+/// What is printed once a property has failed.
+struct Kept {
+    /// The last panic.
+    panic: Option<Panic>,
+    /// The last run, which has not failed itself: what a property expects afterwards may fail.
+    last: Option<Lines>,
+    failed: Option<Failed>,
+}
+
+impl Kept {
+    const NOTHING: Self = Self { panic: None, last: None, failed: None };
+}
+
+struct Failed {
+    panic: Option<Panic>,
+    lines: Option<Lines>,
+}
+
+/// A panic. Proptest tells its message, unless the panic is not one of a property.
+struct Panic {
+    place: String,
+    message: String,
+    backtrace: Backtrace,
+}
+
+impl Panic {
+    fn of(info: &PanicHookInfo<'_>) -> Self {
+        let place = info.location().map_or_else(|| "an unknown place".to_owned(), ToString::to_string);
+        let payload = info.payload();
+        let text = payload.downcast_ref::<String>().map(String::as_str).or_else(|| payload.downcast_ref::<&str>().copied());
+        Self { place, message: text.unwrap_or("Box<dyn Any>").to_owned(), backtrace: Backtrace::capture() }
+    }
+
+    fn words(&self) -> String {
+        let Self { place, message, backtrace } = self;
+        let mut text = if thread::panicking() {
+            // Nobody has caught the panic, as proptest does: a test keeps a value of a strategy itself.
+            format!("\nthread '{}' panicked at {place}:\n{message}\n", thread::current().name().unwrap_or("<unnamed>"))
+        } else {
+            format!("the smallest input panics at {place}\n")
+        };
+        if backtrace.status() == BacktraceStatus::Captured {
+            text.push_str(&trimmed(&backtrace.to_string()));
+        }
+        text
+    }
+}
+
+/// A value of a strategy that may shrink. `Box<dyn ValueTree>` does not leave its thread, and so this does not.
+#[derive(Debug)]
+pub(crate) struct Searching(PhantomData<*const ()>);
+
+impl Searching {
+    pub(crate) fn begin() -> Self {
+        hold_panics_back();
+        SEARCHES.set(SEARCHES.get() + 1);
+        Self(PhantomData)
+    }
+
+    /// The property has failed with the value that was tried last.
+    pub(crate) fn failed() {
+        KEPT.with_borrow_mut(|kept| {
+            // A run that has failed itself was kept before.
+            if let Some(lines) = kept.last.take() {
+                kept.failed = Some(Failed { panic: kept.panic.take(), lines: Some(lines) });
+            }
+        });
+    }
+}
+
+impl Clone for Searching {
+    fn clone(&self) -> Self {
+        Self::begin()
+    }
+}
+
+impl Drop for Searching {
+    fn drop(&mut self) {
+        let left = SEARCHES.get() - 1;
+        SEARCHES.set(left);
+        if left == 0 {
+            let kept = KEPT.replace(Kept::NOTHING);
+            // Where nothing shrinks, a panic after the run is all that tells of the failure.
+            let failed = kept.failed.or_else(|| kept.panic.map(|panic| Failed { panic: Some(panic), lines: kept.last }));
+            if let Some(Failed { panic, lines }) = failed {
+                print(&panic.map(|panic| panic.words()).unwrap_or_default(), lines.unwrap_or_else(|| Box::new(Vec::new)));
+            }
+        }
+    }
+}
+
+/// Whether this thread tries values of a strategy.
+pub(super) fn is_searching() -> bool {
+    SEARCHES.get() > 0
+}
+
+/// Keeps the lines about a run that has failed; gives them back if they are to be printed now.
+pub(super) fn keep_failed(lines: Lines) -> Option<Lines> {
+    if !is_searching() {
+        return Some(lines);
+    }
+    KEPT.with_borrow_mut(|kept| {
+        let panic = kept.panic.take();
+        (kept.last, kept.failed) = (None, Some(Failed { panic, lines: Some(lines) }));
+    });
+    None
+}
+
+/// Keeps the lines about a run that has not failed.
+pub(super) fn keep_last(lines: impl FnOnce() -> Lines) {
+    if is_searching() {
+        let lines = lines();
+        KEPT.with_borrow_mut(|kept| (kept.panic, kept.last) = (None, Some(lines)));
+    }
+}
+
+/// Sees to it, once in a process, that panics of this thread are kept while a value may shrink. All others go to the hook that was there before.
+fn hold_panics_back() {
+    static ONCE: Once = Once::new();
+    // A hook cannot be set while a panic unwinds; the next search does.
+    if thread::panicking() {
+        return;
+    }
+    ONCE.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !keep(info) {
+                before(info);
+            }
+        }));
+    });
+}
+
+/// Keeps a panic; says whether it is kept.
+fn keep(info: &PanicHookInfo<'_>) -> bool {
+    // A panic may come while the thread ends, when there is no state any more, or within a line that has the state.
+    let keep = |kept: &RefCell<Kept>| kept.try_borrow_mut().map(|mut kept| kept.panic = Some(Panic::of(info))).is_ok();
+    SEARCHES.try_with(Cell::get).is_ok_and(|searches| searches > 0) && KEPT.try_with(keep).unwrap_or(false)
+}
+
+/// The frames of a backtrace between the machinery of the panic and the executor.
+fn trimmed(backtrace: &str) -> String {
+    let is_frame = |line: &str| line.trim_start().split_once(": ").is_some_and(|(number, _)| number.parse::<u32>().is_ok());
+    let mut frames: Vec<String> = Vec::new();
+    for line in backtrace.lines() {
+        match frames.last_mut() {
+            Some(frame) if !is_frame(line) => {
+                // Writing to a `String` cannot fail.
+                let _ = write!(frame, "\n{line}");
+            }
+            Some(_) | None => frames.push(line.to_owned()),
+        }
+    }
+    let end = frames.iter().position(|frame| frame.contains("__rust_begin_short_backtrace")).unwrap_or(frames.len());
+    // What catches panics, below, has such names too.
+    let is_machinery = |frame: &String| frame.contains("panicking::") || frame.contains("rust_begin_unwind");
+    let begin = frames[..end].iter().rposition(is_machinery).map_or(0, |place| place + 1);
+    frames[begin..end].iter().fold(String::new(), |text, frame| text + frame + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_backtrace_is_cut_at_both_ends() {
+        let text = "   0: kit::failure::keep\n   1: std::panicking::rust_panic_with_hook\n             at a.rs:1\n   2: core::panicking::panic_fmt\n   \
+                    3: mine::ask\n             at src/lib.rs:9:5\n   4: mine::test\n   5: x::__rust_begin_short_backtrace\n   6: std::panicking::catch_unwind\n";
+        assert_eq!(trimmed(text), "   3: mine::ask\n             at src/lib.rs:9:5\n   4: mine::test\n");
+        assert_eq!(trimmed("   0: main\n"), "   0: main\n");
+        assert_eq!(trimmed(""), "");
+    }
+}

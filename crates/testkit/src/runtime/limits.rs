@@ -1,0 +1,113 @@
+//! When a run is given up: nothing will ever happen, or it does not end.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use cohaptic_units::Instant;
+use cohaptic_units::print::{Seconds, Span};
+
+use crate::core::{Core, Shared};
+use crate::task::Tasks;
+
+/// How far a run may go.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Limits {
+    /// Its own time.
+    pub(crate) time: Duration,
+    /// How often its tasks are polled.
+    pub(crate) steps: u64,
+}
+
+/// Longer than any test means to run. A program that asks five times a second has asked 18,000 times by then, which takes a tenth of a second.
+const TIME: Duration = Duration::from_secs(3600);
+
+/// Some seconds by the wall clock.
+const STEPS: u64 = 20_000_000;
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { time: TIME, steps: STEPS }
+    }
+}
+
+/// The limit that a run has reached.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Reached {
+    Time(Duration),
+    Steps(u64),
+}
+
+impl Limits {
+    /// The limit that a run reaches with that instant, after so many steps.
+    #[inline]
+    pub(super) fn reached(self, at: Instant, steps: u64) -> Option<Reached> {
+        if at > Instant::ZERO.saturating_add(self.time) {
+            return Some(Reached::Time(self.time));
+        }
+        (steps > self.steps).then_some(Reached::Steps(self.steps))
+    }
+}
+
+/// How many lines of a kind a message has.
+const SHOWN: usize = 8;
+
+fn write_lines<T: std::fmt::Display>(text: &mut String, what: &str, lines: impl ExactSizeIterator<Item = T>) {
+    let more = lines.len().saturating_sub(SHOWN);
+    // Writing to a `String` cannot fail.
+    for line in lines.take(SHOWN) {
+        let _ = write!(text, "\n  {line}");
+    }
+    if more > 0 {
+        let _ = write!(text, "\n  and {more} more{what}");
+    }
+}
+
+/// Who waits for what since when: the tasks, and then the sockets.
+fn who_waits(core: &Core, tasks: &Tasks) -> String {
+    let mut text = String::new();
+    write_lines(&mut text, "", tasks.waiting().iter().map(|task| task.waits(core)));
+    write_lines(&mut text, " sockets", core.waits().into_iter());
+    text
+}
+
+/// Tells that nothing will ever happen any more.
+///
+/// # Panics
+///
+/// Always.
+#[expect(clippy::panic, reason = "the program waits for ever; says who does, and the way out")]
+pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
+    let (now, text) = {
+        let core = shared.lock();
+        (core.now(), who_waits(&core, tasks))
+    };
+    panic!(
+        "nothing will ever happen after {} s: no packet is on its way, no timer is set, and these wait for what never comes. A lost packet needs a `timeout`:{text}",
+        Seconds(now)
+    );
+}
+
+/// Tells that a run does not end.
+///
+/// # Panics
+///
+/// Always.
+#[expect(clippy::panic, reason = "the program goes on for ever; says who does, over which network, and the way out")]
+pub(super) fn goes_on(shared: &Shared, tasks: &Tasks, limit: Reached) -> ! {
+    let (now, text) = {
+        let core = shared.lock();
+        let mut text = String::new();
+        write_lines(&mut text, " links", core.settings.said.lines(core.plan.names()).into_iter());
+        let network = if text.is_empty() { "\n  ideal links".to_owned() } else { text };
+        (core.now(), format!("The network:{network}\nWho waits:{}", who_waits(&core, tasks)))
+    };
+    let (limit, method) = match limit {
+        Reached::Time(time) => (format!("its time limit of {}", Span(time)), "time_limit"),
+        Reached::Steps(steps) => (format!("its step limit of {steps} polls of tasks"), "step_limit"),
+    };
+    panic!(
+        "the run goes on beyond {limit}: it is {} s. A program that tries again needs a last attempt, or a `timeout` around all of them; \
+         `Testbed::{method}` sets another limit. {text}",
+        Seconds(now)
+    );
+}
