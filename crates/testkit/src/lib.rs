@@ -28,6 +28,9 @@
 //!
 //! The chapter "Testing your own program over a bad network", `docs/testing.md` in the repository, begins with nothing and shows all of it by example.
 //!
+//! A failure of a property prints a whole `#[test]` that fails again, also when other hosts and links are there: its chance is kept by its seed, or replaced by
+//! [hits](hit) that name the packets that were lost.
+//!
 //! # Contents
 //!
 //! | what | where |
@@ -54,6 +57,7 @@
 #![cfg_attr(feature = "scenes", doc = "| scene files as tests, and scenes at random | [`check_scene`], [`check_scenes`], [`strategies::scene`] |")]
 #![cfg_attr(not(feature = "scenes"), doc = "| scene files as tests, and scenes at random | feature `scenes` |")]
 //! | what happened: events, the fate of every packet, the first difference between two runs | [`Trace`], [`Record`], [`Difference`] |
+//! | when a run that does not end is given up | [`Testbed::time_limit`], [`Testbed::step_limit`] |
 //! | what a failed test leaves behind, and its replay | [`Testbed::artefacts`], [`Record::write`] |
 //!
 //! # Features

@@ -38,13 +38,14 @@ pub(crate) enum Reached {
 }
 
 impl Limits {
-    /// The limit that a run reaches with that instant, after so many steps.
-    #[inline]
-    pub(super) fn reached(self, at: Instant, steps: u64) -> Option<Reached> {
-        if at > Instant::ZERO.saturating_add(self.time) {
-            return Some(Reached::Time(self.time));
-        }
-        (steps > self.steps).then_some(Reached::Steps(self.steps))
+    /// The last instant of a run.
+    pub(super) fn until(self) -> Instant {
+        Instant::ZERO.saturating_add(self.time)
+    }
+
+    /// The limit that a run has reached after so many steps, which goes on.
+    pub(super) const fn reached(self, steps: u64) -> Reached {
+        if steps > self.steps { Reached::Steps(self.steps) } else { Reached::Time(self.time) }
     }
 }
 

@@ -33,7 +33,7 @@ use crate::bed::{Bed, Recorder};
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::failure::__rust_begin_short_backtrace;
-use crate::task::Tasks;
+use crate::task::{JoinHandle, Tasks};
 use crate::watch::Watched;
 use crate::wire::Recorded;
 
@@ -57,6 +57,8 @@ struct Idle {
     is_wanted: AtomicBool,
     /// Where the hook has left the clock \[ns\], if nothing runs between it and the executor that could move it; else [`NO_INSTANT`].
     moved: AtomicU64,
+    /// The last instant of the run.
+    until: Instant,
     /// The time when tokio parked last \[ns\].
     parked: AtomicU64,
     /// Tokio jumps to where nothing will ever have happened: in several jumps, since its timers do not reach so far.
@@ -65,20 +67,19 @@ struct Idle {
     main: Mutex<Option<Waker>>,
 }
 
-impl Default for Idle {
-    fn default() -> Self {
+impl Idle {
+    fn new(until: Instant) -> Self {
         Self {
             armed: AtomicU64::new(NO_INSTANT - 1),
             is_wanted: AtomicBool::new(true),
             moved: AtomicU64::new(NO_INSTANT),
+            until,
             parked: AtomicU64::new(0),
             is_idle: AtomicBool::new(false),
             main: Mutex::new(None),
         }
     }
-}
 
-impl Idle {
     /// Wakes the executor, which is polled next: tokio polls the future of its `block_on` before tasks.
     fn wake(&self, now: Instant) {
         self.moved.store(now.as_nanos(), Ordering::Relaxed);
@@ -89,12 +90,15 @@ impl Idle {
 
     /// Whether the run is beyond its time limit: tasks of tokio alone may keep it going, which the executor does not see.
     fn must_end(&self, core: &mut Core) -> bool {
-        let now = core.now();
-        let jumped = now.as_nanos().saturating_sub(self.parked.swap(now.as_nanos(), Ordering::Relaxed));
-        if u128::from(jumped) > NEVER.as_nanos() / 2 && core.next_event().is_none() {
+        let (parked, now) = (self.parked.load(Ordering::Relaxed), core.now());
+        self.parked.store(now.as_nanos(), Ordering::Relaxed);
+        if now <= self.until {
+            return false;
+        }
+        if now.saturating_duration_since(Instant::from_nanos(parked)) > NEVER / 2 && core.next_event().is_none() {
             self.is_idle.store(true, Ordering::Relaxed);
         }
-        !self.is_idle.load(Ordering::Relaxed) && core.settings.limits.reached(now, 0).is_some()
+        !self.is_idle.load(Ordering::Relaxed)
     }
 
     /// Tokio is about to park its thread: all wait.
@@ -185,7 +189,7 @@ where
              outside of `block_on`"
         );
     }
-    let idle = Arc::new(Idle::default());
+    let idle = Arc::new(Idle::new(core.settings.limits.until()));
     let known: Arc<OnceLock<Arc<Shared>>> = Arc::default();
     let (hook_idle, hook_known, pulse) = (Arc::clone(&idle), Arc::clone(&known), Arc::clone(&watched.pulse));
     let runtime = tokio::runtime::Builder::new_current_thread()
@@ -219,56 +223,75 @@ where
         let _here = shared.stay();
         let outcome = Rc::new(RefCell::new(None));
         let (future, slot) = (Box::pin(program(Bed::new(Arc::clone(&shared)))), Rc::clone(&outcome));
-        let mut main = pin!(tasks.spawn(None, origin, async move {
+        let main = tasks.spawn(None, origin, async move {
             let came_out = future.await;
             *slot.borrow_mut() = Some(came_out);
-        }));
-        let mut pump = pin!(pump(&shared, &tasks, &idle, origin_of_time));
-        let mut woken: Option<Arc<SetWaker>> = None;
-        let limits = shared.lock().settings.limits;
-        let mut steps = 0;
-        let mut turn = |cx: &mut Context<'_>| {
-            let woken = woken.get_or_insert_with(|| {
-                executor.begin(Some(cx.waker()));
-                *idle.main.lock().unwrap_or_else(PoisonError::into_inner) = Some(cx.waker().clone());
-                Arc::new(SetWaker { is_woken: AtomicBool::new(true), main: cx.waker().clone() })
-            });
-            let moved = idle.moved.swap(NO_INSTANT, Ordering::Relaxed);
-            idle.is_idle.store(false, Ordering::Relaxed);
-            let synced = shared.sync((moved != NO_INSTANT).then(|| Instant::from_nanos(moved)));
-            shared.attend();
-            let mut left = POLLS;
-            let all_wait = executor.run_some(shared.now(), || {
-                shared.attend();
-                if let Some(patience) = shared.count_poll() {
-                    time_stands_still(&shared, patience, executor.last().as_deref());
-                }
-                left -= 1;
-                steps += 1;
-                left > 0 && tokio::task::coop::has_budget_remaining()
-            });
-            if main.is_finished() && main.as_mut().poll(cx).is_ready() {
-                return Poll::Ready(());
-            }
-            if all_wait {
-                // It never ends.
-                let _: Poll<()> = pump.as_mut().poll(cx);
-            } else {
-                cx.waker().wake_by_ref();
-            }
-            if let Some(limit) = limits.reached(shared.now(), steps) {
-                goes_on(&shared, &tasks, limit);
-            }
-            drop(synced);
-            if woken.is_woken.swap(false, Ordering::Relaxed) {
-                // Without tasks it is over, until there is one.
-                let _: Poll<()> = Pin::new(&mut set).poll(&mut Context::from_waker(&Arc::clone(woken).into()));
-            }
-            Poll::Pending
-        };
-        poll_fn(|cx| __rust_begin_short_backtrace(|| turn(cx))).await;
+        });
+        drive(&executor, &shared, &tasks, &idle, origin_of_time, main, &mut set).await;
         outcome.take().unwrap_or_else(|| panic!("the program was stopped before it was over: do not abort it, or the runtime"))
     })
+}
+
+/// Polls tasks until the program is over. It is not generic as [`run`] is, so that it is compiled once, with the test kit.
+async fn drive(
+    executor: &Executor,
+    shared: &Shared,
+    tasks: &Tasks,
+    idle: &Idle,
+    origin: tokio::time::Instant,
+    main: JoinHandle<()>,
+    set: &mut LocalSet,
+) {
+    let mut main = pin!(main);
+    let mut pump = pin!(pump(shared, tasks, idle, origin));
+    let mut woken: Option<Arc<SetWaker>> = None;
+    let limits = shared.lock().settings.limits;
+    let mut steps = 0;
+    let mut turn = |cx: &mut Context<'_>| {
+        let woken = woken.get_or_insert_with(|| {
+            executor.begin(Some(cx.waker()));
+            *idle.main.lock().unwrap_or_else(PoisonError::into_inner) = Some(cx.waker().clone());
+            Arc::new(SetWaker { is_woken: AtomicBool::new(true), main: cx.waker().clone() })
+        });
+        let moved = idle.moved.swap(NO_INSTANT, Ordering::Relaxed);
+        idle.is_idle.store(false, Ordering::Relaxed);
+        let synced = shared.sync((moved != NO_INSTANT).then(|| Instant::from_nanos(moved)));
+        // Time does not pass before the end of the turn.
+        let now = shared.now();
+        let mut left = POLLS;
+        let all_wait = executor.run_some(now, || {
+            shared.attend();
+            if let Some(patience) = shared.count_poll() {
+                time_stands_still(shared, patience, executor.last().as_deref());
+            }
+            left -= 1;
+            steps += 1;
+            left > 0 && tokio::task::coop::has_budget_remaining()
+        });
+        if main.is_finished() && main.as_mut().poll(cx).is_ready() {
+            return Poll::Ready(());
+        }
+        if all_wait {
+            // It never ends.
+            let _: Poll<()> = pump.as_mut().poll(cx);
+            // Where no task was polled, nothing has looked yet at what other threads and tasks of tokio have left.
+            if left == POLLS {
+                shared.attend();
+            }
+        } else {
+            cx.waker().wake_by_ref();
+        }
+        if now > idle.until || steps > limits.steps {
+            goes_on(shared, tasks, limits.reached(steps));
+        }
+        drop(synced);
+        if woken.is_woken.swap(false, Ordering::Relaxed) {
+            // Without tasks it is over, until there is one.
+            let _: Poll<()> = Pin::new(&mut *set).poll(&mut Context::from_waker(&Arc::clone(woken).into()));
+        }
+        Poll::Pending
+    };
+    poll_fn(|cx| __rust_begin_short_backtrace(|| turn(cx))).await;
 }
 
 /// Wakes the executor, which polls the set then.

@@ -226,7 +226,7 @@ impl Executor {
     pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
         let Settings { patience, limits, .. } = shared.lock().settings;
         let (mut polls, mut steps, mut batch) = (0, 0, Batch::default());
-        let mut now = shared.now();
+        let (mut now, until) = (shared.now(), limits.until());
         self.begin(None);
         loop {
             // A task that is polled tells by itself that the executor does not stand.
@@ -249,9 +249,9 @@ impl Executor {
             };
             if next > now {
                 steps += std::mem::take(&mut polls);
-                if let Some(limit) = limits.reached(next, steps) {
+                if next > until || steps > limits.steps {
                     drop(core);
-                    goes_on(shared, tasks, limit);
+                    goes_on(shared, tasks, limits.reached(steps));
                 }
             }
             core.pass(next);

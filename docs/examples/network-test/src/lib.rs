@@ -19,7 +19,7 @@ pub async fn ask(socket: &UdpSocket, question: u8) -> u8 {
 #[cfg(test)]
 mod tests {
     use cohaptic_testkit::proptest::prelude::*;
-    use cohaptic_testkit::strategies::{ImpairedNetwork, any_network};
+    use cohaptic_testkit::strategies::any_network;
     use cohaptic_testkit::{Bed, Testbed};
 
     use super::ask;
@@ -47,11 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn late_questions() {
-        let network = ImpairedNetwork::words(
-            "2 hosts
-             a -> b: delay 210ms",
-        );
-        Testbed::new(["client", "server"]).network(&network).run(ten_questions);
+    fn each_question_has_its_own_answer_again() {
+        Testbed::new(["client", "server"]).link("client", "server", "delay 210ms").run(ten_questions);
     }
 }

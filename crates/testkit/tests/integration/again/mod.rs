@@ -37,6 +37,17 @@ proptest! {
     }
 
     #[test]
+    fn letters_of_a_closure_arrive(network in networks_like(2, lossy())) {
+        if is_child("letters_of_a_closure_arrive") {
+            Testbed::new(["client", "server"]).network(&network).on_tokio().run(|bed| async move {
+                let (begin, end) = (b"(", ")");
+                five_letters(bed).await;
+                assert_ne!(begin, end.as_bytes());
+            });
+        }
+    }
+
+    #[test]
     fn letters_keep_their_order(network in networks_like(2, LinkBounds::ideal().jitter(Duration::ZERO..=Duration::from_millis(100)))) {
         if is_child("letters_keep_their_order") {
             Testbed::new(["client", "server"]).network(&network).run(letters_in_order);
@@ -100,12 +111,19 @@ fn test_in(printed: &str) -> &str {
 
 const SAVED: &str = include_str!("saved.rs");
 
+const CHAPTER: &str = include_str!("../../../../../docs/testing.md");
+
 #[test]
 fn the_printed_tests_are_saved_in_saved_rs_and_fail_there() {
-    for test in ["every_letter_arrives", "letters_keep_their_order"] {
+    for test in ["every_letter_arrives", "letters_of_a_closure_arrive", "letters_keep_their_order"] {
         let text = printed(test, &[]);
         assert!(SAVED.contains(test_in(&text)), "saved.rs does not have\n{}", test_in(&text));
     }
+    let text = printed("every_letter_arrives", &[]);
+    assert!(
+        CHAPTER.contains(test_in(&text)) && CHAPTER.contains("`loss 7.1%`") && text.contains("loss 7.1%"),
+        "docs/testing.md does not show\n{text}"
+    );
 }
 
 /// The test bed with the calls that a printed test makes.

@@ -20,3 +20,16 @@ fn letters_keep_their_order_again() {
         .seed(16721237442888058395)
         .run(letters_in_order);
 }
+
+#[should_panic(expected = "letters are missing")]
+#[test]
+fn letters_of_a_closure_arrive_again() {
+    Testbed::new(["client", "server"])
+        .hit("client", "server", "drop packet 2")
+        .on_tokio()
+        .run(|bed| async move {
+            let (begin, end) = (b"(", ")");
+            five_letters(bed).await;
+            assert_ne!(begin, end.as_bytes());
+        });
+}

@@ -3,7 +3,7 @@
 use std::net::Ipv4Addr;
 use std::time::Duration;
 
-use cohaptic_testkit::{Instant, Testbed, time};
+use cohaptic_testkit::{Instant, Testbed, UdpSocket, time};
 
 use super::message_of;
 
@@ -102,6 +102,24 @@ fn waits_that_never_end() {
         })
     });
     assert_begin_shown(&message, ":\n");
+}
+
+#[test]
+fn sockets_without_a_host_and_programs_that_never_end() {
+    let after_place = |message: &str| message.split_once(" is called ").map(|(_, rest)| format!("…is called {rest}")).unwrap();
+    assert_shown(&after_place(&message_of(|| pair().run(|_| async { drop(UdpSocket::bind("0.0.0.0:7").await) }))));
+    assert_shown(&after_place(&message_of(|| drop(UdpSocket::bind("0.0.0.0:7")))));
+    let message = message_of(|| {
+        pair().link("client", "server", "delay 5ms loss 100%").run(|_| async {
+            loop {
+                time::sleep(Duration::from_millis(200)).await;
+            }
+        })
+    });
+    assert_begin_shown(&message, "\n");
+    // What the page shows.
+    let (network, _) = message.split_once("\n  the task").unwrap();
+    super::assert_shown(network);
 }
 
 #[test]
