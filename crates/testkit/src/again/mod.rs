@@ -18,33 +18,33 @@ use crate::hit::{Hit, Laws};
 use crate::seed::Seed;
 use crate::trace::PacketName;
 
-/// What a run needs to be the same again.
+/// Parts of a test bed with which a run is the same again.
 #[derive(Clone, Debug)]
 pub(crate) struct Again {
     pub(crate) names: Arc<Names>,
     pub(crate) said: Arc<Said>,
     pub(crate) laws: Laws,
     pub(crate) seed: Seed,
-    /// What else the test has said: lines of the builder.
+    /// Other calls of the builder, one a line.
     pub(crate) others: Vec<String>,
     /// The call of the run.
     pub(crate) place: &'static Location<'static>,
 }
 
-/// What chance did in a run.
+/// Effects of chance in a run.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Drawn {
     /// The packets that links lost by chance, the first [`MOST_LOST`].
     pub(crate) lost: Vec<PacketName>,
-    /// Programs or connections of TCP have drawn random numbers.
+    /// Whether programs or connections of TCP have drawn random numbers, or links were changed during the run.
     pub(crate) has_drawn: bool,
 }
 
-/// How many packets are named at most: with more, the seed is shorter.
+/// Packets that are named at most: with more, the seed is shorter.
 pub(crate) const MOST_LOST: usize = 64;
 
 impl Again {
-    /// The calls of a builder that make the network, one a line: with the seed, or with the packets that chance has lost in place of chance.
+    /// Returns the calls of a builder that make the network, one a line: with the seed, or with the packets that chance has lost in place of chance.
     pub(crate) fn network(&self, drawn: &Drawn) -> Vec<String> {
         let seeded = self.lines(None, self.needs_seed(drawn));
         let Some(lost) = self.lost(drawn) else { return seeded };
@@ -53,7 +53,7 @@ impl Again {
         if len(&hit) < len(&seeded) { hit } else { seeded }
     }
 
-    /// The whole test, with the program as it stands in its source. `has_failed`: in the run, and not afterwards.
+    /// Returns the whole test, with the program as it stands in its source. `has_failed`: the run itself has failed, and not the test afterwards.
     pub(crate) fn test(&self, drawn: &Drawn, has_failed: bool) -> String {
         let call = program::call(self.place);
         let (method, program) = match &call {
@@ -102,7 +102,7 @@ impl Again {
         self.has_other_chance(drawn) || self.has_chance()
     }
 
-    /// The packets that were lost, by path, if they are all that chance did.
+    /// Returns the packets that were lost, by path, if chance has done nothing else.
     fn lost(&self, drawn: &Drawn) -> Option<BTreeMap<Path, Vec<u64>>> {
         let is_known = drawn.lost.len() < MOST_LOST && !self.has_other_chance(drawn) && self.needs_seed(drawn);
         is_known.then(|| {
@@ -112,7 +112,7 @@ impl Again {
         })
     }
 
-    /// The calls, with these packets lost in place of chance.
+    /// Returns the calls, with these packets lost in place of chance.
     fn lines(&self, lost: Option<&BTreeMap<Path, Vec<u64>>>, with_seed: bool) -> Vec<String> {
         let shown = |words: &Words| match (words, words.chance()) {
             (Words::Model, _) => None,

@@ -1,4 +1,4 @@
-//! The program of a test, as it stands in the source of the test.
+//! Programs of tests, as they stand in the sources of the tests.
 
 use std::fs;
 use std::panic::Location;
@@ -10,7 +10,7 @@ pub(super) struct Call {
     pub(super) program: String,
 }
 
-/// The call at a place; `None` if the source is not there, or something else stands at that place, as in the code of a macro.
+/// Returns the call at a place; `None` if the source is not there, or something else stands at that place, as in the code of a macro.
 pub(super) fn call(place: &Location<'_>) -> Option<Call> {
     let text = fs::read_to_string(source(place.file())?).ok()?;
     let line = text.lines().nth((place.line() as usize).checked_sub(1)?)?;
@@ -19,7 +19,7 @@ pub(super) fn call(place: &Location<'_>) -> Option<Call> {
     read(&text[begin..])
 }
 
-/// The source file: its path is one from the folder in which the compiler ran, that of a workspace, and a test runs in that of its package.
+/// Returns the path of a source file: the path that is known is one from the folder in which the compiler ran, that of a workspace, and a test runs in that of its package.
 fn source(file: &str) -> Option<PathBuf> {
     let here = std::env::current_dir().ok()?;
     here.ancestors().map(|folder| folder.join(Path::new(file))).find(|path| path.is_file())
@@ -39,10 +39,10 @@ fn read(text: &str) -> Option<Call> {
     Some(Call { method: method.to_owned(), program })
 }
 
-/// How deep a call stands in the test that is printed.
+/// Indentation of a call in the test that is printed \[columns\].
 const INDENT: usize = 8;
 
-/// The lines after the first, moved so that the outermost of them stand as deep as the call does.
+/// Returns the program with the lines after the first moved so that the outermost of them stand as deep as the call does.
 fn indented(program: &str) -> String {
     let depth = |line: &str| line.len() - line.trim_start().len();
     let least = program.lines().skip(1).filter(|line| !line.trim().is_empty()).map(depth).min().unwrap_or(0);
@@ -58,7 +58,7 @@ fn indented(program: &str) -> String {
     text
 }
 
-/// Where the parenthesis closes that has opened before the text, and whether a string of several lines stands before.
+/// Returns the place of the parenthesis that closes the one before the text, and whether a string of several lines stands before.
 fn closing(text: &str) -> Option<(usize, bool)> {
     let bytes = text.as_bytes();
     let (mut place, mut depth, mut has_long_text) = (0, 0_usize, false);
@@ -90,7 +90,7 @@ fn closing(text: &str) -> Option<(usize, bool)> {
     None
 }
 
-/// The length of a comment, within which others may stand.
+/// Returns the length of a comment, within which others may stand.
 fn comment(text: &str) -> Option<usize> {
     let (mut depth, mut place) = (0_usize, 0);
     loop {
@@ -110,7 +110,7 @@ fn comment(text: &str) -> Option<usize> {
     }
 }
 
-/// The length of a string in quotation marks.
+/// Returns the length of a string in quotation marks.
 fn string(text: &str) -> Option<usize> {
     let mut is_escaped = false;
     for (place, byte) in text.bytes().enumerate().skip(1) {
@@ -131,7 +131,7 @@ fn is_raw(text: &str, place: usize) -> bool {
     !is_word && text[place + 1..].trim_start_matches('#').starts_with('"')
 }
 
-/// The length of a raw string.
+/// Returns the length of a raw string.
 fn raw_string(text: &str) -> Option<usize> {
     let hashes = text[1..].bytes().take_while(|byte| *byte == b'#').count();
     let begin = hashes + 2;
@@ -139,7 +139,7 @@ fn raw_string(text: &str) -> Option<usize> {
     Some(begin + text.get(begin..)?.find(&end)? + end.len())
 }
 
-/// The length of a character in quotation marks; one for the mark of a lifetime.
+/// Returns the length of a character in quotation marks; one for the mark of a lifetime.
 fn character(text: &str) -> usize {
     let mut characters = text.char_indices().skip(1);
     match characters.next() {

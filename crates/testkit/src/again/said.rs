@@ -1,4 +1,4 @@
-//! A network in the words with which a test has said it, and what of it is chance.
+//! Networks in the words of their tests, and the part of chance in them.
 
 use std::collections::BTreeMap;
 
@@ -32,7 +32,7 @@ impl Words {
         link.words().map_or(Self::Model, Self::Known)
     }
 
-    /// How the words are shown.
+    /// Returns the words as messages show them.
     fn shown(&self) -> &str {
         match self {
             Self::Known(words) => words,
@@ -40,7 +40,7 @@ impl Words {
         }
     }
 
-    /// What of the link is chance, and the words without it.
+    /// Returns the part of chance in the link, with the words without losses.
     pub(super) fn chance(&self) -> Chance {
         let Self::Known(words) = self else { return Chance::Other };
         if words.is_empty() {
@@ -50,7 +50,7 @@ impl Words {
     }
 }
 
-/// What of a link is chance.
+/// The part of chance in a link.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Chance {
     Nothing,
@@ -78,7 +78,7 @@ impl Chance {
 }
 
 impl Said {
-    /// What every link is that is not said by itself.
+    /// Sets the words of all links that are not said by themselves.
     pub(crate) fn set_every(&mut self, link: &impl ToLink) {
         self.every = Words::of(link);
     }
@@ -87,7 +87,7 @@ impl Said {
         self.links.insert(path, Words::of(link));
     }
 
-    /// A file or the like has said all links, by models.
+    /// Sets all links, which a file has said by models.
     pub(crate) fn set_models(&mut self, every_is_ideal: bool, links: impl Iterator<Item = Path>) {
         self.every = if every_is_ideal { Words::default() } else { Words::Model };
         self.links = links.map(|path| (path, Words::Model)).collect();
@@ -102,7 +102,7 @@ impl Said {
         self.links.iter().map(|(path, words)| (*path, words)).filter(|(_, words)| **words != self.every)
     }
 
-    /// A line for each link that is not ideal, one for all that are not named.
+    /// Returns a line for each link that is not ideal, and one for all links that are not named.
     pub(crate) fn lines(&self, hosts: &[String]) -> Vec<String> {
         let name = |host: NodeId| hosts.get(host.index()).map_or("?", |name| name);
         let links = self.links().map(|(path, words)| {

@@ -1,4 +1,4 @@
-//! What a run needs to be the same again.
+//! Parts of a test bed with which a run is the same again.
 
 use std::panic::Location;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use crate::seed::Seed;
 use crate::wire::Settings;
 
 impl Testbed {
-    /// What the run needs to be the same again.
+    /// Returns the parts of the test bed with which a run is the same again.
     pub(super) fn again(&self, seed: &Seed, place: &'static Location<'static>) -> Again {
         let Settings { receive_buffer, limits, said, laws, .. } = &self.settings;
         let default = Limits::default();

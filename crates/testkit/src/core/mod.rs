@@ -163,7 +163,7 @@ impl Core {
         self.entropy.of(host, self.plan.names())
     }
 
-    /// What was recorded so far.
+    /// Returns the record of the run so far.
     pub(crate) fn recorded(&self) -> Recorded {
         #[cfg_attr(not(any(feature = "quinn", feature = "tcp")), expect(unused_mut, reason = "nothing but links draws"))]
         let mut recorded = self.wire.recorded();

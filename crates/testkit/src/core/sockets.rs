@@ -314,7 +314,7 @@ impl Core {
         lines.collect()
     }
 
-    /// What a task with that waker waits for, in words; empty if sockets and timers do not know the task.
+    /// Returns the things that a task with that waker waits for, in words; empty if sockets and timers do not know the task.
     pub(crate) fn awaited_by(&self, waker: &Waker) -> Vec<String> {
         let sockets = self.sockets.places.iter().flatten().filter(|socket| socket.is_awaited_by(waker));
         let mut awaited: Vec<String> = sockets.map(|socket| format!("a datagram at UDP {}", socket.local)).collect();

@@ -94,7 +94,7 @@ impl Timers {
         earlier(self.ordered.front().map(|(id, _)| deadline(id)), self.others.first_key_value().map(|(id, _)| deadline(id)))
     }
 
-    /// The first deadline for which that waker waits.
+    /// Returns the first deadline for which a task with that waker waits.
     pub(super) fn deadline_of(&self, waker: &Waker) -> Option<Instant> {
         let is_of = |other: Option<&Waker>| other.is_some_and(|other| other.will_wake(waker));
         let ordered = self.ordered.iter().find(|(_, other)| is_of(other.as_ref())).map(|((deadline, _), _)| *deadline);

@@ -1,4 +1,4 @@
-//! What a failure prints: once, when the smallest input of a property is found, and not for each input on the way there.
+//! Report of a failure: printed once, when the smallest input of a property is found, and not for each input on the way there.
 
 #[cfg(feature = "strategies")]
 mod searching;
@@ -6,7 +6,7 @@ mod searching;
 #[cfg(feature = "strategies")]
 pub(crate) use searching::Searching;
 
-/// The lines about a run, made when they are printed: they may write a trace.
+/// Lines about a run, made when they are printed: they may write a trace.
 pub(crate) type Lines = Box<dyn FnOnce() -> Vec<String>>;
 
 /// Whether this thread tries values of a strategy.
@@ -17,14 +17,14 @@ pub(crate) fn is_searching() -> bool {
     false
 }
 
-/// A run has failed.
+/// Reports a run that has failed: now, or once the smallest input is found.
 pub(crate) fn report(lines: Lines) {
     #[cfg(feature = "strategies")]
     let Some(lines) = searching::keep_failed(lines) else { return };
     print("", lines);
 }
 
-/// A run has not failed. What the property expects of it may fail.
+/// Notes a run that has not failed: its property may fail afterwards.
 #[cfg_attr(not(feature = "strategies"), expect(unused_variables, reason = "only properties look back"))]
 pub(crate) fn note_run(lines: impl FnOnce() -> Lines) {
     #[cfg(feature = "strategies")]

@@ -17,7 +17,7 @@ thread_local! {
     static KEPT: RefCell<Kept> = const { RefCell::new(Kept::NOTHING) };
 }
 
-/// What is printed once a property has failed.
+/// Panic and lines to be printed once a property has failed.
 struct Kept {
     /// The last panic.
     panic: Option<Panic>,

@@ -1,4 +1,4 @@
-//! When a run is given up: nothing will ever happen, or it does not end.
+//! Runs that are given up: nothing will ever happen, or the run does not end.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -9,12 +9,12 @@ use cohaptic_units::print::{Seconds, Span};
 use crate::core::{Core, Shared};
 use crate::task::Tasks;
 
-/// How far a run may go.
+/// Limits of a run, beyond which it is given up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Limits {
-    /// Its own time.
+    /// Time of the run.
     pub(crate) time: Duration,
-    /// How often its tasks are polled.
+    /// Polls of its tasks.
     pub(crate) steps: u64,
 }
 
@@ -43,7 +43,7 @@ impl Limits {
         Instant::ZERO.saturating_add(self.time)
     }
 
-    /// The limit that a run has reached after so many steps, which goes on.
+    /// Returns the limit that a run has reached which goes on after this number of steps.
     pub(super) const fn reached(self, steps: u64) -> Reached {
         if steps > self.steps { Reached::Steps(self.steps) } else { Reached::Time(self.time) }
     }
@@ -63,7 +63,7 @@ fn write_lines<T: std::fmt::Display>(text: &mut String, what: &str, lines: impl 
     }
 }
 
-/// Who waits for what since when: the tasks, and then the sockets.
+/// Returns a line for each task with the things that the task waits for, and since when; then a line for each socket that a task waits for.
 fn who_waits(core: &Core, tasks: &Tasks) -> String {
     let mut text = String::new();
     write_lines(&mut text, "", tasks.waiting().iter().map(|task| task.waits(core)));

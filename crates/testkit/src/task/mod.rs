@@ -31,7 +31,7 @@ pub(crate) struct Task {
     /// What the pulse knows it by.
     number: usize,
     program: RefCell<Option<Program>>,
-    /// When it was polled last: since then it waits.
+    /// Instant of the last poll: since then the task waits.
     polled: Cell<Instant>,
     /// It was stopped while it was polled.
     is_doomed: Cell<bool>,
@@ -100,7 +100,7 @@ impl Task {
         self.program.try_borrow().is_ok_and(|program| program.is_none())
     }
 
-    /// The task in words, since when it waits, and what for.
+    /// Returns the task in words, with the instant since which the task waits, and the things that it waits for.
     pub(crate) fn waits(&self, core: &Core) -> String {
         let awaited = self.waker.borrow().as_ref().map(|waker| core.awaited_by(waker)).unwrap_or_default();
         let awaited = if awaited.is_empty() { "another task, or something that is not of the test bed".to_owned() } else { awaited.join(", or ") };

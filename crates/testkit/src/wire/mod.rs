@@ -44,7 +44,7 @@ pub(crate) struct Settings {
     pub(crate) patience: u64,
     /// How many bytes the run may hold.
     pub(crate) byte_limit: u64,
-    /// When a run is given up that does not end.
+    /// Limits beyond which a run is given up.
     pub(crate) limits: Limits,
     /// The network in the words of the test.
     pub(crate) said: Arc<Said>,
@@ -97,7 +97,7 @@ pub(crate) struct Wire<A> {
     /// Where packets are hit.
     hitting: Option<Box<Hitting<A>>>,
     recording: Recording,
-    /// What chance has done.
+    /// Effects of chance so far.
     drawn: Drawn,
 }
 

@@ -7,7 +7,7 @@ use cohaptic_tcp::State;
 use super::Core;
 
 impl Core {
-    /// What a task with that waker waits for at sockets of TCP, in words.
+    /// Returns the sockets of TCP that a task with that waker waits for, in words.
     pub(in crate::core) fn tcp_awaited_by(&self, waker: &Waker) -> impl Iterator<Item = String> {
         let listeners = self.tcp.listeners.iter().map(|(_, listener)| listener).filter(|listener| listener.wakers.has(waker));
         let listeners = listeners.map(|listener| format!("a connection at the TCP listener {}", listener.local));
