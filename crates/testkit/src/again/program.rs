@@ -19,7 +19,8 @@ pub(super) fn call(place: &Location<'_>) -> Option<Call> {
     read(&text[begin..])
 }
 
-/// Returns the path of a source file: the path that is known is one from the folder in which the compiler ran, that of a workspace, and a test runs in that of its package.
+/// Returns the path of a source file: the path that is known is one from the folder in which the compiler ran, that of a workspace, and a test runs in that
+/// of its package.
 fn source(file: &str) -> Option<PathBuf> {
     let here = std::env::current_dir().ok()?;
     here.ancestors().map(|folder| folder.join(Path::new(file))).find(|path| path.is_file())

@@ -195,7 +195,8 @@ impl Testbed {
         self
     }
 
-    /// Until when the program may run, in its own time; an hour if it is not said. A run that goes on is given up, with the network, each task, and what the task
+    /// Until when the program may run, in its own time; an hour if it is not said. A run that goes on is given up, with the network, each task, and what the
+    /// task
     /// waits for since when: a program that asks again and again over a network that answers nothing would never end. [`Duration::MAX`] is no limit.
     pub const fn time_limit(mut self, limit: Duration) -> Self {
         self.settings.limits.time = limit;
@@ -262,7 +263,8 @@ impl Testbed {
     /// # Panics
     ///
     /// If the program or one of its tasks does, with the task and the seed on standard error; if nothing will ever happen any more, time does not pass, the run
-    /// goes on beyond [`Testbed::time_limit`] or [`Testbed::step_limit`], or more than [`Testbed::byte_limit`] is on its way; if another thread uses a socket of the run; inside another test bed or runtime.
+    /// goes on beyond [`Testbed::time_limit`] or [`Testbed::step_limit`], or more than [`Testbed::byte_limit`] is on its way; if another thread uses a socket
+    /// of the run; inside another test bed or runtime.
     #[track_caller]
     pub fn run<T, F>(self, program: impl FnOnce(Bed) -> F) -> T
     where

@@ -40,7 +40,8 @@ impl Entropy {
     }
 }
 
-/// Random bytes for the programs of each host, and for those of no host. Each host has a stream of its own, by its name: what other hosts ask for, and which hosts there
+/// Random bytes for the programs of each host, and for those of no host. Each host has a stream of its own, by its name: what other hosts ask for, and which
+/// hosts there
 /// are besides, changes none of the bytes.
 #[derive(Debug)]
 pub(crate) struct ByHost {

@@ -37,7 +37,8 @@ fn print(before: &str, lines: Lines) {
     eprint!("{before}{text}");
 }
 
-/// Runs what polls the tasks of a run. Backtraces end here: what calls this function is the test bed, proptest and the test harness, and says nothing about the program.
+/// Runs what polls the tasks of a run. Backtraces end here: what calls this function is the test bed, proptest and the test harness, and says nothing about
+/// the program.
 /// The standard library leaves out what lies below a function of this name.
 #[inline(never)]
 pub(crate) fn __rust_begin_short_backtrace<T>(act: impl FnOnce() -> T) -> T {

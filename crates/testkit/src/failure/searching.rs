@@ -1,4 +1,5 @@
-//! Failures of properties: while a value of a [strategy](crate::strategies) may shrink, its property fails again and again. Each failure replaces the one before, and the
+//! Failures of properties: while a value of a [strategy](crate::strategies) may shrink, its property fails again and again. Each failure replaces the one
+//! before, and the
 //! last is printed when the search is over, before proptest says the message of the panic and the smallest input.
 
 use std::backtrace::{Backtrace, BacktraceStatus};

@@ -334,8 +334,9 @@ fn misuse_says_what_to_do() {
     assert!(message(|| drop(Nodes::new().start())).contains("a run without nodes"));
     assert!(message(|| drop(Nodes::new().add("a", Wrong::Sends).add("a", Wrong::Sends))).contains("two hosts are called `a`"));
     assert!(message(|| _ = fine.link_stats("a", "a")).contains("no link to itself"));
-    let mut beats = Nodes::new().add("a", Beat(ms(0))).time_limit(Duration::from_secs(2)).start();
-    assert!(message(|| _ = beats.run_until_idle()).starts_with("at 2.001 s something happens still"));
+    let mut beats = Nodes::new().add("a", Beat(ms(0))).links("delay 3ms").time_limit(Duration::from_secs(2)).start();
+    let text = message(|| _ = beats.run_until_idle());
+    assert!(text.starts_with("at 2.001 s something happens still") && text.ends_with(". The network:\n  all: delay 3ms"), "{text}");
     assert!(message(|| _ = beats.run_while(|_| true)).starts_with("at 2.002 s what was to end has not ended"));
     assert_eq!(address(0, 1).port(), 1);
 }
