@@ -1,37 +1,67 @@
 //! Measurements from a pair of captures, one of each end.
 //!
-//! Both files are read for UDP datagrams (pcap or pcapng; Ethernet, raw IP, Linux "cooked" and loopback frames; IPv4 and IPv6). A datagram of the
-//! sender's file is matched with one of the receiver's that has the same payload and the same IP identification, the first with the first, the second
-//! with the second, and so on; the rest is then matched by payload alone, for paths that rewrite identifications. Addresses and ports do not
-//! count: they may be translated. A datagram of the sender that has no match is lost.
+//! Both files are read for UDP datagrams. A datagram of the sender's file is matched with one of the receiver's that has the same payload and the same IP
+//! identification, the first with the first, the second with the second, and so on; the rest is then matched by payload alone, for paths that rewrite
+//! identifications. Addresses and ports do not count: they may be translated. A datagram of the sender that has no match is lost.
 //!
 //! So payloads should differ, by a sequence number say; where several datagrams are equal and one of them is lost, the wrong ones may be matched:
-//! [`Matched::ambiguous`] counts them. Both files must hold as much of each datagram, or payloads look different. The clocks of the two ends are taken as
-//! they are: see [`Measurements::shifted`] and [`Measurements::without_skew`].
+//! [`Matched::ambiguous`] counts them. The clocks of the two ends are taken as they are: see [`Measurements::shifted`], [`Measurements::without_skew`]
+//! and [`Measurements::steps`].
+//!
+//! | what captures do | what is done |
+//! | --- | --- |
+//! | One was begun later, or ended earlier | Datagrams at either end that the receiver's capture could not show are left out: [`Matched::left_out`]. |
+//! | Frames are cut | Datagrams are matched by their length and the octets that both files hold. |
+//! | A packet is shown several times | The first view counts: [`Contents::seen_again`]. |
+//! | A network card cuts or joins packets | Long datagrams are matched as the packets that they hold: [`Contents::super_packets`]. Of a long datagram whose frame was cut, only the first packet is judged. |
+//! | Frames hold something else | They are counted by name: [`Contents::kinds`]. Fragments are such frames, so that a datagram that the path cut counts as lost. |
+//! | The file ends within a block | It is read up to there: [`Contents::cut_off`]. |
+//!
+//! # Formats
+//!
+//! pcap (both orders of octets, microseconds, nanoseconds and the "modified" form) and pcapng (several sections and interfaces, enhanced, simple and
+//! obsolete packet blocks; a simple packet has no time and is only counted).
+//!
+//! Frames of Ethernet, IEEE 802.11 (also with radiotap), PPP, PPPoE, Cisco HDLC, Linux "cooked" captures, loopback and raw IP; tags of VLANs, labels of
+//! MPLS, 802.2; IPv4, and IPv6 with extension headers. A frame check sequence that the file tells of is no part of a frame.
 
+mod contents;
+mod ends;
 mod frame;
+mod hidden;
+mod matching;
 mod reader;
+mod segments;
+mod views;
 
-use std::collections::{BTreeMap, VecDeque};
 use std::io::Read;
 
 use cohaptic_units::print::Counted;
 
-use self::frame::Datagram;
+pub use self::contents::Contents;
+use self::contents::{Capture, Datagram};
+use self::matching::Pairs;
 use super::table::Attoseconds;
 use super::{Measurement, Measurements, MeasurementsError};
 
 /// What two captures say together.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Matched {
-    /// The packets of the sender, in the order of sending; times from the first.
+    /// The packets of the sender that are judged, in the order of sending; times from the first of them.
     pub measurements: Measurements,
-    /// Datagrams that only the sender has: counted as lost.
+    /// Packets of [`Matched::measurements`] that only the sender has: counted as lost.
     pub unmatched_sent: usize,
-    /// Datagrams that only the receiver has: copies, or other traffic. They are left out.
+    /// Packets that only the receiver has: copies, or other traffic. They are left out.
     pub unmatched_arrived: usize,
-    /// Datagrams of the sender that equal another in payload and identification.
+    /// Packets of [`Matched::measurements`] that equal another one in payload and identification.
     pub ambiguous: usize,
+    /// Packets of the sender before the first and after the last one that is judged. The capture of the receiver may not have run when they arrived, so
+    /// that they are neither lost nor delivered.
+    pub left_out: [usize; 2],
+    /// What the capture of the sender holds.
+    pub sender: Contents,
+    /// What the capture of the receiver holds.
+    pub receiver: Contents,
 }
 
 /// Which of the two files.
@@ -57,14 +87,25 @@ pub enum CaptureError {
         problem: CaptureProblem,
     },
     /// A file has no UDP datagrams that were asked for.
-    #[error("the capture of the {} has no UDP datagrams{} in {}: expected those of the link", end.name(), port.map(|port| format!(" to port {port}")).unwrap_or_default(), Counted(*frames, "frame"))]
+    #[error("the capture of the {} {}", end.name(), without_datagrams(*port, contents))]
     NoDatagrams {
         /// Which file.
         end: End,
-        /// How many frames it has.
-        frames: usize,
         /// The port that was asked for.
         port: Option<u16>,
+        /// What the file holds.
+        contents: Box<Contents>,
+    },
+    /// No datagram of one file is in the other.
+    #[error(
+        "none of {} of the sender is among the {arrived} of the receiver: expected captures of the same packets, whose payload the path leaves as it is",
+        Counted(*sent, "datagram")
+    )]
+    NoneMatched {
+        /// Datagrams of the sender.
+        sent: usize,
+        /// Datagrams of the receiver.
+        arrived: usize,
     },
     /// The times make no measurements.
     #[error(transparent)]
@@ -80,8 +121,8 @@ pub enum CaptureProblem {
     /// A block contradicts the format.
     #[error("found a malformed block")]
     Malformed,
-    /// The file ends within a block.
-    #[error("the file ends within a block")]
+    /// The file ends before the first block or frame.
+    #[error("the file ends within its header")]
     CutOff,
     /// The file cannot be read.
     #[error("the file cannot be read")]
@@ -100,85 +141,71 @@ impl End {
     }
 }
 
-/// Whether a file that begins like this is a capture: pcap of either byte order, with microseconds or nanoseconds, or pcapng.
+fn without_datagrams(port: Option<u16>, contents: &Contents) -> String {
+    let wanted = port.map_or_else(String::new, |port| format!(" to port {port}"));
+    let cut = if contents.cut_off { ", then the file ends within a block" } else { "" };
+    if contents.frames == 0 {
+        return format!("holds no frame{cut}: expected UDP datagrams{wanted} of the link");
+    }
+    format!("has no UDP datagrams{wanted} that can be read: expected those of the link, found {contents}{cut}")
+}
+
+/// Whether a file that begins like this is a capture: pcap of either order of octets, with microseconds or nanoseconds, also in its "modified" form, or
+/// pcapng.
 #[must_use]
 pub fn is_capture(beginning: &[u8]) -> bool {
-    const PCAPNG: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
-    const PCAP: [[u8; 4]; 2] = [[0xA1, 0xB2, 0xC3, 0xD4], [0xA1, 0xB2, 0x3C, 0x4D]];
-    let Some(&[a, b, c, d]) = beginning.first_chunk() else { return false };
-    [a, b, c, d] == PCAPNG || PCAP.contains(&[a, b, c, d]) || PCAP.contains(&[d, c, b, a])
+    reader::is_capture(beginning)
 }
 
 /// Reads the captures of both ends. `port`: only datagrams to that UDP port count, which keeps other traffic from being taken for losses.
 ///
+/// Takes as much memory as the payloads of both captures and some hundred octets for each datagram.
+///
 /// # Errors
 ///
-/// [`CaptureError`] if a file cannot be read or has no such datagrams.
-pub fn between(sender: impl Read + Send, receiver: impl Read + Send, port: Option<u16>) -> Result<Matched, CaptureError> {
-    let sent = datagrams(End::Sender, sender, port)?;
-    let arrived = datagrams(End::Receiver, receiver, port)?;
-    Ok(matched(&sent, &arrived)?)
-}
-
-/// The datagrams of one file, in the order of their times.
-fn datagrams(end: End, from: impl Read + Send, port: Option<u16>) -> Result<Vec<Datagram>, CaptureError> {
-    let mut frames = 0;
-    let mut datagrams = Vec::new();
-    reader::for_each_frame(from, |frame| {
-        frames += 1;
-        datagrams.extend(frame::datagram(&frame).filter(|datagram| port.is_none_or(|port| datagram.destination_port == port)));
-    })
-    .map_err(|problem| CaptureError::Unreadable { end, frames, problem })?;
-    if datagrams.is_empty() {
-        return Err(CaptureError::NoDatagrams { end, frames, port });
+/// [`CaptureError`] if a file cannot be read or has no such datagrams, or if no datagram of one file is in the other.
+pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Result<Matched, CaptureError> {
+    let mut sent = Capture::read(End::Sender, sender, port)?;
+    let mut arrived = Capture::read(End::Receiver, receiver, port)?;
+    let mut pairs = Pairs::of(&sent, &arrived);
+    if segments::split(&mut sent, &mut arrived, &pairs) {
+        pairs = Pairs::of(&sent, &arrived);
     }
-    datagrams.sort_by_key(|datagram| datagram.nanos);
-    Ok(datagrams)
+    let doubled = views::merge_doubled(&mut sent, &pairs);
+    if doubled > 0 {
+        sent.contents.seen_again += doubled;
+        pairs = Pairs::of(&sent, &arrived);
+    }
+    hidden::pair(&mut sent, &mut arrived, &mut pairs);
+    matched(sent, arrived, &pairs)
 }
 
-fn matched(sent: &[Datagram], arrived: &[Datagram]) -> Result<Matched, MeasurementsError> {
-    let mut arrival_of: Vec<Option<usize>> = vec![None; sent.len()];
-    let mut taken = vec![false; arrived.len()];
-    let ambiguous = pair(sent, arrived, &mut arrival_of, &mut taken, |datagram| (datagram.payload, datagram.identification));
-    pair(sent, arrived, &mut arrival_of, &mut taken, |datagram| datagram.payload);
+fn matched(mut sent: Capture, arrived: Capture, pairs: &Pairs) -> Result<Matched, CaptureError> {
+    let none_matched = || CaptureError::NoneMatched { sent: sent.datagrams.len(), arrived: arrived.datagrams.len() };
+    let judged = ends::judged(&sent, &arrived, pairs).ok_or_else(none_matched)?;
     let instant = |datagram: &Datagram| Attoseconds::from_nanos(datagram.nanos);
     // Nanoseconds of 64 bits are far below what attoseconds of 128 bits hold.
     let since = |later: &Datagram, earlier: &Datagram| instant(later).zip(instant(earlier)).and_then(|(later, earlier)| later.seconds_since(earlier));
-    let packets = sent.iter().zip(&arrival_of).map(|(datagram, arrival)| Measurement {
-        sent_s: since(datagram, &sent[0]).unwrap_or(f64::NAN),
-        delay_s: arrival.map(|place| since(&arrived[place], datagram).unwrap_or(f64::NAN)),
-    });
+    let own = |range: std::ops::Range<usize>| range.filter(|number| !pairs.is_again[*number] && !pairs.is_hidden[*number]);
+    let first = &sent.datagrams[own(judged.clone()).next().unwrap_or(judged.start)];
+    let packet = |number: usize| {
+        let datagram = &sent.datagrams[number];
+        let delay_s = pairs.arrival_of[number].map(|arrival| since(&arrived.datagrams[arrival], datagram).unwrap_or(f64::NAN));
+        Measurement { sent_s: since(datagram, first).unwrap_or(f64::NAN), delay_s }
+    };
+    let packets: Vec<Measurement> = own(judged.clone()).map(packet).collect();
+    let unmatched_sent = packets.iter().filter(|packet| packet.delay_s.is_none()).count();
+    let left_out = [own(0..judged.start).count(), own(judged.end..sent.datagrams.len()).count()];
+    sent.contents.seen_again += pairs.is_again.iter().filter(|is_again| **is_again).count();
     Ok(Matched {
-        measurements: Measurements::new(packets.collect())?,
-        unmatched_sent: arrival_of.iter().filter(|arrival| arrival.is_none()).count(),
-        unmatched_arrived: taken.iter().filter(|taken| !**taken).count(),
-        ambiguous,
+        measurements: Measurements::new(packets)?,
+        unmatched_sent,
+        unmatched_arrived: pairs.taken.iter().filter(|taken| !**taken).count(),
+        ambiguous: own(judged).filter(|number| pairs.is_ambiguous[*number]).count(),
+        left_out,
+        sender: sent.contents,
+        receiver: arrived.contents,
     })
-}
-
-/// Pairs datagrams that are not paired yet by equal keys, in the order of occurrence; gives the number of the sender's datagrams whose key is not the only one.
-fn pair<K: Ord>(
-    sent: &[Datagram],
-    arrived: &[Datagram],
-    arrival_of: &mut [Option<usize>],
-    taken: &mut [bool],
-    key: impl Fn(&Datagram) -> K,
-) -> usize {
-    let mut waiting: BTreeMap<K, (VecDeque<usize>, usize)> = BTreeMap::new();
-    for (place, datagram) in sent.iter().enumerate().filter(|(place, _)| arrival_of[*place].is_none()) {
-        let (places, times) = waiting.entry(key(datagram)).or_default();
-        places.push_back(place);
-        *times += 1;
-    }
-    for (place, datagram) in arrived.iter().enumerate() {
-        if !taken[place]
-            && let Some(first) = waiting.get_mut(&key(datagram)).and_then(|(places, _)| places.pop_front())
-        {
-            arrival_of[first] = Some(place);
-            taken[place] = true;
-        }
-    }
-    waiting.values().filter(|(_, times)| *times > 1).map(|(_, times)| times).sum()
 }
 
 #[cfg(test)]

@@ -1,0 +1,158 @@
+//! What a capture holds: the datagrams that are matched, and counts of everything else.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io::Read;
+use std::ops::Range;
+
+use cohaptic_units::print::Counted;
+use serde::Serialize;
+
+use super::{CaptureError, End, frame, reader, views};
+
+/// What a capture holds.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
+pub struct Contents {
+    /// Frames in the file.
+    pub frames: usize,
+    /// Number of frames of each kind. `UDP` counts the datagrams that were read; every other name is that of frames that were not.
+    pub kinds: BTreeMap<Cow<'static, str>, usize>,
+    /// Frames that show a packet which an earlier frame of the same capture had shown, at another interface for example.
+    pub seen_again: usize,
+    /// Datagrams that hold several packets, because the network card cuts or joins them.
+    pub super_packets: usize,
+    /// Whether the file ends within a block. It was read up to there.
+    pub cut_off: bool,
+}
+
+/// Most kinds that a text names.
+const MOST_NAMED: usize = 8;
+
+impl fmt::Display for Contents {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", Counted(self.frames, "frame"))?;
+        let mut kinds: Vec<(&str, usize)> = self.kinds.iter().map(|(kind, count)| (kind.as_ref(), *count)).collect();
+        kinds.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
+        for (place, (kind, count)) in kinds.iter().take(MOST_NAMED).enumerate() {
+            write!(f, "{} {kind} {count}", if place == 0 { ":" } else { "," })?;
+        }
+        let others: usize = kinds.iter().skip(MOST_NAMED).map(|kind| kind.1).sum();
+        if others > 0 { write!(f, ", others {others}") } else { Ok(()) }
+    }
+}
+
+/// A datagram of a capture.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Datagram {
+    /// When it was captured, in nanoseconds since 1970.
+    pub(super) nanos: i128,
+    pub(super) destination_port: u16,
+    /// The IPv4 identification.
+    pub(super) identification: Option<u16>,
+    /// Length of the payload as sent \[byte\].
+    pub(super) length: usize,
+    /// Hash of the payload that was captured.
+    pub(super) hash: u64,
+    /// Hash of where the frame was seen.
+    pub(super) place: u64,
+    /// Where the payload that was captured lies in [`Capture::bytes`].
+    range: Range<usize>,
+}
+
+impl Datagram {
+    /// Octets of the payload that were captured.
+    pub(super) const fn captured(&self) -> usize {
+        self.range.end - self.range.start
+    }
+
+    /// The identification, if the sender gives each packet one. Zero stands for none: the sender forbids fragments.
+    pub(super) fn own_identification(&self) -> Option<u16> {
+        self.identification.filter(|number| *number != 0)
+    }
+}
+
+/// A capture that was read.
+#[derive(Debug)]
+pub(super) struct Capture {
+    /// The datagrams in the order of their times.
+    pub(super) datagrams: Vec<Datagram>,
+    /// Payloads of all datagrams, one after the other.
+    bytes: Vec<u8>,
+    /// Times of the first and the last frame of any kind, in nanoseconds since 1970: in between the capture ran.
+    pub(super) ran: (i128, i128),
+    pub(super) contents: Contents,
+}
+
+impl Capture {
+    /// Reads a file. `port`: only datagrams to that UDP port count.
+    pub(super) fn read(end: End, from: impl Read, port: Option<u16>) -> Result<Self, CaptureError> {
+        let mut capture = Self { datagrams: Vec::new(), bytes: Vec::new(), ran: (i128::MAX, i128::MIN), contents: Contents::default() };
+        let ending = reader::for_each_frame(from, |frame| capture.add(&frame, port));
+        let frames = capture.contents.frames;
+        let ending = ending.map_err(|problem| CaptureError::Unreadable { end, frames, problem })?;
+        capture.contents.cut_off = ending == reader::Ending::CutOff;
+        if capture.datagrams.is_empty() {
+            return Err(CaptureError::NoDatagrams { end, port, contents: Box::new(capture.contents) });
+        }
+        capture.datagrams.sort_by_key(|datagram| datagram.nanos);
+        capture.contents.seen_again = views::merge(&mut capture);
+        Ok(capture)
+    }
+
+    fn add(&mut self, frame: &reader::Frame<'_>, port: Option<u16>) {
+        self.contents.frames += 1;
+        if let Some(nanos) = frame.nanos {
+            self.ran = (self.ran.0.min(nanos), self.ran.1.max(nanos));
+        }
+        let kind = match (frame::datagram(frame), frame.nanos) {
+            (Err(kind), _) => kind,
+            (Ok(found), _) if port.is_some_and(|port| port != found.destination_port) => "UDP to other ports".into(),
+            (Ok(_), None) => "UDP without a time".into(),
+            (Ok(found), Some(nanos)) => {
+                let begin = self.bytes.len();
+                self.bytes.extend(found.payload);
+                self.datagrams.push(Datagram {
+                    nanos,
+                    destination_port: found.destination_port,
+                    identification: found.identification,
+                    length: found.length,
+                    hash: hash(found.payload),
+                    place: found.place,
+                    range: begin..self.bytes.len(),
+                });
+                "UDP".into()
+            }
+        };
+        *self.contents.kinds.entry(kind).or_default() += 1;
+    }
+
+    /// The payload, as far as it was captured.
+    pub(super) fn payload(&self, datagram: &Datagram) -> &[u8] {
+        &self.bytes[datagram.range.clone()]
+    }
+
+    /// The packets that the network card makes of a datagram: each has that number of octets, the last at most as many. Identifications count on, as
+    /// where Linux cuts packets.
+    pub(super) fn pieces(&self, datagram: &Datagram, octets: usize) -> Vec<Datagram> {
+        let piece = |(number, begin): (u16, usize)| {
+            let range = begin..datagram.range.end.min(begin + octets);
+            Datagram {
+                identification: datagram.own_identification().map(|first| first.wrapping_add(number)),
+                length: range.len(),
+                hash: hash(&self.bytes[range.clone()]),
+                range,
+                ..datagram.clone()
+            }
+        };
+        (0..=u16::MAX).zip(datagram.range.clone().step_by(octets)).map(piece).collect()
+    }
+}
+
+/// Hash of octets. Of 10⁶ datagrams, two different ones have the same hash with probability 3·10⁻⁸; payloads are compared before they are matched.
+pub(super) fn hash(octets: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    octets.hash(&mut hasher);
+    hasher.finish()
+}

@@ -1,0 +1,113 @@
+//! Headers before IP. Numbers of link types: <https://www.tcpdump.org/linktypes.html>.
+
+use super::{CUT, Kind, half, wireless};
+
+const IPV4: u16 = 0x0800;
+const IPV6: u16 = 0x86DD;
+
+/// The IP packet of a frame: the end of the frame, from the first octet of IP on.
+pub(super) fn packet(link_type: u16, data: &[u8]) -> Result<&[u8], Kind> {
+    let after = |octets: usize| data.get(octets..).ok_or(CUT);
+    match link_type {
+        // The family of addresses, in an order of octets that the file does not tell. The version of IP says the same.
+        0 | 108 => after(4),
+        1 => by_type(half(data, 12).ok_or(CUT)?, after(14)?),
+        9 => ppp(data),
+        // PPP or Cisco's framing, which begins with 0x0F or 0x8F.
+        50 if matches!(data.first(), Some(0x0F | 0x8F)) => by_type(half(data, 2).ok_or(CUT)?, after(4)?),
+        50 => ppp(data),
+        51 => pppoe(data),
+        // Raw IP, and the numbers of BSD for the same.
+        12 | 14 | 101 | 228 | 229 => Ok(data),
+        104 => by_type(half(data, 2).ok_or(CUT)?, after(4)?),
+        105 => wireless::packet(data, false),
+        // "Cooked" captures: the type stands at the end of the first form of the header, and at the start of the second.
+        113 => by_type(half(data, 14).ok_or(CUT)?, after(16)?),
+        127 => wireless::with_radiotap(data),
+        // The direction stands in the place of the address of PPP, or before it.
+        166 => ppp(after(2)?),
+        204 => ppp(after(1)?),
+        276 => by_type(half(data, 0).ok_or(CUT)?, after(20)?),
+        other => Err(format!("link type {other}").into()),
+    }
+}
+
+/// What follows an Ethernet type. Tags of VLANs and labels of MPLS are passed over.
+fn by_type(mut ether_type: u16, mut rest: &[u8]) -> Result<&[u8], Kind> {
+    loop {
+        match ether_type {
+            IPV4 | IPV6 => return Ok(rest),
+            // 802.1Q, 802.1ad, and the older tag of nested VLANs.
+            0x8100 | 0x88A8 | 0x9100 => {
+                ether_type = half(rest, 2).ok_or(CUT)?;
+                rest = &rest[4..];
+            }
+            0x8847 | 0x8848 => return mpls(rest),
+            0x8864 => return pppoe(rest),
+            // Below 1536 the number is a length, and the type stands in a header of 802.2.
+            0..0x0600 => (ether_type, rest) = type_of_llc(rest)?,
+            other => return Err(ether_type_name(other)),
+        }
+    }
+}
+
+/// What follows a header of 802.2.
+pub(super) fn llc(rest: &[u8]) -> Result<&[u8], Kind> {
+    let (ether_type, rest) = type_of_llc(rest)?;
+    by_type(ether_type, rest)
+}
+
+/// The Ethernet type in a header of 802.2 (RFC 1042), and what follows the header.
+fn type_of_llc(rest: &[u8]) -> Result<(u16, &[u8]), Kind> {
+    match rest {
+        [0xAA, 0xAA, 3, 0, 0, 0 | 0xF8, high, low, rest @ ..] => Ok((u16::from_be_bytes([*high, *low]), rest)),
+        [0x06, 0x06, 3, rest @ ..] => Ok((IPV4, rest)),
+        [_, _, _, ..] => Err("802.2".into()),
+        _ => Err(CUT),
+    }
+}
+
+/// Labels of MPLS (RFC 3032), the last of which has the bit "bottom of stack".
+fn mpls(mut rest: &[u8]) -> Result<&[u8], Kind> {
+    loop {
+        let (label, after) = rest.split_first_chunk::<4>().ok_or(CUT)?;
+        rest = after;
+        if label[2] & 1 != 0 {
+            // The labels do not tell what they carry.
+            return if matches!(rest.first(), Some(0x40..=0x6F)) { Ok(rest) } else { Err("MPLS without IP".into()) };
+        }
+    }
+}
+
+/// A session of PPPoE (RFC 2516): 6 octets of header, then PPP.
+fn pppoe(rest: &[u8]) -> Result<&[u8], Kind> {
+    if *rest.get(1).ok_or(CUT)? != 0 { Err("PPPoE discovery".into()) } else { ppp(rest.get(6..).ok_or(CUT)?) }
+}
+
+/// A frame of PPP (RFC 1661), with or without the address and control field of HDLC (RFC 1662).
+fn ppp(frame: &[u8]) -> Result<&[u8], Kind> {
+    let frame = frame.strip_prefix(&[0xFF, 0x03]).unwrap_or(frame);
+    let (protocol, rest) = match frame {
+        // The last octet of a number is odd and the others are even, so that a compressed number is known.
+        [low, rest @ ..] if low & 1 != 0 => (u16::from(*low), rest),
+        [high, low, rest @ ..] => (u16::from_be_bytes([*high, *low]), rest),
+        _ => return Err(CUT),
+    };
+    match protocol {
+        0x0021 | 0x0057 => Ok(rest),
+        0x0281 | 0x0283 => mpls(rest),
+        other => Err(format!("PPP protocol 0x{other:04x}").into()),
+    }
+}
+
+fn ether_type_name(ether_type: u16) -> Kind {
+    match ether_type {
+        0x0806 => "ARP".into(),
+        0x8863 => "PPPoE discovery".into(),
+        0x888E => "EAPOL".into(),
+        0x88CC => "LLDP".into(),
+        0x88E5 => "MACsec".into(),
+        0x88F7 => "PTP".into(),
+        other => format!("Ethernet type 0x{other:04x}").into(),
+    }
+}

@@ -1,0 +1,60 @@
+//! Frames of IEEE 802.11, with or without the header of radiotap.
+
+use super::{CUT, Kind, link};
+
+/// Whether frames of that link type begin with a header that differs from frame to frame.
+pub(super) const fn is_wireless(link_type: u16) -> bool {
+    link_type == 105 || link_type == 127
+}
+
+/// The IP packet after a header of radiotap (<https://www.radiotap.org>), whose numbers have the lowest octet first.
+pub(super) fn with_radiotap(data: &[u8]) -> Result<&[u8], Kind> {
+    const PAD: u8 = 0x20;
+    let [_, _, low, high, ..] = *data else { return Err(CUT) };
+    let frame = data.get(usize::from(u16::from_le_bytes([low, high]))..).ok_or(CUT)?;
+    // Words that tell which fields follow; the top bit says that one more word follows.
+    let mut at = 4;
+    let mut first = None;
+    loop {
+        let word = u32::from_le_bytes(*data.get(at..).and_then(|rest| rest.first_chunk()).ok_or(CUT)?);
+        at += 4;
+        first = first.or(Some(word));
+        if word >> 31 == 0 {
+            break;
+        }
+    }
+    let present = first.unwrap_or(0);
+    // Field 0 is a time of 8 octets at a multiple of 8, field 1 the flags.
+    let at = if present & 1 == 0 { at } else { at.next_multiple_of(8) + 8 };
+    let flags = if present & 2 == 0 { 0 } else { *data.get(at).ok_or(CUT)? };
+    packet(frame, flags & PAD != 0)
+}
+
+/// The IP packet of a frame of data. `padded`: the header is padded to a multiple of four octets.
+pub(super) fn packet(frame: &[u8], padded: bool) -> Result<&[u8], Kind> {
+    let [control, flags, ..] = *frame else { return Err(CUT) };
+    let (is_quality, has_no_data) = (control & 0x80 != 0, control & 0x40 != 0);
+    match control & 0x0F {
+        0x08 => {}
+        0x00 => return Err("802.11 management".into()),
+        0x04 => return Err("802.11 control".into()),
+        _ => return Err("802.11 of another version".into()),
+    }
+    if has_no_data {
+        return Err("802.11 without data".into());
+    }
+    if flags & 0x40 != 0 {
+        return Err("802.11 encrypted".into());
+    }
+    // Four addresses between two access points, three otherwise.
+    let addresses = if flags & 3 == 3 { 30 } else { 24 };
+    if is_quality && frame.get(addresses).ok_or(CUT)? & 0x80 != 0 {
+        return Err("802.11 aggregates (A-MSDU)".into());
+    }
+    let header = match (is_quality, flags & 0x80 != 0) {
+        (false, _) => addresses,
+        (true, false) => addresses + 2,
+        (true, true) => addresses + 6,
+    };
+    link::llc(frame.get(if padded { header.next_multiple_of(4) } else { header }..).ok_or(CUT)?)
+}

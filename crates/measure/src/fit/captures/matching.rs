@@ -1,0 +1,100 @@
+//! Which datagram of one capture is which of the other.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::contents::{Capture, Datagram, hash};
+use super::views;
+
+/// Datagrams of the sender with the datagrams of the receiver that they are.
+#[derive(Debug)]
+pub(super) struct Pairs {
+    /// Number of the receiver's datagram, indexed by that of the sender.
+    pub(super) arrival_of: Vec<Option<usize>>,
+    /// Whether a datagram of the sender shows a packet that another one shows already; such a datagram is no packet of its own.
+    pub(super) is_again: Vec<bool>,
+    /// Whether a datagram of the sender may have arrived within a long datagram of which the receiver's capture shows the first packet alone.
+    pub(super) is_hidden: Vec<bool>,
+    /// Whether a datagram of the receiver has a counterpart.
+    pub(super) taken: Vec<bool>,
+    /// Datagrams of the receiver that show a packet again and are matched with nothing.
+    is_copy: Vec<bool>,
+    /// Whether a datagram of the sender equals another one in everything that matching looks at.
+    pub(super) is_ambiguous: Vec<bool>,
+}
+
+/// Datagrams of one content that are compared for each arrival, where captures hold different parts of them.
+const MOST_COMPARED: usize = 64;
+
+impl Pairs {
+    pub(super) fn of(sent: &Capture, arrived: &Capture) -> Self {
+        let (sent_count, arrived_count) = (sent.datagrams.len(), arrived.datagrams.len());
+        let mut pairs = Self {
+            arrival_of: vec![None; sent_count],
+            is_again: vec![false; sent_count],
+            is_hidden: vec![false; sent_count],
+            taken: vec![false; arrived_count],
+            is_copy: vec![false; arrived_count],
+            is_ambiguous: vec![false; sent_count],
+        };
+        pairs.pair(sent, arrived, true, |_, datagram| Some((datagram.length, datagram.captured(), datagram.hash, datagram.identification)));
+        let prefixes = pairs.prefixes(sent, arrived);
+        let prefix = |capture: &Capture, datagram: &Datagram| {
+            let octets = *prefixes.get(&datagram.length)?;
+            Some((datagram.length, hash(&capture.payload(datagram)[..octets.min(datagram.captured())])))
+        };
+        pairs.pair(sent, arrived, true, |capture, datagram| Some((prefix(capture, datagram)?, datagram.identification)));
+        // A second view of a packet must not take the place of a lost packet of the same content.
+        let is_again = views::again(sent, |number| pairs.arrival_of[number].is_some());
+        let is_copy = views::again(arrived, |number| pairs.taken[number]);
+        (pairs.is_again, pairs.is_copy) = (is_again, is_copy);
+        // Some paths rewrite identifications.
+        pairs.pair(sent, arrived, false, |_, datagram| Some((datagram.length, datagram.captured(), datagram.hash)));
+        pairs.pair(sent, arrived, false, prefix);
+        pairs
+    }
+
+    /// Pairs datagrams that are not paired yet by equal keys, in the order of occurrence. `tells`: a key of the sender that is not the only one is ambiguous.
+    fn pair<K: Ord>(&mut self, sent: &Capture, arrived: &Capture, tells: bool, key: impl Fn(&Capture, &Datagram) -> Option<K>) {
+        let mut waiting: BTreeMap<K, VecDeque<usize>> = BTreeMap::new();
+        for (number, datagram) in sent.datagrams.iter().enumerate().filter(|(number, _)| self.arrival_of[*number].is_none()) {
+            if let Some(key) = key(sent, datagram).filter(|_| !self.is_again[number]) {
+                waiting.entry(key).or_default().push_back(number);
+            }
+        }
+        if tells {
+            waiting.values().filter(|numbers| numbers.len() > 1).flatten().for_each(|number| self.is_ambiguous[*number] = true);
+        }
+        for (number, datagram) in arrived.datagrams.iter().enumerate() {
+            if !self.taken[number]
+                && !self.is_copy[number]
+                && let Some(numbers) = key(arrived, datagram).and_then(|key| waiting.get_mut(&key))
+                && let Some(place) = numbers.iter().take(MOST_COMPARED).position(|first| agree(sent, *first, arrived, number))
+                && let Some(first) = numbers.remove(place)
+            {
+                self.arrival_of[first] = Some(number);
+                self.taken[number] = true;
+            }
+        }
+    }
+
+    /// The octets that both captures hold of each datagram without a counterpart, by length of the payload. Lengths of which every datagram was captured
+    /// as a whole are left out.
+    fn prefixes(&self, sent: &Capture, arrived: &Capture) -> BTreeMap<usize, usize> {
+        let mut octets: BTreeMap<usize, usize> = BTreeMap::new();
+        let of_sent = sent.datagrams.iter().enumerate().filter(|(number, _)| self.arrival_of[*number].is_none());
+        let of_arrived = arrived.datagrams.iter().enumerate().filter(|(number, _)| !self.taken[*number]);
+        for (_, datagram) in of_sent.chain(of_arrived) {
+            let least = octets.entry(datagram.length).or_insert(usize::MAX);
+            *least = (*least).min(datagram.captured());
+        }
+        octets.retain(|length, octets| *octets < *length);
+        octets
+    }
+}
+
+/// Whether two datagrams have one length, and payloads that agree as far as both were captured.
+pub(super) fn agree(one: &Capture, number: usize, other: &Capture, other_number: usize) -> bool {
+    let (first, second) = (&one.datagrams[number], &other.datagrams[other_number]);
+    let octets = first.captured().min(second.captured());
+    first.length == second.length && one.payload(first)[..octets] == other.payload(second)[..octets]
+}

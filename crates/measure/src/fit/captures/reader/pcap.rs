@@ -1,0 +1,65 @@
+//! Files of pcap (draft-ietf-opsawg-pcap), and the older forms that libpcap reads.
+
+use std::io::Read;
+
+use super::{CaptureProblem, Ending, Frame, LONGEST_BLOCK, Order, Source, without_check};
+
+/// What the first four octets say.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Format {
+    order: Order,
+    /// Nanoseconds in a unit of the second number of a timestamp.
+    unit_nanos: i128,
+    /// Octets of the header of a frame.
+    header: usize,
+}
+
+impl Format {
+    /// `None` for another kind of file.
+    pub(super) const fn of(magic: [u8; 4]) -> Option<Self> {
+        let big = u32::from_be_bytes(magic);
+        let order = match big {
+            0xA1B2_C3D4 | 0xA1B2_3C4D | 0xA1B2_CD34 => Order::Big,
+            _ => Order::Little,
+        };
+        match if matches!(order, Order::Big) { big } else { big.swap_bytes() } {
+            0xA1B2_C3D4 => Some(Self { order, unit_nanos: 1_000, header: 16 }),
+            0xA1B2_3C4D => Some(Self { order, unit_nanos: 1, header: 16 }),
+            // The "modified" format of an old patch of libpcap: index, protocol and type of the packet follow the lengths.
+            0xA1B2_CD34 => Some(Self { order, unit_nanos: 1_000, header: 24 }),
+            _ => None,
+        }
+    }
+}
+
+/// Reads what follows the first four octets.
+pub(super) fn read(mut source: Source<impl Read>, format: Format, mut each: impl FnMut(Frame<'_>)) -> Result<Ending, CaptureProblem> {
+    let order = format.order;
+    let Some(rest) = source.array::<20>()? else { return Err(CaptureProblem::CutOff) };
+    let (major, minor) = (order.half(&rest, 0).unwrap_or(0), order.half(&rest, 2).unwrap_or(0));
+    let network = order.word(&rest, 16).unwrap_or(0);
+    // The type has 16 bits. Above it stand the length of a frame check sequence, in units of 16 bits, and whether that length is given.
+    let check = if network & 0x0400_0000 == 0 { 0 } else { 2 * usize::try_from(network >> 28).unwrap_or(0) };
+    let link_type = u16::try_from(network & 0xFFFF).unwrap_or(0);
+    let (mut header, mut data) = (Vec::new(), Vec::new());
+    loop {
+        if !source.fill(&mut header, format.header)? {
+            return Ok(if header.is_empty() { Ending::Whole } else { Ending::CutOff });
+        }
+        let number = |at| order.word(&header, at).unwrap_or(0);
+        let (mut captured, mut length) = (number(8), number(12));
+        // As in libpcap: before version 2.3 the two lengths stood in the other order, and in that version some programs wrote them so.
+        if (major, minor) < (2, 3) || major == 543 || ((major, minor) == (2, 3) && captured > length) {
+            (captured, length) = (length, captured);
+        }
+        if captured > LONGEST_BLOCK {
+            return Err(CaptureProblem::Malformed);
+        }
+        if !source.fill(&mut data, usize::try_from(captured).unwrap_or(usize::MAX))? {
+            return Ok(Ending::CutOff);
+        }
+        let nanos = i128::from(number(0)) * 1_000_000_000 + i128::from(number(4)) * format.unit_nanos;
+        let (data, length) = without_check(&data, length, check);
+        each(Frame { nanos: Some(nanos), link_type, interface: 0, data, length });
+    }
+}
