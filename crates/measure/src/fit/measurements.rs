@@ -16,9 +16,9 @@ pub struct Measurement {
 /// Packets in the order of sending, all numbers finite.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Measurements {
-    packets: Vec<Measurement>,
+    pub(super) packets: Vec<Measurement>,
     /// The drift that was taken off.
-    removed: Option<Skew>,
+    pub(super) removed: Option<Skew>,
 }
 
 /// Why measurements are refused. Packets are counted from 1.
@@ -87,6 +87,24 @@ impl Measurements {
     #[must_use]
     pub fn packets(&self) -> &[Measurement] {
         &self.packets
+    }
+
+    /// Instants at which packets were sent. Fewer than packets if these are sent in bursts.
+    #[must_use]
+    pub fn instants(&self) -> usize {
+        self.packets.chunk_by(|one, other| one.sent_s.total_cmp(&other.sent_s).is_eq()).count()
+    }
+
+    /// The least delay \[s\]; `None` if nothing arrived.
+    #[must_use]
+    pub fn least_s(&self) -> Option<f64> {
+        self.arrivals().map(|arrival| arrival.1).reduce(f64::min)
+    }
+
+    /// The mean delay \[s\]; `None` if nothing arrived.
+    #[must_use]
+    pub fn mean_s(&self) -> Option<f64> {
+        crate::series::mean(&self.arrivals().map(|arrival| arrival.1).collect::<Vec<_>>())
     }
 
     /// The drift that was taken off, which the mean of the delays is no more certain than.

@@ -27,6 +27,7 @@ mod loss;
 mod measurements;
 mod search;
 mod skew;
+mod steps;
 mod table;
 
 use cohaptic_units::print::Counted;
@@ -39,6 +40,7 @@ pub use link::{FittedJitter, FittedLink};
 pub use loss::{LossFit, LossModel};
 pub use measurements::{Measurement, Measurements, MeasurementsError};
 pub use skew::{Location, Skew, SkewError};
+pub use steps::Step;
 pub use table::TableError;
 
 use crate::batches::{self, student};
@@ -62,7 +64,7 @@ pub struct Goodness {
     pub received: usize,
     /// The number of independent delays that would say as much about their mean, n·(1 − r₁)/(1 + r₁) with the autocorrelation r₁ at lag one.
     pub effective: f64,
-    /// The median gap between packets sent \[s\].
+    /// The median gap between packets sent \[s\]; where most gaps are zero, because packets are sent in bursts, the median gap between bursts.
     pub spacing_s: f64,
     /// Whether at least 95 % of the gaps are within a fifth of the median. If so, correlation and loss are per packet, otherwise in time.
     pub evenly_spaced: bool,
@@ -108,9 +110,7 @@ pub enum FitError {
         received: usize,
     },
     /// A delay is negative: the clocks are offset.
-    #[error(
-        "the packet sent at {sent_s} s has a delay of {delay_s} s: expected none below zero (are the two clocks offset? shift the delays by the offset)"
-    )]
+    #[error("the packet sent at {sent_s} s has a delay of {delay_s} s: expected none below zero (are the two clocks apart?)")]
     NegativeDelay {
         /// When it was sent \[s\].
         sent_s: f64,
@@ -126,7 +126,7 @@ pub enum FitError {
         delay_s: f64,
     },
     /// All packets were sent at the same time.
-    #[error("most packets were sent at one instant, {sent_s} s: expected a stream of packets, at times")]
+    #[error("all packets were sent at one instant, {sent_s} s: expected packets of several instants")]
     OneInstant {
         /// That time \[s\].
         sent_s: f64,
@@ -140,7 +140,7 @@ const LEAST_RECEIVED: usize = 50;
 ///
 /// # Errors
 ///
-/// [`FitError`] if fewer than 50 packets arrived, a delay is negative, all delays are equal, or most packets were sent at one instant.
+/// [`FitError`] if fewer than 50 packets arrived, a delay is negative, all delays are equal, or all packets were sent at one instant.
 ///
 /// # Panics
 ///
@@ -166,7 +166,7 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     }
     let (spacing_s, evenly_spaced) = spacing(packets);
     if spacing_s <= 0.0 {
-        return Err(FitError::OneInstant { sent_s: packets[packets.len() / 2].sent_s });
+        return Err(FitError::OneInstant { sent_s: packets[0].sent_s });
     }
 
     let effective = effective(packets);
@@ -217,13 +217,17 @@ fn of_delays(law: &LawFit, floor_s: Option<f64>, phi: f64) -> f64 {
     cohaptic_wan::law::Law::new(&law.distribution.into(), law.mean_s, law.sd_s, floor_s).map_or(phi, |law| law.correlation(phi))
 }
 
-/// The median gap, and whether nearly all gaps are like it.
+/// The median gap, and whether nearly all gaps are like it. Of packets that are sent in bursts, each at one instant, the median gap between bursts, which is
+/// zero only if there is one burst.
 fn spacing(packets: &[Measurement]) -> (f64, bool) {
     let mut gaps: Vec<f64> = packets.windows(2).map(|pair| pair[1].sent_s - pair[0].sent_s).collect();
     gaps.sort_by(f64::total_cmp);
-    let median = gaps[gaps.len() / 2];
-    let like = gaps.iter().filter(|gap| (*gap - median).abs() <= 0.2 * median).count();
-    (median, count(like) >= 0.95 * count(gaps.len()))
+    let median = |gaps: &[f64]| gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
+    let all = median(&gaps);
+    // Gaps are not negative.
+    let spacing = if all > 0.0 { all } else { median(&gaps[gaps.partition_point(|gap| *gap <= 0.0)..]) };
+    let like = gaps.iter().filter(|gap| (*gap - spacing).abs() <= 0.2 * spacing).count();
+    (spacing, count(like) >= 0.95 * count(gaps.len()))
 }
 
 /// At least 2, at most the number of delays.
