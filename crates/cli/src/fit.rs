@@ -1,39 +1,29 @@
 //! `cohaptic fit`.
 
+mod clocks;
+mod ends;
+
 use std::io::Read as _;
 use std::process::ExitCode;
 
 use cohaptic_files::MOST_BYTES;
-use cohaptic_measure::fit::{self, Fitted, LossFit, LossModel, Measurements, Skew, captures};
+use cohaptic_measure::fit::{self, Fitted, LossFit, LossModel, Measurements, captures};
 use cohaptic_units::print::Counted;
 use cohaptic_wan::FateRow;
-use serde::Serialize;
 
 use crate::arguments::FitArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_file;
 use crate::{file, output};
-
-/// What was left over of a pair of captures.
-#[derive(Clone, Copy, Serialize)]
-struct Matched {
-    unmatched_sent: usize,
-    unmatched_arrived: usize,
-    ambiguous: usize,
-}
+use ends::Ends;
 
 /// Estimates a link.
 pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
-    let (measurements, matched) = read(arguments)?;
+    let Source { measurements, matched, has_one_clock } = read(arguments)?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(&arguments.file)));
-    let (measurements, skew) = if arguments.skew {
-        let (corrected, skew) = measurements.without_skew().map_err(|error| named(&error))?;
-        (corrected, Some(skew))
-    } else {
-        (measurements, None)
-    };
-    let fitted = fit::fit(&measurements).map_err(|error| named(&error))?;
+    let (measurements, clocks, skew) = clocks::settled(arguments, &measurements, has_one_clock).map_err(|error| named(&error))?;
+    let fitted = fit::fit(&measurements).map_err(|error| named(&clocks::explained(&error)))?;
     let scene = fitted.link.to_scene_toml();
     if let Some(path) = &arguments.out {
         write_file(path, &scene)?;
@@ -49,21 +39,38 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
             #[serde(flatten)]
             skew: skew.map(|skew| document! { skew: skew }),
             #[serde(flatten)]
-            matched: matched.map(|matched| document! { matched: matched }),
+            matched: matched.as_ref().map(|matched| document! { matched: matched }),
+            clocks: &clocks,
         },
-        || describe(&fitted, &scene, skew, matched),
+        || {
+            describe(
+                &fitted,
+                &scene,
+                &measurements,
+                [matched.as_ref().map_or_else(Vec::new, Ends::describe), clocks::describe(&clocks, skew.as_ref())].concat(),
+            )
+        },
         &arguments.out,
     )?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Failure> {
+/// What was read.
+struct Source {
+    measurements: Measurements,
+    /// What a pair of captures leaves over.
+    matched: Option<Ends>,
+    /// Whether both ends have one clock, as in a log of fates.
+    has_one_clock: bool,
+}
+
+fn read(arguments: &FitArguments) -> Result<Source, Failure> {
     let path = &arguments.file;
     if let Some(receiver) = &arguments.receiver {
         let matched = captures::between(file::open_large(path)?, file::open_large(receiver)?, arguments.port)
             .map_err(|error| Failure::Input(format!("{}, {}: {error}", output::path(path), output::path(receiver))))?;
-        let left = Matched { unmatched_sent: matched.unmatched_sent, unmatched_arrived: matched.unmatched_arrived, ambiguous: matched.ambiguous };
-        return Ok((matched.measurements, Some(left)));
+        let (measurements, ends) = Ends::of(matched);
+        return Ok(Source { measurements, matched: Some(ends), has_one_clock: false });
     }
     let unreadable = |error| Failure::File { verb: "read", path: path.clone(), error };
     let mut from = file::open_large(path)?;
@@ -77,39 +84,38 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
         ));
     }
     if bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes).starts_with(FateRow::HEADER.as_bytes()) {
-        return Ok((Measurements::from_fates(&file::read_fates(path, bytes.chain(from))?), None));
+        let measurements = Measurements::from_fates(&file::read_fates(path, bytes.chain(from))?);
+        return Ok(Source { measurements, matched: None, has_one_clock: true });
     }
     // Any other table is read as a whole.
     from.limited_to(MOST_BYTES).and_then(|mut rest| rest.read_to_end(&mut bytes)).map_err(unreadable)?;
     let text = file::text_of(bytes, path)?;
-    Ok((Measurements::from_csv(text.as_bytes()).map_err(|error| named(&error))?, None))
+    let measurements = Measurements::from_csv(text.as_bytes()).map_err(|error| named(&error))?;
+    Ok(Source { measurements, matched: None, has_one_clock: false })
 }
 
 /// The first bytes of a file, which show of which kind it is.
 const HEAD: u64 = 256;
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
-fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Matched>) -> String {
+/// `notes`: lines about what was read and about the clocks.
+fn describe(fitted: &Fitted, scene: &str, measurements: &Measurements, notes: Vec<String>) -> String {
     let goodness = &fitted.goodness;
     let mut text = format!("{scene}\n");
     let mut line = |line: String| text.push_str(&format!("{line}\n"));
+    let instants = measurements.instants();
+    // Where most gaps are zero, the spacing is that of bursts.
+    let are_bursts = 2 * instants <= goodness.packets;
+    let (bursts, burst) = if are_bursts { (format!(" in {}", Counted(instants, "burst")), " burst") } else { (String::new(), "") };
     let spaced = if goodness.evenly_spaced { "evenly" } else { "unevenly" };
     line(format!(
-        "{}, {} arrived, one every {} ({spaced}); they say as much as {:.0} independent ones",
+        "{}{bursts}, {} arrived, one{burst} every {} ({spaced}); they say as much as {:.0} independent ones",
         Counted(goodness.packets, "packet"),
         goodness.received,
         milliseconds(goodness.spacing_s),
         goodness.effective
     ));
-    if let Some(matched) = matched {
-        line(format!(
-            "{} sent and {} received without a counterpart, {} ambiguous",
-            matched.unmatched_sent, matched.unmatched_arrived, matched.ambiguous
-        ));
-    }
-    if let Some(skew) = skew {
-        line(describe_skew(&skew));
-    }
+    notes.into_iter().for_each(&mut line);
     let error = goodness.mean_se_s.map_or_else(String::new, |error| format!(" +- {}", milliseconds(error)));
     line(format!(
         "mean {}{error}, standard deviation {}, least {}",
@@ -142,14 +148,6 @@ fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Ma
         line(format!("  {:<60}{:>10.5} %{:>14.1}", model(loss), loss.mean_loss * 100.0, loss.bic - best));
     }
     text
-}
-
-fn describe_skew(skew: &Skew) -> String {
-    let [drift, error, low, high] =
-        [skew.seconds_per_second, skew.standard_error, skew.interval_99[0], skew.interval_99[1]].map(|drift| format!("{:.3}", drift * 1e6));
-    let location = skew.location.name();
-    let removed = if skew.significant { "removed" } else { "not significant at 1 %, left in" };
-    format!("clocks drift by {drift} +- {error} us/s, in 99 % from {low} to {high} ({location} of each of {} blocks): {removed}", skew.blocks)
 }
 
 fn model(loss: &LossFit) -> String {

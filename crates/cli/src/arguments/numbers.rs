@@ -38,6 +38,16 @@ pub(crate) fn memory(text: &str) -> Result<u64, String> {
     of_unit("MiB", 20).or_else(|| of_unit("GiB", 30)).ok_or_else(|| "expected an amount of memory such as 512MiB or 16GiB".to_owned())
 }
 
+/// A duration, perhaps with a sign, in seconds.
+pub(crate) fn signed_duration(text: &str) -> Result<f64, String> {
+    let (sign, rest) = match text.trim().strip_prefix('-') {
+        Some(rest) => (-1.0, rest),
+        None => (1.0, text.trim().strip_prefix('+').unwrap_or(text.trim())),
+    };
+    let duration = parse::duration(rest).map_err(|_| "expected a duration such as 1.5s, -20ms or 2h".to_owned())?;
+    Ok(sign * duration.as_secs_f64())
+}
+
 /// A number, whatever its range.
 pub(crate) fn real(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "expected a number such as 0.25, 100 or 1e-3".to_owned())
@@ -77,6 +87,14 @@ mod tests {
         assert_eq!((memory("512MiB"), memory(" 16 GiB")), (Ok(512 << 20), Ok(16 << 30)));
         for text in ["", "8", "8GB", "0GiB", "-1GiB", "1.5GiB", "17179869184GiB"] {
             assert_eq!(memory(text), Err("expected an amount of memory such as 512MiB or 16GiB".to_owned()), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_duration_may_have_a_sign() {
+        assert_eq!(["1.5s", "-20ms", "+2h", "-0s"].map(signed_duration), [1.5, -0.02, 7_200.0, 0.0].map(Ok));
+        for text in ["", "-", "--1s", "++1s", "5", "-5", "soon"] {
+            assert_eq!(signed_duration(text), Err("expected a duration such as 1.5s, -20ms or 2h".to_owned()), "{text}");
         }
     }
 

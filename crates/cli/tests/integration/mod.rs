@@ -19,6 +19,7 @@ mod errors;
 mod explain;
 mod falcon;
 mod fit;
+mod fit_captures;
 mod help;
 #[cfg(unix)]
 mod interrupt;

@@ -20,4 +20,4 @@ def write(name, times):
 sent = [(number, 1000 * number) for number in range(300)]
 write("sender.pcap", sent)
 # Delays by arithmetic, so that they are the same everywhere.
-write("receiver.pcap", [(number, micros + 20000 + (number * 7919) % 900) for number, micros in sent if number % 50 != 7])
+write("receiver.pcap", [(number, micros + 20000 + number * number * 7919 % 907) for number, micros in sent if number % 50 != 7])

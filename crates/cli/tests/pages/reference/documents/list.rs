@@ -469,7 +469,7 @@ pub(super) const DOCUMENTS: [Document; 24] = [
     },
     Document {
         command: "fit",
-        lines: &["python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --json"],
+        lines: &["python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --least 20ms --json"],
         rows: &[
             ("link.NAME", "the link that fits best"),
             ("goodness.NAME", "what was measured, and how well each law and each model of loss fits"),
@@ -479,6 +479,14 @@ pub(super) const DOCUMENTS: [Document; 24] = [
                 "with `--skew`: the [drift](commands-network.md#fit)",
             ),
             ("matched.unmatched_sent, matched.unmatched_arrived, matched.ambiguous", "of two captures: packets in one alone, or indistinguishable"),
+            ("matched.left_out", "packets of the sender at its beginning and at its end that the other capture could not show"),
+            ("matched.sender.@Contents of a capture, matched.receiver.@Contents of a capture", "what each file holds"),
+            ("clocks.added_s", "with `--offset` or `--least`: what was added to every delay"),
+            (
+                "clocks.steps",
+                "[steps](commands-network.md#clocks-that-are-apart) of the least delay: `at_s`, `by_s`, and the number of the first `packet` after it",
+            ),
+            ("clocks.fitted.first, clocks.fitted.packets", "the packets that were fitted, the first one counted from 0"),
         ],
     },
     Document {

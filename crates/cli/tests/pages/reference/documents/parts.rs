@@ -7,7 +7,7 @@ pub(super) struct Part {
 }
 
 /// Parts that several documents have. A row names one by its heading: `links[].@Counters`.
-pub(super) const PARTS: [Part; 7] = [
+pub(super) const PARTS: [Part; 8] = [
     Part {
         name: "Counters",
         rows: &[
@@ -66,6 +66,16 @@ pub(super) const PARTS: [Part; 7] = [
             ("limit_n, largest_n", "the limit, and the largest force"),
             ("limited, slewed, saturated", "how many forces were changed"),
             ("zeroed.NAME", "how many were zero, by cause"),
+        ],
+    },
+    Part {
+        name: "Contents of a capture",
+        rows: &[
+            ("frames", "how many"),
+            ("kinds.NAME", "frames of each kind: `UDP` that were read, and everything else by name"),
+            ("seen_again", "frames that show a packet again"),
+            ("super_packets", "datagrams that hold several packets"),
+            ("cut_off", "whether the file ends within a block"),
         ],
     },
 ];

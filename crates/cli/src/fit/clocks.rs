@@ -1,0 +1,101 @@
+//! The clocks of the two ends: offset, steps and drift, which are taken off before a link is fitted.
+
+use cohaptic_measure::fit::{FitError, Measurements, Skew, Step};
+use serde::Serialize;
+
+use super::milliseconds;
+use crate::arguments::FitArguments;
+
+/// A mean delay beyond this \[s\] is more likely the offset of two clocks.
+const QUESTIONED_S: f64 = 60.0;
+const OPTIONS: &str = "--offset TIME adds a time to the clock of the receiver, --least TIME says what the least delay is";
+
+/// What the clocks did, and what was done about it.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(super) struct Clocks {
+    /// What `--offset` or `--least` added to every delay \[s\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    added_s: Option<f64>,
+    /// Instants at which the least delay changed and stayed so.
+    steps: Vec<Step>,
+    /// The packets that were fitted.
+    fitted: Fitted,
+    #[serde(skip)]
+    all: usize,
+}
+
+/// The packets between two steps.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+struct Fitted {
+    /// Number of the first one, from 0.
+    first: usize,
+    packets: usize,
+}
+
+/// Measurements that one clock could have made, what was done to get them, and the drift that was looked for. If both ends have one clock, a change of the
+/// least delay and a long delay are those of the link.
+pub(super) fn settled(
+    arguments: &FitArguments,
+    measurements: &Measurements,
+    has_one_clock: bool,
+) -> Result<(Measurements, Clocks, Option<Skew>), String> {
+    let refused = |error: &dyn std::fmt::Display| error.to_string();
+    let mut added_s = arguments.offset;
+    let shifted = added_s.map(|by| measurements.shifted(by)).transpose().map_err(|error| refused(&error))?;
+    let measurements = shifted.as_ref().unwrap_or(measurements);
+    let steps = if has_one_clock { Vec::new() } else { measurements.steps() };
+    let longest = measurements.longest_part(&steps);
+    let fitted = Fitted { first: longest.start, packets: longest.len() };
+    let part = measurements.part(longest);
+    let (mut settled, skew) = if arguments.skew {
+        let (corrected, skew) = part.without_skew().map_err(|error| refused(&error))?;
+        (corrected, Some(skew))
+    } else {
+        (part, None)
+    };
+    if let (Some(least), Some(found)) = (arguments.least, settled.least_s()) {
+        let by = least.as_secs_f64() - found;
+        settled = settled.shifted(by).map_err(|error| refused(&error))?;
+        added_s = Some(by);
+    }
+    if let Some(mean) = settled.mean_s().filter(|mean| *mean > QUESTIONED_S && added_s.is_none() && !has_one_clock) {
+        return Err(format!("the mean delay is {mean:.6} s: are the two clocks apart? {OPTIONS}; with --offset 0s the delays are taken as they are"));
+    }
+    let clocks = Clocks { added_s, steps, fitted, all: measurements.packets().len() };
+    Ok((settled, clocks, skew))
+}
+
+/// The message of a fit that was refused. Names the options that help where clocks are apart.
+pub(super) fn explained(error: &FitError) -> String {
+    match error {
+        FitError::NegativeDelay { .. } => format!("{error}: {OPTIONS}"),
+        FitError::NothingArrived { .. } | FitError::TooFew { .. } | FitError::ConstantDelay { .. } | FitError::OneInstant { .. } => error.to_string(),
+    }
+}
+
+/// Lines that say what was done.
+pub(super) fn describe(clocks: &Clocks, skew: Option<&Skew>) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(added) = clocks.added_s {
+        lines.push(format!("{} was added to every delay", milliseconds(added)));
+    }
+    for step in &clocks.steps {
+        let by = step.by_s * 1e3;
+        lines.push(format!("the least delay changes by {by:+.5} ms at {:.3} s and stays so: a clock was set, or the path changed", step.at_s));
+    }
+    if !clocks.steps.is_empty() {
+        let Fitted { first, packets } = clocks.fitted;
+        let parts = clocks.steps.len() + 1;
+        lines.push(format!("all figures are of the longest of these {parts} parts, packets {} to {} of {}", first + 1, first + packets, clocks.all));
+    }
+    lines.extend(skew.map(describe_skew));
+    lines
+}
+
+fn describe_skew(skew: &Skew) -> String {
+    let [drift, error, low, high] =
+        [skew.seconds_per_second, skew.standard_error, skew.interval_99[0], skew.interval_99[1]].map(|drift| format!("{:.3}", drift * 1e6));
+    let location = skew.location.name();
+    let removed = if skew.significant { "removed" } else { "not significant at 1 %, left in" };
+    format!("clocks drift by {drift} +- {error} us/s, in 99 % from {low} to {high} ({location} of each of {} blocks): {removed}", skew.blocks)
+}
