@@ -112,7 +112,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let Header { title, duration, seed, axes, count } = header;
     let peers_node = root.get("peers");
     let names = count.and_then(|count| read_names(peers_node, count, file));
-    let file = file.with_names(names.as_ref());
+    let file = file.with_names(names.as_ref()).with_end(duration);
     let topology_node = root.get("topology");
     let topology = match topology_node {
         Some(node) => read_topology(node, file),

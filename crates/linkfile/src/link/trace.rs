@@ -1,8 +1,10 @@
 //! Recordings: `trace`, a recorded line or a recorded path, and `replay`, a link that does what a log says.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use cohaptic_units::Bytes;
+use cohaptic_units::print::Span;
+use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Between, DeliveryTrace, DeliveryTraceError, FateLog, FateLogError, MAHIMAHI_BYTES, PathTrace, PathTraceError};
 
 use super::is_none;
@@ -27,10 +29,10 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
         return Some(None);
     }
     if node.as_table().is_none() {
-        return load(node, context, MAHIMAHI_BYTES, Between::Steps, false).map(Some);
+        return load(node, context, Form { bytes: MAHIMAHI_BYTES, between: Between::Steps, repeat: false, start: Start::Zero }).map(Some);
     }
     let mut table = TableReader::new(node, context, "the name of a recording, or a table such as { file = \"path.csv\", repeat = true }")?;
-    let (bytes_entry, of_path) = (table.entry("bytes"), [table.entry("between"), table.entry("repeat")]);
+    let (bytes_entry, of_path) = (table.entry("bytes"), [table.entry("between"), table.entry("repeat"), table.entry("start")]);
     let bytes = table.optional("bytes", MAHIMAHI_BYTES, |node, context| {
         let bytes = values::size(node, context)?;
         if bytes == Bytes::ZERO {
@@ -42,17 +44,19 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     let ways = [("steps", Between::Steps), ("lines", Between::Lines)];
     let between = table.optional("between", Between::Steps, |node, context| values::choice(node, context, &ways));
     let repeat = table.optional("repeat", false, values::boolean);
+    let starts = [("zero", Start::Zero), ("first", Start::First)];
+    let start = table.optional("start", Start::Zero, |node, context| values::choice(node, context, &starts));
     let file = table.get("file");
     if file.is_none() {
         table.miss("file", FILE);
     }
     table.finish();
-    let (bytes, between, repeat) = (bytes?, between?, repeat?);
+    let form = Form { bytes: bytes?, between: between?, repeat: repeat?, start: start? };
     let Some(file) = file else {
         // A missing key was reported above, and in a part of a scene none is missing.
         return context.partial.then_some(None);
     };
-    let trace = load(file, context, bytes, between, repeat)?;
+    let trace = load(file, context, form)?;
     let misplaced = match &trace {
         Trace::Delivery(_) => of_path.into_iter().flatten().next(),
         Trace::Path(_) => bytes_entry,
@@ -60,7 +64,7 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     if let Some(entry) = misplaced {
         let message = match &trace {
             Trace::Delivery(_) => "is for a recorded path: expected only bytes beside instants of delivery, which always repeat",
-            Trace::Path(_) => "is for instants of delivery: expected between and repeat beside a recorded path",
+            Trace::Path(_) => "is for instants of delivery: expected between, repeat and start beside a recorded path",
         };
         context.fault(entry.key, &entry.node.path, format!("{} {message}", entry.name));
         return None;
@@ -68,10 +72,51 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     Some(Some(trace))
 }
 
-fn load(node: &Node, context: Context<'_>, bytes: Bytes, between: Between, repeat: bool) -> Option<Trace> {
+/// What a recording is read as.
+#[derive(Clone, Copy, Debug)]
+struct Form {
+    bytes: Bytes,
+    between: Between,
+    repeat: bool,
+    start: Start,
+}
+
+/// What times of a recorded path count from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Start {
+    Zero,
+    First,
+}
+
+/// A run whose end is not known lasts less than this: ten years. Times since 1970 are later.
+const LONGEST_RUN: Duration = Duration::from_secs(10 * 365 * 86_400);
+
+fn load(node: &Node, context: Context<'_>, form: Form) -> Option<Trace> {
     let path = file_path(node, context, FILE)?;
-    let form = format!("trace {bytes} {between:?} {repeat}");
-    read_file(node, context, &path, &form, |text| parse(text, bytes, between, repeat))
+    let Form { bytes, between, repeat, start } = form;
+    let ends = context.ends;
+    let read_as = format!("trace {bytes} {between:?} {repeat} {start:?} {ends:?}");
+    read_file(node, context, &path, &read_as, |text| match parse(text, bytes, between, repeat)? {
+        Trace::Path(path) if start == Start::First => path.from_first().map(Trace::Path).map_err(|error| Fault::in_line(text, None, &error)),
+        Trace::Path(path) => match outside(&path, ends) {
+            Some(message) => Err(Fault { span: first_row_span(text), message }),
+            None => Ok(Trace::Path(path)),
+        },
+        delivery @ Trace::Delivery(_) => Ok(delivery),
+    })
+}
+
+/// The fault of a recording that begins after the end of the run, of which the run would see the first row alone.
+fn outside(path: &PathTrace, ends: Option<Duration>) -> Option<String> {
+    let first = path.first().saturating_duration_since(Instant::ZERO);
+    let end = ends.unwrap_or(LONGEST_RUN);
+    (first >= end).then(|| {
+        let run = if ends.is_some() { format!("the run ends at {}", Span(end)) } else { "no run lasts for ten years".to_owned() };
+        format!(
+            "the recording begins at {}, and {run}: expected times since the start of the run, or start = \"first\", which counts from the first row",
+            Span(first)
+        )
+    })
 }
 
 /// A file whose first line is a number has instants of delivery; any other one is a CSV.
@@ -101,8 +146,18 @@ fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Tra
 
 /// The first line that says anything.
 fn header_span(text: &str) -> core::ops::Range<usize> {
-    let content = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
-    let line = text.lines().position(content).map_or(1, |place| place + 1);
+    content_span(text, 0)
+}
+
+/// The line below the columns.
+fn first_row_span(text: &str) -> core::ops::Range<usize> {
+    content_span(text, 1)
+}
+
+/// A line that says anything, counted from 0.
+fn content_span(text: &str, number: usize) -> core::ops::Range<usize> {
+    let content = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
+    let line = text.lines().enumerate().filter(|(_, line)| content(line)).nth(number).map_or(1, |(place, _)| place + 1);
     crate::reading::named_file::line_span(text, line)
 }
 

@@ -8,6 +8,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
+use std::time::Duration;
 
 use cohaptic_wan::Modulator;
 
@@ -83,6 +84,8 @@ pub struct Context<'a> {
     pub modulators: Option<&'a Arc<Modulators>>,
     /// Whether a table is read without the table below it: then no key is missing.
     pub partial: bool,
+    /// Time from the start of the run to its end. `None`: not known, because the run ends when somebody ends it, or because the time was refused.
+    pub ends: Option<Duration>,
 }
 
 impl<'a> Context<'a> {
@@ -96,6 +99,12 @@ impl<'a> Context<'a> {
     #[must_use]
     pub const fn with_modulators(self, modulators: Option<&'a Arc<Modulators>>) -> Self {
         Self { modulators, ..self }
+    }
+
+    /// This state with the end of the run.
+    #[must_use]
+    pub const fn with_end(self, ends: Option<Duration>) -> Self {
+        Self { ends, ..self }
     }
 
     /// This state for a table that is read without the table below it.

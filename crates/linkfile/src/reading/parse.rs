@@ -84,7 +84,7 @@ pub fn parse_with<T>(
     let mut document = parse_toml(sources.text, sources)?;
     let faults = Faults::default();
     let files = Files::default();
-    let context = Context { sources, faults: &faults, files: &files, reader, names: None, modulators: None, partial: false };
+    let context = Context { sources, faults: &faults, files: &files, reader, names: None, modulators: None, partial: false, ends: None };
     overrides::apply(&mut document, sources.overrides, context);
     let whole = read(&document, context);
     match (faults.into_first(), whole) {

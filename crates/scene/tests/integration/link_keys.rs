@@ -223,6 +223,9 @@ fn recordings_are_told_apart_by_their_first_line() {
     let path = |between, repeats| Some(PathTrace::parse(&data("path.csv"), between, repeats).unwrap());
     assert_eq!(config("trace = \"path.csv\"").trace, path(Between::Steps, false));
     assert_eq!(config("trace = { file = \"path.csv\", between = \"lines\", repeat = true }").trace, path(Between::Lines, true));
+    // Times since 1970, less those of the first row.
+    assert_eq!(config("trace = { file = \"since-1970.csv\", start = \"first\" }").trace, path(Between::Steps, false));
+    assert_eq!(config("trace = { file = \"path.csv\", start = \"zero\" }").trace, path(Between::Steps, false));
     let line = |bytes| Some(Service::Recorded(DeliveryTrace::parse(&data("line.trace"), bytes).unwrap()));
     let bottleneck = config("trace = \"line.trace\"\nqueue.limit = \"9 packets\"").bottleneck.unwrap();
     assert_eq!((Some(bottleneck.service), bottleneck.limit), (line(MAHIMAHI_BYTES), Some(QueueLimit::Packets(9))));
@@ -455,6 +458,12 @@ fn a_recording_that_makes_no_sense_is_shown_in_its_line() {
         ("trace = \"ends-at-0.trace\"", "ends-at-0.trace:1:1: link.trace: the recording ends at 0 ms: expected a last line above 0"),
         ("trace = \"bad-path.csv\"", "bad-path.csv:3:1: link.trace: column loss: expected a probability from 0 to 1"),
         ("trace = \"hand.csv\"", "hand.csv:1:1: link.trace: no recording: expected the columns t,delay"),
+        (
+            "trace = \"late-path.csv\"",
+            "late-path.csv:3:1: link.trace: the recording begins at 9s, and the run ends at 9s: expected times since the start of the run, or start = \"first\"",
+        ),
+        ("trace = \"since-1970.csv\"", "since-1970.csv:2:1: link.trace: the recording begins at 1700000000s, and the run ends at 9s"),
+        ("trace = { file = \"line.trace\", start = \"first\" }", "links.toml:6:32: link.trace.start: start is for a recorded path"),
         ("trace = { file = \"line.trace\", repeat = true }", "links.toml:6:32: link.trace.repeat: repeat is for a recorded path"),
         ("trace = { file = \"path.csv\", bytes = \"1B\" }", "links.toml:6:30: link.trace.bytes: bytes is for instants of delivery"),
         ("replay = \"bad-fates.csv\"", "bad-fates.csv:2:1: link.replay: column fate: found \"vanished\", expected delivered, duplicated"),

@@ -119,6 +119,24 @@ impl PathTrace {
         }
     }
 
+    /// The instant of the first row.
+    #[must_use]
+    pub fn first(&self) -> Instant {
+        self.rows.first().map_or(Instant::ZERO, |first| first.at)
+    }
+
+    /// The same recording with all times counted from its first row, as for times since 1970.
+    ///
+    /// # Errors
+    ///
+    /// [`PathTraceError::NoLength`] if it repeats and has one row.
+    pub fn from_first(self) -> Result<Self, PathTraceError> {
+        let first = self.first();
+        let rows: Arc<[Row]> =
+            self.rows.iter().map(|row| Row { at: Instant::ZERO.saturating_add(row.at.saturating_duration_since(first)), ..*row }).collect();
+        if self.repeats && rows.len() < 2 { Err(PathTraceError::NoLength) } else { Ok(Self { rows, ..self }) }
+    }
+
     /// The delay \[ns\] and the loss at an instant.
     pub(crate) fn at(&self, now: Instant) -> (u64, Probability) {
         let end = self.rows.last().map_or(Instant::ZERO, |last| last.at);
@@ -198,7 +216,9 @@ static TRACE: Table = Table::of(&[&[
     usual("bytes", Form::Size, "\"1504B\"", "What leaves at each instant of delivery"),
     usual("between", Form::Words(&BETWEEN), "\"steps\"", "What holds between two rows of a recorded path"),
     usual("repeat", Form::Boolean, "false", "Whether a recorded path begins anew after its end"),
+    usual("start", Form::Words(&START), "\"zero\"", "What times of a recorded path count from"),
 ]]);
+const START: [(&str, &str); 2] = [("zero", "the start of the run"), ("first", "the first row, as for times since 1970")];
 const BETWEEN: [(&str, &str); 2] = [("steps", "the earlier row"), ("lines", "a delay on the line between both")];
 
 #[cfg(test)]
@@ -236,6 +256,19 @@ mod tests {
     fn lines_and_repetition() {
         let expected = [(20, 0.0), (30, 0.0), (40, 0.5), (40, 0.5), (25, 1.0), (20, 0.0), (30, 0.0), (20, 0.0)];
         assert_eq!(delays(Between::Lines, true), expected);
+    }
+
+    #[test]
+    fn times_may_count_from_the_first_row() {
+        let since_1970 = "t,delay,loss\n1700000000,0.020,0\n1700000001.5,0.040,0.5\n1700000002,0.010,0\n";
+        for repeats in [false, true] {
+            let trace = PathTrace::parse(since_1970, Between::Lines, repeats).unwrap();
+            assert_eq!(trace.first(), Instant::from_nanos(1_700_000_000_000_000_000));
+            let from_zero = PathTrace::parse("t,delay,loss\n0,0.020,0\n1.5,0.040,0.5\n2,0.010,0\n", Between::Lines, repeats).unwrap();
+            assert_eq!(trace.from_first().unwrap(), from_zero);
+        }
+        let one_row = |repeats| PathTrace::parse("t,delay\n5,1\n", Between::Steps, repeats).unwrap().from_first();
+        assert_eq!((one_row(true), one_row(false).unwrap().first()), (Err(PathTraceError::NoLength), Instant::ZERO));
     }
 
     #[test]
