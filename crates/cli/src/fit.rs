@@ -55,10 +55,10 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What was read.
+/// Measurements as they were read.
 struct Source {
     measurements: Measurements,
-    /// What a pair of captures leaves over.
+    /// Counts of a pair of captures.
     matched: Option<Ends>,
     /// Whether both ends have one clock, as in a log of fates.
     has_one_clock: bool,

@@ -62,10 +62,10 @@ pub(crate) struct FitArguments {
     /// Only datagrams to this UDP port, of captures
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u16>(0, 65_535), requires = "receiver")]
     pub(crate) port: Option<u16>,
-    /// What is added to the clock of the receiver, and so to every delay, if the clocks are known to be apart. May be negative: --offset -20ms
+    /// Time that is added to the clock of the receiver, and so to every delay, where the clocks are known to be apart; may be negative, such as -20ms
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = signed_duration, conflicts_with = "least")]
     pub(crate) offset: Option<f64>,
-    /// What the least delay is known to be: the same time is added to every delay, after the drift is removed, so that the least of them is TIME
+    /// The least delay, where it is known: one time is added to every delay, after the drift is removed, so that the least of them is TIME
     #[arg(long, value_name = "TIME", value_parser = cohaptic_units::parse::duration)]
     pub(crate) least: Option<std::time::Duration>,
     /// Remove the linear drift of one clock against the other first, where it is significant at 1 %

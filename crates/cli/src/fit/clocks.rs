@@ -10,10 +10,10 @@ use crate::arguments::FitArguments;
 const QUESTIONED_S: f64 = 60.0;
 const OPTIONS: &str = "--offset TIME adds a time to the clock of the receiver, --least TIME says what the least delay is";
 
-/// What the clocks did, and what was done about it.
+/// Corrections of the clocks.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(super) struct Clocks {
-    /// What `--offset` or `--least` added to every delay \[s\].
+    /// Time that `--offset` or `--least` added to every delay \[s\].
     #[serde(skip_serializing_if = "Option::is_none")]
     added_s: Option<f64>,
     /// Instants at which the least delay changed and stayed so.

@@ -1,11 +1,11 @@
-//! What the captures of both ends hold besides the packets that are fitted.
+//! Counts of the captures of both ends.
 
 use cohaptic_measure::fit::Measurements;
 use cohaptic_measure::fit::captures::{Contents, Matched};
 use cohaptic_units::print::Counted;
 use serde::Serialize;
 
-/// What a pair of captures leaves over.
+/// Packets of a pair of captures that are not fitted, and counts of all frames.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(super) struct Ends {
     unmatched_sent: usize,

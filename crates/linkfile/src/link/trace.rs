@@ -72,7 +72,7 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     Some(Some(trace))
 }
 
-/// What a recording is read as.
+/// The way in which a recording is read.
 #[derive(Clone, Copy, Debug)]
 struct Form {
     bytes: Bytes,
@@ -81,7 +81,7 @@ struct Form {
     start: Start,
 }
 
-/// What times of a recorded path count from.
+/// Origin of the times of a recorded path.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Start {
     Zero,

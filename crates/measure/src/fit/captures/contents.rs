@@ -1,4 +1,4 @@
-//! What a capture holds: the datagrams that are matched, and counts of everything else.
+//! The content of a capture: the datagrams that are matched, and counts of everything else.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::{CaptureError, End, frame, reader, views};
 
-/// What a capture holds.
+/// Counts of the frames of a capture.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct Contents {
     /// Frames in the file.

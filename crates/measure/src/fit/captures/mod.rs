@@ -8,7 +8,7 @@
 //! [`Matched::ambiguous`] counts them. The clocks of the two ends are taken as they are: see [`Measurements::shifted`], [`Measurements::without_skew`]
 //! and [`Measurements::steps`].
 //!
-//! | what captures do | what is done |
+//! | captures | treatment |
 //! | --- | --- |
 //! | One was begun later, or ended earlier | Datagrams at either end that the receiver's capture could not show are left out: [`Matched::left_out`]. |
 //! | Frames are cut | Datagrams are matched by their length and the octets that both files hold. |
@@ -58,9 +58,9 @@ pub struct Matched {
     /// Packets of the sender before the first and after the last one that is judged. The capture of the receiver may not have run when they arrived, so
     /// that they are neither lost nor delivered.
     pub left_out: [usize; 2],
-    /// What the capture of the sender holds.
+    /// Frames of the sender's capture, by kind.
     pub sender: Contents,
-    /// What the capture of the receiver holds.
+    /// Frames of the receiver's capture, by kind.
     pub receiver: Contents,
 }
 
@@ -93,7 +93,7 @@ pub enum CaptureError {
         end: End,
         /// The port that was asked for.
         port: Option<u16>,
-        /// What the file holds.
+        /// Frames of the file, by kind.
         contents: Box<Contents>,
     },
     /// No datagram of one file is in the other.

@@ -32,7 +32,7 @@ pub(super) fn packet(link_type: u16, data: &[u8]) -> Result<&[u8], Kind> {
     }
 }
 
-/// What follows an Ethernet type. Tags of VLANs and labels of MPLS are passed over.
+/// Returns the octets after an Ethernet type. Tags of VLANs and labels of MPLS are passed over.
 fn by_type(mut ether_type: u16, mut rest: &[u8]) -> Result<&[u8], Kind> {
     loop {
         match ether_type {
@@ -51,7 +51,7 @@ fn by_type(mut ether_type: u16, mut rest: &[u8]) -> Result<&[u8], Kind> {
     }
 }
 
-/// What follows a header of 802.2.
+/// Returns the octets after a header of 802.2.
 pub(super) fn llc(rest: &[u8]) -> Result<&[u8], Kind> {
     let (ether_type, rest) = type_of_llc(rest)?;
     by_type(ether_type, rest)

@@ -99,8 +99,8 @@ impl Order {
     }
 }
 
-/// The octets of a frame and its length on the wire, both without the frame check sequence of that many octets. A capture that was cut may hold a part of
-/// the sequence, or none of it.
+/// Returns the octets of a frame and its length on the wire without the frame check sequence, which has `check` octets. A capture that was cut may hold a part
+/// of the sequence, or none of it.
 fn without_check(data: &[u8], length: u32, check: usize) -> (&[u8], usize) {
     let length = usize::try_from(length).unwrap_or(usize::MAX).max(data.len()).saturating_sub(check);
     (&data[..data.len().min(length)], length)

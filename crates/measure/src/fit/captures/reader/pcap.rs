@@ -4,7 +4,7 @@ use std::io::Read;
 
 use super::{CaptureProblem, Ending, Frame, LONGEST_BLOCK, Order, Source, without_check};
 
-/// What the first four octets say.
+/// Form of the file, as its first four octets tell.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Format {
     order: Order,
