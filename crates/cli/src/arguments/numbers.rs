@@ -40,9 +40,10 @@ pub(crate) fn memory(text: &str) -> Result<u64, String> {
 
 /// A duration, perhaps with a sign, in seconds.
 pub(crate) fn signed_duration(text: &str) -> Result<f64, String> {
-    let (sign, rest) = match text.trim().strip_prefix('-') {
+    let text = text.trim();
+    let (sign, rest) = match text.strip_prefix('-') {
         Some(rest) => (-1.0, rest),
-        None => (1.0, text.trim().strip_prefix('+').unwrap_or(text.trim())),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
     };
     let duration = parse::duration(rest).map_err(|_| "expected a duration such as 1.5s, -20ms or 2h".to_owned())?;
     Ok(sign * duration.as_secs_f64())
