@@ -2,21 +2,25 @@
 
 mod clocks;
 mod ends;
+mod written;
 
 use std::io::Read as _;
+use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use cohaptic_files::MOST_BYTES;
 use cohaptic_measure::fit::{self, Fitted, LossFit, LossModel, Measurements, captures};
-use cohaptic_units::print::Counted;
+use cohaptic_units::print::{Counted, Span};
 use cohaptic_wan::FateRow;
 
 use crate::arguments::FitArguments;
 use crate::document_schema::{DocumentSchema, document};
-use crate::failure::Failure;
+use crate::failure::{EXPECTATION, Failure};
 use crate::file::write_file;
 use crate::{file, output};
 use ends::Ends;
+use written::{Delays, read_again};
 
 /// Estimates a link.
 pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
@@ -24,9 +28,19 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(&arguments.file)));
     let (measurements, clocks, skew) = clocks::settled(arguments, &measurements, has_one_clock).map_err(|error| named(&error))?;
     let fitted = fit::fit(&measurements).map_err(|error| named(&clocks::explained(&error)))?;
-    let scene = fitted.link.to_scene_toml();
-    if let Some(path) = &arguments.out {
-        write_file(path, &scene)?;
+    let out = arguments.out.as_deref().unwrap_or_else(|| Path::new("link.toml"));
+    let delays = Delays { path: out.with_extension("delays.csv"), csv: fitted.delays_csv() };
+    let scene = fitted.link.to_scene_toml(&delays.name());
+    read_again(&scene, &fitted.link, out, &delays)?;
+    let law_is_missing = arguments.require_law && delays.csv.is_some();
+    let mut written: Vec<&Path> = Vec::new();
+    if arguments.out.is_some() && !law_is_missing {
+        if let Some(csv) = &delays.csv {
+            write_file(&delays.path, csv)?;
+            written.push(&delays.path);
+        }
+        write_file(out, &scene)?;
+        written.push(out);
     }
     output::answer(
         arguments.json,
@@ -50,9 +64,9 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
                 [matched.as_ref().map_or_else(Vec::new, Ends::describe), clocks::describe(&clocks, skew.as_ref())].concat(),
             )
         },
-        &arguments.out,
+        written,
     )?;
-    Ok(ExitCode::SUCCESS)
+    Ok(if law_is_missing { ExitCode::from(EXPECTATION) } else { ExitCode::SUCCESS })
 }
 
 /// Measurements as they were read.
@@ -90,7 +104,7 @@ fn read(arguments: &FitArguments) -> Result<Source, Failure> {
     // Any other table is read as a whole.
     from.limited_to(MOST_BYTES).and_then(|mut rest| rest.read_to_end(&mut bytes)).map_err(unreadable)?;
     let text = file::text_of(bytes, path)?;
-    let measurements = Measurements::from_csv(text.as_bytes()).map_err(|error| named(&error))?;
+    let measurements = Measurements::from_csv(&text).map_err(|error| named(&error))?;
     Ok(Source { measurements, matched: None, has_one_clock: false })
 }
 
@@ -118,17 +132,27 @@ fn describe(fitted: &Fitted, scene: &str, measurements: &Measurements, notes: Ve
     notes.into_iter().for_each(&mut line);
     let error = goodness.mean_se_s.map_or_else(String::new, |error| format!(" +- {}", milliseconds(error)));
     line(format!(
-        "mean {}{error}, standard deviation {}, least {}",
+        "mean {}{error}, standard deviation {} +- {}, least {}, in steps of {}",
         milliseconds(goodness.mean_s),
         milliseconds(goodness.sd_s),
-        milliseconds(goodness.least_s)
+        milliseconds(goodness.sd_se_s),
+        milliseconds(goodness.least_s),
+        step(goodness.resolution_s)
     ));
-    line(format!("\n  {:<12}{:>14}{:>14}{:>14}{:>16}{:>12}", "law", "mean", "sd", "floor", "AIC - best", "Kolmogorov"));
-    let best = goodness.laws.first().map_or(0.0, |law| law.aic);
+    line(format!("\n  {:<12}{:>14}{:>14}{:>14}{:>16}{:>12}{:>12}", "law", "mean", "sd", "floor", "AIC - best", "Kolmogorov", "p-value"));
+    let best = goodness.laws.iter().map(|law| law.aic).fold(f64::INFINITY, f64::min);
     for law in &goodness.laws {
         let floor = law.floor_s.map_or_else(|| "-".to_owned(), milliseconds);
         let [mean, sd] = [law.mean_s, law.sd_s].map(milliseconds);
-        line(format!("  {:<12}{mean:>14}{sd:>14}{floor:>14}{:>16.1}{:>12.5}", law.distribution.name(), law.aic - best, law.kolmogorov));
+        let (name, aic) = (law.distribution.name(), law.aic - best);
+        let mark = if law.fits { "" } else { "  *" };
+        line(format!("  {name:<12}{mean:>14}{sd:>14}{floor:>14}{aic:>16.1}{:>12.5}{:>12.5}{mark}", law.kolmogorov, law.p_value));
+    }
+    if goodness.laws.iter().any(|law| !law.fits) {
+        line(format!("  * does not fit: its distance from the delays (Kolmogorov) is above {:.5}", goodness.kolmogorov_limit));
+    }
+    if goodness.laws.first().is_none_or(|law| !law.fits) {
+        line("no law fits: the link draws from the measured delays, a file that --out writes beside the link".to_owned());
     }
     match goodness.correlation {
         None => line("\ndelays are as good as independent".to_owned()),
@@ -157,6 +181,11 @@ fn model(loss: &LossFit) -> String {
         LossModel::GilbertElliott { p, r, h, k } => format!("Gilbert-Elliott p {p:.5} r {r:.5} h {h:.3} k {k:.5}"),
         LossModel::GilbertElliottInTime { mean_good_s, mean_bad_s } => format!("in time, good {mean_good_s:.4} s bad {mean_bad_s:.4} s"),
     }
+}
+
+/// A step of a clock: a round number, which a nanosecond may miss.
+fn step(seconds: f64) -> Span {
+    Span(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
 }
 
 fn milliseconds(seconds: f64) -> String {

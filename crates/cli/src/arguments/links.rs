@@ -74,7 +74,10 @@ pub(crate) struct FitArguments {
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write the link table of a scene into this file
+    /// End with status 1, and write nothing, where no law fits the delays
+    #[arg(long)]
+    pub(crate) require_law: bool,
+    /// Write the link table of a scene into this file, and the delays beside it where no law fits them
     #[arg(long, value_name = "SCENE_LINK.toml")]
     pub(crate) out: Option<PathBuf>,
 }

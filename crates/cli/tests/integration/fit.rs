@@ -134,12 +134,86 @@ fn the_link_that_is_found_is_the_link_of_a_scene() {
         desk.text(&format!("fit {file} --out link.toml"));
         let link = desk.read("link.toml");
         assert!(words.iter().all(|word| link.contains(word)), "{link}");
-        let rest = "[scene]\nduration = \"1s\"\ncount = 2\n[object]\nmass = 0.45\n[coordination]\nstrategy = \"average-position\"\nstiffness = 100\n\
-                    damping = 5\nupdate = \"8ms\"\n[peer]\ncontact = \"none\"\ndevice = { mass = 0.1, damping = 5 }\n\
-                    coupling = { stiffness = 100, damping = 5 }\n";
-        desk.write("scene.toml", format!("{rest}{link}"));
+        desk.write("scene.toml", format!("{SCENE}{link}"));
         assert!(desk.text("explain scene.toml").contains("jitter"), "{link}");
     }
+}
+
+/// A scene but for its links.
+const SCENE: &str = "[scene]\nduration = \"1s\"\ncount = 2\n[object]\nmass = 0.45\n[coordination]\nstrategy = \"average-position\"\nstiffness = 100\n\
+                     damping = 5\nupdate = \"8ms\"\n[peer]\ncontact = \"none\"\ndevice = { mass = 0.1, damping = 5 }\n\
+                     coupling = { stiffness = 100, damping = 5 }\n";
+
+/// Delays of a clock of a millisecond. SciPy finds the mean 22.0966 ms, the deviation 1.4916 ms and the floor 19.9647 ms of a Weibull law, at a distance of 0.0078
+/// (`crates/measure/tests/reference`). The floor of a law of greatest density is the least delay, and its deviation 2.46 ms.
+#[test]
+fn a_coarse_clock_shows_intervals() {
+    let counts = [(20, 22), (21, 61), (22, 53), (23, 31), (24, 17), (25, 9), (26, 4), (27, 3)];
+    let mut delays: Vec<u32> = counts.iter().flat_map(|&(delay, count)| std::iter::repeat_n(delay, count)).collect();
+    // In an order without memory: 77 is prime to 200.
+    delays = (0..200).map(|i| delays[i * 77 % 200]).collect();
+    let rows = delays.iter().enumerate().map(|(i, delay)| format!("{},{delay}\n", i * 10));
+    let desk = Desk::with("m.csv", &format!("t_ms,delay_ms\n{}", rows.collect::<String>()));
+    let document = desk.json("fit m.csv --require-law --out link.toml --json");
+    let near = |value: &Value, expected: f64, of: f64| assert!((number(value) - expected).abs() < of, "{value} {expected} {document:#}");
+    let (jitter, best) = (&document["link"]["jitter"], &document["goodness"]["laws"][0]);
+    assert_eq!(jitter["distribution"], "weibull");
+    near(&document["link"]["delay_s"], 22.0966e-3, 1e-6);
+    near(&jitter["sd_s"], 1.4916e-3, 1e-6);
+    near(&jitter["floor_s"], 19.9647e-3, 1e-5);
+    near(&best["kolmogorov"], 0.0078, 1e-4);
+    near(&document["goodness"]["resolution_s"], 1e-3, 1e-12);
+    assert_eq!(best["fits"], true);
+    assert!(number(&best["p_value"]) > 0.99 && number(&document["goodness"]["effective"]) > 100.0, "{document:#}");
+    assert!(desk.text("fit m.csv").contains(", in steps of 1ms\n"));
+    assert_eq!(desk.files("."), ["link.toml", "m.csv"]);
+}
+
+/// Two routes, and what spikes do to a link, have no law. Shot noise of 2 spikes of 50 ms a second that decay in 20 ms has the mean 2·50·0.02 = 2 ms and the deviation
+/// 50·√(2·0.02/2) = 7.07 ms (Campbell); with a correlation time of 20 ms, 600 s tell the mean to 7.07 ms·√(2·20 ms/600 s) = 58 µs. The deviation is known to a tenth.
+#[test]
+fn delays_without_a_law_are_the_law() {
+    let desk = Desk::new();
+    // 2 of 10 are 21 ms, and so on, in an order without memory (777 is prime to 2000), and up to 0.6 ms more: mean 30.6 + 0.3 ms, deviation √(104.44 + 0.04) ms.
+    let route = |i: u32| [20, 40, 21, 41, 20, 42, 40, 20, 41, 21][(i * 777 % 2000 / 200) as usize];
+    let routes = (0..2000).map(|i| format!("{},{}.{}\n", i * 10, route(i), i % 7));
+    desk.write("routes.csv", format!("t_ms,delay_ms\n{}", routes.collect::<String>()));
+    desk.text("link delay=20ms jitter={sd=\"100us\"} spike={rate=2,height=\"50ms\",decay=\"20ms\"} --packets 60000 --every 10ms --fates spike.csv");
+    for (file, mean, mean_of, sd, sd_of) in [("routes.csv", 30.9e-3, 0.01e-3, 10.222e-3, 0.01e-3), ("spike.csv", 22e-3, 5.0 * 58e-6, 7.07e-3, 0.7e-3)]
+    {
+        let document = desk.json(&format!("fit {file} --out link.toml --json"));
+        let (link, goodness) = (&document["link"], &document["goodness"]);
+        assert_eq!(link["jitter"]["distribution"], "empirical", "{document:#}");
+        assert!((number(&link["delay_s"]) - mean).abs() < mean_of && (number(&link["jitter"]["sd_s"]) - sd).abs() < sd_of, "{document:#}");
+        for law in goodness["laws"].as_array().unwrap() {
+            assert!(
+                law["fits"] == false && number(&law["kolmogorov"]) > number(&goodness["kolmogorov_limit"]) && number(&law["p_value"]) < 0.01,
+                "{law}"
+            );
+        }
+        let text = desk.text(&format!("fit {file}"));
+        assert!(text.contains("no law fits: the link draws from the measured delays"), "{text}");
+        // The link and its file of delays are read by a scene, whose law has the moments that were said.
+        assert!(desk.read("link.toml").contains("distribution = { empirical = \"link.delays.csv\" }"));
+        desk.write("scene.toml", format!("{SCENE}{}", desk.read("link.toml")));
+        assert!(desk.text("explain scene.toml").contains("measured"));
+        for left in ["link.toml", "link.delays.csv"] {
+            std::fs::remove_file(desk.path(left)).unwrap();
+        }
+        let refused = desk.cohaptic(&format!("fit {file} --require-law --out link.toml"));
+        assert_eq!((refused.status, refused.stdout.contains("no law fits"), desk.path("link.toml").exists()), (Some(1), true, false), "{refused:?}");
+        assert!(!desk.path("link.delays.csv").exists());
+    }
+}
+
+/// What no scene reads is not written: a delay of 300 years.
+#[test]
+fn a_link_that_no_scene_reads_is_not_written() {
+    let rows = (0..100).map(|i| format!("{i},{}\n", 1e10 + f64::from(i % 7)));
+    let desk = Desk::with("m.csv", &format!("t,delay\n{}", rows.collect::<String>()));
+    desk.cohaptic("fit m.csv --out link.toml")
+        .assert_refused(2, &["the mean of the delays is 10000000002.9", " s, and 9223372036.854776 s in a scene"]);
+    assert_eq!(desk.files("."), ["m.csv"]);
 }
 
 #[test]

@@ -20,13 +20,32 @@ pub struct FittedLink {
     pub loss: LossModel,
 }
 
+/// The law of jitter.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(into = "&'static str")]
+pub enum FittedLaw {
+    /// One that fits.
+    Law(DelayLaw),
+    /// The measured delays themselves, because no law fits them: `empirical`.
+    Empirical,
+}
+
+impl From<FittedLaw> for &'static str {
+    fn from(law: FittedLaw) -> Self {
+        match law {
+            FittedLaw::Law(law) => law.name(),
+            FittedLaw::Empirical => "empirical",
+        }
+    }
+}
+
 /// Jitter as it can be written into a scene.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct FittedJitter {
     /// The standard deviation \[s\].
     pub sd_s: f64,
     /// The law.
-    pub distribution: DelayLaw,
+    pub distribution: FittedLaw,
     /// The least delay, from which the lognormal, gamma and Weibull laws begin \[s\]; `None`: zero, or the law has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub floor_s: Option<f64>,
@@ -40,12 +59,17 @@ pub struct FittedJitter {
 }
 
 impl FittedLink {
-    /// The `[link]` table of a scene, with a line break at the end. Durations are rounded to nanoseconds, other numbers to six digits.
+    /// The `[link]` table of a scene, with a line break at the end. Durations are rounded to nanoseconds, other numbers to six digits. `delays` is the name
+    /// of the file with the measured delays ([`Fitted::delays_csv`](super::Fitted::delays_csv)), relative to the folder of the scene, where they are the law.
     #[must_use]
-    pub fn to_scene_toml(&self) -> String {
+    pub fn to_scene_toml(&self, delays: &str) -> String {
         let mut text = format!("[link]\ndelay = \"{}\"\n", duration(self.delay_s));
         let jitter = &self.jitter;
-        let mut keys = format!("sd = \"{}\", distribution = \"{}\"", duration(jitter.sd_s), jitter.distribution.name());
+        let distribution = match jitter.distribution {
+            FittedLaw::Law(law) => format!("\"{}\"", law.name()),
+            FittedLaw::Empirical => format!("{{ empirical = {} }}", text_of(delays)),
+        };
+        let mut keys = format!("sd = \"{}\", distribution = {distribution}", duration(jitter.sd_s));
         let floor = jitter.floor_s.map(|floor| format!(", floor = \"{}\"", duration(floor)));
         let correlation = jitter.correlation.map(|correlation| format!(", correlation = {}", number(correlation)));
         let time = jitter.correlation_time_s.map(|time| format!(", correlation-time = \"{}\"", duration(time)));
@@ -78,6 +102,16 @@ fn duration(seconds: f64) -> Span {
     Span(nanos.min(Duration::from_nanos(i64::MAX.unsigned_abs())))
 }
 
+/// A TOML string. The names of files may hold quotes and backslashes.
+fn text_of(text: &str) -> String {
+    let escaped = |character: char| match character {
+        '"' | '\\' => format!("\\{character}"),
+        control if control.is_control() => format!("\\u{:04X}", u32::from(control)),
+        other => other.to_string(),
+    };
+    format!("\"{}\"", text.chars().map(escaped).collect::<String>())
+}
+
 /// Six digits, as a TOML float.
 fn number(value: f64) -> String {
     let rounded = format!("{value:.5e}").parse().unwrap_or(value);
@@ -90,19 +124,34 @@ mod tests {
 
     const LINK: FittedLink = FittedLink {
         delay_s: 0.024,
-        jitter: FittedJitter { sd_s: 0.002, distribution: DelayLaw::Gamma, floor_s: Some(0.02), correlation: Some(0.9), correlation_time_s: None },
+        jitter: FittedJitter {
+            sd_s: 0.002,
+            distribution: FittedLaw::Law(DelayLaw::Gamma),
+            floor_s: Some(0.02),
+            correlation: Some(0.9),
+            correlation_time_s: None,
+        },
         loss: LossModel::GilbertElliott { p: 0.01, r: 1.0 / 3.0, h: 0.0, k: 1.0 },
     };
 
     #[test]
     fn a_link_reads_as_a_scene() {
         assert_eq!(
-            LINK.to_scene_toml(),
+            LINK.to_scene_toml(""),
             "[link]\n\
              delay = \"24ms\"\n\
              jitter = { sd = \"2ms\", distribution = \"gamma\", floor = \"20ms\", correlation = 0.9 }\n\
              loss = { gilbert-elliott = { p = 0.01, r = 0.333333 } }\n"
         );
+    }
+
+    #[test]
+    fn measured_delays_are_named() {
+        let jitter = FittedJitter { distribution: FittedLaw::Empirical, floor_s: None, correlation: None, ..LINK.jitter };
+        let text = FittedLink { jitter, loss: LossModel::None, ..LINK }.to_scene_toml("odd \"\\\n.csv");
+        assert!(text.ends_with("jitter = { sd = \"2ms\", distribution = { empirical = \"odd \\\"\\\\\\u000A.csv\" } }\n"), "{text}");
+        let table: toml::Table = text.parse().unwrap();
+        assert_eq!(table["link"]["jitter"]["distribution"]["empirical"].as_str(), Some("odd \"\\\n.csv"));
     }
 
     #[test]
@@ -115,7 +164,7 @@ mod tests {
         ];
         for loss in models {
             let jitter = FittedJitter { correlation: None, correlation_time_s: Some(1.0 / 3.0), floor_s: None, ..LINK.jitter };
-            let text = FittedLink { loss, jitter, ..LINK }.to_scene_toml();
+            let text = FittedLink { loss, jitter, ..LINK }.to_scene_toml("");
             let table: toml::Table = text.parse().unwrap();
             let link = table["link"].as_table().unwrap();
             let span = |value: &toml::Value| cohaptic_units::parse::duration(value.as_str().unwrap()).unwrap().as_secs_f64();

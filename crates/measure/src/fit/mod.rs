@@ -1,7 +1,7 @@
 //! An estimate of a link from measured one-way delays and losses.
 //!
 //! ```text
-//! CSV ─────────┐                       ┌─► law of the delay: six families, floor, AIC, Kolmogorov's distance
+//! CSV ─────────┐                       ┌─► law of the delay: six families, floor, AIC, Kolmogorov's distance, or the delays themselves
 //!              ├─► Measurements ─ fit ─┼─► its memory: correlation time of an Ornstein–Uhlenbeck process
 //! captures ────┘   (offset, skew)      └─► loss: independent or in bursts, BIC
 //! ```
@@ -18,11 +18,13 @@
 //! delay or arrival, or `lost` = 1, is a lost packet. [`captures::between`] reads a pair of captures of the two ends.
 
 pub mod captures;
+mod cells;
 mod correlation;
 mod distribution;
 mod hidden_markov;
 mod law;
 mod link;
+mod link_delay;
 mod loss;
 mod measurements;
 mod search;
@@ -30,18 +32,26 @@ mod skew;
 mod steps;
 mod table;
 
+use std::fmt::Write as _;
+use std::sync::Arc;
+
 use cohaptic_units::print::Counted;
+use cohaptic_wan::law::Empirical;
 use serde::Serialize;
 
 pub use correlation::CorrelationFit;
 pub use distribution::LawFit;
 pub use law::DelayLaw;
-pub use link::{FittedJitter, FittedLink};
+pub use link::{FittedJitter, FittedLaw, FittedLink};
 pub use loss::{LossFit, LossModel};
 pub use measurements::{Measurement, Measurements, MeasurementsError};
 pub use skew::{Location, Skew, SkewError};
 pub use steps::Step;
 pub use table::TableError;
+
+use cells::Cells;
+use distribution::Moments;
+use link_delay::LinkDelay;
 
 use crate::batches::{self, student};
 use crate::series::{self, count};
@@ -53,6 +63,22 @@ pub struct Fitted {
     pub link: FittedLink,
     /// How good it is.
     pub goodness: Goodness,
+    /// The measured delays \[s\], where they are the law of the link.
+    #[serde(skip)]
+    delays: Option<Arc<Empirical>>,
+}
+
+impl Fitted {
+    /// The file of delays that the link names where no law fits: CSV with the column `delay`, in seconds, sorted. `None` where a law fits.
+    #[must_use]
+    pub fn delays_csv(&self) -> Option<String> {
+        let mut text = "delay\n".to_owned();
+        for delay in self.delays.as_ref()?.knots() {
+            // Writing to a `String` cannot fail.
+            let _ = writeln!(text, "{delay}");
+        }
+        Some(text)
+    }
 }
 
 /// What the estimate rests on, and the models that were not chosen.
@@ -76,12 +102,19 @@ pub struct Goodness {
     pub mean_se_s: Option<f64>,
     /// The standard deviation of the measured delays \[s\].
     pub sd_s: f64,
+    /// Its standard error \[s\], sd·√((κ − 1)/4m) with the kurtosis κ of the delays and m = `effective`, at most half of it.
+    pub sd_se_s: f64,
     /// The least delay \[s\].
     pub least_s: f64,
+    /// The resolution of the clock \[s\]: the greatest step of which all differences of delays are whole multiples, in nanoseconds. A delay stands for all within
+    /// half a step.
+    pub resolution_s: f64,
     /// The least delay corrected for its bias without a law, 2x₁ − x₂ of the two least *different* delays (Robson & Whitlock 1964, Biometrika 51(1/2)),
     /// not below zero \[s\]. It is right for laws that are dense at their floor, and too high for others, whose own floors stand in `laws`.
     pub floor_robson_whitlock_s: f64,
-    /// Every law, the chosen one first.
+    /// The largest distance of distribution functions at which a law fits, 0.02 + 1.63/√m with m = `effective`, at least 50.
+    pub kolmogorov_limit: f64,
+    /// Every law that has the moments of the delays: those that fit first, of which the first one is the law of the link.
     pub laws: Vec<LawFit>,
     /// The memory of the delays; `None` if they are as good as independent.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -133,6 +166,8 @@ pub enum FitError {
     },
 }
 
+/// A link counts nanoseconds: delays that are closer are equal.
+const HALF_A_NANOSECOND: f64 = 0.5e-9;
 /// Fewer delays than this tell laws apart by chance.
 const LEAST_RECEIVED: usize = 50;
 
@@ -140,7 +175,7 @@ const LEAST_RECEIVED: usize = 50;
 ///
 /// # Errors
 ///
-/// [`FitError`] if fewer than 50 packets arrived, a delay is negative, all delays are equal, or all packets were sent at one instant.
+/// [`FitError`] if fewer than 50 packets arrived, a delay is negative, all delays are equal in nanoseconds, or all packets were sent at one instant.
 ///
 /// # Panics
 ///
@@ -161,27 +196,30 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     if let Some(&(sent_s, delay_s)) = arrivals.iter().find(|arrival| arrival.1 < 0.0) {
         return Err(FitError::NegativeDelay { sent_s, delay_s });
     }
-    if least_s >= greatest {
+    let resolution_s = cells::resolution(measurements).filter(|_| greatest - least_s >= HALF_A_NANOSECOND);
+    let Some(resolution_s) = resolution_s else {
         return Err(FitError::ConstantDelay { received, delay_s: least_s });
-    }
+    };
     let (spacing_s, evenly_spaced) = spacing(packets);
     if spacing_s <= 0.0 {
         return Err(FitError::OneInstant { sent_s: packets[0].sent_s });
     }
 
     let effective = effective(packets);
-    let laws = distribution::fit_all(&sorted, effective);
-    let best = *laws.first().expect("the normal law fits whatever varies");
+    let moments = Moments::of(&sorted, effective).expect("delays differ");
+    let laws = distribution::fit_all(&Cells::new(&sorted, resolution_s), &moments, effective);
     let correlation = correlation::fit(&arrivals, spacing_s);
     let losses = loss::fit_all(&packets.iter().map(|packet| (packet.sent_s, packet.delay_s.is_none())).collect::<Vec<_>>(), evenly_spaced);
     let delays: Vec<f64> = arrivals.iter().map(|arrival| arrival.1).collect();
-    let begins_at_floor = matches!(best.distribution, DelayLaw::Lognormal | DelayLaw::Gamma | DelayLaw::Weibull);
-    let floor_s = best.floor_s.filter(|_| begins_at_floor);
+    let delay = match laws.first().filter(|best| best.fit.fits) {
+        Some(best) => LinkDelay::of_law(best),
+        None => LinkDelay::of_delays(&sorted),
+    };
     let jitter = FittedJitter {
-        sd_s: best.sd_s,
-        distribution: best.distribution,
-        floor_s,
-        correlation: correlation.filter(|_| evenly_spaced).map(|fit| of_delays(&best, floor_s, fit.lag_one)),
+        sd_s: delay.sd_s,
+        distribution: delay.distribution,
+        floor_s: delay.floor_s,
+        correlation: correlation.filter(|_| evenly_spaced).map(|fit| delay.law.as_ref().map_or(fit.lag_one, |law| law.correlation(fit.lag_one))),
         correlation_time_s: correlation.filter(|_| !evenly_spaced).map(|fit| fit.time_s),
     };
     let goodness = Goodness {
@@ -190,18 +228,21 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
         effective,
         spacing_s,
         evenly_spaced,
-        mean_s: series::mean(&delays).expect("there are delays"),
+        mean_s: moments.mean,
         mean_se_s: batches::batch_standard_error(&delays).map(|error| error.hypot(error_of_drift(measurements, &arrivals))),
-        sd_s: series::variance(&delays).expect("there are at least two delays").sqrt(),
+        sd_s: moments.sd,
+        sd_se_s: moments.sd_error,
         least_s,
+        resolution_s,
         floor_robson_whitlock_s: robson_whitlock(&sorted),
-        laws,
+        kolmogorov_limit: distribution::limit(effective),
+        laws: laws.iter().map(|law| law.fit).collect(),
         correlation,
         loss_interval_95: batches::share_interval(&packets.iter().map(|packet| f64::from(u8::from(packet.delay_s.is_none()))).collect::<Vec<_>>()),
         losses,
     };
-    let link = FittedLink { delay_s: best.mean_s, jitter, loss: goodness.losses.first().expect("one model always applies").model };
-    Ok(Fitted { link, goodness })
+    let link = FittedLink { delay_s: delay.mean_s, jitter, loss: goodness.losses.first().expect("one model always applies").model };
+    Ok(Fitted { link, goodness, delays: delay.delays })
 }
 
 /// What the error of a drift that was taken off, so that the first packet stayed as it is, makes of the mean \[s\].
@@ -209,12 +250,6 @@ fn error_of_drift(measurements: &Measurements, arrivals: &[(f64, f64)]) -> f64 {
     let Some((skew, first)) = measurements.removed().zip(measurements.packets().first()) else { return 0.0 };
     let since = series::mean(&arrivals.iter().map(|arrival| arrival.0 - first.sent_s).collect::<Vec<_>>()).unwrap_or(0.0);
     since * skew.standard_error * student(0.975, skew.blocks - 2) / student(0.975, batches::MOST - 1)
-}
-
-/// The correlation of delays of that law whose normal scores have the correlation `phi`.
-fn of_delays(law: &LawFit, floor_s: Option<f64>, phi: f64) -> f64 {
-    // A law that a link refuses, one a hair too wide, has the correlation of a normal one, which differs in the second digit.
-    cohaptic_wan::law::Law::new(&law.distribution.into(), law.mean_s, law.sd_s, floor_s).map_or(phi, |law| law.correlation(phi))
 }
 
 /// The median gap, and whether nearly all gaps are like it. Of packets that are sent in bursts, each at one instant, the median gap between bursts, which is
@@ -244,5 +279,7 @@ fn robson_whitlock(sorted: &[f64]) -> f64 {
     (2.0 * least - second).max(0.0)
 }
 
+#[cfg(test)]
+mod refusal;
 #[cfg(test)]
 mod tests;

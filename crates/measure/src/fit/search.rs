@@ -1,4 +1,6 @@
-//! The greatest value of a function of one variable.
+//! The greatest value of a function of one or of a few variables.
+
+use crate::series::count;
 
 /// (√5 − 1)/2.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -24,25 +26,56 @@ pub(super) fn maximise(low: f64, high: f64, points: u32, f: impl Fn(f64) -> f64)
     f64::midpoint(left, right)
 }
 
+/// Where `f` is greatest near `start`, and its value there: the simplex of Nelder & Mead (1965, The Computer Journal 7(4)), begun anew once from where it
+/// settled. `None` if `f` is minus infinity at all corners of the first simplex, which lie one `step` from `start` along each axis.
+pub(super) fn climb<const N: usize>(start: [f64; N], step: [f64; N], f: impl Fn([f64; N]) -> f64) -> Option<([f64; N], f64)> {
+    let first = simplex(start, step, &f)?;
+    // A simplex may collapse before it is at the top; a new one of full dimension goes on. Smaller, because the top is near.
+    simplex(first.0, step.map(|step| step / 8.0), &f)
+}
+
+/// Function values closer than this are equal: a hundred millionth of what tells two likelihoods apart.
+const SETTLED: f64 = 1e-9;
+const MOST_ROUNDS: usize = 400;
+
+fn simplex<const N: usize>(start: [f64; N], step: [f64; N], f: &impl Fn([f64; N]) -> f64) -> Option<([f64; N], f64)> {
+    let with_value = |at: [f64; N]| (at, f(at));
+    let beside = |axis: usize| std::array::from_fn(|i| if i == axis { start[i] + step[i] } else { start[i] });
+    let mut corners: Vec<([f64; N], f64)> = std::iter::once(start).chain((0..N).map(beside)).map(with_value).collect();
+    for _ in 0..MOST_ROUNDS {
+        corners.sort_by(|one, other| other.1.total_cmp(&one.1));
+        let (best, worst) = (corners[0], corners[N]);
+        if best.1 - worst.1 <= SETTLED {
+            break;
+        }
+        let middle: [f64; N] = std::array::from_fn(|i| corners[..N].iter().map(|corner| corner.0[i]).sum::<f64>() / count(N));
+        // 1 is the worst corner mirrored at the middle of the others, 2 twice as far, ½ halfway, −½ halfway to the worst corner.
+        let along = |by: f64| with_value(std::array::from_fn(|i| middle[i] + by * (middle[i] - worst.0[i])));
+        let mirrored = along(1.0);
+        let next = if mirrored.1 > best.1 {
+            let farther = along(2.0);
+            if farther.1 > mirrored.1 { farther } else { mirrored }
+        } else if mirrored.1 > corners[N - 1].1 {
+            mirrored
+        } else {
+            along(if mirrored.1 > worst.1 { 0.5 } else { -0.5 })
+        };
+        if next.1 > worst.1 {
+            corners[N] = next;
+        } else {
+            for corner in &mut corners[1..] {
+                *corner = with_value(std::array::from_fn(|i| f64::midpoint(best.0[i], corner.0[i])));
+            }
+        }
+    }
+    corners.into_iter().max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > f64::NEG_INFINITY)
+}
+
 /// The standard error of an estimate of greatest likelihood from the curvature there: (−d²ln L/dx²)^−½, by central differences of step `h`. `None`
 /// where the likelihood is not curved.
 pub(super) fn standard_error(at: f64, h: f64, log_likelihood: impl Fn(f64) -> f64) -> Option<f64> {
     let curvature = (log_likelihood(at - h) - 2.0 * log_likelihood(at) + log_likelihood(at + h)) / (h * h);
     (curvature < 0.0).then(|| (-1.0 / curvature).sqrt())
-}
-
-/// The place where an increasing `f` crosses zero on `low..=high`; an end if it does not.
-pub(super) fn crossing(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
-    // 60 halvings leave 10⁻¹⁸ of the interval.
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if f(middle) < 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    f64::midpoint(low, high)
 }
 
 #[cfg(test)]
@@ -63,15 +96,20 @@ mod tests {
     }
 
     #[test]
+    fn the_top_of_a_narrow_ridge_is_found() {
+        // Rosenbrock's valley (1960), turned over: its top is at (1, 1). In three dimensions a peak beside a wall that cannot be entered.
+        let (at, value) = climb([-1.2, 1.0], [0.1, 0.1], |[x, y]| -100.0 * (y - x * x).powi(2) - (1.0 - x).powi(2)).unwrap();
+        assert!((at[0] - 1.0).abs() < 1e-3 && (at[1] - 1.0).abs() < 2e-3 && value > -1e-6, "{at:?} {value}");
+        let walled = |[x, y, z]: [f64; 3]| if z > 2.0 { f64::NEG_INFINITY } else { z - (x - 1.0).powi(2) - (y + z).powi(2) };
+        let (at, value) = climb([0.0; 3], [0.3; 3], walled).unwrap();
+        assert!((at[0] - 1.0).abs() < 0.01 && (value - 2.0).abs() < 0.01, "{at:?} {value}");
+        assert_eq!(climb([0.0], [1.0], |_| f64::NEG_INFINITY), None);
+    }
+
+    #[test]
     fn curvature_is_certainty() {
         let se = standard_error(2.0, 1e-3, |x| -(x - 2.0).powi(2) / (2.0 * 0.3 * 0.3)).unwrap();
         assert!((se - 0.3).abs() < 1e-6);
         assert_eq!(standard_error(0.0, 1e-3, |x| x), None);
-    }
-
-    #[test]
-    fn a_root_is_found_or_an_end() {
-        assert!((crossing(0.0, 2.0, |x| x * x - 2.0) - 2.0_f64.sqrt()).abs() < 1e-12);
-        assert!((crossing(0.0, 1.0, |_| -1.0) - 1.0).abs() < 1e-12);
     }
 }

@@ -1,24 +1,28 @@
 //! Which law do the delays follow?
 //!
-//! | law | estimate |
-//! | --- | --- |
-//! | normal | mean and deviation (greatest likelihood) |
-//! | Laplace | median and mean deviation from it (greatest likelihood) |
-//! | uniform | x₁ − w, xₙ + w with w = (xₙ − x₁)/(n − 1): unbiased of least variance |
-//! | lognormal, gamma, Weibull | shape and scale of greatest likelihood for the floor θ of Cohen & Whitten: F(x₁ − θ) = 1/(n + 1) |
+//! A delay x that a clock of resolution r shows is the interval x − r/2 to x + r/2. For each law that a link has ([`cohaptic_wan::law`]), mean, standard
+//! deviation and, for the lognormal, gamma and Weibull laws, the floor are those which make the intervals most probable,
 //!
-//! The condition on the floor (Cohen & Whitten 1980, JASA 75(370); 1982, Technometrics 24(4)) says that the least of n delays lies where the least of n
-//! is expected. Unlike the full likelihood, which is infinite at θ = x₁ for the lognormal law and for shapes below 1, it has one solution, if there is
-//! a floor above zero at all. For correlated delays n is the effective number, n·(1 − r₁)/(1 + r₁).
+//! ```text
+//! ln L = Σ ln(F(x + r/2) − F(x − r/2)),
+//! ```
 //!
-//! The laws are compared by Akaike's criterion, 2k − 2·ln L with k parameters; the least is chosen. Correlation makes the differences larger than they
-//! should be, but does not move them systematically to one of the laws.
+//! among those whose mean and standard deviation lie within one standard error of the sample's: sd/√m for the mean, sd·√((κ − 1)/4m) for the deviation,
+//! with the kurtosis κ of the sample and m independent delays that say as much. A law that is chosen for its form therefore never has other moments than the
+//! measurement. No law gains without bound at the least delay, because no interval has a probability above 1. Uniform laws reach from end to end: the part of the law
+//! beyond the inner end of the outermost interval is the share of the delays there, which is unbiased for a fine clock.
+//!
+//! A law fits if its distribution function is nowhere farther from that of the delays than 0.02 + 1.63/√m at ends of intervals (Kolmogorov): 1.63/√m is the 0.99
+//! quantile of the distance for the true law, and 0.02 is a difference that no application of a link notices. m counts as at least 50 here. A law with more parameters
+//! than two fewer than there are intervals could not fail and is left out. Among the laws that fit, Akaike's criterion, 2k − 2·ln L with k parameters, chooses; the least is
+//! best. Correlation makes the differences larger than they should be, but does not move them systematically to one of the laws.
 
+use cohaptic_wan::law::Law;
 use serde::Serialize;
-use statrs::function::gamma;
 
-use super::law::{DelayLaw, Law};
-use super::search::crossing;
+use super::cells::Cells;
+use super::law::DelayLaw;
+use super::search::climb;
 use crate::series::{self, count};
 
 /// One law fitted to the delays.
@@ -36,175 +40,222 @@ pub struct LawFit {
     /// Its shape: that of the gamma and Weibull laws, the standard deviation of the logarithm of the lognormal law.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<f64>,
-    /// ln L of the delays, in seconds, as if they were independent.
+    /// ln L of the intervals, as if delays were independent; not above zero.
     pub log_likelihood: f64,
     /// Akaike's criterion; less is better, and a difference of 10 is plain (Burnham & Anderson 2002).
     pub aic: f64,
-    /// The largest distance between the distribution functions of the data and of the law (Kolmogorov). The usual table does not apply, as the
-    /// parameters were fitted.
+    /// The largest distance between the distribution functions of the data and of the law, at ends of intervals (Kolmogorov).
     pub kolmogorov: f64,
+    /// The probability of a distance that is larger, if the law were true and its parameters not fitted: 2·Σ(−1)ᵏ⁻¹·e^(−2k²mD²) for m independent delays
+    /// (Smirnov 1948, The Annals of Mathematical Statistics 19(2)). It is too large for fitted parameters.
+    pub p_value: f64,
+    /// Whether the distance is within the limit ([`Goodness::kolmogorov_limit`](super::Goodness::kolmogorov_limit)).
+    pub fits: bool,
 }
 
-/// How many order statistics stand for all of them while a floor is looked for.
-const THINNED: usize = 4_000;
-/// The finest resolution of a distance of distribution functions.
-const COMPARED: usize = 50_000;
-/// Beyond this shape a gamma law is a normal law.
-const LARGEST_SHAPE: f64 = 1e4;
-const LEAST_SHAPE: f64 = 1e-2;
-
-/// All laws, the best first. `sorted` are at least two different delays, none negative.
-pub(super) fn fit_all(sorted: &[f64], effective: f64) -> Vec<LawFit> {
-    let mut fits: Vec<LawFit> = DelayLaw::ALL.into_iter().filter_map(|name| Some(judge(&fit(name, sorted, effective)?, sorted))).collect();
-    fits.sort_by(|one, other| one.aic.total_cmp(&other.aic));
-    fits
+/// A law that a link can have.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub(super) fit: LawFit,
+    pub(super) law: Law,
+    pub(super) asked: Asked,
 }
 
-fn judge(law: &Law, sorted: &[f64]) -> LawFit {
-    let floor_s = law.floor().filter(|&floor| floor > 0.0);
-    let name = law.name();
-    let parameters = match name {
-        DelayLaw::Normal | DelayLaw::Uniform | DelayLaw::Laplace => 2.0,
-        DelayLaw::Lognormal | DelayLaw::Gamma | DelayLaw::Weibull => {
-            if floor_s.is_some() {
-                3.0
-            } else {
-                2.0
-            }
-        }
+/// What a link is told of a law \[s\]. A law that is cut at zero has other moments.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Asked {
+    pub(super) mean: f64,
+    pub(super) sd: f64,
+    pub(super) floor: f64,
+}
+
+/// The moments of the sample, and their standard errors.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Moments {
+    pub(super) mean: f64,
+    pub(super) mean_error: f64,
+    pub(super) sd: f64,
+    pub(super) sd_error: f64,
+}
+
+/// A distance of distribution functions that does not matter.
+const NEAR: f64 = 0.02;
+/// The 0.99 quantile of Kolmogorov's law.
+const KOLMOGOROV_99: f64 = 1.627_624;
+/// Few independent delays prove nothing against a law, and nothing for it either: no larger distance is passed over than with this many.
+const LEAST_EFFECTIVE: f64 = 50.0;
+/// A delay that a law excludes counts as one of this probability: such a law is far behind, and still compared.
+const EXCLUDED: f64 = 1e-300;
+
+impl Moments {
+    /// Of at least two delays that are not all equal, as good as `effective` independent ones.
+    pub(super) fn of(delays: &[f64], effective: f64) -> Option<Self> {
+        let (mean, sd) = (series::mean(delays)?, series::variance(delays)?.sqrt());
+        let kurtosis = delays.iter().map(|delay| ((delay - mean) / sd).powi(4)).sum::<f64>() / count(delays.len());
+        let sd_error = sd * ((kurtosis - 1.0).max(0.0) / (4.0 * effective)).sqrt();
+        // Half of all at most, so that a deviation stays above zero: few independent delays of which one is far out.
+        Some(Self { mean, mean_error: sd / effective.sqrt(), sd, sd_error: sd_error.min(sd / 2.0) })
+    }
+
+    /// The place of these moments in units of their errors, moved within one of them.
+    fn within(&self, [mean, sd]: [f64; 2]) -> [f64; 2] {
+        [self.mean + self.mean_error * mean.clamp(-1.0, 1.0), self.sd + self.sd_error * sd.clamp(-1.0, 1.0)]
+    }
+
+    /// Whether the law delivers these moments: one that is cut at zero has others than it was asked for. Rounding is granted.
+    fn has(&self, law: &Law) -> bool {
+        let near = |found: f64, wanted: f64, error: f64| (found - wanted).abs() <= error + 1e-9 * self.sd;
+        near(law.mean(), self.mean, self.mean_error) && near(law.sd(), self.sd, self.sd_error)
+    }
+}
+
+/// How far from the data a law may be that fits.
+pub(super) fn limit(effective: f64) -> f64 {
+    NEAR + KOLMOGOROV_99 / effective.max(LEAST_EFFECTIVE).sqrt()
+}
+
+/// All laws, those that fit first, the best first of each. `cells` hold delays that are not all equal and none of which is negative.
+pub(super) fn fit_all(cells: &Cells, moments: &Moments, effective: f64) -> Vec<Candidate> {
+    let (coarse, judged) = (cells.coarse(), cells.judged());
+    let of_law = |name: DelayLaw| {
+        let asked = fit(name, &coarse, moments, effective)?;
+        let law = law(name, asked).filter(|law| moments.has(law))?;
+        let parameters = if begins_at_floor(name) && asked.floor > 0.0 { 3.0 } else { 2.0 };
+        (parameters <= count(cells.cells.len()) - 2.0).then(|| Candidate {
+            fit: judge(name, asked, &law, parameters, &judged, effective),
+            law,
+            asked,
+        })
     };
-    let log_likelihood = sorted.iter().map(|&delay| law.log_density(delay)).sum::<f64>();
+    let mut all: Vec<Candidate> = DelayLaw::ALL.into_iter().filter_map(of_law).collect();
+    all.sort_by(|one, other| other.fit.fits.cmp(&one.fit.fits).then(one.fit.aic.total_cmp(&other.fit.aic)));
+    all
+}
+
+/// Whether the floor of a law is a parameter of its own.
+const fn begins_at_floor(name: DelayLaw) -> bool {
+    matches!(name, DelayLaw::Lognormal | DelayLaw::Gamma | DelayLaw::Weibull)
+}
+
+fn law(name: DelayLaw, Asked { mean, sd, floor }: Asked) -> Option<Law> {
+    Law::new(&name.into(), mean, sd, Some(floor)).ok()
+}
+
+fn judge(name: DelayLaw, asked: Asked, law: &Law, parameters: f64, judged: &Cells, effective: f64) -> LawFit {
+    let log_likelihood = log_likelihood(law, judged);
+    let kolmogorov = kolmogorov(law, judged);
+    let least = if name == DelayLaw::Uniform { law.least() } else { asked.floor };
     LawFit {
         distribution: name,
         mean_s: law.mean(),
         sd_s: law.sd(),
-        floor_s,
-        shape: law.shape(),
+        floor_s: Some(least).filter(|&floor| floor > 0.0),
+        shape: shape(name, law, asked),
         log_likelihood,
         aic: 2.0 * parameters - 2.0 * log_likelihood,
-        kolmogorov: kolmogorov(law, sorted),
+        kolmogorov,
+        p_value: farther(effective.sqrt() * kolmogorov),
+        fits: kolmogorov <= limit(effective),
     }
 }
 
-/// Exact up to 50 000 delays; with more, at 50 000 of them, which misses at most 1/50 000.
-fn kolmogorov(law: &Law, sorted: &[f64]) -> f64 {
-    let n = count(sorted.len());
-    let step = sorted.len().div_ceil(COMPARED);
-    let distance = |(i, &delay): (usize, &f64)| {
-        let below = law.below(delay);
-        (below - count(i) / n).max(count(i + 1) / n - below)
-    };
-    sorted.iter().enumerate().step_by(step).map(distance).fold(0.0, f64::max)
-}
-
-fn fit(name: DelayLaw, sorted: &[f64], effective: f64) -> Option<Law> {
-    let (least, greatest) = (*sorted.first()?, *sorted.last()?);
-    match name {
-        DelayLaw::Normal => {
-            let mean = series::mean(sorted)?;
-            let n = count(sorted.len());
-            Some(Law::Normal { mean, sd: (series::variance(sorted)? * (n - 1.0) / n).sqrt() })
-        }
-        DelayLaw::Uniform => {
-            let widening = (greatest - least) / (effective - 1.0).max(1.0);
-            Some(Law::Uniform { low: (least - widening).max(0.0), high: greatest + widening })
-        }
-        DelayLaw::Laplace => {
-            let middle = f64::midpoint(sorted[(sorted.len() - 1) / 2], sorted[sorted.len() / 2]);
-            let spread = series::mean(&sorted.iter().map(|delay| (delay - middle).abs()).collect::<Vec<_>>())?;
-            (spread > 0.0).then_some(Law::Laplace { middle, spread })
-        }
-        DelayLaw::Lognormal | DelayLaw::Gamma | DelayLaw::Weibull => {
-            let floor = floor(name, sorted, effective)?;
-            fit_above(name, floor, sorted)
-        }
-    }
-}
-
-/// The floor θ at which F(x₁ − θ) = 1/(n + 1); 0 if no floor above zero is far enough below x₁.
-fn floor(name: DelayLaw, sorted: &[f64], effective: f64) -> Option<f64> {
-    let &least = sorted.first()?;
-    let thinned = thin(sorted);
-    let median = thinned[thinned.len() / 2];
-    let wanted = 1.0 / (effective + 1.0);
-    let excess = |floor: f64| fit_above(name, floor, &thinned).map(|law| law.below(least) - wanted);
-    if least <= 0.0 {
-        // A delay of zero has no logarithm: only a floor of zero is left, and no law with one.
-        return None;
-    }
-    if excess(0.0).is_none_or(|excess| excess < 0.0) {
-        return Some(0.0);
-    }
-    // In the logarithm of the distance below x₁. A part in 10⁹ of the typical distance above it is as good as none.
-    let nearest = (1e-9 * (median - least).max(1e-3 * (sorted[sorted.len() - 1] - least))).min(least);
-    let distance = crossing(nearest.ln(), least.ln(), |log_distance| excess(least - log_distance.exp()).unwrap_or(1.0)).exp();
-    Some((least - distance).max(0.0))
-}
-
-/// The most order statistics, at the middles of equal shares; the least is among them.
-fn thin(sorted: &[f64]) -> Vec<f64> {
-    if sorted.len() <= THINNED {
-        return sorted.to_vec();
-    }
-    (0..THINNED).map(|i| sorted[(2 * i + 1) * sorted.len() / (2 * THINNED)]).collect()
-}
-
-/// The law of greatest likelihood above that floor, which lies below all delays. `None` where it degenerates.
-fn fit_above(name: DelayLaw, floor: f64, delays: &[f64]) -> Option<Law> {
-    let logs: Vec<f64> = delays.iter().map(|delay| (delay - floor).ln()).collect();
-    let mean_log = series::mean(&logs).filter(|mean| mean.is_finite())?;
-    let n = count(delays.len());
-    let sd_log = (series::variance(&logs)? * (n - 1.0) / n).sqrt();
-    if sd_log <= 0.0 {
-        return None;
-    }
+fn shape(name: DelayLaw, law: &Law, Asked { mean, sd, floor }: Asked) -> Option<f64> {
+    let above = mean - floor;
+    let variation = sd / above;
     match name {
         DelayLaw::Normal | DelayLaw::Uniform | DelayLaw::Laplace => None,
-        DelayLaw::Lognormal => Some(Law::Lognormal { floor, mean_log, sd_log }),
-        DelayLaw::Gamma => {
-            let mean = series::mean(delays)? - floor;
-            // ln k − ψ(k) = ln(mean) − mean of the logarithms (Johnson, Kotz & Balakrishnan 1994, 17.42); the left side falls with k.
-            let wanted = mean.ln() - mean_log;
-            let gap = |shape: f64| shape.ln() - gamma::digamma(shape);
-            if !(gap(LARGEST_SHAPE)..gap(LEAST_SHAPE)).contains(&wanted) {
-                return None;
-            }
-            let shape = crossing(LEAST_SHAPE.ln(), LARGEST_SHAPE.ln(), |log| wanted - gap(log.exp())).exp();
-            Some(Law::Gamma { floor, shape, scale: mean / shape })
-        }
+        DelayLaw::Lognormal => Some((variation * variation).ln_1p().sqrt()),
+        DelayLaw::Gamma => Some(1.0 / (variation * variation)),
         DelayLaw::Weibull => {
-            let shape = weibull_shape(&logs, mean_log, sd_log)?;
-            // Scale about the greatest logarithm, so that no power overflows.
-            let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let power = logs.iter().map(|log| (shape * (log - top)).exp()).sum::<f64>() / n;
-            Some(Law::Weibull { floor, shape, scale: (top + power.ln() / shape).exp() })
+            // −ln S grows as the distance from the floor to the power of the shape.
+            let hazard = |x: f64| -law.survival(floor + x).ln();
+            Some((hazard(above) / hazard(above / 2.0)).log2())
         }
     }
 }
 
-/// The root of Σxᵏ·ln x/Σxᵏ − 1/k − mean of ln x (Johnson, Kotz & Balakrishnan 1994, 21.49), which increases in k: Newton from the estimate of the
-/// moments of ln x, π/(√6·sd).
-fn weibull_shape(logs: &[f64], mean_log: f64, sd_log: f64) -> Option<f64> {
-    let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let mut shape = std::f64::consts::PI / (6.0_f64.sqrt() * sd_log);
-    for _ in 0..100 {
-        let [s0, s1, s2] = logs.iter().fold([0.0; 3], |[s0, s1, s2], log| {
-            let weight = (shape * (log - top)).exp();
-            [s0 + weight, s1 + weight * log, s2 + weight * log * log]
-        });
-        let value = s1 / s0 - 1.0 / shape - mean_log;
-        let slope = s2 / s0 - (s1 / s0).powi(2) + 1.0 / (shape * shape);
-        // Never further than by half or to double: the function is not convex everywhere.
-        let next = (shape - value / slope).clamp(shape / 2.0, shape * 2.0);
-        if !(LEAST_SHAPE..LARGEST_SHAPE).contains(&next) {
-            return None;
-        }
-        if (next - shape).abs() <= 1e-10 * shape {
-            return Some(next);
-        }
-        shape = next;
+fn log_likelihood(law: &Law, Cells { cells, n }: &Cells) -> f64 {
+    let mut before = 0.0;
+    let logarithm = |cell: &super::cells::Cell| {
+        // A difference of the smaller tail keeps its digits.
+        let lower_half = before + cell.count / 2.0 < n / 2.0;
+        let probability = if lower_half { law.cdf(cell.high) - law.cdf(cell.low) } else { law.survival(cell.low) - law.survival(cell.high) };
+        before += cell.count;
+        cell.count * probability.max(EXCLUDED).ln()
+    };
+    cells.iter().map(logarithm).sum()
+}
+
+fn kolmogorov(law: &Law, Cells { cells, n }: &Cells) -> f64 {
+    let mut before = 0.0;
+    let distance = |cell: &super::cells::Cell| {
+        let at_low = (law.cdf(cell.low) - before / n).abs();
+        before += cell.count;
+        at_low.max((law.cdf(cell.high) - before / n).abs())
+    };
+    cells.iter().map(distance).fold(0.0, f64::max)
+}
+
+/// The probability that Kolmogorov's law is above x.
+fn farther(x: f64) -> f64 {
+    if x < 0.2 {
+        // Above 1 − 10⁻¹², where the series needs many terms.
+        return 1.0;
     }
-    None
+    let term = |k: u32| (-2.0 * (f64::from(k) * x).powi(2)).exp();
+    // Pairs of terms of opposite signs; beyond 40 terms nothing is left.
+    (2.0 * (1..40).step_by(2).map(|k| term(k) - term(k + 1)).sum::<f64>()).clamp(0.0, 1.0)
+}
+
+/// The most probable law of that name; `None` if no law of that name has the moments.
+fn fit(name: DelayLaw, cells: &Cells, moments: &Moments, effective: f64) -> Option<Asked> {
+    if name == DelayLaw::Uniform {
+        return uniform(cells, moments, effective);
+    }
+    let likelihood = |asked: Asked| {
+        let law = law(name, asked).filter(|law| moments.has(law));
+        law.map_or(f64::NEG_INFINITY, |law| log_likelihood(&law, cells))
+    };
+    // Sines stay within one error and have no flat part beyond it, on which a simplex would settle.
+    if !begins_at_floor(name) {
+        let of = |at: [f64; 2]| {
+            let [mean, sd] = moments.within(at.map(f64::sin));
+            Asked { mean, sd, floor: 0.0 }
+        };
+        return climb([0.0; 2], [0.5; 2], |at| likelihood(of(at))).map(|(at, _)| of(at));
+    }
+    // The floor by the logarithm of its distance below the upper end of the least interval, beyond which no floor can lie.
+    let top = cells.cells.first()?.high;
+    let of = |[mean, sd, log_distance]: [f64; 3]| {
+        let [mean, sd] = moments.within([mean.sin(), sd.sin()]);
+        Asked { mean, sd, floor: (top - log_distance.exp()).max(0.0) }
+    };
+    // From a tenth of a cell to a hundred deviations below, where each of these laws is nearly normal: the likelihood may have several tops.
+    let nearest = (top - cells.cells.first()?.low) / 10.0;
+    let farthest = (100.0 * moments.sd).min(top).max(2.0 * nearest);
+    let starts = (0..=STARTS).map(|i| [0.0, 0.0, nearest.ln() + (farthest / nearest).ln() * f64::from(i) / f64::from(STARTS)]);
+    let start = starts.map(|at| (at, likelihood(of(at)))).max_by(|one, other| one.1.total_cmp(&other.1))?.0;
+    climb(start, [0.5; 3], |at| likelihood(of(at))).map(|(at, _)| of(at))
+}
+
+/// Floors that are tried first.
+const STARTS: u32 = 24;
+
+fn uniform(cells: &Cells, moments: &Moments, effective: f64) -> Option<Asked> {
+    let (first, last) = (cells.cells.first()?, cells.cells.last()?);
+    // The part of the law beyond the inner end of the outermost interval.
+    let beyond = |cell: &super::cells::Cell| (cell.count / (cells.n + 1.0)).max(1.0 / (effective + 1.0));
+    let width = (last.low - first.high) / (1.0 - beyond(first) - beyond(last));
+    if !(width.is_finite() && width > 0.0) {
+        return None;
+    }
+    let (low, high) = ((first.high - beyond(first) * width).max(0.0), last.low + beyond(last) * width);
+    let place = |value: f64, at: f64, error: f64| if error > 0.0 { (value - at) / error } else { 0.0 };
+    let [mean, _] = moments.within([place(f64::midpoint(low, high), moments.mean, moments.mean_error), 0.0]);
+    // A mean that had to be moved: the law still reaches over both ends, if its deviation may be that large.
+    let half = (mean - low).max(high - mean);
+    let [mean, sd] = moments.within([place(mean, moments.mean, moments.mean_error), place(half / 3.0_f64.sqrt(), moments.sd, moments.sd_error)]);
+    Some(Asked { mean, sd, floor: 0.0 })
 }
 
 #[cfg(test)]

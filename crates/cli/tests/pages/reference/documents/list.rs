@@ -471,8 +471,12 @@ pub(super) const DOCUMENTS: [Document; 24] = [
         command: "fit",
         lines: &["python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --least 20ms --json"],
         rows: &[
-            ("link.NAME", "the link that fits best"),
-            ("goodness.NAME", "what was measured, and how well each law and each model of loss fits"),
+            ("link.NAME", "the link that fits best; `link.jitter.distribution` is `empirical` where no law fits"),
+            (
+                "goodness.NAME",
+                "what was measured, and how well each law and each model of loss fits: `resolution_s` of the clock, `effective` number of delays; of each law \
+                 `kolmogorov`, its `p_value`, and whether it `fits`, with a distance of at most `kolmogorov_limit`",
+            ),
             ("scene", "the `[link]` table as text"),
             (
                 "skew.seconds_per_second, skew.standard_error, skew.interval_99, skew.significant, skew.location, skew.blocks",
