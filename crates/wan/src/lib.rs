@@ -48,6 +48,7 @@
 
 extern crate alloc;
 
+pub mod delay_table;
 mod event_queue;
 mod fates;
 mod laws;

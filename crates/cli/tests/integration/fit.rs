@@ -216,13 +216,45 @@ fn a_link_that_no_scene_reads_is_not_written() {
     assert_eq!(desk.files("."), ["m.csv"]);
 }
 
+/// One file for both: a packet each 10 ms, of which five were lost, with a byte order mark, milliseconds, columns of others, and two packets at one instant.
+#[test]
+fn what_is_fitted_can_be_replayed() {
+    let mut rows = "\u{feff}number,delay_ms,t_ms\n".to_owned();
+    for i in 0..100 {
+        let delay = match i {
+            7 | 8 => "-1".to_owned(),
+            30 => "NaN".to_owned(),
+            31 => "NA".to_owned(),
+            60 => String::new(),
+            _ => format!("{}", 20 + i * 37 % 11),
+        };
+        let _ = writeln!(rows, "{i},{delay},{}", i * 10);
+        if i == 40 {
+            let _ = writeln!(rows, "more,{delay},{}", i * 10);
+        }
+    }
+    let desk = Desk::with("m.csv", &rows);
+    let goodness = &desk.json("fit m.csv --json")["goodness"];
+    assert_eq!((goodness["packets"].as_u64(), goodness["received"].as_u64()), (Some(101), Some(96)), "{goodness:#}");
+    let document = desk.json("link trace=m.csv --packets 100 --every 10ms --fates f.csv --json");
+    assert_eq!((document["fates"]["delivered"].as_u64(), document["fates"]["dropped"]["loss"].as_u64()), (Some(95), Some(5)), "{document:#}");
+    let lost: Vec<String> =
+        desk.read("f.csv").lines().filter(|row| row.contains(",loss,")).map(|row| row.split(',').next().unwrap().to_owned()).collect();
+    assert_eq!(lost, ["7", "8", "30", "31", "60"]);
+    // The third packet: 20 + 2·37 modulo 11 ms.
+    assert!(desk.read("f.csv").contains("\n2,0,20000000,64,48000000,delivered,0,0\n"), "{}", desk.read("f.csv"));
+    // Instants of delivery may have a byte order mark, too.
+    desk.write("line.trace", "\u{feff}1\n2\n");
+    assert_eq!(desk.json("link trace=line.trace --packets 10 --json")["fates"]["delivered"].as_u64(), Some(10));
+}
+
 #[test]
 fn what_cannot_be_estimated_is_refused() {
     let desk = Desk::with("m.csv", "t,delay\n0,0.1\n1,0.2\n");
     desk.write("bad.csv", "t,delay\n0,soon\n");
     for (line, status, part) in [
         ("fit m.csv", 2, "m.csv: only 2 packets arrived: expected at least 50"),
-        ("fit bad.csv", 2, "bad.csv: line 2, column delay: found \"soon\", expected a decimal number"),
+        ("fit bad.csv", 2, "bad.csv: line 2, column delay: found \"soon\", expected a decimal number, or for a lost packet"),
         ("fit gone.csv", 3, "cannot read gone.csv"),
         ("fit m.csv bad.csv", 2, "m.csv, bad.csv: the capture of the sender"),
         ("fit m.csv --port 9", 2, "RECEIVER"),

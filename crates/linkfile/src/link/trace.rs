@@ -5,11 +5,12 @@ use std::time::Duration;
 
 use cohaptic_units::print::Span;
 use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::delay_table::DelayTableError;
 use cohaptic_wan::{Between, DeliveryTrace, DeliveryTraceError, FateLog, FateLogError, MAHIMAHI_BYTES, PathTrace, PathTraceError};
 
 use super::is_none;
 use crate::document::Node;
-use crate::reading::named_file::{Fault, file_path, read_file};
+use crate::reading::named_file::{Fault, file_path, line_span, read_file};
 use crate::reading::{Context, TableReader, values};
 
 /// What a file has recorded.
@@ -121,9 +122,10 @@ fn outside(path: &PathTrace, ends: Option<Duration>) -> Option<String> {
 
 /// A file whose first line is a number has instants of delivery; any other one is a CSV.
 fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Trace, Fault> {
-    let first = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
+    let content = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let first = content.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
     if first.parse::<f64>().is_ok() {
-        return DeliveryTrace::parse(text, bytes).map(Trace::Delivery).map_err(|error| {
+        return DeliveryTrace::parse(content, bytes).map(Trace::Delivery).map_err(|error| {
             let line = match &error {
                 DeliveryTraceError::Number { line } | DeliveryTraceError::Order { line, .. } => Some(*line),
                 DeliveryTraceError::NoLength | DeliveryTraceError::Empty | DeliveryTraceError::NoBytes => None,
@@ -133,32 +135,23 @@ fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Tra
     }
     PathTrace::parse(text, between, repeat).map(Trace::Path).map_err(|error| {
         let line = match &error {
-            PathTraceError::Header => {
+            PathTraceError::Table(DelayTableError::Columns { line, .. }) => {
                 let message = "no recording: expected the columns t,delay or t,delay,loss, or a whole number of milliseconds on each line".to_owned();
-                return Fault { span: header_span(text), message };
+                return Fault { span: line_span(text, *line), message };
             }
-            PathTraceError::Columns { line, .. } | PathTraceError::Value { line, .. } | PathTraceError::Order { line } => Some(*line),
+            PathTraceError::Table(error) => Some(error.line()),
+            PathTraceError::Value { line, .. } => Some(*line),
             PathTraceError::Empty | PathTraceError::NoLength => None,
         };
         Fault::in_line(text, line, &error)
     })
 }
 
-/// The first line that says anything.
-fn header_span(text: &str) -> core::ops::Range<usize> {
-    content_span(text, 0)
-}
-
-/// The line below the columns.
+/// The line below the columns: the second one that says anything.
 fn first_row_span(text: &str) -> core::ops::Range<usize> {
-    content_span(text, 1)
-}
-
-/// A line that says anything, counted from 0.
-fn content_span(text: &str, number: usize) -> core::ops::Range<usize> {
     let content = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
-    let line = text.lines().enumerate().filter(|(_, line)| content(line)).nth(number).map_or(1, |(place, _)| place + 1);
-    crate::reading::named_file::line_span(text, line)
+    let line = text.lines().enumerate().filter(|(_, line)| content(line)).nth(1).map_or(1, |(place, _)| place + 1);
+    line_span(text, line)
 }
 
 pub(super) fn read_replay(node: &Node, context: Context<'_>) -> Option<Arc<FateLog>> {

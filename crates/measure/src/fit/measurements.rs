@@ -80,6 +80,11 @@ impl Measurements {
             }
         }
         // A log stands in the order of sending, and its instants are finite.
+        Self::in_order(packets)
+    }
+
+    /// Packets that are known to be finite and in the order of sending.
+    pub(super) const fn in_order(packets: Vec<Measurement>) -> Self {
         Self { packets, removed: None }
     }
 

@@ -14,8 +14,8 @@
 //!
 //! # Files of measurements
 //!
-//! [`Measurements::from_csv`] reads the columns `t,delay[,lost]` or `sent,arrived`, in seconds unless the name ends in `_ms`, `_us` or `_ns`; an empty
-//! delay or arrival, or `lost` = 1, is a lost packet. [`captures::between`] reads a pair of captures of the two ends.
+//! [`Measurements::from_csv`] reads the columns `t,delay[,lost]` or `sent,arrived` ([`cohaptic_wan::delay_table`]). [`captures::between`] reads a pair of captures of
+//! the two ends.
 
 pub mod captures;
 mod cells;
@@ -47,7 +47,6 @@ pub use loss::{LossFit, LossModel};
 pub use measurements::{Measurement, Measurements, MeasurementsError};
 pub use skew::{Location, Skew, SkewError};
 pub use steps::Step;
-pub use table::TableError;
 
 use cells::Cells;
 use distribution::Moments;

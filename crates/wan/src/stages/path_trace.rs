@@ -5,10 +5,11 @@ use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
+use crate::delay_table::{self, Attoseconds, DelayRow, DelayTableError};
 use crate::parameters::{Form, Key, Table, required, usual};
 use cohaptic_units::{Instant, Probability};
 
-/// Delay and loss over time, as measured: a CSV of `t,delay,loss`, times in seconds.
+/// Delay and loss over time, as measured: a [table of delays](crate::delay_table), perhaps with a column `loss`.
 ///
 /// Between two rows the delay is that of the earlier one, or on the line between them; the loss is always that of the earlier one. Before the first row the
 /// first holds. After the last row it holds for ever, or the recording begins anew.
@@ -38,18 +39,11 @@ struct Row {
 }
 
 /// Why a recording is refused. Lines count from 1.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub enum PathTraceError {
-    /// The first line names no such columns.
-    Header,
-    /// A row has another number of columns.
-    Columns {
-        /// Which line.
-        line: usize,
-        /// How many.
-        expected: usize,
-    },
-    /// A value is no number, or not one that it can be.
+    /// The text is no table of delays.
+    Table(DelayTableError),
+    /// A number is not one that it can be.
     Value {
         /// Which line.
         line: usize,
@@ -57,11 +51,6 @@ pub enum PathTraceError {
         column: &'static str,
         /// What was expected.
         expected: &'static str,
-    },
-    /// A row is not later than the one above.
-    Order {
-        /// Which line.
-        line: usize,
     },
     /// There is no row.
     Empty,
@@ -72,10 +61,8 @@ pub enum PathTraceError {
 impl fmt::Display for PathTraceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Header => f.write_str("line 1: expected the columns t,delay or t,delay,loss"),
-            Self::Columns { line, expected } => write!(f, "line {line}: expected {expected} columns"),
+            Self::Table(error) => error.fmt(f),
             Self::Value { line, column, expected } => write!(f, "line {line}, column {column}: expected {expected}"),
-            Self::Order { line } => write!(f, "line {line}: expected a time later than that of the row above"),
             Self::Empty => f.write_str("no row below the columns: expected at least one"),
             Self::NoLength => f.write_str("a recording that repeats needs a last row later than 0 s"),
         }
@@ -85,32 +72,16 @@ impl fmt::Display for PathTraceError {
 impl core::error::Error for PathTraceError {}
 
 impl PathTrace {
-    /// Reads a CSV: a line with the columns `t,delay` or `t,delay,loss`, then one row a line, times in seconds, loss as a probability from 0 to 1. An empty
-    /// delay means that everything is lost. Blank lines and lines that begin with # are skipped.
+    /// Reads a table of delays, as [`delay_table`] describes it, with times and delays from 0 to 9·10⁹ s. A column `loss` may hold the probability of loss from each
+    /// row on. While the row of a lost packet holds, everything is lost. Of rows with equal times the last one holds.
     ///
     /// # Errors
     ///
     /// [`PathTraceError`] with the line. Never panics.
     pub fn parse(text: &str, between: Between, repeats: bool) -> Result<Self, PathTraceError> {
-        let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
-        let header: Vec<&str> = lines.next().ok_or(PathTraceError::Header)?.1.split(',').map(str::trim).collect();
-        let columns = match *header {
-            ["t", "delay"] => 2,
-            ["t", "delay", "loss"] => 3,
-            _ => return Err(PathTraceError::Header),
-        };
         let mut rows: Vec<Row> = Vec::new();
-        for (place, text) in lines {
-            let line = place + 1;
-            let values: Vec<&str> = text.split(',').map(str::trim).collect();
-            if values.len() != columns {
-                return Err(PathTraceError::Columns { line, expected: columns });
-            }
-            let row = row(line, &values, rows.last())?;
-            if rows.last().is_some_and(|last| last.at >= row.at) {
-                return Err(PathTraceError::Order { line });
-            }
-            rows.push(row);
+        for table_row in delay_table::read(text).map_err(PathTraceError::Table)? {
+            rows.push(row(&table_row, rows.last())?);
         }
         match rows.last() {
             None => Err(PathTraceError::Empty),
@@ -181,27 +152,21 @@ impl PathTrace {
     }
 }
 
-fn row(line: usize, values: &[&str], above: Option<&Row>) -> Result<Row, PathTraceError> {
-    const TIME: &str = "a time in seconds, from 0 to 9e9";
-    let seconds = |column, text: &str| {
-        let seconds = text.parse().ok().filter(|seconds| (0.0..=9e9).contains(seconds));
-        let seconds: f64 = seconds.ok_or(PathTraceError::Value { line, column, expected: TIME })?;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 9e18")]
-        Ok(libm::rint(seconds * 1e9) as u64)
-    };
-    let at = Instant::from_nanos(seconds("t", values[0])?);
-    if values[1].is_empty() {
+/// The longest time and delay of a recording \[ns\].
+const MOST: u64 = 9_000_000_000_000_000_000;
+
+fn row(row: &DelayRow, above: Option<&Row>) -> Result<Row, PathTraceError> {
+    let refused = |column, expected| PathTraceError::Value { line: row.line, column, expected };
+    let nanos = |column, time: Attoseconds| time.nanos().filter(|nanos| *nanos <= MOST).ok_or_else(|| refused(column, "a time from 0 to 9e9 s"));
+    let at = Instant::from_nanos(nanos("t", row.sent)?);
+    let Some(delay) = row.delay else {
         return Ok(Row { at, delay_nanos: above.map_or(0, |above| above.delay_nanos), loss: Probability::ONE });
-    }
-    let loss = match values.get(2) {
-        None => Probability::ZERO,
-        Some(text) => text.parse().ok().and_then(|value| Probability::new(value).ok()).ok_or(PathTraceError::Value {
-            line,
-            column: "loss",
-            expected: "a probability from 0 to 1",
-        })?,
     };
-    Ok(Row { at, delay_nanos: seconds("delay", values[1])?, loss })
+    let loss = match row.loss.as_str() {
+        "" => Probability::ZERO,
+        text => text.parse().ok().and_then(|value| Probability::new(value).ok()).ok_or_else(|| refused("loss", "a probability from 0 to 1"))?,
+    };
+    Ok(Row { at, delay_nanos: nanos("delay", delay)?, loss })
 }
 
 /// The parameter of recorded lines and paths.
@@ -212,7 +177,11 @@ pub(crate) const KEYS: [Key; 1] = [usual(
     "A recorded line or path, from a file; \"none\" takes it away",
 )];
 static TRACE: Table = Table::of(&[&[
-    required("file", Form::File, "Instants of delivery in milliseconds, one a line (mahimahi), or a CSV with t,delay or t,delay,loss in seconds"),
+    required(
+        "file",
+        Form::File,
+        "Instants of delivery in milliseconds, one a line (mahimahi), or a CSV with t,delay or t,delay,loss in seconds, or what fit reads",
+    ),
     usual("bytes", Form::Size, "\"1504B\"", "What leaves at each instant of delivery"),
     usual("between", Form::Words(&BETWEEN), "\"steps\"", "What holds between two rows of a recorded path"),
     usual("repeat", Form::Boolean, "false", "Whether a recorded path begins anew after its end"),
@@ -258,6 +227,22 @@ mod tests {
         assert_eq!(delays(Between::Lines, true), expected);
     }
 
+    /// A recording is read like measurements are: byte order mark, units, columns in any order and more of them, equal times, and lost packets as programs write them.
+    #[test]
+    fn what_is_measured_is_replayed() {
+        let plain = |text| PathTrace::parse(text, Between::Steps, false).unwrap();
+        let expected = plain("t,delay\n0,0.020\n0.010,0.030\n0.020,\n0.030,\n0.040,\n0.050,\n0.060,0.025\n");
+        let measured = "\u{feff}number,delay_ms,T_ms,lost\n0,20,0,0\n1,99,10,0\n2,30,10,0\n3,-1,20,0\n4,NaN,30,\n5,NA,40,0\n6,77,50,1\n7,25,60,0\n";
+        let at = |trace: &PathTrace, ms: u64| trace.at(Instant::from_nanos(ms * 1_000_000));
+        for ms in 0..80 {
+            assert_eq!(at(&plain(measured), ms), at(&expected, ms), "{ms}");
+        }
+        assert_eq!(at(&expected, 35), (30_000_000, Probability::ONE));
+        // On the line to and from an instant with two rows, too.
+        let lines = PathTrace::parse("sent,arrived\n0,0.02\n1,1.04\n1,1.01\n2,2.01\n", Between::Lines, false).unwrap();
+        assert_eq!([500, 999, 1000, 1500].map(|ms| at(&lines, ms).0 / 100_000), [300, 399, 100, 100]);
+    }
+
     #[test]
     fn times_may_count_from_the_first_row() {
         let since_1970 = "t,delay,loss\n1700000000,0.020,0\n1700000001.5,0.040,0.5\n1700000002,0.010,0\n";
@@ -274,13 +259,14 @@ mod tests {
     #[test]
     fn what_is_no_recording_is_refused() {
         let error = |text: &str| PathTrace::parse(text, Between::Steps, true).unwrap_err();
-        assert_eq!(error(""), PathTraceError::Header);
-        assert_eq!(error("a,b\n"), PathTraceError::Header);
+        assert!(matches!(error(""), PathTraceError::Table(DelayTableError::Columns { line: 1, .. })));
+        assert!(matches!(error("a,b\n"), PathTraceError::Table(DelayTableError::Columns { line: 1, .. })));
         assert_eq!(error("t,delay\n"), PathTraceError::Empty);
         assert_eq!(error("t,delay\n0,1\n"), PathTraceError::NoLength);
-        assert_eq!(error("t,delay\n1,1\n1,2\n"), PathTraceError::Order { line: 3 });
-        assert_eq!(error("t,delay\n1,1,1\n"), PathTraceError::Columns { line: 2, expected: 2 });
-        assert!(matches!(error("t,delay\n1,nan\n"), PathTraceError::Value { line: 2, column: "delay", .. }));
+        assert!(matches!(error("t,delay\n1,1\n0.9,2\n"), PathTraceError::Table(DelayTableError::TimeGoesBack { line: 3, .. })));
+        assert!(matches!(error("t,delay\n1,soon\n"), PathTraceError::Table(DelayTableError::Cell { line: 2, .. })));
+        assert!(matches!(error("t,delay\n1,-0.5\n"), PathTraceError::Value { line: 2, column: "delay", .. }));
+        assert!(matches!(error("t,delay\n-1,0.5\n"), PathTraceError::Value { line: 2, column: "t", .. }));
         assert!(matches!(error("t,delay,loss\n1,1,1.5\n"), PathTraceError::Value { line: 2, column: "loss", .. }));
     }
 }
