@@ -32,7 +32,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// A cell is no narrower than this part of the mean deviation from the median: the difference of two probabilities then keeps six digits, and a law cannot
 /// gain from a single delay.
 const NARROWEST: f64 = 1e-6;
-/// So many cells are few.
+/// Samples of at most this number of cells need no coarser ones.
 const FEW: usize = 200;
 /// The share of the delays beyond a cell, on its shorter side, that are put into one cell while a law is looked for.
 const COARSE: f64 = 1.0 / 12.0;
@@ -76,7 +76,7 @@ fn step(differences: &[f64]) -> f64 {
     count_u64(differences.iter().fold(0_u64, |common, difference| greatest_common_divisor(whole(*difference), common)).max(1))
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative; what is beyond 2^64 units is that")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative; a number beyond 2^64 becomes 2^64 - 1")]
 fn whole(units: f64) -> u64 {
     units.round() as u64
 }

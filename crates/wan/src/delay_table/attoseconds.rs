@@ -38,7 +38,7 @@ impl Attoseconds {
         Some(Self(if negative { -value } else { value }))
     }
 
-    /// So many nanoseconds; `None` if they are too many.
+    /// The time of this number of nanoseconds; `None` if the number is too large.
     #[must_use]
     pub const fn from_nanos(nanos: i128) -> Option<Self> {
         match nanos.checked_mul(1_000_000_000) {
