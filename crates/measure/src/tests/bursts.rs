@@ -2,7 +2,7 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::fit::{DelayLaw, LossModel, Measurement, Measurements, fit};
+use crate::fit::{DelayLaw, FittedLaw, LossModel, Measurement, Measurements, fit};
 use crate::tests::TestRng;
 
 /// Bursts each 10 ms of that number of packets, with normal delays of 30 ± 2 ms; each packet is lost with probability 0.1, whichever others are.
@@ -24,7 +24,7 @@ fn a_link_is_found_from_bursts() {
         let fitted = fit(&measurements).unwrap();
         assert!((fitted.goodness.spacing_s - 0.01).abs() < 1e-9, "{of} {:?}", fitted.goodness.spacing_s);
         assert!(!fitted.goodness.evenly_spaced);
-        assert_eq!(fitted.link.jitter.distribution, DelayLaw::Normal, "{of}");
+        assert_eq!(fitted.link.jitter.distribution, FittedLaw::Law(DelayLaw::Normal), "{of}");
         assert!((fitted.link.delay_s - 0.03).abs() < 5.0 * 15e-6 && (fitted.link.jitter.sd_s - 0.002).abs() < 5.0 * 11e-6, "{of} {:?}", fitted.link);
         let LossModel::Independent { probability } = fitted.link.loss else { panic!("{of} {:?}", fitted.link) };
         assert!((probability - 0.1).abs() < 5.0 * 0.0021, "{of} {probability}");
