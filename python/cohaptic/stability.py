@@ -79,7 +79,11 @@ class Stability:
     """
 
     verdict: str
-    """``stable``, ``marginal``, ``overflow`` or ``unstable``; in the mean square where links leave something to chance."""
+    """``stable``, ``marginal``, ``overflow`` or ``unstable``: the answer to the question that `judged` names."""
+    judged: str
+    """``spectral-radius``; where links leave something to chance, ``mean-square``, or ``nominal`` where that cannot be followed."""
+    left_out: list[str]
+    """The random parts of the links that a nominal verdict leaves out, such as ``random loss``; empty otherwise."""
     radius: float
     """The spectral radius over a frame, with nothing left to chance."""
     error: float
@@ -104,6 +108,7 @@ class Stability:
         moment = said["mean_square"]
         self._scene, self._law = scene, law
         self.verdict, self.radius, self.error = said["verdict"], said["radius"], said["error"]
+        self.judged, self.left_out = said["judged"], said["left_out"]
         self.mean_square = None if moment is None else Radius(*moment)
         self.method, self.frame, self.notes = said["method"], said["frame"], said["notes"]
         self.dimension, self.rigid_modes = said["dimension"], said["rigid_modes"]

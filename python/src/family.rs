@@ -72,8 +72,10 @@ pub(crate) fn map_of<'py>(
     let said = PyDict::new(py);
     let drawing = {
         let (map, keys, title, criterion) = (map.clone(), keys.clone(), title(py, &family)?, family.criterion());
+        let left_out = family.left_out().to_vec();
         Drawing::of(move || {
-            let drawn = map_picture(&title, [&keys[0], &keys[1]], &[NamedMap { name: "as it stands", map: &map, criterion }]);
+            let named = NamedMap { name: "as it stands", map: &map, criterion, left_out: &left_out };
+            let drawn = map_picture(&title, [&keys[0], &keys[1]], &[named]);
             drawn.unwrap_or_else(|| Picture::new(title.as_str()))
         })
     };
@@ -118,7 +120,8 @@ pub(crate) fn boundary_of<'py>(
     let said = PyDict::new(py);
     let drawing = {
         let (found, key, title, criterion) = (found.clone(), key.clone(), title(py, &family)?, family.criterion());
-        Drawing::of(move || boundary_picture(&title, &key, criterion, &found))
+        let left_out = family.left_out().to_vec();
+        Drawing::of(move || boundary_picture(&title, &key, criterion, &left_out, &found))
     };
     said.set_item("drawing", drawing)?;
     said.set_item("key", &key.key)?;

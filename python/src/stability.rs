@@ -2,7 +2,7 @@
 
 use cohaptic_answers::notes;
 use cohaptic_stability::{
-    AnalysisError, ContactMode, Judgement, Limits, Method, analyse_with, eigenvalues, judge_watched, monodromy, monodromy_with,
+    AnalysisError, ContactMode, Judgement, Limits, Method, analyse_with, eigenvalues, judge_watched, left_out, monodromy, monodromy_with,
 };
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
@@ -33,6 +33,7 @@ pub(crate) fn stability<'py>(py: Python<'py>, scene: &Scene, method: &str, law: 
             verdict: analysis.verdict(),
             analysis,
             mean_square: None,
+            left_out: left_out(&scene.scene),
         }),
     })?;
     if let Some(laws) = &laws {
@@ -74,9 +75,11 @@ pub(crate) fn eigenvalues_of(py: Python<'_>, rows: Vec<Vec<f64>>) -> PyResult<Bo
 }
 
 fn document<'py>(py: Python<'py>, scene: &Scene, judgement: &Judgement) -> PyResult<Bound<'py, PyDict>> {
-    let Judgement { verdict, analysis, mean_square } = judgement;
+    let Judgement { verdict, analysis, mean_square, left_out } = judgement;
     let said = PyDict::new(py);
     said.set_item("verdict", verdict.word())?;
+    said.set_item("judged", judgement.kind().word())?;
+    said.set_item("left_out", left_out)?;
     said.set_item("radius", analysis.radius.value)?;
     said.set_item("error", analysis.radius.error)?;
     said.set_item("mean_square", mean_square.as_ref().map(|moment| (moment.radius.value, moment.radius.error)))?;

@@ -43,7 +43,7 @@ pub use notes::notes;
 pub use parts::{MOST_LINKS, access_line, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 pub use pictures::{
     AdmittanceCurve, AdmittanceWords, NamedMap, admittance_picture, admittance_words, axis_of, axis_of_key, boundary_picture, crossing_in_words,
-    label, map_picture, radius_name,
+    label, map_picture,
 };
 pub use quick_verdict::{OPERATIONS_A_SECOND, Quick, quick_verdict};
 pub use run::run;

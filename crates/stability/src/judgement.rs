@@ -2,7 +2,8 @@
 
 use cohaptic_scene::Scene;
 
-use crate::{Analysis, AnalysisError, Limits, MeanSquare, Method, Verdict, analyse_watched, mean_square_watched};
+use crate::network::chance_of;
+use crate::{Analysis, AnalysisError, Limits, MeanSquare, Method, Verdict, VerdictKind, analyse_watched, mean_square_watched};
 
 /// A verdict, and what it rests on.
 #[derive(Clone, PartialEq, Debug)]
@@ -13,6 +14,26 @@ pub struct Judgement {
     pub analysis: Analysis,
     /// `None` where nothing is left to chance, or where the second moment cannot be followed; then a note says why.
     pub mean_square: Option<MeanSquare>,
+    /// Random parts of the links that the verdict leaves out, in words; empty of a verdict that leaves none out.
+    pub left_out: Vec<&'static str>,
+}
+
+impl Judgement {
+    /// Returns the verdict of an analysis that follows no chance of the links of a scene.
+    #[must_use]
+    pub fn nominal(scene: &Scene, analysis: Analysis) -> Self {
+        Self { verdict: analysis.verdict(), analysis, mean_square: None, left_out: left_out(scene) }
+    }
+
+    /// Returns the question that the verdict answers.
+    #[must_use]
+    pub const fn kind(&self) -> VerdictKind {
+        match (&self.mean_square, self.left_out.is_empty()) {
+            (Some(_), _) => VerdictKind::MeanSquare,
+            (None, true) => VerdictKind::Certain,
+            (None, false) => VerdictKind::Nominal,
+        }
+    }
 }
 
 /// How the note begins that says why a second moment is not followed.
@@ -36,16 +57,27 @@ pub fn judge(scene: &Scene, method: Method, most: usize) -> Result<Judgement, An
 pub fn judge_watched(scene: &Scene, method: Method, limits: &Limits<'_>) -> Result<Judgement, AnalysisError> {
     let mut analysis = analyse_watched(scene, method, limits.watch)?;
     if !has_chance(scene) {
-        return Ok(Judgement { verdict: analysis.verdict(), analysis, mean_square: None });
+        return Ok(Judgement::nominal(scene, analysis));
     }
     match mean_square_watched(scene, limits) {
         Err(AnalysisError::Stopped) => Err(AnalysisError::Stopped),
-        Ok(mean_square) => Ok(Judgement { verdict: mean_square.verdict(), analysis, mean_square: Some(mean_square) }),
+        Ok(mean_square) => Ok(Judgement { verdict: mean_square.verdict(), analysis, mean_square: Some(mean_square), left_out: Vec::new() }),
         Err(error) => {
             analysis.notes.push(format!("{NOMINAL}{error}"));
-            Ok(Judgement { verdict: analysis.verdict(), analysis, mean_square: None })
+            Ok(Judgement::nominal(scene, analysis))
         }
     }
+}
+
+/// Returns the random parts of the links of a scene, in words and each once: what a nominal verdict leaves out. Empty if the links leave nothing to chance.
+#[must_use]
+pub fn left_out(scene: &Scene) -> Vec<&'static str> {
+    if !has_chance(scene) {
+        return Vec::new();
+    }
+    let named = chance_of(scene);
+    // A part that no name fits must not make a nominal verdict look certain.
+    if named.is_empty() { vec!["chance"] } else { named }
 }
 
 /// Whether the network of a scene leaves anything to chance.

@@ -1,16 +1,7 @@
 //! What an axis says of a key: its name and symbol as in the paper, and its unit.
 
 use cohaptic_picture::Axis;
-use cohaptic_stability::{Criterion, KeyRange};
-
-/// What a radius of that criterion is called.
-#[must_use]
-pub const fn radius_name(criterion: Criterion) -> &'static str {
-    match criterion {
-        Criterion::SpectralRadius => "spectral radius",
-        Criterion::MeanSquare => "mean-square radius",
-    }
-}
+use cohaptic_stability::KeyRange;
 
 /// The key with the unit that its range has, or else that of the key itself: `coordination.stiffness [N/m]`, `link.delay [ms]`.
 #[must_use]

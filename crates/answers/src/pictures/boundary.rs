@@ -1,22 +1,26 @@
 //! The radius along a key, with the crossings marked.
 
-use cohaptic_picture::{Axis, Line, Look, Panel};
-use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange};
+use cohaptic_picture::{Axis, Line, Look, Marker, Panel};
+use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange, Kinds, nominal_head};
 use cohaptic_units::print::six_digits;
 
-use super::axis::{axis_of, radius_name};
+use super::axis::axis_of;
 
-/// The picture of a boundary along that key.
+/// The picture of a boundary along that key, judged by that criterion. `left_out`: the random parts of the links that nominal values leave out, in words.
 #[must_use]
-pub fn boundary_picture(title: &str, range: &KeyRange, criterion: Criterion, found: &Boundary) -> cohaptic_picture::Picture {
+pub fn boundary_picture(title: &str, range: &KeyRange, criterion: Criterion, left_out: &[&str], found: &Boundary) -> cohaptic_picture::Picture {
     let samples: Vec<(f64, f64)> = found.known.iter().map(|(value, cell)| (*value, cell.radius.value)).collect();
     // `samples.csv` has all digits.
     let named = |crossing: &Crossing| crossing_in_words(range, &Crossing { value: six_digits(crossing.value), ..*crossing });
     let crossings: Vec<(f64, String)> = found.crossings.iter().map(|crossing| (crossing.value, named(crossing))).collect();
+    let kinds = Kinds::of(criterion, found.known.iter().map(|(_, cell)| cell.is_nominal));
+    let nominal: Vec<(f64, f64)> = found.known.iter().filter(|(_, cell)| cell.is_nominal).map(|(value, cell)| (*value, cell.radius.value)).collect();
     let picture = Picture {
         title,
         axis: axis_of(range),
-        radius: radius_name(criterion),
+        // Marks tell nominal values from others; of one kind alone the curve has its name.
+        radius: kinds.only().unwrap_or(criterion.kind(false)).radius_name(),
+        nominal: (&nominal, &nominal_head(left_out)),
         range: (range.low, range.high),
         samples: &samples,
         crossings: &crossings,
@@ -37,6 +41,8 @@ struct Picture<'a> {
     axis: Axis,
     /// The name of the radius: spectral radius, or mean-square radius.
     radius: &'a str,
+    /// Nominal values of the key, each with its radius, and their name in the legend.
+    nominal: (&'a [(f64, f64)], &'a str),
     /// From where to where the key was searched.
     range: (f64, f64),
     /// Values of the key, rising, and the radius at each.
@@ -68,6 +74,10 @@ impl Picture<'_> {
             .with(Line::level(1.0).named("1"))
             .with_all(crossings)
             .with(Line::new(self.samples.iter().copied(), Look::of(0)).named(self.radius));
+        let panel = match self.nominal {
+            ([], _) => panel,
+            (points, name) => panel.with(Line::new(points.iter().copied(), Look::of(1)).marks_only(Marker::Diamond).named(name)),
+        };
         let mut picture = cohaptic_picture::Picture::new(self.title).aspect(0.45).panel(panel);
         if cut {
             picture = picture.note("What goes far beyond 1 is cut off.");
@@ -92,7 +102,7 @@ mod tests {
 
     fn picture(samples: &[(f64, f64)], crossings: &[(f64, String)]) -> String {
         let axis = Axis::new("Delay of links").symbol("T_d").unit("ms");
-        Picture { title: "Two users", axis, radius: "mean-square radius", range: (0.0, 5.0), samples, crossings }.drawn().svg()
+        Picture { title: "Two users", axis, radius: "mean-square radius", nominal: (&[], ""), range: (0.0, 5.0), samples, crossings }.drawn().svg()
     }
 
     #[test]

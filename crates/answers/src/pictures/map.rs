@@ -1,9 +1,9 @@
 //! A map: the outline of the region of each variant, and the region of the first one shaded.
 
 use cohaptic_picture::{Axis as Shown, Fill, Line, Look, Panel, Region};
-use cohaptic_stability::{Criterion, KeyRange, Map, Polyline};
+use cohaptic_stability::{Criterion, KeyRange, Kinds, Map, Polyline, nominal_head};
 
-use super::axis::{axis_of, radius_name};
+use super::axis::axis_of;
 
 /// A map with what its legend calls it.
 #[derive(Clone, Copy, Debug)]
@@ -14,21 +14,26 @@ pub struct NamedMap<'a> {
     pub map: &'a Map,
     /// By which radius it judges.
     pub criterion: Criterion,
+    /// Random parts of the links that its nominal cells leave out, in words.
+    pub left_out: &'a [&'a str],
 }
 
 /// The picture of maps over the same keys; `None` of no map.
 #[must_use]
 pub fn map_picture(title: &str, [x, y]: [&KeyRange; 2], maps: &[NamedMap<'_>]) -> Option<cohaptic_picture::Picture> {
     let first = maps.first()?;
-    let title = format!("{title}: {} 1", radius_name(first.criterion));
+    let kinds = Kinds::of(first.criterion, first.map.nominal.iter().flatten().copied());
+    let title = format!("{title}: {} 1", kinds.radius_name());
+    let hatched = nominal_head(first.left_out);
     let picture = Picture {
         title: &title,
-        stable: if first.criterion == Criterion::MeanSquare { "stable in the mean square" } else { "stable" },
+        stable: &kinds.says("stable"),
         x: Axis { shown: axis_of(x), values: &first.map.x },
         y: Axis { shown: axis_of(y), values: &first.map.y },
         outlines: maps.iter().map(|NamedMap { name, map, .. }| Outline { name: (*name).to_owned(), lines: map.contour() }).collect(),
         regions: first.map.regions(),
         nominal: &first.map.nominal,
+        hatched: &hatched,
     };
     Some(picture.drawn())
 }
@@ -45,6 +50,8 @@ struct Picture<'a> {
     regions: Vec<Polyline>,
     /// Which cells of the first variant are nominal, row by row.
     nominal: &'a [Vec<bool>],
+    /// The name of these cells in the legend.
+    hatched: &'a str,
 }
 
 /// One axis: what it says, and the values at which there are cells, rising.
@@ -75,7 +82,7 @@ impl Picture<'_> {
             .with_all(lines);
         let is_nominal = |column: usize, row: usize| self.nominal.get(row).and_then(|row| row.get(column)).copied().unwrap_or(false);
         let panel = if self.nominal.iter().flatten().any(|nominal| *nominal) {
-            panel.with(Region::cells(self.x.values, self.y.values, Fill::Hatch, is_nominal).named("nominal: nothing is left to chance"))
+            panel.with(Region::cells(self.x.values, self.y.values, Fill::Hatch, is_nominal).named(self.hatched))
         } else {
             panel
         };
@@ -114,6 +121,7 @@ mod tests {
             outlines: Vec::new(),
             regions: [1.0, 3.0, 2.0].map(square).into(),
             nominal: &[],
+            hatched: "",
         }
         .drawn()
         .svg();
@@ -136,10 +144,11 @@ mod tests {
             outlines,
             regions: Vec::new(),
             nominal: &[vec![true, false], vec![true, true]],
+            hatched: "nominal (jitter left out)",
         }
         .drawn()
         .svg();
-        assert!(svg.contains("nominal: nothing is left to chance"));
+        assert!(svg.contains("nominal (jitter left out)"));
         assert_eq!(svg.matches("</svg>").count(), 1);
         assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;") && !svg.contains('\u{1}'));
         assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);

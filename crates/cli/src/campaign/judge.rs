@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cohaptic_campaign::{Judge, Judgement, Report, Verdict};
 use cohaptic_scene::Scene;
-use cohaptic_stability::{AnalysisError, Criterion, Limits, Method, has_chance, judge_watched};
+use cohaptic_stability::{AnalysisError, Limits, Method, VerdictKind, judge_watched};
 
 use crate::analysis_watch::Interruptible;
 use crate::stability::source;
@@ -30,29 +30,32 @@ impl Judge for ByAnalysis {
             Err(AnalysisError::Stopped) => return None,
             Err(error) => return Some(Judgement::Refused(error.to_string().into())),
         };
-        let (criterion, is_nominal, radius) = match &judgement.mean_square {
-            Some(mean_square) => (Criterion::MeanSquare, false, mean_square.radius),
+        let kind = judgement.kind();
+        let radius = match (&judgement.mean_square, kind) {
+            (Some(mean_square), _) => mean_square.radius,
             // As in a map, so that it can be compared with mean-square radii.
-            None if has_chance(scene) => (Criterion::MeanSquare, true, judgement.analysis.radius.over(2)),
-            None => (Criterion::SpectralRadius, false, judgement.analysis.radius),
+            (None, VerdictKind::Nominal) => judgement.analysis.radius.over(2),
+            (None, VerdictKind::Certain | VerdictKind::MeanSquare) => judgement.analysis.radius,
         };
-        let judged = source::judged(criterion, is_nominal);
-        Some(Judgement::Known(Verdict { word: judgement.verdict.word().into(), judged: judged.into(), radius: radius.value, error: radius.error }))
+        let (word, judged) = (judgement.verdict.word().into(), kind.word().into());
+        Some(Judgement::Known(Verdict { word, judged, radius: radius.value, error: radius.error }))
     }
 }
 
 /// Whether the verdict leaves out what links leave to chance.
 pub(super) fn is_nominal(judgement: &Judgement) -> bool {
-    is_judged(judgement, source::judged(Criterion::MeanSquare, true))
+    kind(judgement) == Some(VerdictKind::Nominal)
 }
 
 /// Whether the radius is that of the scene with nothing left to chance because nothing is.
 pub(super) fn is_spectral(judgement: &Judgement) -> bool {
-    is_judged(judgement, source::judged(Criterion::SpectralRadius, false))
+    kind(judgement) == Some(VerdictKind::Certain)
 }
 
-fn is_judged(judgement: &Judgement, word: &str) -> bool {
-    judgement.verdict().is_some_and(|verdict| &*verdict.judged == word)
+/// The question that the verdict answers, from the word that its file has.
+fn kind(judgement: &Judgement) -> Option<VerdictKind> {
+    let verdict = judgement.verdict()?;
+    VerdictKind::ALL.into_iter().find(|kind| kind.word() == &*verdict.judged)
 }
 
 /// What the verdicts leave out, and how many combinations have none, by reason.

@@ -5,11 +5,9 @@ use cohaptic_campaign::{Judge, Judgement, Verdict};
 use cohaptic_harness::Model;
 use cohaptic_harness::check::{Stability, stability};
 use cohaptic_scene::Scene;
-use cohaptic_stability::Criterion;
 
 use crate::analysis_watch::Interruptible;
 use crate::interrupt;
-use crate::stability::source;
 
 /// Two runs judge where the analysis takes longer than this, by its estimate \[s\].
 const QUICK: f64 = 0.25;
@@ -26,11 +24,8 @@ impl Judge for ByAnalysisOrRuns {
     fn judge(&self, scene: &Scene) -> Option<Judgement> {
         match quick_verdict(scene, QUICK, &Interruptible) {
             Quick::Known(judgement) => {
-                let (criterion, radius) = match &judgement.mean_square {
-                    Some(mean_square) => (Criterion::MeanSquare, mean_square.radius),
-                    None => (Criterion::SpectralRadius, judgement.analysis.radius),
-                };
-                let judged = source::judged(criterion, false).into();
+                let radius = judgement.mean_square.as_ref().map_or(judgement.analysis.radius, |mean_square| mean_square.radius);
+                let judged = judgement.kind().word().into();
                 Some(Judgement::Known(Verdict { word: judgement.verdict.word().into(), judged, radius: radius.value, error: radius.error }))
             }
             Quick::Simulate(_) => by_runs(scene),

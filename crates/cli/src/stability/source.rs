@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Criterion, Family, FamilyError, KeyRange};
+use cohaptic_stability::{Family, FamilyError, KeyRange, VerdictKind};
+use serde::Serialize;
 
 use super::rows_file::fingerprint;
+use crate::document_schema::document;
 use crate::failure::{Failure, not_analysed};
 use crate::{input, output};
 
@@ -66,9 +68,9 @@ pub(super) fn fingerprint_of(family: &Family) -> Result<u64, FamilyError> {
     Ok(fingerprint(&format!("{:?}", at_low(family)?)))
 }
 
-/// The word in tables for what a verdict rests on: the criterion, or `nominal`.
-pub(crate) const fn judged(criterion: Criterion, is_nominal: bool) -> &'static str {
-    if is_nominal { "nominal" } else { criterion.word() }
+/// Things of one kind that were judged, as JSON answers them: how many there are, and the share of them that is stable.
+pub(crate) fn judged(kind: VerdictKind, count: usize, stable_fraction: f64) -> impl Serialize {
+    document! { judged: kind.word(), count: count, stable_fraction: stable_fraction }
 }
 
 /// The chance that a number of radii leave out, because the second moment cannot be followed there; `None` if there are none. Of one and of several it is said in other

@@ -26,7 +26,7 @@ fn kinds() -> Vec<(String, Vec<&'static str>, Vec<&'static str>)> {
         (
             random(STRATEGIES),
             with(&["The rows are the values of coordination.strategy.", "average-position"]),
-            vec!["proportional-derivative", "Mean-square radius"],
+            vec!["proportional-derivative", "Nominal radius squared"],
         ),
         (
             random(&format!("--vary link.loss=0%..40%/5 {STRATEGIES}")),
@@ -36,7 +36,7 @@ fn kinds() -> Vec<(String, Vec<&'static str>, Vec<&'static str>)> {
         (
             random("--vary link.loss=0%..40%/5 --vary coordination.stiffness=500..2000/4:log"),
             vec!["Median of the largest discrepancy [mm]", "Coordination stiffness", "Loss on links [%]"],
-            vec!["nominal: nothing is left to chance", "stable in the mean square"],
+            vec!["nominal: nothing is left to chance", "nominally stable"],
         ),
         (
             random(&format!("--vary link.loss=0%,40% --vary coordination.stiffness=500,900 {STRATEGIES}")),
@@ -57,7 +57,7 @@ fn kinds() -> Vec<(String, Vec<&'static str>, Vec<&'static str>)> {
         (
             format!("campaign paper.toml --set {UNFOLLOWED} --verdicts --vary coordination.stiffness=500..1000/3"),
             vec!["Coordination stiffness"],
-            vec!["nominal: nothing is left to chance"],
+            vec!["nominal: nothing is left to chance", "Nominal radius squared"],
         ),
     ]
 }

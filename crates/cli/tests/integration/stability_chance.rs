@@ -66,6 +66,57 @@ fn cells_that_cannot_be_followed_are_marked_and_counted() {
     assert!(desk.read("out/map.csv").lines().skip(1).all(|line| line.ends_with(",nominal")));
     let boundary = desk.json(&format!("stability boundary paper.toml {failing} --along coordination.stiffness=100..200 --samples 5 --json"));
     assert_eq!(boundary["nominal"], boundary["samples"]);
+    // No text, title or legend says "in the mean square" of cells that are all nominal.
+    assert_eq!(document["verdicts"], serde_json::json!([{ "judged": "nominal", "count": 6, "stable_fraction": document["stable_fraction"] }]));
+    assert_eq!(document["left_out"], serde_json::json!(["random outages"]));
+    let text = desk.text(&map);
+    assert!(
+        text.contains("\n  nominal (random outages left out): ")
+            && text.contains(" % of 6 cells are nominally stable; the least nominal radius squared is ")
+    );
+    let picture = desk.read("out/map.svg");
+    assert!(
+        picture.contains(": nominal radius squared 1")
+            && picture.contains("nominally stable: ")
+            && picture.contains("nominal (random outages left out)")
+    );
+    assert!(!text.contains("in the mean square") && !picture.contains("mean square") && !picture.contains("mean-square"), "{text}{picture}");
+    let along = format!("stability boundary paper.toml {failing} --along coordination.stiffness=100..200 --samples 5 --out line");
+    let text = desk.text(&along);
+    assert!(text.contains("nominal (random outages left out)\n  nominally stable from coordination.stiffness=100"), "{text}");
+    let picture = desk.read("line/boundary.svg");
+    assert!(picture.contains("Nominal radius squared") && !picture.contains("ean-square"), "{picture}");
+}
+
+/// With losses in bursts two peers are followed in the mean square, and the twelve links of four have 2¹² joint states, which are too many.
+#[test]
+fn a_map_of_both_kinds_counts_each_by_itself() {
+    let desk = Desk::with("paper.toml", PAPER);
+    let bursts = "--set link.loss={gilbert-elliott={p=0.1,r=0.5}} --set link.delay=8ms";
+    let map = format!("stability map paper.toml {bursts} --x coordination.stiffness=500..1000 --y scene.count=2..4 --grid 2x2");
+    let document = desk.json(&format!("{map} --json"));
+    let judged = |loss: &str, count: usize| {
+        let of =
+            |stiffness: usize| point(&desk, &format!("--set scene.count={count} --set coordination.stiffness={stiffness} --set link.loss={loss}"));
+        [500, 1000].map(|stiffness| f64::from(u8::from(of(stiffness)["verdict"] == "stable"))).iter().sum::<f64>() / 2.0
+    };
+    // Nominal is the scene without loss.
+    let expected = [judged("{gilbert-elliott={p=0.1,r=0.5}}", 2), judged("0%", 4)];
+    let of = |kind: &str, share: f64| serde_json::json!({ "judged": kind, "count": 2, "stable_fraction": share });
+    assert_eq!(document["verdicts"], serde_json::json!([of("mean-square", expected[0]), of("nominal", expected[1])]));
+    let text = desk.text(&format!("{map} --out out")) + &desk.text(&map);
+    assert!(
+        text.contains(&format!("\n  {:.2} % of 2 cells judged in the mean square are stable in the mean square; ", 100.0 * expected[0])),
+        "{text}"
+    );
+    assert!(
+        text.contains(&format!("nominal (random loss left out): {:.2} % of 2 cells judged nominally are nominally stable; ", 100.0 * expected[1])),
+        "{text}"
+    );
+    let picture = desk.read("out/map.svg");
+    assert!(picture.contains("stable in the mean square, nominally stable where hatched"), "{picture}");
+    let along = desk.text(&format!("stability boundary paper.toml {bursts} --along scene.count=2..4 --samples 3 --tolerance 1"));
+    assert!(along.contains("nominal (random loss left out): ") && along.contains("stable in the mean square from scene.count=2"), "{along}");
 }
 
 #[test]

@@ -146,6 +146,19 @@ fn links_that_leave_something_to_chance_have_a_mean_square() {
     assert!(refused.get("mean_square_radius").is_none());
     let notes = refused["notes"].as_array().unwrap();
     assert!(notes.iter().any(|note| note.as_str().unwrap().starts_with("the verdict is nominal")), "{refused:#}");
+    assert_eq!((&refused["judged"], &refused["left_out"]), (&"nominal".into(), &serde_json::json!(["random loss"])));
+    assert_eq!((&document["judged"], &certain["judged"]), (&"mean-square".into(), &"spectral-radius".into()));
+    // A nominal verdict is called so first.
+    for (set, left_out) in [
+        ("--set scene.count=9 --set link.loss={gilbert-elliott={p=0.1,r=0.5}}", "random loss"),
+        ("--set scene.count=9 --set link.loss={gilbert-elliott={p=0.1,r=0.5}} --set link.jitter=2ms", "jitter and random loss"),
+        ("--set link.outage={random={up=\"5s\",down=\"50ms\"}} --set link.loss=1%", "random outages and random loss"),
+        ("--graph ring --set link.loss=1%", "random loss"),
+    ] {
+        let text = desk.text(&format!("stability point paper.toml {set}"));
+        let verdict = text.lines().nth(2).unwrap();
+        assert!(verdict.starts_with(&format!("Nominal ({left_out} left out): ")) && verdict.contains("STABLE: "), "{text}");
+    }
 }
 
 #[test]

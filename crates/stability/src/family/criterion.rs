@@ -1,6 +1,6 @@
 //! By which radius the scenes of a family are judged.
 
-use crate::Radius;
+use crate::{Radius, VerdictKind};
 
 /// By which radius the scenes of a family are judged: one for all of them, so that their radii can be compared and drawn as one map.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -19,6 +19,16 @@ impl Criterion {
         match self {
             Self::SpectralRadius => "spectral-radius",
             Self::MeanSquare => "mean-square",
+        }
+    }
+
+    /// Returns the question that a verdict by this criterion answers, which is another one where the radius is nominal.
+    #[must_use]
+    pub const fn kind(self, is_nominal: bool) -> VerdictKind {
+        match (self, is_nominal) {
+            (_, true) => VerdictKind::Nominal,
+            (Self::SpectralRadius, false) => VerdictKind::Certain,
+            (Self::MeanSquare, false) => VerdictKind::MeanSquare,
         }
     }
 }

@@ -23,7 +23,7 @@ pub use error::FamilyError;
 pub use range::{KeyRange, KeyRangeError};
 
 use crate::scene_radius::RadiusScratch;
-use crate::{Radius, Unwatched, Watch, has_chance};
+use crate::{Radius, Unwatched, Watch, left_out};
 use leaves::Probe;
 use prepared::Prepared;
 
@@ -39,6 +39,8 @@ pub struct Family {
     keys: Vec<KeyRange>,
     learned: Vec<bool>,
     criterion: Criterion,
+    /// Random parts of the links anywhere in the family, in words.
+    left_out: Vec<&'static str>,
     /// Scenes by the values of the keys that are not learned.
     prepared: Mutex<BTreeMap<Vec<u64>, Arc<Prepared>>>,
     /// Tells this family from others, also from those that are gone.
@@ -81,7 +83,8 @@ impl Family {
         let learned = vec![false; keys.len()];
         let (text, file, overrides) = (text.to_owned(), file.to_path_buf(), overrides.to_vec());
         let criterion = Criterion::SpectralRadius;
-        let mut family = Self { text, file, overrides, keys, learned, criterion, prepared: Mutex::default(), identity: Arc::new(()) };
+        let mut family =
+            Self { text, file, overrides, keys, learned, criterion, left_out: Vec::new(), prepared: Mutex::default(), identity: Arc::new(()) };
         let low: Vec<f64> = family.keys.iter().map(|range| range.low).collect();
         let high: Vec<f64> = family.keys.iter().map(|range| range.high).collect();
         let at_low = family.scene(&low).map_err(|error| family.no_number(error))?;
@@ -89,8 +92,13 @@ impl Family {
         crate::scene_radius::scene_radii(&[&at_low])?;
         // The chance at one end may be none at the other: no loss, no jitter. In between a key may take no value at all.
         let inside: Vec<f64> = family.keys.iter().enumerate().map(|(key, range)| range.odd(key)).collect();
-        let chance = has_chance(&at_low) || has_chance(&at_high) || family.scene(&inside).is_ok_and(|scene| has_chance(&scene));
-        family.criterion = if chance { Criterion::MeanSquare } else { Criterion::SpectralRadius };
+        let inside = family.scene(&inside).ok();
+        for name in [Some(&at_low), Some(&at_high), inside.as_ref()].into_iter().flatten().flat_map(left_out) {
+            if !family.left_out.contains(&name) {
+                family.left_out.push(name);
+            }
+        }
+        family.criterion = if family.left_out.is_empty() { Criterion::SpectralRadius } else { Criterion::MeanSquare };
         drop((at_low, at_high));
         for key in 0..family.keys.len() {
             family.learned[key] = family.is_learned(key, &low);
@@ -142,6 +150,12 @@ impl Family {
     #[must_use]
     pub const fn criterion(&self) -> Criterion {
         self.criterion
+    }
+
+    /// Returns the random parts of the links anywhere in the family, in words: what its nominal radii leave out. Empty if nothing is left to chance.
+    #[must_use]
+    pub fn left_out(&self) -> &[&'static str] {
+        &self.left_out
     }
 
     /// The radius with those values of the keys, by the family's criterion and without a bound of its error: below 1 the scene is stable.

@@ -114,6 +114,20 @@ impl NominalNetwork {
     }
 }
 
+/// Returns the names of the random parts of all links and access lines of a scene, each once, in the order in which links have them.
+pub(crate) fn chance_of(scene: &Scene) -> Vec<&'static str> {
+    let size = Bytes::new(scene.sample_kind().datagram_len(scene.axes.count()) as u64);
+    let used = scene.used_links();
+    let lines = scene.peers.iter().flat_map(|peer| peer.uplink.as_deref().into_iter().chain(peer.downlink.as_deref()));
+    let mut names = Vec::new();
+    for name in used.iter().map(|(link, _)| link.as_ref()).chain(lines).flat_map(|model| Nominal::of(model, size).chance) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
 /// Timings as they are met, each with a link that has it.
 #[derive(Default)]
 struct Known {

@@ -14,13 +14,38 @@ use cohaptic_wan::{
 pub(crate) struct Nominal {
     pub(crate) config: LinkConfig,
     pub(crate) replaced: Vec<String>,
+    /// Names of the random parts among the replaced ones.
+    pub(crate) chance: Vec<&'static str>,
+}
+
+/// The replaced parts of a link, as they are met.
+#[derive(Default)]
+struct Replaced {
+    words: Vec<String>,
+    chance: Vec<&'static str>,
+}
+
+impl Replaced {
+    /// Notes a part that is certain and does not repeat.
+    fn end(&mut self, words: &str) {
+        self.words.push(words.to_owned());
+    }
+
+    /// Notes a random part by its name.
+    fn chance(&mut self, name: &'static str, words: String) {
+        self.words.push(words);
+        self.chance.push(name);
+    }
 }
 
 impl Nominal {
     /// The nominal link for samples of that size, which understand congestion marks.
     pub(crate) fn of(model: &LinkModel, size: Bytes) -> Self {
-        let only =
-            |delay, words: String| Self { config: LinkConfig { delay: Delay::constant(delay), ..LinkConfig::default() }, replaced: vec![words] };
+        let only = |delay, words: String, chance: &[&'static str]| Self {
+            config: LinkConfig { delay: Delay::constant(delay), ..LinkConfig::default() },
+            replaced: vec![words],
+            chance: chance.to_vec(),
+        };
         let mean = model.mean_delay();
         match model {
             LinkModel::Fixed(config) => stripped(config, size),
@@ -29,12 +54,17 @@ impl Nominal {
                 only(
                     mean,
                     format!("a recording of fates, which ends, is replaced by the mean delay of what it delivered, {}, and no loss", Span(mean)),
+                    &[],
                 )
             }
-            LinkModel::Modulated(_) => {
-                only(mean, format!("a link that changes by chance is replaced by the mean of the delays of its states, {}, alone", Span(mean)))
+            LinkModel::Modulated(_) => only(
+                mean,
+                format!("a link that changes by chance is replaced by the mean of the delays of its states, {}, alone", Span(mean)),
+                &["random changes of a link"],
+            ),
+            LinkModel::Kernel(_) => {
+                only(mean, format!("Linux's netem is replaced by its mean delay, {}, alone", Span(mean)), &["the chance of Linux's netem"])
             }
-            LinkModel::Kernel(_) => only(mean, format!("Linux's netem is replaced by its mean delay, {}, alone", Span(mean))),
         }
     }
 
@@ -80,16 +110,16 @@ impl Nominal {
 }
 
 fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
-    let mut replaced = Vec::new();
+    let mut replaced = Replaced::default();
     let mut config = config.clone();
     if config.delay.jitter().is_some() {
         let mean = config.delay.mean();
-        replaced.push(format!("jitter is replaced by the mean delay, {}", Span(mean)));
+        replaced.chance("jitter", format!("jitter is replaced by the mean delay, {}", Span(mean)));
         config.delay = Delay::constant(mean);
     }
     if let Some(extra) = config.listed.extra_delay() {
         let mean = Duration::try_from_secs_f64(extra.mean).unwrap_or(Duration::MAX);
-        replaced.push(format!("{} is replaced by its mean delay, {}", config.listed.words().join(", then "), Span(mean)));
+        replaced.chance("random extra delay", format!("{} is replaced by its mean delay, {}", config.listed.words().join(", then "), Span(mean)));
         config.listed = Impairments::default();
         config.delay = Delay::constant(config.delay.mean().saturating_add(mean));
     }
@@ -104,31 +134,31 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
     }
     config.loss = loss(config.loss, &mut replaced);
     if !config.duplication.is_never() {
-        replaced.push("duplication is left out".to_owned());
+        replaced.chance("duplication", "duplication is left out".to_owned());
         config.duplication = Chance::default();
     }
     if config.corruption.take().is_some() {
-        replaced.push("corruption is left out".to_owned());
+        replaced.chance("corruption", "corruption is left out".to_owned());
     }
     if config.reorder.take().is_some() {
-        replaced.push("reordering on purpose is left out".to_owned());
+        replaced.chance("reordering", "reordering on purpose is left out".to_owned());
     }
     if let Some(bottleneck) = &mut config.bottleneck
         && matches!(bottleneck.discipline, Discipline::Red(_))
     {
-        replaced.push("random early detection is replaced by the limit of the queue alone".to_owned());
+        replaced.chance("random early detection", "random early detection is replaced by the limit of the queue alone".to_owned());
         bottleneck.discipline = Discipline::TailDrop;
     }
     config.slots = config.slots.map(|slots| regular(slots, &mut replaced));
     if let Some(trace) = config.trace.take() {
         let certain = trace.without_chance();
         if certain != trace {
-            replaced.push("random loss of a recorded path is left out".to_owned());
+            replaced.chance("random loss", "random loss of a recorded path is left out".to_owned());
         }
         if certain.period().is_some() {
             config.trace = Some(certain);
         } else {
-            replaced.push("a recorded path, which ends, is replaced by its last row".to_owned());
+            replaced.end("a recorded path, which ends, is replaced by its last row");
             let (delay, loss) = certain.last();
             config.delay = Delay::constant(config.delay.mean().saturating_add(delay));
             if loss.get() > 0.0 {
@@ -136,20 +166,20 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
             }
         }
     }
-    Nominal { config, replaced }
+    Nominal { config, replaced: replaced.words, chance: replaced.chance }
 }
 
 /// Outages that come and go with spans of fixed length stay; those that are drawn are left out, and those of a list end.
-fn outages(given: &Outages, replaced: &mut Vec<String>) -> Outages {
+fn outages(given: &Outages, replaced: &mut Replaced) -> Outages {
     let mut kept = Outages::default();
     if !given.scheduled().is_empty() {
-        replaced.push("outages at given times are left out, because they end".to_owned());
+        replaced.end("outages at given times are left out, because they end");
     }
     if let Some(random) = given.random() {
         if matches!((random.up, random.down), (Sojourn::Fixed(_), Sojourn::Fixed(_))) {
             kept = kept.clone().with_random(random).unwrap_or(kept);
         } else {
-            replaced.push("random outages are left out".to_owned());
+            replaced.chance("random outages", "random outages are left out".to_owned());
         }
     }
     if let Some(idle) = given.idle() {
@@ -158,7 +188,7 @@ fn outages(given: &Outages, replaced: &mut Vec<String>) -> Outages {
     kept
 }
 
-fn loss(given: Loss, replaced: &mut Vec<String>) -> Loss {
+fn loss(given: Loss, replaced: &mut Replaced) -> Loss {
     if given == Loss::None {
         return Loss::None;
     }
@@ -166,7 +196,7 @@ fn loss(given: Loss, replaced: &mut Vec<String>) -> Loss {
         if pattern.period().is_some() {
             return Loss::Pattern(pattern);
         }
-        replaced.push("losses at given places are left out, because they end".to_owned());
+        replaced.end("losses at given places are left out, because they end");
         return Loss::None;
     }
     let mean = given.mean();
@@ -175,7 +205,7 @@ fn loss(given: Loss, replaced: &mut Vec<String>) -> Loss {
         return everything();
     }
     if mean != Some(0.0) {
-        replaced.push("random loss is left out".to_owned());
+        replaced.chance("random loss", "random loss is left out".to_owned());
     }
     Loss::None
 }
@@ -190,13 +220,13 @@ fn everything() -> Loss {
     Pattern::of_packets(Vec::from([first]), Some(1)).map_or(Loss::None, Loss::Pattern)
 }
 
-fn regular(slots: Slots, replaced: &mut Vec<String>) -> Slots {
+fn regular(slots: Slots, replaced: &mut Replaced) -> Slots {
     let (mean, random) = match slots.gap() {
         SlotGap::Between { min, max } => (*min + (*max - *min) / 2, min != max),
         SlotGap::Drawn(delay) => (delay.mean(), delay.jitter().is_some()),
     };
     if random {
-        replaced.push(format!("random gaps between slots are replaced by their mean, {}", Span(mean)));
+        replaced.chance("random gaps between slots", format!("random gaps between slots are replaced by their mean, {}", Span(mean)));
     }
     let mut regular = Slots::drawn(Delay::constant(mean));
     (regular.packets, regular.bytes) = (slots.packets, slots.bytes);

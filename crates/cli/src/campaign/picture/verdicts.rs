@@ -1,9 +1,8 @@
 //! The verdicts of a campaign: the radius over one key, regions over two.
 
-use cohaptic_answers::radius_name;
 use cohaptic_campaign::Judgement;
 use cohaptic_picture::{Axis, Fill, Line, Look, Marker, Panel, Picture};
-use cohaptic_stability::{Criterion, Verdict};
+use cohaptic_stability::{Criterion, Kinds, Verdict};
 
 use super::Sheet;
 use super::arranged::{Along, Keys};
@@ -18,6 +17,8 @@ const NOMINAL: &str = "nominal: nothing is left to chance";
 /// The radii of a campaign, all by one criterion: as in a map, a scene that leaves nothing to chance has the square of its spectral radius beside mean-square radii.
 struct Radii {
     criterion: Criterion,
+    /// The name of the radius: a nominal one where every verdict is nominal.
+    name: &'static str,
     /// From where to where the axis reaches.
     range: (f64, f64),
     is_cut: bool,
@@ -45,7 +46,9 @@ impl Radii {
     fn of(judgements: &[Judgement]) -> Self {
         let mean_square = judgements.iter().any(|judgement| judgement.verdict().is_some() && !is_spectral(judgement));
         let criterion = if mean_square { Criterion::MeanSquare } else { Criterion::SpectralRadius };
-        let mut radii = Self { criterion, range: (1.0, 1.0), is_cut: false };
+        let kinds = Kinds::of(criterion, judgements.iter().filter(|judgement| judgement.verdict().is_some()).map(is_nominal));
+        let name = kinds.only().unwrap_or(criterion.kind(false)).radius_name();
+        let mut radii = Self { criterion, name, range: (1.0, 1.0), is_cut: false };
         for radius in judgements.iter().filter_map(|judgement| radii.radius(judgement)).collect::<Vec<f64>>() {
             radii.is_cut |= radius.is_nan() || radius > HIGHEST;
             if radius.is_finite() {
@@ -64,11 +67,8 @@ impl Radii {
     }
 
     fn axis(&self) -> Axis {
-        let name = match self.criterion {
-            Criterion::SpectralRadius => "Spectral radius",
-            Criterion::MeanSquare => "Mean-square radius",
-        };
-        Axis::new(name).range(self.range.0, self.range.1)
+        let (first, rest) = self.name.split_at(1);
+        Axis::new(format!("{}{rest}", first.to_uppercase())).range(self.range.0, self.range.1)
     }
 
     /// Each value of a key, its radius, and whether that is nominal.
@@ -85,8 +85,7 @@ impl Radii {
     fn line(&self, sheet: &Sheet<'_>, along: &Along, facet: usize) -> Panel {
         let points = self.points(sheet, along, facet);
         let radius = Line::new(points.iter().map(|(x, radius, _)| (*x, *radius)), Look::of(0));
-        let panel =
-            Panel::new(along.axis(), self.axis()).with(Line::level(1.0).named("1")).with(marked(radius, along).named(radius_name(self.criterion)));
+        let panel = Panel::new(along.axis(), self.axis()).with(Line::level(1.0).named("1")).with(marked(radius, along).named(self.name));
         with_nominal(panel, points.iter().filter(|point| point.2).map(|(x, radius, _)| (*x, *radius)).collect())
     }
 
@@ -95,7 +94,7 @@ impl Radii {
         let points = self.points(sheet, along, facet);
         let of = |nominal: bool| points.iter().filter(move |point| point.2 == nominal).map(|(y, radius, _)| (*radius, *y)).collect::<Vec<_>>();
         let panel = Panel::new(self.axis(), along.axis()).with(Line::upright(1.0).named("1"));
-        with_nominal(panel.with(Line::new(of(false), Look::of(0)).marks_only(Marker::Disc).named(radius_name(self.criterion))), of(true))
+        with_nominal(panel.with(Line::new(of(false), Look::of(0)).marks_only(Marker::Disc).named(self.name)), of(true))
     }
 }
 
@@ -109,10 +108,12 @@ fn regions(sheet: &Sheet<'_>, along: (&Along, &Along), facet: usize, criterion: 
     let judgement = |column: usize, row: usize| sheet.report.judgements.get(sheet.combination(facet, &[column, row]));
     let word = |column: usize, row: usize| judgement(column, row).and_then(Judgement::verdict).map(|verdict| &*verdict.word);
     let is = |verdict: Verdict| move |column: usize, row: usize| word(column, row) == Some(verdict.word());
-    let in_mean_square = |word: &str| if criterion == Criterion::MeanSquare { format!("{word} in the mean square") } else { word.to_owned() };
+    // Among mean-square radii a certain scene has the square of its spectral radius, which is its mean-square radius.
+    let verdicts = sheet.report.judgements.iter().filter(|judgement| judgement.verdict().is_some());
+    let kinds = Kinds::of(criterion, verdicts.map(is_nominal));
     let panel = Panel::new(along.0.axis(), along.1.axis());
-    let panel = with_cells(panel, along, Fill::Tint(0), &in_mean_square(Verdict::Stable.word()), is(Verdict::Stable));
-    let panel = with_cells(panel, along, Fill::Tint(1), &in_mean_square(Verdict::Unstable.word()), is(Verdict::Unstable));
+    let panel = with_cells(panel, along, Fill::Tint(0), &kinds.says(Verdict::Stable.word()), is(Verdict::Stable));
+    let panel = with_cells(panel, along, Fill::Tint(1), &kinds.says(Verdict::Unstable.word()), is(Verdict::Unstable));
     let unknown = |column: usize, row: usize| is(Verdict::Marginal)(column, row) || is(Verdict::Overflow)(column, row);
     let panel = with_cells(panel, along, Fill::Grey, "cannot be told", unknown);
     let panel = with_cells(panel, along, Fill::BackHatch, "no verdict", |column, row| word(column, row).is_none());

@@ -10,11 +10,10 @@ use cohaptic_units::print::csv_field;
 use super::Order;
 use crate::failure::Failure;
 use crate::file::write_into;
-use crate::stability::source;
 
 /// Writes `boundary.csv`, `samples.csv` and `boundary.svg`, and gives their paths.
 pub(super) fn write(folder: &Path, order: &Order, found: &Boundary, size: Size) -> Result<Vec<String>, Failure> {
-    let picture = boundary_picture(&order.title, &order.range, order.family.criterion(), found);
+    let picture = boundary_picture(&order.title, &order.range, order.family.criterion(), order.family.left_out(), found);
     let files = [("boundary.csv", crossings(order, found)), ("samples.csv", samples(order, found)), ("boundary.svg", picture.size(size).svg())];
     files.into_iter().map(|(name, content)| write_into(folder, name, content)).collect()
 }
@@ -34,7 +33,7 @@ fn samples(order: &Order, found: &Boundary) -> String {
     for (value, Cell { radius, is_nominal }) in &found.known {
         text.push_str(&format!("{value:?},{:?},{:?},{}", radius.value, radius.error, radius.verdict().word()));
         if is_mean_square {
-            text.push_str(&format!(",{}", source::judged(Criterion::MeanSquare, *is_nominal)));
+            text.push_str(&format!(",{}", Criterion::MeanSquare.kind(*is_nominal).word()));
         }
         text.push('\n');
     }

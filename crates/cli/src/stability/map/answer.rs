@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_answers::{label, radius_name};
-use cohaptic_stability::{Criterion, Verdict};
+use cohaptic_answers::label;
+use cohaptic_stability::{Criterion, Verdict, VerdictKind, nominal_head};
 use cohaptic_units::print::Counted;
 use serde::Serialize;
 
@@ -22,7 +22,8 @@ pub(super) fn of(order: &Order, maps: &[VariantMap], speed: Speed, files: &[Stri
             overrides: map.overrides.as_slice(),
             #[serde(flatten)]
             radii: radii(map),
-            stable_fraction: map.stable_fraction(),
+            #[serde(flatten)]
+            shares: shares(map),
             #[serde(flatten)]
             file: map.file.as_ref().map(|file| document! { file: file }),
         }
@@ -37,7 +38,8 @@ pub(super) fn of(order: &Order, maps: &[VariantMap], speed: Speed, files: &[Stri
         y: first.map(|map| map.map.y.as_slice()).unwrap_or_default(),
         #[serde(flatten)]
         radii: first.map(radii),
-        stable_fraction: first.map(VariantMap::stable_fraction).unwrap_or_default(),
+        #[serde(flatten)]
+        shares: first.map(shares),
         // The maps beside the first.
         curves: curves.collect::<Vec<_>>(),
         wall_s: speed.wall_s,
@@ -65,6 +67,17 @@ fn radii(map: &VariantMap) -> impl Serialize {
     }
 }
 
+/// The shares of stable cells: of all, and of those whose verdicts answer the same question.
+fn shares(map: &VariantMap) -> impl Serialize + use<> {
+    let kinds = map.kinds().present().map(|(kind, count)| source::judged(kind, count, map.stable_fraction_of(kind)));
+    document! {
+        stable_fraction: map.stable_fraction(),
+        verdicts: kinds.collect::<Vec<_>>(),
+        // Random parts of the links that nominal cells leave out; empty where there are none.
+        left_out: if map.nominal_cells() > 0 { map.left_out.clone() } else { Vec::new() },
+    }
+}
+
 /// The omissions of the radii of the maps.
 pub(super) fn notes(maps: &[VariantMap]) -> Vec<String> {
     let cells: usize = maps.iter().map(VariantMap::nominal_cells).sum();
@@ -87,14 +100,7 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], speed: Speed, picture
             let axes = (glance::Axis { label: &x, values: &map.map.x }, glance::Axis { label: &y, values: &map.map.y });
             text.push_str(&glance::draw(&axes.0, &axes.1, |column, row| map.verdicts[row][column] == Verdict::Stable));
         }
-        let _ = writeln!(
-            text,
-            "  {:.2} % of {} stable{}{}",
-            100.0 * map.stable_fraction(),
-            are(order.grid.columns() * order.grid.rows(), "cell"),
-            if map.criterion == Criterion::MeanSquare { " in the mean square" } else { "" },
-            least(order, map)
-        );
+        text.push_str(&headline(order, map));
     }
     let _ = writeln!(text, "\n{} computed in {:.3} s: {:.0} a second", Counted(speed.cells, "cell"), speed.wall_s, speed.cells_per_s());
     for note in notes(maps) {
@@ -103,11 +109,29 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], speed: Speed, picture
     text
 }
 
-/// The least radius, and where it is.
-fn least(order: &Order, VariantMap { map, criterion, .. }: &VariantMap) -> String {
-    let cells = map.y.iter().zip(&map.radius).flat_map(|(y, row)| map.x.iter().zip(row).map(move |(x, radius)| (*radius, *x, *y)));
-    let least = cells.filter(|(radius, ..)| radius.is_finite()).min_by(|one, other| one.0.total_cmp(&other.0));
-    least.map_or_else(String::new, |(radius, x, y)| {
-        format!("; the least {} is {}, at {} and {}", radius_name(*criterion), figure(radius, 6), order.x().text(x), order.y().text(y))
+/// The share of stable cells, a line for each question that verdicts answer: a share over cells of several kinds would answer none.
+fn headline(order: &Order, map: &VariantMap) -> String {
+    let is_mixed = map.kinds().only().is_none();
+    let line = |(kind, count): (VerdictKind, usize)| {
+        let cells = if is_mixed { format!("{} judged {} {}", Counted(count, "cell"), kind.manner(), verb(count)) } else { are(count, "cell") };
+        let head = if kind == VerdictKind::Nominal { format!("{}: ", nominal_head(&map.left_out)) } else { String::new() };
+        format!("  {head}{:.2} % of {cells} {}{}\n", 100.0 * map.stable_fraction_of(kind), kind.says("stable"), least(order, map, kind))
+    };
+    map.kinds().present().map(line).collect()
+}
+
+const fn verb(count: usize) -> &'static str {
+    if count == 1 { "is" } else { "are" }
+}
+
+/// The least radius of the cells of a kind, and where it is.
+fn least(order: &Order, VariantMap { map, criterion, .. }: &VariantMap, kind: VerdictKind) -> String {
+    let rows = map.y.iter().zip(map.radius.iter().zip(&map.nominal));
+    let cells =
+        rows.flat_map(|(y, (row, nominal))| map.x.iter().zip(row.iter().zip(nominal)).map(move |(x, (radius, nominal))| (*radius, *x, *y, *nominal)));
+    let of_kind = cells.filter(|(radius, _, _, nominal)| radius.is_finite() && criterion.kind(*nominal) == kind);
+    let least = of_kind.min_by(|one, other| one.0.total_cmp(&other.0));
+    least.map_or_else(String::new, |(radius, x, y, _)| {
+        format!("; the least {} is {}, at {} and {}", kind.radius_name(), figure(radius, 6), order.x().text(x), order.y().text(y))
     })
 }

@@ -10,7 +10,6 @@ use cohaptic_units::print::csv_field;
 use super::{Order, VariantMap};
 use crate::failure::Failure;
 use crate::file::write_into;
-use crate::stability::source;
 
 /// Writes `map.csv`, `map-2.csv` ... and `map.svg`, and gives their paths.
 pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap], size: Size) -> Result<Vec<String>, Failure> {
@@ -21,7 +20,8 @@ pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap], size:
         map.file = Some(path.clone());
         files.push(path);
     }
-    let named: Vec<NamedMap<'_>> = maps.iter().map(|map| NamedMap { name: &map.name, map: &map.map, criterion: map.criterion }).collect();
+    let named: Vec<NamedMap<'_>> =
+        maps.iter().map(|map| NamedMap { name: &map.name, map: &map.map, criterion: map.criterion, left_out: &map.left_out }).collect();
     let picture = map_picture(&order.title, [order.x(), order.y()], &named);
     files.push(write_into(folder, "map.svg", picture.map(|picture| picture.size(size).svg()).unwrap_or_default())?);
     Ok(files)
@@ -38,7 +38,7 @@ fn table(order: &Order, VariantMap { map, criterion, verdicts, .. }: &VariantMap
         for (((x, radius), verdict), nominal) in map.x.iter().zip(row).zip(verdicts).zip(nominal) {
             text.push_str(&format!("{x:?},{y:?},{radius:?},{}", verdict.word()));
             if *criterion == Criterion::MeanSquare {
-                text.push_str(&format!(",{}", source::judged(*criterion, *nominal)));
+                text.push_str(&format!(",{}", criterion.kind(*nominal).word()));
             }
             text.push('\n');
         }

@@ -9,7 +9,7 @@ mod prove;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_stability::{Criterion, Family, Grid, KeyRange, Map, MapError, Verdict};
+use cohaptic_stability::{Criterion, Family, Grid, KeyRange, Kinds, Map, MapError, Verdict, VerdictKind};
 
 use super::source::{self, Said};
 use crate::arguments::MapArguments;
@@ -37,6 +37,8 @@ struct VariantMap {
     map: Map,
     /// By which radius it judges.
     criterion: Criterion,
+    /// Random parts of the links that its nominal cells leave out, in words.
+    left_out: Vec<&'static str>,
     /// Of every cell, row after row.
     verdicts: Vec<Vec<Verdict>>,
     /// Its table, if it was written.
@@ -74,7 +76,8 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let named = maps.into_iter().enumerate().map(|(number, map)| {
         let Variant { name, overrides, .. } = &order.variants[number];
         let verdicts = map.verdicts(&order.families[number]).map_err(|error| order.failure(number, arguments, error.into()))?;
-        Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), criterion: order.families[number].criterion(), map, verdicts, file: None })
+        let (criterion, left_out) = (order.families[number].criterion(), order.families[number].left_out().to_vec());
+        Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), criterion, left_out, map, verdicts, file: None })
     });
     let mut maps = named.collect::<Result<Vec<VariantMap>, Failure>>()?;
     let speed = Speed { wall_s: start.elapsed().as_secs_f64(), cells };
@@ -142,6 +145,18 @@ impl VariantMap {
     /// How many of its cells leave out what their links leave to chance.
     fn nominal_cells(&self) -> usize {
         self.map.nominal.iter().flatten().filter(|nominal| **nominal).count()
+    }
+
+    /// Returns the numbers of its cells, by the question that their verdicts answer.
+    fn kinds(&self) -> Kinds {
+        Kinds::of(self.criterion, self.map.nominal.iter().flatten().copied())
+    }
+
+    /// Returns the share of the cells of a kind that is stable.
+    fn stable_fraction_of(&self, kind: VerdictKind) -> f64 {
+        let all = self.verdicts.iter().flatten().zip(self.map.nominal.iter().flatten());
+        let of_kind: Vec<Verdict> = all.filter(|(_, nominal)| self.criterion.kind(**nominal) == kind).map(|(verdict, _)| *verdict).collect();
+        share(of_kind.iter().filter(|verdict| **verdict == Verdict::Stable).count(), of_kind.len())
     }
 
     /// What share of its cells is stable.

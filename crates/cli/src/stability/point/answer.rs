@@ -2,7 +2,9 @@
 
 use cohaptic_answers::notes;
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
+use cohaptic_stability::{
+    Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, VerdictKind, WorstVerdict, nominal_head,
+};
 use cohaptic_units::print::Span;
 use serde::Serialize;
 
@@ -19,7 +21,7 @@ pub(super) fn of(
     every: Option<&every_number::Proof>,
     contacts: Option<&switching::Proof>,
 ) -> impl Serialize {
-    let Judgement { verdict, analysis, mean_square } = judgement;
+    let Judgement { verdict, analysis, mean_square, left_out } = judgement;
     let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);
     let constant = time_constant(analysis);
     let modes = analysis.modes.iter().map(|mode| {
@@ -38,6 +40,9 @@ pub(super) fn of(
         title: scene.title.as_str(),
         // In the mean square where links leave something to chance.
         verdict: verdict.word(),
+        // The question that the verdict answers; of a nominal one, the random parts of the links that it leaves out.
+        judged: judgement.kind().word(),
+        left_out: left_out.as_slice(),
         spectral_radius: analysis.radius.value,
         error_bound: analysis.radius.error,
         #[serde(flatten)]
@@ -89,8 +94,12 @@ fn worst_mode(analysis: &Analysis) -> Option<&ContactMode> {
 const MOST_MODES: usize = 16;
 
 pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> String {
-    let Judgement { verdict, analysis, mean_square } = judgement;
-    let mut text = format!("{}\n\n{}\n", scene.title, sentence(*verdict, mean_square.is_some()));
+    let Judgement { verdict, analysis, mean_square, left_out } = judgement;
+    let sentence = sentence(*verdict, mean_square.is_some());
+    let mut text = match judgement.kind() {
+        VerdictKind::Nominal => format!("{}\n\n{}: {sentence}\n", scene.title, nominal_head(left_out).replacen('n', "N", 1)),
+        VerdictKind::Certain | VerdictKind::MeanSquare => format!("{}\n\n{sentence}\n", scene.title),
+    };
     let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     if let Some(mean_square) = mean_square {
         line(format!("mean-square radius {} over a frame of {}", number(mean_square.radius), Span(mean_square.frame)));

@@ -88,7 +88,7 @@ fn nominal(scene: &Scene, mut analysis: Analysis, place: &str) -> Judgement {
     if has_chance(scene) {
         analysis.notes.push(format!("the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed {place}"));
     }
-    Judgement { verdict: analysis.verdict(), analysis, mean_square: None }
+    Judgement::nominal(scene, analysis)
 }
 
 /// The verdict if each peer hears only its neighbours.
