@@ -17,7 +17,7 @@ use crate::lifted::{Node, Sampling};
 use crate::timetable::Timetable;
 
 /// The numbers of a part of a scene at a corner of a box.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub(super) struct Point {
     pub(super) nodes: Vec<Node>,
     pub(super) weights: Matrix,
@@ -34,8 +34,9 @@ pub(super) struct Common<'a> {
     pub(super) time: f64,
 }
 
-/// More numbers than this that vary are refused: a box has two corners to the power of them.
-const MOST_NUMBERS: u32 = 6;
+/// More numbers than this that vary are refused: a box has two corners to the power of them. Two dampings are four coefficients of a step map each, of bodies that
+/// are equal in all peers; beside them there is room for the weight with which a peer hears others, and for one number more.
+const MOST_NUMBERS: usize = 10;
 
 /// Parts of the computation that all points share.
 struct Frame<'a> {
@@ -198,9 +199,29 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
             }
         }
     }
-    let mut all = points.to_vec();
+    let mut varying = Vec::new();
     for (found, bodies) in groups {
         let ranges = ranges(&found)?;
+        varying.push((bodies, ranges, together(&ranges, &found)));
+    }
+    let mut all = points.to_vec();
+    for (bodies, ranges, _) in &varying {
+        for point in &mut all {
+            for (node, body) in bodies {
+                if let Some(place) = body.of(&mut point.nodes[*node]) {
+                    *place = place.with_map(map_of(ranges.map(|(low, _)| low)));
+                }
+            }
+        }
+    }
+    // A key that changes bodies alone counts by their coefficients, and no more by itself.
+    let mut all = without_idle_numbers(all);
+    let numbers = all.len().trailing_zeros() as usize;
+    let coefficients_of_bodies: usize = varying.iter().map(|(_, _, together)| together.len()).sum();
+    if numbers + coefficients_of_bodies > MOST_NUMBERS {
+        return Err(ProofError::Numerous { coefficients: coefficients_of_bodies, others: numbers, most: MOST_NUMBERS });
+    }
+    for (bodies, ranges, together) in varying {
         let set = |point: &Point, values: &dyn Fn([f64; 6]) -> [f64; 6]| {
             let mut point = point.clone();
             for (node, body) in &bodies {
@@ -210,8 +231,7 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
             }
             point
         };
-        all = all.iter().map(|point| set(point, &|_| ranges.map(|(low, _)| low))).collect();
-        for places in together(&ranges, &found) {
+        for places in together {
             all = doubled(&all, |point, upper| {
                 let at = |mut values: [f64; 6]| {
                     places.iter().for_each(|(place, falls)| values[*place] = if upper == *falls { ranges[*place].0 } else { ranges[*place].1 });
@@ -220,11 +240,27 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
                 set(point, &at)
             });
         }
-        if all.len() > 1 << MOST_NUMBERS {
-            return Err(ProofError::Numerous { most: MOST_NUMBERS });
-        }
     }
     Ok(all)
+}
+
+/// The points without the numbers that change none of them.
+fn without_idle_numbers(mut points: Vec<Point>) -> Vec<Point> {
+    let mut number = 0;
+    while points.len() > 1 << number {
+        let bit = 1 << number;
+        let is_idle = (0..points.len()).filter(|place| place & bit == 0).all(|place| points[place] == points[place | bit]);
+        if is_idle {
+            let mut place = 0;
+            points.retain(|_| {
+                place += 1;
+                (place - 1) & bit == 0
+            });
+        } else {
+            number += 1;
+        }
+    }
+    points
 }
 
 /// Which body of a node.

@@ -207,10 +207,18 @@ pub enum ProofError {
     #[error("a mass or damping varies and clocks drift: expected drift = 0")]
     Drift,
     /// Too many numbers vary.
-    #[error("more than {most} gains, masses and dampings vary at once")]
+    #[error(
+        "{} numbers of the steps vary at once, {coefficients} of them coefficients of step maps of bodies: a damping makes four of each different body, a mass beside \
+         a damping that stays two, and a mass without damping one; at most {most} can, so expected fewer keys that are masses and dampings, or peers with equal \
+         bodies; `--curve` varies one of them", coefficients + others
+    )]
     Numerous {
-        /// How many may.
-        most: u32,
+        /// Coefficients of step maps that vary.
+        coefficients: usize,
+        /// Gains and weights that vary.
+        others: usize,
+        /// How many may vary.
+        most: usize,
     },
 }
 

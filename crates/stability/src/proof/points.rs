@@ -82,7 +82,7 @@ impl Found {
     /// Whether a box is decided.
     fn judge(&mut self, case: &Case, followed: &Followed<'_>, ranges: [[f64; 2]; 2], points: &[&Point]) -> bool {
         let proven = match followed.decide(&ranges) {
-            // Masses of copies and devices, all with damping.
+            // Dampings of devices that differ.
             Err(ProofError::Numerous { .. }) => None,
             decided => decided.unwrap(),
         };

@@ -334,6 +334,29 @@ fn family(set: &[&str], x: &str, y: &str) -> Family {
 
 const GAINS: [&str; 2] = ["coordination.stiffness=100..6000", "coordination.damping=0..60"];
 
+/// How many points within proven boxes of a region were looked at: single radii with their own bounds agree at all of them. Fails where one does not.
+fn agreeing(family: &Family, region: &ProvenRegion) -> usize {
+    let mut scratch = crate::FamilyScratch::default();
+    let mut decided = 0;
+    for (number, one) in region.boxes.iter().enumerate().filter(|(_, one)| one.guarantee != Guarantee::Undecided) {
+        // Each box has other points, spread by the golden ratio.
+        let share = |place: usize, irrational: f64| (count(number + 1) * (count(place) + irrational) * 0.618_033_988_749_894_9).fract();
+        let between = |[low, high]: [f64; 2], share: f64| (low + share * (high - low)).clamp(low, high);
+        let inside = (0..6).map(|place| [between(one.x, share(place, 0.3)), between(one.y, share(place, 0.7))]);
+        let corners = [[one.x[0], one.y[0]], [one.x[1], one.y[0]], [one.x[0], one.y[1]], [one.x[1], one.y[1]]];
+        for values in inside.chain(corners) {
+            let verdict = family.bounded_radius(&values, &mut scratch).unwrap().radius.verdict();
+            let contradicts = match one.guarantee {
+                Guarantee::Stable => verdict == Verdict::Unstable,
+                Guarantee::Unstable | Guarantee::Undecided => verdict == Verdict::Stable,
+            };
+            assert!(!contradicts, "{one:?}, and {verdict:?} at {values:?}");
+            decided += 1;
+        }
+    }
+    decided
+}
+
 /// No box that is proven has a point of the other kind: at thousands of points within proven boxes, their corners among them, single radii with their own bounds agree.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
@@ -360,28 +383,36 @@ fn no_box_holds_a_point_that_contradicts_it() {
     ] {
         let family = family(set, x, y);
         let region = ProvenRegion::prove(&family, 5, None, &Unwatched).unwrap();
-        let mut scratch = crate::FamilyScratch::default();
-        let mut decided = 0;
-        for (number, one) in region.boxes.iter().enumerate().filter(|(_, one)| one.guarantee != Guarantee::Undecided) {
-            // Each box has other points, spread by the golden ratio.
-            let share = |place: usize, irrational: f64| (count(number + 1) * (count(place) + irrational) * 0.618_033_988_749_894_9).fract();
-            let between = |[low, high]: [f64; 2], share: f64| (low + share * (high - low)).clamp(low, high);
-            let inside = (0..6).map(|place| [between(one.x, share(place, 0.3)), between(one.y, share(place, 0.7))]);
-            let corners = [[one.x[0], one.y[0]], [one.x[1], one.y[0]], [one.x[0], one.y[1]], [one.x[1], one.y[1]]];
-            for values in inside.chain(corners) {
-                let verdict = family.bounded_radius(&values, &mut scratch).unwrap().radius.verdict();
-                let contradicts = match one.guarantee {
-                    Guarantee::Stable => verdict == Verdict::Unstable,
-                    Guarantee::Unstable | Guarantee::Undecided => verdict == Verdict::Stable,
-                };
-                assert!(!contradicts, "{set:?} {x} {y}: {one:?}, and {verdict:?} at {values:?}");
-                decided += 1;
-            }
-        }
+        let decided = agreeing(&family, &region);
         assert!(decided > 200, "{set:?} {x} {y}: {decided} points of {} boxes", region.boxes.len());
         let shares = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided].map(|guarantee| region.share(guarantee));
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12 && shares[2] < 0.6, "{set:?} {x} {y}: {shares:?}");
     }
+}
+
+/// Two keys that are dampings make four coefficients of a step map each. The radii at points within the boxes come from single scenes, which know no boxes.
+#[test]
+fn two_dampings_make_a_region() {
+    for (set, [x, y], least) in [
+        (&["coordination.stiffness=2000"][..], ["object.damping=0..8", "peer.device.damping=0.5..8"], 0.2),
+        (&["coordination.stiffness=2000"], ["object.damping=0..8", "object.mass=0.2..1"], 0.2),
+        (&["scene.count=4", "topology={ kind = \"ring\" }"], ["object.damping=0..8", "object.mass=0.2..1"], 0.2),
+    ] {
+        let family = family(set, x, y);
+        let region = ProvenRegion::prove(&family, 3, None, &Unwatched).unwrap();
+        let points = agreeing(&family, &region);
+        let open = region.share(Guarantee::Undecided);
+        assert!(points > 20 && open < 1.0 - least, "{set:?} {x} {y}: {points} points, {open} undecided");
+    }
+}
+
+/// Three devices that differ have four coefficients each under one damping, beside four of the copies.
+#[test]
+fn too_many_coefficients_are_counted() {
+    let set = ["scene.count=3", "peers=[{ name = \"peer2\", device = { mass = 0.2 } }, { name = \"peer3\", device = { mass = 0.3 } }]"];
+    let family = family(&set, "object.damping=0..8", "peer.device.damping=0.5..8");
+    let message = ProvenRegion::prove(&family, 3, None, &Unwatched).unwrap_err().to_string();
+    assert!(message.starts_with("16 numbers of the steps vary at once, 16 of them coefficients") && message.contains("at most 10"), "{message}");
 }
 
 /// Every crossing that a search finds lies in a stretch that is not decided, and no stretch is longer than asked for.
