@@ -99,6 +99,8 @@ pub struct FrameCost {
     pub rows: usize,
     /// The joint states of the chains of all links; at least 1.
     pub joint: usize,
+    /// Moments that deliveries on links that remember add up in a frame, each from one joint state to another.
+    pub sums: usize,
 }
 
 /// How often a frame is gone through: by the iteration, and for the bounds that are tried.
@@ -119,7 +121,9 @@ impl FrameCost {
 
     /// One way through the frame, and the work for all numbers at its end.
     pub(crate) fn of_a_pass(&self) -> f64 {
-        OF_AN_EVENT * count(self.joint) * count(self.rows) * count(self.events) + BETWEEN * self.numbers()
+        // Half of a symmetric moment is added up.
+        let sums = 0.5 * count(self.sums) * count(self.rows).powi(2);
+        OF_AN_EVENT * count(self.joint) * count(self.rows) * count(self.events) + sums + BETWEEN * self.numbers()
     }
 
     /// How many numbers are kept at once within the frame.
@@ -154,13 +158,16 @@ mod tests {
     /// times the work of each event.
     #[test]
     fn the_cost_follows_events_rows_and_joint_states() {
-        let frame = FrameCost { events: 10_000_000, rows: 100, joint: 1 };
+        let frame = FrameCost { events: 10_000_000, rows: 100, joint: 1, sums: 0 };
         let ratio = |other: FrameCost| other.operations() / frame.operations();
         assert!((ratio(FrameCost { events: 20_000_000, ..frame }) - 2.0).abs() < 0.01);
         assert!((ratio(FrameCost { joint: 2, ..frame }) - 2.0).abs() < 0.1);
         assert!((ratio(FrameCost { rows: 1000, ..frame }) - 10.0).abs() < 0.5);
+        // Sums of moments beside next to no events: each is half of 100² operations.
+        let summed = FrameCost { events: 1, sums: 1_000_000, ..frame };
+        assert!((summed.operations() / (60.0 * 5e9) - 1.0).abs() < 0.01);
         // 8 bytes each: a gibibyte is 2^27 numbers.
-        assert_eq!(FrameCost { events: 1, rows: 8192, joint: 2 }.numbers().to_bits(), 134_217_728_f64.to_bits());
+        assert_eq!(FrameCost { events: 1, rows: 8192, joint: 2, sums: 0 }.numbers().to_bits(), 134_217_728_f64.to_bits());
     }
 
     /// 8192 states are 2^26 entries, of 8 bytes, in 16 matrices: 8 GiB.

@@ -35,6 +35,9 @@ pub(crate) struct Hazards {
     oldest: Vec<i64>,
     /// The newest that may have arrived by the tick before each, and by the last.
     newest: Vec<i64>,
+    /// For each sample of the frame: the number of its first tick, counted from the first tick of the frame, and the probability that it has arrived by that
+    /// tick and by each one after it, up to its last.
+    arrived: Vec<(i64, Vec<f64>)>,
 }
 
 /// A sample that may be taken in at a tick.
@@ -42,8 +45,19 @@ pub(crate) struct Hazards {
 pub(crate) struct Hazard {
     pub(crate) sample: i64,
     pub(crate) hazard: f64,
-    /// Whether it cannot have arrived before.
-    pub(crate) first: bool,
+}
+
+/// The samples that matter at a tick.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Window {
+    /// The oldest sample that may arrive at the tick or later.
+    pub(crate) before: i64,
+    /// The oldest sample that may arrive later.
+    pub(crate) after: i64,
+    /// The newest sample that may have arrived by the tick.
+    pub(crate) newest: i64,
+    /// Places at the beginning of the tick.
+    pub(crate) places: usize,
 }
 
 /// What may happen at a tick: from one place to another, taking in a sample or none.
@@ -72,6 +86,7 @@ impl Hazards {
         let mut at: Vec<Vec<Hazard>> = vec![Vec::new(); ticks.len()];
         // The first and the last tick of each sample of the frame, counted on over frames.
         let mut spans: Vec<(i128, i128)> = Vec::with_capacity(sends.len());
+        let mut arrived = Vec::with_capacity(sends.len());
         for (sample, sent) in sends.iter().enumerate() {
             let sent = i128::from(*sent);
             let earliest = sent + arrival.least();
@@ -79,6 +94,7 @@ impl Hazards {
             let in_frame = ticks.partition_point(|tick| i128::from(*tick) < earliest - frames * frame);
             let mut number = frames * count + i128::try_from(in_frame).ok()?;
             let (mut before, mut first, mut steps) = (0.0, None, 0);
+            let mut reached = Vec::new();
             let last = loop {
                 let now = arrival.within(tick(number)? - sent);
                 let hazard = if before < 1.0 { (now - before) / (1.0 - before) } else { 0.0 };
@@ -86,10 +102,13 @@ impl Hazards {
                     let place = usize::try_from(number.rem_euclid(count)).ok()?;
                     let frames = i64::try_from(number.div_euclid(count)).ok()?;
                     let sample = i64::try_from(sample).ok()? - frames * i64::try_from(sends.len()).ok()?;
-                    at[place].push(Hazard { sample, hazard: hazard.min(1.0), first: first.is_none() });
+                    at[place].push(Hazard { sample, hazard: hazard.min(1.0) });
                     first.get_or_insert(number);
                 }
                 before = now;
+                if first.is_some() {
+                    reached.push(now);
+                }
                 if now >= final_probability {
                     break number;
                 }
@@ -100,6 +119,7 @@ impl Hazards {
                 }
             };
             spans.push((first.unwrap_or(last), last));
+            arrived.push((i64::try_from(first.unwrap_or(last)).ok()?, reached));
         }
         for hazards in &mut at {
             hazards.sort_unstable_by_key(|hazard| hazard.sample);
@@ -115,12 +135,28 @@ impl Hazards {
         }
         let places = oldest.iter().zip(&newest).map(|(oldest, newest)| reach(*oldest, *newest)).max()? + 1;
         let spread = spans.iter().any(|(first, last)| first != last);
-        Some(Self { at, places, spread, oldest, newest })
+        Some(Self { at, places, spread, oldest, newest, arrived })
     }
 
     /// How many samples of earlier frames may be taken in.
     pub(crate) fn depth(&self) -> usize {
         self.at.iter().flatten().map(|hazard| usize::try_from(-hazard.sample).unwrap_or(0)).max().unwrap_or(0)
+    }
+
+    /// Returns the samples that matter at a tick.
+    pub(crate) fn window(&self, tick: usize) -> Window {
+        let (before, after) = (self.oldest[tick], self.oldest[tick + 1]);
+        Window { before, after, newest: self.newest[tick + 1], places: reach(before, self.newest[tick]) + 1 }
+    }
+
+    /// Returns the probabilities that a sample has arrived by the tick before a tick of the frame, and by that tick.
+    pub(crate) fn arrived(&self, sample: i64, tick: usize) -> (f64, f64) {
+        let (sends, ticks) = (i64::try_from(self.arrived.len()).unwrap_or(1), i64::try_from(self.at.len()).unwrap_or(1));
+        let (first, reached) = &self.arrived[usize::try_from(sample.rem_euclid(sends)).unwrap_or(0)];
+        // The tick as the sample of the frame counts it that is sent as this one is.
+        let tick = i64::try_from(tick).unwrap_or(i64::MAX) - sample.div_euclid(sends) * ticks;
+        let by = |tick: i64| usize::try_from(tick - first).map_or(0.0, |place| reached.get(place).or(reached.last()).copied().unwrap_or(0.0));
+        (by(tick - 1), by(tick))
     }
 
     /// What may happen at a tick, from every place that can be reached.

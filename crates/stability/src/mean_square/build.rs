@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use super::arrivals::{Hazard, Hazards, Outcome};
+use super::arrivals::{Hazards, Outcome};
+use super::bursts::Bursts;
 use super::events::{Arrive, Events, Step};
 use super::held::staying;
 use super::law::LossChain;
@@ -129,7 +130,9 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
                 for (link, line) in lines.iter().enumerate().filter(|(_, line)| line.to == node) {
                     for outcomes in outcomes(line, tick[node], &instants.sends[line.from], frame) {
                         flush(&mut pending, &mut made, node);
-                        let outcomes = outcomes.into_iter().map(|outcome| Arrive::new(outcome, |sample| row_of(line.from, sample))).collect();
+                        let arrive = |outcome| Arrive::new(outcome, |sample| row_of(line.from, sample));
+                        let mut outcomes: Vec<Arrive> = outcomes.into_iter().map(arrive).collect();
+                        outcomes.sort_by_key(|outcome| (outcome.to, outcome.from));
                         made.steps.push(Step::Deliver { link, row: held_row(link), numbers, outcomes });
                     }
                 }
@@ -162,25 +165,27 @@ impl Line {
     }
 }
 
-/// How many states a link's chain has: its places, or those of its losses, with whether the sample under way is lost where that must be remembered.
+/// How many states a link's chain has: its places, and in each of them those of its losses.
 fn chain_states(line: &Line) -> usize {
     match &line.chance {
         None => 1,
         Some((hazards, None)) => hazards.places,
-        Some((hazards, Some(chain))) => chain.states() * if hazards.spread { 2 } else { 1 },
+        Some((hazards, Some(chain))) => Bursts { hazards, chain: *chain, gap: |_| 0.0 }.states(),
     }
 }
 
 /// What may happen on a line at a tick of its receiver, one after the other.
 fn outcomes(line: &Line, tick: usize, sends: &[u64], frame: u64) -> Vec<Vec<Outcome>> {
-    match &line.chance {
-        None => Vec::new(),
-        Some((hazards, None)) if hazards.places == 1 && hazards.at[tick].is_empty() => Vec::new(),
-        Some((hazards, None)) => vec![hazards.outcomes(tick)],
-        Some((hazards, Some(chain))) => {
-            hazards.at[tick].iter().map(|hazard| chained(*hazard, *chain, hazards.spread, gap(hazard.sample, sends, frame))).collect()
-        }
+    let Some((hazards, chain)) = &line.chance else { return Vec::new() };
+    let window = hazards.window(tick);
+    // Nothing arrives, and no place is counted anew.
+    if hazards.at[tick].is_empty() && (hazards.places == 1 && chain.is_none() || window.before == window.after) {
+        return Vec::new();
     }
+    vec![match chain {
+        None => hazards.outcomes(tick),
+        Some(chain) => Bursts { hazards, chain: *chain, gap: |sample| gap(sample, sends, frame) }.outcomes(tick),
+    }]
 }
 
 /// How long before a sample the one before it was sent \[s\].
@@ -189,36 +194,4 @@ fn gap(sample: i64, sends: &[u64], frame: u64) -> f64 {
     let place = usize::try_from(sample.rem_euclid(count)).unwrap_or(0);
     let before = if place == 0 { sends[sends.len() - 1].wrapping_sub(frame) } else { sends[place - 1] };
     Duration::from_nanos(sends[place].wrapping_sub(before)).as_secs_f64()
-}
-
-/// The chain of losses moves when its sample may first arrive; a sample is lost or arrives with its hazard.
-fn chained(hazard: Hazard, chain: LossChain, spread: bool, gap: f64) -> Vec<Outcome> {
-    let Hazard { sample, hazard, first } = hazard;
-    // With a sample under way for several ticks: twice the state, and one more if it is lost.
-    let place = |state: usize, lost: bool| if spread { 2 * state + usize::from(lost) } else { state };
-    let mut outcomes = Vec::new();
-    let mut alive = |from: usize, to: usize, probability: f64| {
-        outcomes.push(Outcome { from, to, take: Some(sample), probability: probability * hazard });
-        outcomes.push(Outcome { from, to, take: None, probability: probability * (1.0 - hazard) });
-    };
-    let mut lost = Vec::new();
-    if first {
-        for (from, to, is_lost, probability) in chain.moves(gap) {
-            for before in [false, true].into_iter().take(if spread { 2 } else { 1 }) {
-                if is_lost {
-                    lost.push(Outcome { from: place(from, before), to: place(to, true), take: None, probability });
-                } else {
-                    alive(place(from, before), place(to, false), probability);
-                }
-            }
-        }
-    } else {
-        for state in 0..chain.states() {
-            alive(place(state, false), place(state, false), 1.0);
-            lost.push(Outcome { from: place(state, true), to: place(state, true), take: None, probability: 1.0 });
-        }
-    }
-    outcomes.append(&mut lost);
-    outcomes.retain(|outcome| outcome.probability > 0.0);
-    outcomes
 }

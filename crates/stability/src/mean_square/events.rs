@@ -52,7 +52,8 @@ pub(crate) enum Step {
     Move { first: usize, map: Matrix, sizes: Matrix, held: Vec<Vec<(usize, f64)>> },
     /// The row becomes that combination.
     Sample { row: usize, of: [(usize, f64); 2] },
-    /// The rows of a held sample, as many as a sample has numbers, may become those of another sample: `take` is its first row.
+    /// The rows of a held sample, as many as a sample has numbers, may become those of another sample: `take` is its first row. Outcomes are in the order of
+    /// their ends, and of their beginnings where these are equal.
     Deliver { link: usize, row: usize, numbers: usize, outcomes: Vec<Arrive> },
 }
 
@@ -82,60 +83,65 @@ impl Events {
         self.chains.iter().product()
     }
 
-    fn deliver(&self, moments: Vec<Matrix>, link: usize, (row, numbers): (usize, usize), outcomes: &[Arrive]) -> Vec<Matrix> {
-        let inner: usize = self.chains[link + 1..].iter().product();
-        let own = self.chains[link];
-        let mut after: Vec<Matrix> = Vec::with_capacity(moments.len());
-        for joint in 0..moments.len() {
-            let to = joint / inner % own;
-            let base = joint - to * inner;
-            let mut sum = Matrix::zeros(self.rows, self.rows);
-            let mut taken = Taken::new(numbers, self.rows);
-            for from in 0..own {
-                let source = &moments[base + from * inner];
-                let mut whole = 0.0;
-                for outcome in outcomes.iter().filter(|outcome| (outcome.from, outcome.to) == (from, to)) {
-                    whole += outcome.probability;
-                    taken.add(source, outcome, row);
-                }
-                if whole != 0.0 {
-                    add(&mut sum, source, whole);
-                }
-            }
-            taken.put(&mut sum, row);
-            after.push(sum);
-        }
-        after
+    /// Returns how many moments deliveries on links that remember add up in a frame.
+    pub(crate) fn sums(&self) -> usize {
+        let of = |step: &Step| match step {
+            Step::Deliver { link, outcomes, .. } if self.chains[*link] > 1 => ways(outcomes).count() * (self.states() / self.chains[*link]),
+            Step::Move { .. } | Step::Sample { .. } | Step::Deliver { .. } => 0,
+        };
+        self.steps.iter().map(of).sum()
     }
 
-    fn step(&self, mut moments: Vec<Matrix>, step: &Step, signs: Signs) -> Vec<Matrix> {
+    /// Delivers on a link that remembers. `after` is room of the size of `moments`, which is taken once for all deliveries of a frame: thousands of moments that
+    /// were made and dropped at each of them took as long as their sums.
+    fn deliver(&self, moments: &mut Vec<Matrix>, after: &mut Vec<Matrix>, link: usize, (row, numbers): (usize, usize), outcomes: &[Arrive]) {
+        let inner: usize = self.chains[link + 1..].iter().product();
+        let own = self.chains[link];
+        after.resize_with(moments.len(), || Matrix::zeros(self.rows, self.rows));
+        // Chains with many places have a thousand outcomes and more, which each joint state would look through.
+        let ways: Vec<(&[Arrive], f64)> = ways(outcomes).map(|way| (way, way.iter().map(|outcome| outcome.probability).sum())).collect();
+        for (joint, sum) in after.iter_mut().enumerate() {
+            let to = joint / inner % own;
+            let base = joint - to * inner;
+            sum.entries_mut().fill(0.0);
+            let mut taken = Taken::new(numbers, self.rows);
+            let first = ways.partition_point(|(way, _)| way[0].to < to);
+            for (way, whole) in ways[first..].iter().take_while(|(way, _)| way[0].to == to) {
+                let source = &moments[base + way[0].from * inner];
+                way.iter().for_each(|outcome| taken.add(source, outcome, row));
+                add_upper(sum, source, *whole);
+            }
+            mirror(sum);
+            taken.put(sum, row);
+        }
+        std::mem::swap(moments, after);
+    }
+
+    fn step(&self, moments: &mut Vec<Matrix>, spare: &mut Vec<Matrix>, step: &Step, signs: Signs) {
         match step {
             Step::Move { first, map, sizes, held } => {
                 let map = if signs == Signs::Kept { map } else { sizes };
-                for moment in &mut moments {
+                for moment in moments {
                     advance(moment, *first, map, held);
                 }
-                moments
             }
             Step::Sample { row, of: [(x, position), (v, velocity)] } => {
-                for moment in &mut moments {
+                for moment in moments {
                     let mut line: Vec<f64> = moment.row(*x).iter().zip(moment.row(*v)).map(|(x, v)| position * x + velocity * v).collect();
                     line[*row] = position * line[*x] + velocity * line[*v];
                     set_line(moment, *row, &line);
                 }
-                moments
             }
             Step::Deliver { link, row, numbers, outcomes } => match (self.chains[*link], outcomes.as_slice()) {
                 // Nothing to keep apart: in place.
                 (1, _) => {
-                    for moment in &mut moments {
+                    for moment in moments {
                         let mut taken = Taken::new(*numbers, self.rows);
                         outcomes.iter().for_each(|outcome| taken.add(moment, outcome, *row));
                         taken.put(moment, *row);
                     }
-                    moments
                 }
-                (_, outcomes) => self.deliver(moments, *link, (*row, *numbers), outcomes),
+                (_, outcomes) => self.deliver(moments, spare, *link, (*row, *numbers), outcomes),
             },
         }
     }
@@ -170,8 +176,9 @@ impl Events {
             }
             moments.push(moment);
         }
+        let mut spare = Vec::new();
         for step in &self.steps {
-            moments = self.step(moments, step, signs);
+            self.step(&mut moments, &mut spare, step, signs);
         }
         let mut packed = Vec::with_capacity(element.len());
         for moment in &moments {
@@ -209,7 +216,8 @@ impl Positive for Events {
             Step::Move { map, held, .. } => 2 * (map.columns() + 2 * held.iter().map(Vec::len).sum::<usize>() + 2) + 2,
             // Two products, a sum, and the factors' own: twice.
             Step::Sample { .. } => 12,
-            Step::Deliver { outcomes, .. } => 2 * outcomes.len() + 4,
+            // A term goes into one end alone.
+            Step::Deliver { outcomes, .. } => 2 * outcomes.chunk_by(|one, other| one.to == other.to).map(<[Arrive]>::len).max().unwrap_or(0) + 4,
         };
         self.steps.iter().map(of).sum::<usize>() + 2 * self.roundings + 8
     }
@@ -224,6 +232,11 @@ impl Positive for Events {
         }
         matrices
     }
+}
+
+/// Outcomes by their end and their beginning.
+fn ways(outcomes: &[Arrive]) -> impl Iterator<Item = &[Arrive]> {
+    outcomes.chunk_by(|one, other| (one.to, one.from) == (other.to, other.from))
 }
 
 /// The rows of a held sample after a delivery, in the making.
@@ -295,9 +308,19 @@ fn advance(moment: &mut Matrix, first: usize, map: &Matrix, held: &[Vec<(usize, 
     }
 }
 
-fn add(sum: &mut Matrix, matrix: &Matrix, factor: f64) {
+/// Adds the part of a symmetric matrix on and above the diagonal.
+fn add_upper(sum: &mut Matrix, matrix: &Matrix, factor: f64) {
     for row in 0..sum.rows() {
-        sum.row_mut(row).iter_mut().zip(matrix.row(row)).for_each(|(sum, entry)| *sum += factor * entry);
+        sum.row_mut(row)[row..].iter_mut().zip(&matrix.row(row)[row..]).for_each(|(sum, entry)| *sum += factor * entry);
+    }
+}
+
+/// Copies the part above the diagonal to the part below it.
+fn mirror(matrix: &mut Matrix) {
+    for row in 0..matrix.rows() {
+        for column in row + 1..matrix.columns() {
+            matrix[(column, row)] = matrix[(row, column)];
+        }
     }
 }
 

@@ -34,7 +34,7 @@ pub(crate) struct LinkLaw {
     pub(crate) cut: bool,
 }
 
-/// Losses that depend on what happened to the samples before: a chain that each sample moves.
+/// Losses that depend on what happened to the samples before: a chain that gives each sample a state, from which the probability of its loss follows.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum LossChain {
     GilbertElliott(GilbertElliott),
@@ -42,9 +42,6 @@ pub(crate) enum LossChain {
     Correlated(Chance),
     FourState(FourState),
 }
-
-/// A move of a chain of losses: from, to, whether the sample is lost, and how probable.
-pub(crate) type LossMove = (usize, usize, bool, f64);
 
 impl LossChain {
     /// The states that it is ever in: a link begins in the chain's stationary law, so one of probability zero is not among them.
@@ -68,44 +65,43 @@ impl LossChain {
 
     /// Whether everything is lost.
     fn loses_all(&self) -> bool {
-        self.moves(1.0).iter().all(|(_, _, lost, _)| *lost)
+        (0..self.states()).all(|state| self.lost(state) >= 1.0)
     }
 
-    /// The moves of a sample sent that number of seconds after the one before.
-    pub(crate) fn moves(&self, gap: f64) -> Vec<LossMove> {
-        let live = self.live();
-        let mut moves = Vec::with_capacity(2 * live.len() * live.len());
-        for (from, state) in live.iter().enumerate() {
-            for (to, next) in live.iter().enumerate() {
-                let (way, lost) = self.step(*state, *next, gap);
-                moves.extend([(from, to, true, way * lost), (from, to, false, way * (1.0 - lost))]);
-            }
+    /// Returns the probability that a sample is lost in a state. The second state of two is the bad one.
+    pub(crate) fn lost(&self, state: usize) -> f64 {
+        let state = self.live()[state];
+        match self {
+            // The state before a packet's move decides, which is therefore the state of that packet.
+            Self::GilbertElliott(chain) => [1.0 - chain.k.get(), 1.0 - chain.h.get()][state],
+            Self::InTime(chain) => [1.0 - chain.k.get(), 1.0 - chain.h.get()][state],
+            Self::Correlated(_) => [0.0, 1.0][state],
+            // Lost within a burst or between bursts.
+            Self::FourState(_) => [0.0, 0.0, 1.0, 1.0][state],
         }
-        moves.retain(|(.., probability)| *probability > 0.0);
-        moves
     }
 
-    /// The probability of a move, and of a loss with it. The second state of two is the bad one.
-    fn step(&self, from: usize, to: usize, gap: f64) -> (f64, f64) {
+    /// Returns the probabilities of the states of a sample, in columns, after each state of the sample before, in rows, which was sent `gap` seconds earlier.
+    pub(crate) fn moves(&self, gap: f64) -> Vec<Vec<f64>> {
+        let live = self.live();
+        live.iter().map(|from| live.iter().map(|to| self.way(*from, *to, gap)).collect()).collect()
+    }
+
+    fn way(&self, from: usize, to: usize, gap: f64) -> f64 {
         let pick = |to_bad: f64| if to == 1 { to_bad } else { 1.0 - to_bad };
         match self {
-            // The state before the move decides.
-            Self::GilbertElliott(chain) => {
-                let lost = [1.0 - chain.k.get(), 1.0 - chain.h.get()][from];
-                (pick([chain.p.get(), 1.0 - chain.r.get()][from]), lost)
-            }
+            Self::GilbertElliott(chain) => pick([chain.p.get(), 1.0 - chain.r.get()][from]),
             Self::InTime(chain) => {
                 let (good, bad) = chain.mean_times();
                 let (rate, share) = (1.0 / good.as_secs_f64() + 1.0 / bad.as_secs_f64(), chain.bad_fraction());
                 let forgotten = -libm::expm1(-rate * gap);
-                (pick([share * forgotten, 1.0 - (1.0 - share) * forgotten][from]), [1.0 - chain.k.get(), 1.0 - chain.h.get()][to])
+                pick([share * forgotten, 1.0 - (1.0 - share) * forgotten][from])
             }
             Self::Correlated(chance) => {
                 let (p, rho) = (chance.probability().get(), chance.correlation());
-                (pick([p * (1.0 - rho), p + rho * (1.0 - p)][from].clamp(0.0, 1.0)), [0.0, 1.0][to])
+                pick([p * (1.0 - rho), p + rho * (1.0 - p)][from].clamp(0.0, 1.0))
             }
-            // The state after the move decides: lost within a burst or between bursts.
-            Self::FourState(chain) => (chain.transitions()[from][to], [0.0, 0.0, 1.0, 1.0][to]),
+            Self::FourState(chain) => chain.transitions()[from][to],
         }
     }
 }

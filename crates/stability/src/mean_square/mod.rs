@@ -17,6 +17,7 @@
 
 pub(crate) mod arrivals;
 mod build;
+mod bursts;
 mod equal;
 mod events;
 mod held;
@@ -276,9 +277,6 @@ fn hazards(
     if hazards.places > 1 && law.in_order {
         return Err(refuse("its samples wait for each other (order = \"in-order\")"));
     }
-    if hazards.places > 1 && law.chain.is_some() {
-        return Err(refuse("its losses come in bursts and its samples overtake each other"));
-    }
     if hazards.spread && law.cut {
         notes.push("delays outside the central 1 − 2·10⁻⁹ of their law count as at its ends".to_owned());
     }
@@ -506,7 +504,7 @@ fn one_by_one(
     let Some((joint, unknowns)) = joint.zip(unknowns).filter(|(_, unknowns)| *unknowns <= most) else {
         return Err(AnalysisError::TooManyMoments { joint: operator.joint(), unknowns, most });
     };
-    let cost = FrameCost { joint, ..cost };
+    let cost = FrameCost { joint, sums: operator.sums(), ..cost };
     within(cost, limits)?;
     PartCost { states: cost.rows, bytes: 8.0 * cost.numbers(), operations: cost.operations() }.begin(limits.watch)?;
     let radius = radius_watched(&operator, cost.of_a_pass(), limits.watch).ok_or(AnalysisError::Stopped)?;
@@ -534,7 +532,7 @@ fn frame_cost(scene: &Scene, timetable: &Timetable, links: usize) -> FrameCost {
     let sent: usize = timetable.sent.iter().sum();
     // Position and velocity of a device and of a copy.
     let rows = 4 * peers + sent + timetable.depth.iter().sum::<usize>() + links;
-    FrameCost { events: timetable.events.len() + sent / peers * links, rows, joint: 1 }
+    FrameCost { events: timetable.events.len() + sent / peers * links, rows, joint: 1, sums: 0 }
 }
 
 /// Refuses what takes longer than it may, or more memory than there is.

@@ -5,6 +5,7 @@
 
 mod admittance;
 mod anchors;
+mod bursts;
 mod client_server;
 mod graphs;
 mod laws;

@@ -1,4 +1,4 @@
-"""Makes radii.json, mean_square.json, admittance.json, random.json, laws.json, absurd.json and verdicts.json, or those named on the command line. See README.md."""
+"""Makes radii.json, mean_square.json, bursts.json, admittance.json, random.json, laws.json, absurd.json and verdicts.json, or those named on the command line. See README.md."""
 
 import json
 import sys
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import absurd
 import admittance
+import bursts
 import cases
 import laws
 import mean_square
@@ -55,12 +56,14 @@ def write(name, entries):
 
 
 def main():
-    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance", "random", "laws", "absurd", "verdicts"]
+    wanted = sys.argv[1:] or ["radii", "mean_square", "bursts", "admittance", "random", "laws", "absurd", "verdicts"]
     with Pool() as pool:
         if "radii" in wanted:
             write("radii.json", radii(pool))
         if "mean_square" in wanted:
             write("mean_square.json", mean_square.entries(pool))
+        if "bursts" in wanted:
+            write("bursts.json", bursts.entries(pool))
         if "admittance" in wanted:
             write("admittance.json", admittance.entries(pool))
         if "random" in wanted:
