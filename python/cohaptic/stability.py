@@ -156,7 +156,8 @@ class Stability:
         return _native.eigenvalues(self.matrix.tolist())
 
     def __repr__(self) -> str:
-        return f"<Stability {self.verdict}: radius {self.radius:.12f} within {self.error:.1e}>"
+        verdict = f"nominally {self.verdict}" if self.judged == "nominal" else self.verdict
+        return f"<Stability {verdict}: radius {self.radius:.12f} within {self.error:.1e}>"
 
 
 @dataclass(frozen=True)

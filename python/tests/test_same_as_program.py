@@ -88,6 +88,7 @@ def test_a_verdict_is_the_same(path: str, cohaptic_program: Command) -> None:
     for name, theirs in finite.items():
         mine = getattr(stability, name)
         assert not np.isfinite(mine) if theirs is None else bits(mine) == bits(theirs), name
+    assert (stability.judged, stability.left_out) == (document["judged"], document["left_out"])
     if stability.mean_square is None:
         assert "mean_square_radius" not in document
     else:

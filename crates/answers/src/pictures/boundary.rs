@@ -19,7 +19,7 @@ pub fn boundary_picture(title: &str, range: &KeyRange, criterion: Criterion, lef
         title,
         axis: axis_of(range),
         // Marks tell nominal values from others; of one kind alone the curve has its name.
-        radius: kinds.only().unwrap_or(criterion.kind(false)).radius_name(),
+        radius: kinds.only().unwrap_or_else(|| criterion.kind(false)).radius_name(),
         nominal: (&nominal, &nominal_head(left_out)),
         range: (range.low, range.high),
         samples: &samples,

@@ -22,7 +22,7 @@ fn kinds() -> Vec<(String, Vec<&'static str>, Vec<&'static str>)> {
     let bands = ["90 % of the runs", "50 % of the runs", "median", "Largest discrepancy [mm]"];
     let with = |more: &[&'static str]| bands.iter().chain(more).copied().collect();
     vec![
-        (random("--vary link.loss=0%..40%/5"), with(&["Loss on links [%]"]), vec!["Loss on links [%]", "Mean-square radius", "1"]),
+        (random("--vary link.loss=0%..40%/5"), with(&["Loss on links [%]"]), vec!["Loss on links [%]", "Nominal radius squared", "1"]),
         (
             random(STRATEGIES),
             with(&["The rows are the values of coordination.strategy.", "average-position"]),

@@ -155,7 +155,7 @@ impl Hazards {
         let (first, reached) = &self.arrived[usize::try_from(sample.rem_euclid(sends)).unwrap_or(0)];
         // The tick as the sample of the frame counts it that is sent as this one is.
         let tick = i64::try_from(tick).unwrap_or(i64::MAX) - sample.div_euclid(sends) * ticks;
-        let by = |tick: i64| usize::try_from(tick - first).map_or(0.0, |place| reached.get(place).or(reached.last()).copied().unwrap_or(0.0));
+        let by = |tick: i64| usize::try_from(tick - first).map_or(0.0, |place| reached.get(place).or_else(|| reached.last()).copied().unwrap_or(0.0));
         (by(tick - 1), by(tick))
     }
 

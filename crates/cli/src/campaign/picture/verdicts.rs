@@ -47,7 +47,7 @@ impl Radii {
         let mean_square = judgements.iter().any(|judgement| judgement.verdict().is_some() && !is_spectral(judgement));
         let criterion = if mean_square { Criterion::MeanSquare } else { Criterion::SpectralRadius };
         let kinds = Kinds::of(criterion, judgements.iter().filter(|judgement| judgement.verdict().is_some()).map(is_nominal));
-        let name = kinds.only().unwrap_or(criterion.kind(false)).radius_name();
+        let name = kinds.only().unwrap_or_else(|| criterion.kind(false)).radius_name();
         let mut radii = Self { criterion, name, range: (1.0, 1.0), is_cut: false };
         for radius in judgements.iter().filter_map(|judgement| radii.radius(judgement)).collect::<Vec<f64>>() {
             radii.is_cut |= radius.is_nan() || radius > HIGHEST;
