@@ -59,7 +59,7 @@ fn all_scenes_of_a_folder_are_checked_whatever_came_before() {
     let text = message(|| check_scenes(base.path()));
     assert!(
         text.starts_with("of 3 scenes 2 failed:\n")
-            && text.contains("a.toml:1:1: object: missing key")
+            && text.contains("a.toml:1:9: scene: found the integer 1")
             && text.contains("c.toml: nothing was compared"),
         "{text}"
     );

@@ -13,15 +13,15 @@ use std::time::Duration;
 use cohaptic_wan::Modulator;
 
 use super::names::Names;
-use crate::document::{Diagnostic, FileError, Node, Place, Sources};
+use crate::document::{BEGINNING, Diagnostic, FileError, Node, Place, Sources};
 use crate::fingerprint::Fingerprint;
 
-/// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier. What is missing
-/// stands nowhere and comes last: `mas = 0.45` in a file without a `[coordination]` is told first.
+/// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier. A table that the
+/// whole file lacks comes last: of a file with `mas = 0.45` and without a `[coordination]` the wrong key is told first.
 #[derive(Debug, Default)]
 pub(crate) struct Faults(RefCell<Option<((Kind, Place), FileError)>>);
 
-/// Whether something is wrong or missing, in the order in which that is told.
+/// Whether something is wrong, or a table of the whole file is missing, in the order in which that is told.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Kind {
     Wrong,
@@ -121,7 +121,8 @@ impl<'a> Context<'a> {
     /// Reports that a key is missing in the table at a place.
     pub(super) fn missing(&self, place: Place, key: &str, expected: &str) {
         let error = || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), format!("missing key: expected {expected}"))));
-        self.faults.report_kind((Kind::Missing, place), error);
+        let kind = if place == BEGINNING { Kind::Missing } else { Kind::Wrong };
+        self.faults.report_kind((kind, place), error);
     }
 
     /// Reports what is wrong with a value.

@@ -45,18 +45,27 @@ impl FileSchema {
     }
 
     /// The unit in which the value of a key is a plain number: `"N/m"` of `coordination.stiffness` and of `peers.anna.coupling.stiffness`. Empty for a key
-    /// whose values carry their units (`link.delay`), are no numbers or have no unit, and for what is no key.
+    /// whose values carry their units (`link.delay`), are no numbers or have no unit, and for a text that names no key.
     #[must_use]
     pub fn unit_of(self, key: &str) -> &'static str {
         let mut parts = key.split('.');
         let Some(first) = parts.next().and_then(|name| form_of(self.root(), name)) else { return "" };
-        parts.try_fold(first, |form, name| form_of(form.table()?, name)).map_or("", unit)
+        parts.try_fold(first, within).map_or("", unit)
     }
 
     /// The catalogue as a JSON Schema of draft 7.
     #[must_use]
     pub fn json(self) -> Value {
         schema::json_schema(self.root(), self.title())
+    }
+}
+
+/// What stands under a name within a value: a key of a table, or an entry of a list by its name or place.
+fn within(form: &'static Form, name: &str) -> Option<&'static Form> {
+    match form {
+        Form::List(entry) => Some(entry),
+        Form::AnyOf(forms) => forms.iter().find_map(|form| within(form, name)),
+        form => form_of(form.table()?, name),
     }
 }
 

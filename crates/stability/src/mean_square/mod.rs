@@ -452,7 +452,7 @@ fn one_by_one(
     let instants = Instants::of(&timetable);
     let horizon = linear_law(scene, 0).and_then(|law| law.horizon);
     let beyond = horizon.is_some_and(|horizon| timetable.oldest() > horizon).then_some(BEYOND_HORIZON);
-    // What is older or younger by a difference of clocks may be beyond the horizon, or sent later than now.
+    // Samples whose ages include a difference of clocks may be beyond the horizon, or sent later than now.
     let apart = (horizon.is_some() && !has_equal_clocks(scene)).then_some(AGES_BY_CLOCKS);
     if let Some(why) = beyond.or(apart) {
         let link = format!("{} → {}", scene.peers[0].name, scene.peers[1].name);

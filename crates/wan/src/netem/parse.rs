@@ -50,9 +50,9 @@ impl Netem {
     /// Reads the options of a netem, in any order: what stands behind `netem` in a command for `tc`.
     ///
     /// Stricter than `tc`: nothing may be said twice, negative times, sizes and counts are refused, and so are zero where it would switch off
-    /// an impairment (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, chains whose ways out of a state sum to more than 1, and times and
-    /// percentages without a unit, but for zero: `delay 20` is 20 µs for iproute2 6.6 and 20 ns from 6.9 on, and `loss 1` is 1 % where the number 1 in a scene is
-    /// 100 %. More lenient: `packets` and `bytes` of a slot may stand in either order, and `ns` is a unit of `delay` (as in iproute2 from 6.9 on).
+    /// an impairment (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, and chains whose ways out of a state sum to more than 1. Times and
+    /// percentages need their units, but for zero: `delay 20` is 20 µs for iproute2 6.6 and 20 ns from 6.9 on, and `loss 1` is 1 % where the number 1 in a scene
+    /// is 100 %. More lenient: `packets` and `bytes` of a slot may stand in either order, and `ns` is a unit of `delay` (as in iproute2 from 6.9 on).
     ///
     /// # Errors
     ///
