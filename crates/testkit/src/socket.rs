@@ -32,8 +32,7 @@ const KIND: &str = "a UDP socket";
 /// - A socket at `[::]` hears IPv6 only.
 /// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out. So does every method once the run of its test bed has
 ///   ended, also within the run of another test bed: a task or a destructor may outlive the run. To bind a socket where there is no host is a fault of the
-/// test,
-///   and panics.
+///   test, and panics.
 /// - It belongs to the thread that runs the test bed. On another thread every method gives [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct UdpSocket {
     shared: Arc<Shared>,

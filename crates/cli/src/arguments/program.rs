@@ -38,7 +38,10 @@ impl Arguments {
 fn with_short_options(command: Command) -> Command {
     let command = command.mut_args(|arg| {
         let short = SHORT.iter().find(|(long, _)| arg.get_long() == Some(long));
-        short.map_or(arg.clone(), |(_, letter)| arg.short(*letter))
+        match short {
+            Some((_, letter)) => arg.short(*letter),
+            None => arg,
+        }
     });
     command.mut_subcommands(with_short_options)
 }

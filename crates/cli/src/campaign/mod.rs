@@ -84,7 +84,7 @@ pub(crate) fn pool<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Sen
 
 /// The file of the scene, for messages about it; that of the folder if none was named.
 fn scene_file(arguments: &CampaignArguments) -> &Path {
-    arguments.scene.as_deref().unwrap_or(Path::new("campaign.json"))
+    arguments.scene.as_deref().unwrap_or_else(|| Path::new("campaign.json"))
 }
 
 fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignPlan, Failure> {
@@ -94,7 +94,7 @@ fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignP
         if !overrides.set.is_empty() || !vary.is_empty() || measure.word().is_some() || *verdicts {
             return Err(Failure::Input("the options of a campaign stand beside no scene: expected its scene too, or none of them".to_owned()));
         }
-        return Campaign::plan_in(sharing.folder().unwrap_or(Path::new(".")), PROGRAM).map_err(refused);
+        return Campaign::plan_in(sharing.folder().unwrap_or_else(|| Path::new(".")), PROGRAM).map_err(refused);
     };
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;

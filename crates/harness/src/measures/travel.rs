@@ -103,7 +103,7 @@ mod tests {
         let mut copy = Copy(1, Vec::new());
         let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut copy);
         let (_, first) = copy.1[0];
-        assert_eq!(first, 0.0, "the copy begins where the server's does");
+        assert_eq!(first.to_bits(), 0.0_f64.to_bits(), "the copy begins where the server's does");
         let (reached, _) = copy.1.iter().find(|(_, position)| (position - first).abs() >= 0.02).unwrap();
         let (_, measured) = Measures::run(&scene, Model::Least);
         assert_eq!(measured.iter().map(|measure| measure.value).collect::<Vec<_>>(), [Some(*reached)]);

@@ -62,10 +62,12 @@ impl FileSchema {
 
 /// What stands under a name within a value: a key of a table, or an entry of a list by its name or place.
 fn within(form: &'static Form, name: &str) -> Option<&'static Form> {
-    match form {
-        Form::List(entry) => Some(entry),
-        Form::AnyOf(forms) => forms.iter().find_map(|form| within(form, name)),
-        form => form_of(form.table()?, name),
+    if let Form::List(entry) = form {
+        Some(entry)
+    } else if let Form::AnyOf(forms) = form {
+        forms.iter().find_map(|form| within(form, name))
+    } else {
+        form_of(form.table()?, name)
     }
 }
 

@@ -52,7 +52,7 @@ pub struct Admittance {
 /// What moves.
 #[derive(Clone, Debug)]
 enum System {
-    OneAxis(OneAxis),
+    OneAxis(Box<OneAxis>),
     Turned(Box<Turned>),
 }
 
@@ -131,14 +131,14 @@ impl Admittance {
                 return Err(uncoupled());
             }
             let (system, radius, notes) = OneAxis::of(scene, peer, axis.place(), &network, watch)?;
-            return Ok(Self::new(System::OneAxis(system), radius, notes, scene.object.mass, axes));
+            return Ok(Self::new(System::OneAxis(Box::new(system)), radius, notes, scene.object.mass, axes));
         };
         let parts = scene.rotation_parts().and_then(Result::ok).map_or_else(Vec::new, |parts| parts.parts);
         let part = parts.iter().find(|part| !is_cross && part.components.iter().any(|component| component == axis.word()));
         let mut admittance = if let Some(part) = part {
             let (system, radius, notes) = OneAxis::of(&part.scene, peer, 0, &network, watch)?;
             let mass = if axis.is_turn() { rotation.inertia[axis.place() - 3] } else { scene.object.mass };
-            Self::new(System::OneAxis(system), radius, notes, mass, axes)
+            Self::new(System::OneAxis(Box::new(system)), radius, notes, mass, axes)
         } else {
             let (system, radius) = Turned::of(scene, peer, axes.map(PushedAxis::place), &network, watch)?;
             let (mass, mut notes) = (system.mass(scene), network.notes.clone());
@@ -399,7 +399,7 @@ mod tests {
         let others = crate::structure::count(count - 1);
         structure.weights = Matrix::from_fn(2, 2, |row, column| [[0.0, 1.0], [1.0 / others, (others - 1.0) / others]][row][column]);
         let (axis, radius) = OneAxis::of_classes(&scene, structure, 0, &Unwatched).unwrap();
-        Admittance::new(System::OneAxis(axis), radius, Vec::new(), 0.45, [PushedAxis::X; 2])
+        Admittance::new(System::OneAxis(Box::new(axis)), radius, Vec::new(), 0.45, [PushedAxis::X; 2])
     }
 
     /// The more peers, the less the mean of the others moves: in the limit the copy is held by a spring and a damper at rest, and is as far from that as 1/N.
