@@ -186,7 +186,9 @@ pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -
     let (some, others) = (over(short, ticks - longer), over(long, longer));
     let value = some.value * others.value;
     let error = some.error * (others.value + others.error) + some.value * others.error + f64::EPSILON * value;
-    (Radius { value, error }, if plant.stiffness > 0.0 { 2 } else { 1 })
+    // A bound that overflowed over the frame says nothing.
+    let radius = if error.is_finite() { Radius { value, error } } else { Radius::UNKNOWN };
+    (radius, if plant.stiffness > 0.0 { 2 } else { 1 })
 }
 
 /// The spectral radius of one step of a body: of its velocity alone if nothing ties it to ground.

@@ -35,3 +35,14 @@ fn nothing_is_a_state_that_decides_nothing() {
     let sizes: Vec<(usize, usize)> = analysis.modes[0].parts.iter().map(|part| (part.size, part.copies)).collect();
     assert_eq!((analysis.dimension, sizes), (3 * (4 + 2) - 1, vec![(4, 1), (5, 2)]));
 }
+
+/// A device of 10⁻⁶⁰ kg that touches nothing stands still after a tick, which rounding over eight ticks cannot show: nothing is known of its radius, and its bound is
+/// a number all the same.
+#[test]
+fn a_bound_that_overflowed_over_a_frame_says_nothing() {
+    let analysis = analyse(&scene(&["peer.device.mass=1e-60", "peer.contact=none", "peer.coupling.stiffness=0"]), Method::Reduced).unwrap();
+    let parts = &analysis.modes[0].parts;
+    let loose = parts.iter().find(|part| part.kind.word() == "loose-device").unwrap();
+    assert_eq!((loose.radius.value, loose.radius.error), (f64::INFINITY, f64::INFINITY), "{loose:?}");
+    assert!(parts.iter().all(|part| !part.radius.error.is_nan()), "{parts:?}");
+}
