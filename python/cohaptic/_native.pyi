@@ -99,7 +99,7 @@ class Link:
     @property
     def next(self, /) -> float | None:
         """
-        When something happens next \\[s\\]: `poll` of this number gives it. `None` if nothing is on the way.
+        The instant at which something happens next \\[s\\]: `poll` of this number gives it. `None` if nothing is on the way.
         """
     def poll(self, /, now: "float") -> "list[tuple[typing.Any, int, int, float, float, str, int, bool, bool]]":
         """

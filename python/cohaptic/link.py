@@ -121,7 +121,7 @@ class Link:
 
     @property
     def next(self) -> float | None:
-        """When :meth:`poll` is to be called next [s]; ``None`` if nothing is on the way.
+        """The instant at which :meth:`poll` is to be called next [s]; ``None`` if nothing is on the way.
 
         ``poll(link.next)`` gives what happens then, also where instants are those of ``time.time()``, whose numbers are 238 ns apart: where the nearest
         number is before the arrival, ``next`` is the one after it.

@@ -179,7 +179,7 @@ impl Link {
         Ok(happened)
     }
 
-    /// When something happens next \[s\]: `poll` of this number gives it. `None` if nothing is on the way.
+    /// The instant at which something happens next \[s\]: `poll` of this number gives it. `None` if nothing is on the way.
     #[getter]
     fn next(&self) -> Option<f64> {
         self.live().poll_timeout().and_then(seconds)

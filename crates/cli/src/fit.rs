@@ -74,7 +74,7 @@ struct Source {
     measurements: Measurements,
     /// Counts of a pair of captures.
     matched: Option<Ends>,
-    /// Whether both ends have one clock, as in a log of fates.
+    /// `true` if both ends have one clock, as in a log of fates.
     has_one_clock: bool,
 }
 
@@ -118,7 +118,7 @@ fn describe(fitted: &Fitted, scene: &str, measurements: &Measurements, notes: Ve
     let mut text = format!("{scene}\n");
     let mut line = |line: String| text.push_str(&format!("{line}\n"));
     let instants = measurements.instants();
-    // Where most gaps are zero, the spacing is that of bursts.
+    // The spacing is that of bursts where most gaps are zero.
     let are_bursts = 2 * instants <= goodness.packets;
     let (bursts, burst) = if are_bursts { (format!(" in {}", Counted(instants, "burst")), " burst") } else { (String::new(), "") };
     let spaced = if goodness.evenly_spaced { "evenly" } else { "unevenly" };

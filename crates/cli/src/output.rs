@@ -17,7 +17,7 @@ static WANTS_JSON: AtomicBool = AtomicBool::new(false);
 /// Whether there is something on standard output already.
 static ANSWERED: AtomicBool = AtomicBool::new(false);
 
-/// Whether standard error is for what goes wrong alone.
+/// `true` if standard error is for what goes wrong alone.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
 /// Keeps progress and the names of files that were written from standard error.
@@ -25,7 +25,7 @@ pub(crate) fn be_quiet() {
     QUIET.store(true, Ordering::Relaxed);
 }
 
-/// Whether standard error is for what goes wrong alone.
+/// Returns whether standard error is for what goes wrong alone.
 pub(crate) fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }

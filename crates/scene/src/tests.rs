@@ -505,3 +505,18 @@ fn a_falcon_has_usable_defaults_and_its_keys_are_checked() {
         assert!(error.diagnostic().unwrap().message().contains("expected"), "{error}");
     }
 }
+
+/// Rakhsha & Constantinescu (2015) call their two laws AP and PD.
+#[test]
+fn the_two_laws_of_the_paper_have_short_names() {
+    let strategy = |name: &str| parse(SCENE, &[&format!("coordination.strategy={name}")]).unwrap().coordination.strategy;
+    assert_eq!(["AP", "PD"].map(strategy), ["average-position", "proportional-derivative"].map(strategy));
+    refused(SCENE, &["coordination.strategy=ap"]);
+}
+
+/// A wrong key is told before a table that the whole file lacks.
+#[test]
+fn a_wrong_key_is_told_before_a_missing_table() {
+    check("scene.duration=\"1s\"\nscene.count=2\n[object]\nmas = 0.45\n", "4:1: object.mas: unknown key");
+    check("scene = { duration = \"1s\", count = 2 }\n[object]\nmass = 0.45\n", "1:1: coordination: missing key");
+}

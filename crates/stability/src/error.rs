@@ -205,13 +205,13 @@ pub enum AnalysisError {
     },
 }
 
-/// A number that may be beyond measure, in words.
+/// A number that may be beyond measure, as messages say numbers.
 struct Many(Option<usize>);
 
 impl std::fmt::Display for Many {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.0 {
-            Some(number) => write!(formatter, "{number}"),
+            Some(number) => write!(formatter, "{}", SixDigits(crate::structure::count(number))),
             None => formatter.write_str("far too many"),
         }
     }

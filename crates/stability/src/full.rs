@@ -121,7 +121,7 @@ fn compliance(scene: &Scene, peer: usize, time: f64) -> f64 {
     time * scene.peers[peer].clock.tick.as_secs_f64() / scene.copy_mass()
 }
 
-/// What a clock without an offset shows when a frame begins, so that samples of the frames before were sent at instants too.
+/// Time that a clock without an offset shows when a frame begins, so that samples of the frames before were sent at instants too.
 const EARLIER: Instant = Instant::from_nanos(1 << 60);
 
 type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;

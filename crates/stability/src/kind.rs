@@ -5,16 +5,16 @@ use crate::Criterion;
 /// The question that a verdict answers.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum VerdictKind {
-    /// Whether every disturbance dies out, of links that leave nothing to chance.
+    /// The question is whether every disturbance dies out; links leave nothing to chance.
     Certain,
-    /// Whether the variance of every disturbance dies out, of links that leave something to chance.
+    /// The question is whether the variance of every disturbance dies out; links leave something to chance.
     MeanSquare,
-    /// Whether every disturbance would die out if the links left nothing to chance, of links that do.
+    /// The question is whether every disturbance would die out if the links left nothing to chance. The links do leave something to it.
     Nominal,
 }
 
 impl VerdictKind {
-    /// All kinds, in the order in which answers list them.
+    /// The kinds, in the order in which answers list them.
     pub const ALL: [Self; 3] = [Self::Certain, Self::MeanSquare, Self::Nominal];
 
     /// Returns the word in JSON and CSV: `spectral-radius`, `mean-square` or `nominal`.

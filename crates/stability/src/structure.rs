@@ -199,7 +199,7 @@ pub(crate) fn has_equal_clocks(scene: &Scene) -> bool {
     scene.peers.iter().all(|spec| spec.clock == scene.peers[0].clock)
 }
 
-/// Whether all peers have the same drift: then their clocks are as far apart in every frame.
+/// Returns whether all peers have the same drift: then their clocks are as far apart in every frame.
 pub(crate) fn has_one_drift(scene: &Scene) -> bool {
     scene.peers.iter().all(|spec| spec.clock.drift == scene.peers[0].clock.drift)
 }

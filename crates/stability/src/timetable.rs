@@ -66,7 +66,7 @@ impl NodeClock {
         offset + (local * 1_000_000_000).div_euclid(i128::try_from(self.speed()).unwrap_or(i128::MAX))
     }
 
-    /// What the clock shows at a tick of its own, at the instant to which [`instant`](Self::instant) rounds that tick \[ns\].
+    /// Time that the clock shows at a tick of its own, at the instant to which [`instant`](Self::instant) rounds that tick \[ns\].
     fn local(&self, at: i128) -> i64 {
         let tick = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX);
         let offset = i128::try_from(self.clock.offset.as_nanos()).unwrap_or(i128::MAX);
@@ -245,7 +245,7 @@ impl Instants {
         now.saturating_sub(self.local(from, self.sent_at(from, sample, frame))).max(0) as f64 * 1e-9
     }
 
-    /// What the clock of a node shows at a tick of its own, counted from the beginning of the frame, before which the clock shows less than zero \[ns\].
+    /// Time that the clock of a node shows at a tick of its own, counted from the beginning of the frame, before which the clock shows less than zero \[ns\].
     pub(crate) fn local(&self, node: usize, at: i64) -> i64 {
         self.clocks[node].local(i128::from(at))
     }

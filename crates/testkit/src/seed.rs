@@ -13,7 +13,7 @@ pub const SEED_VARIABLE: &str = "COHAPTIC_TEST_SEED";
 pub(crate) struct Seed {
     pub(crate) value: u64,
     pub(crate) test: String,
-    /// It is that of the place, so that the test that has failed fails again as it stands.
+    /// The value is that of the place, so that the test that has failed fails again as it stands.
     pub(crate) is_of_place: bool,
 }
 

@@ -204,6 +204,18 @@ mod tests {
     }
 
     #[test]
+    fn short_names_are_those_of_the_two_laws() {
+        let both = Strategies::parse("AP, PD{coordination.stiffness=500}").unwrap();
+        assert!(
+            both.names().eq(["average-position", "proportional-derivative{coordination.stiffness=500}"]),
+            "{:?}",
+            both.names().collect::<Vec<_>>()
+        );
+        assert!(matches!(Strategies::parse("AP,average-position"), Err(StrategiesError::Twice { .. })));
+        assert!(matches!(Strategies::parse("AP,pd"), Err(StrategiesError::Unknown { .. })));
+    }
+
+    #[test]
     fn all_strategies_are_those_of_the_registry() {
         let all = Strategies::all();
         assert!(all.names().eq(Coordination::ALL.iter().map(|strategy| strategy.name())));

@@ -20,7 +20,7 @@ const LAYOUT: u32 = 1;
 pub(crate) struct Manifest {
     layout: u32,
     program: String,
-    /// Where the scene's file is, from the folder of the campaign; absent of a scene that came from standard input, and of campaigns of earlier versions. It is
+    /// Way to the scene's file from the folder of the campaign; absent of a scene that came from standard input, and of campaigns of earlier versions. It is
     /// no part of what the campaign is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     file: Option<String>,
@@ -104,7 +104,7 @@ impl Manifest {
         Ok(if self.verdicts { plan.with_verdicts() } else { plan })
     }
 
-    /// What the campaign is, as the file says it, without where its scene is: tables have it, which are the same wherever they are made.
+    /// The text of the file without the way to the scene. Tables hold this text, and are the same wherever they are made.
     pub(crate) fn about(&self) -> String {
         Self { file: None, ..self.clone() }.text()
     }

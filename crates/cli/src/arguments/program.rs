@@ -27,7 +27,7 @@ impl Arguments {
         program.help_template(format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{groups}Options:\n{{options}}{{after-help}}"))
     }
 
-    /// What was typed, the name of the program first.
+    /// Arguments as they were typed, the name of the program first.
     pub(crate) fn of(words: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
         let mut program = Self::program();
         let matches = program.try_get_matches_from_mut(with_point(words.into_iter().collect()))?;

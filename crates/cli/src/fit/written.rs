@@ -16,7 +16,7 @@ use crate::failure::Failure;
 /// The file of delays that a link names where no law fits: beside the file with the link, so that a scene in that folder finds both.
 pub(super) struct Delays {
     pub(super) path: PathBuf,
-    /// `None`: a law fits.
+    /// The content; `None` if a law fits.
     pub(super) csv: Option<String>,
 }
 

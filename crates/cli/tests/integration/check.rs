@@ -26,6 +26,9 @@ fn a_folder_that_holds_gives_one_line_a_scene() {
     assert_eq!(lines.len(), 3 + 1, "{text}");
     assert!(lines.contains(&"ok    scenes/a.toml") && lines.contains(&"ok    scenes/within/b.toml"), "{text}");
     assert!(text.contains("ok    scenes/c.toml (it has no [expect]: nothing was compared)"), "{text}");
+    // An empty table expects nothing either.
+    let empty = folder().text("check scenes/a.toml --set expect={}");
+    assert!(empty.contains("ok    scenes/a.toml (it has no [expect]: nothing was compared)"), "{empty}");
     assert!(text.ends_with("3 passed, 0 failed\n"), "{text}");
 }
 

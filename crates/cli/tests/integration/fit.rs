@@ -206,7 +206,7 @@ fn delays_without_a_law_are_the_law() {
     }
 }
 
-/// What no scene reads is not written: a delay of 300 years.
+/// A delay of 300 years, which no scene reads, is not written.
 #[test]
 fn a_link_that_no_scene_reads_is_not_written() {
     let rows = (0..100).map(|i| format!("{i},{}\n", 1e10 + f64::from(i % 7)));
@@ -216,7 +216,7 @@ fn a_link_that_no_scene_reads_is_not_written() {
     assert_eq!(desk.files("."), ["m.csv"]);
 }
 
-/// One file for both: a packet each 10 ms, of which five were lost, with a byte order mark, milliseconds, columns of others, and two packets at one instant.
+/// A file for both commands: a packet each 10 ms, of which five were lost, with a byte order mark, milliseconds, columns of others, and two packets at one instant.
 #[test]
 fn what_is_fitted_can_be_replayed() {
     let mut rows = "\u{feff}number,delay_ms,t_ms\n".to_owned();

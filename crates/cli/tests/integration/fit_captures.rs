@@ -90,7 +90,7 @@ fn an_offset_of_the_clocks_can_be_given() {
         assert!((number(&document["goodness"]["mean_s"]) - (0.0225 - 0.05 + added)).abs() < 1e-5, "{option} {document:#}");
     }
     assert!(desk.text("fit s.pcap r.pcap --least 20ms").contains("\n50.00000 ms was added to every delay\n"));
-    // One that is ahead: a negative offset.
+    // A clock that is ahead: a negative offset.
     desk.write("r.pcap", pcap((0..2_000).map(|packet| arrived(packet, 50_000))));
     let document = desk.json("fit s.pcap r.pcap --offset -50ms --json");
     assert!((number(&document["goodness"]["least_s"]) - 0.02).abs() < 1e-9, "{document:#}");
@@ -148,7 +148,7 @@ fn bursts_of_one_instant_are_a_schedule() {
     // √(0.1·0.9/5000) = 0.0042.
     assert!((number(&document["link"]["loss"]["independent"]["probability"]) - 0.1).abs() < 4.5 * 0.0042, "{document:#}");
     assert!(desk.text("fit m.csv").contains("5000 packets in 1000 bursts, "));
-    // One burst is no schedule.
+    // A single burst is no schedule.
     desk.write("one.csv", format!("t,delay\n{}", (0..60).fold(String::new(), |rows, packet| rows + &format!("5,0.0{}\n", 20 + packet))));
     desk.cohaptic("fit one.csv").assert_refused(2, &["all packets were sent at one instant, 0 s"]);
 }

@@ -198,7 +198,7 @@ fn an_interrupted_stream_reports_what_was_measured() {
 fn a_recording_with_times_since_1970_is_refused_or_counted_from_its_first_row() {
     let desk = Desk::with("path.csv", "t,delay\n1700000000,0.010\n1700000001,0.030\n");
     desk.cohaptic("link 'trace=\"path.csv\"' --packets 2000").assert_refused(2, &["the recording begins at 1700000000s", "start = \"first\""]);
-    // One second of 10 ms, one of 30 ms.
+    // A second of 10 ms, and a second of 30 ms.
     let document = desk.json("link 'trace={file=\"path.csv\",start=\"first\"}' --packets 2000 --json");
     assert!((number(&document["achieved"]["mean_s"]) - 0.02).abs() < 1e-9, "{document:#}");
 }

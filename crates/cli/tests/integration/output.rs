@@ -18,6 +18,18 @@ const COMMANDS: [&str; 10] = [
     "--version",
 ];
 
+/// Standard error is for what goes wrong alone.
+#[test]
+fn a_quiet_command_says_nothing_but_its_answer() {
+    let desk = Desk::with("two.toml", TWO);
+    for line in ["run two.toml --out out", "run two.toml -o out -q", "-q run two.toml --out out"] {
+        let outcome = desk.cohaptic(line);
+        assert_eq!((outcome.status, outcome.stderr.is_empty()), (Some(0), line.contains("-q")), "{line}: {}", outcome.stderr);
+        assert!(outcome.stdout.contains("200ms simulated") && desk.path("out/trajectory.csv").exists(), "{}", outcome.stdout);
+    }
+    desk.cohaptic("run gone.toml -q").assert_refused(3, &["gone.toml: cannot be read"]);
+}
+
 #[test]
 fn a_file_in_the_way_of_the_folder_is_named() {
     let desk = Desk::with("two.toml", TWO);

@@ -26,7 +26,7 @@ impl Travelled {
         }
     }
 
-    /// When it was that far away first.
+    /// The first tick at which the copy was that far away.
     pub(crate) const fn reached(self) -> Option<Instant> {
         self.reached
     }

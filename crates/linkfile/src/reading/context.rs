@@ -13,15 +13,15 @@ use std::time::Duration;
 use cohaptic_wan::Modulator;
 
 use super::names::Names;
-use crate::document::{BEGINNING, Diagnostic, FileError, Node, Place, Sources};
+use crate::document::{Diagnostic, FileError, Node, Place, Sources};
 use crate::fingerprint::Fingerprint;
 
-/// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier. A table that the
-/// whole file lacks comes last: of a file with `mas = 0.45` and without a `[coordination]` the wrong key is told first.
+/// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier. Keys that are
+/// missing come last: of a file with `mas = 0.45` and without a `[coordination]` the wrong key is told first.
 #[derive(Debug, Default)]
 pub(crate) struct Faults(RefCell<Option<((Kind, Place), FileError)>>);
 
-/// Whether something is wrong, or a table of the whole file is missing, in the order in which that is told.
+/// The kind of a fault, in the order in which faults are told: something is wrong, or missing.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Kind {
     Wrong,
@@ -118,11 +118,10 @@ impl<'a> Context<'a> {
         self.faults.report(place, || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), message.into()))));
     }
 
-    /// Reports that a key is missing in the table at a place.
-    pub(super) fn missing(&self, place: Place, key: &str, expected: &str) {
-        let error = || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), format!("missing key: expected {expected}"))));
-        let kind = if place == BEGINNING { Kind::Missing } else { Kind::Wrong };
-        self.faults.report_kind((kind, place), error);
+    /// Reports that something is missing at a place.
+    pub(super) fn missing(&self, place: Place, key: &str, message: String) {
+        let error = || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), message)));
+        self.faults.report_kind((Kind::Missing, place), error);
     }
 
     /// Reports what is wrong with a value.

@@ -97,7 +97,7 @@ impl<'a> TableReader<'a> {
         }
         if unknown.is_empty() && !self.context.partial {
             for (key, expected) in &self.missing {
-                self.context.missing(self.node.place, &join(&self.node.path, key), expected);
+                self.context.missing(self.node.place, &join(&self.node.path, key), format!("missing key: expected {expected}"));
             }
         }
     }
@@ -110,7 +110,7 @@ pub fn only_one<'a>(node: &Node, context: Context<'_>, entries: &[Option<&'a Ent
     match given.as_slice() {
         [only] => Some(only),
         [] => {
-            context.fault_at(node, format!("nothing is given: expected {expected}"));
+            context.missing(node.place, &node.path, format!("nothing is given: expected {expected}"));
             None
         }
         [first, second, ..] => {

@@ -138,7 +138,7 @@ impl Cells {
             }
         }
         let of_part = |&(first, last, held): &(usize, usize, f64)| {
-            // What lies between two cells belongs to both, by halves: k delays stand for k of the spacings between delays.
+            // The gap between two cells belongs to both, by halves: k delays stand for k of the spacings between delays.
             let low =
                 if first < last && first > 0 { f64::midpoint(self.cells[first - 1].high, self.cells[first].low) } else { self.cells[first].low };
             let next = self.cells.get(last + 1).filter(|_| first < last);

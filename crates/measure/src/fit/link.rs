@@ -24,7 +24,7 @@ pub struct FittedLink {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(into = "&'static str")]
 pub enum FittedLaw {
-    /// One that fits.
+    /// A law that fits.
     Law(DelayLaw),
     /// The measured delays themselves, because no law fits them: `empirical`.
     Empirical,

@@ -1,4 +1,4 @@
-//! What a link is told of its delays: a law that fits, or the delays themselves.
+//! The delays of a link as it is told them: a law that fits, or the delays themselves.
 
 use std::sync::Arc;
 

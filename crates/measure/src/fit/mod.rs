@@ -101,7 +101,7 @@ pub struct Goodness {
     pub mean_se_s: Option<f64>,
     /// The standard deviation of the measured delays \[s\].
     pub sd_s: f64,
-    /// Its standard error \[s\], sd·√((κ − 1)/4m) with the kurtosis κ of the delays and m = `effective`, at most half of it.
+    /// Standard error of the standard deviation \[s\], sd·√((κ − 1)/4m) with the kurtosis κ of the delays and m = `effective`, at most half of it.
     pub sd_se_s: f64,
     /// The least delay \[s\].
     pub least_s: f64,

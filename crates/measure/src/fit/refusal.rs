@@ -26,7 +26,7 @@ fn moments(delays: &[f64]) -> [f64; 4] {
     [mean, sd, sd / n.sqrt(), ((power(4) - sd.powi(4)).max(0.0) / n).sqrt() / (2.0 * sd)]
 }
 
-/// What a link delivers that is written into a scene: whole nanoseconds.
+/// Moments of the delays of a link that is written into a scene: whole nanoseconds.
 fn delivered(link: &FittedLink, law: DelayLaw) -> Law {
     let nanos = |seconds: f64| (seconds * 1e9).round();
     Law::new(&law.into(), nanos(link.delay_s), nanos(link.jitter.sd_s), link.jitter.floor_s.map(nanos)).unwrap()
@@ -43,7 +43,7 @@ fn case(kind: usize, seed: u64) -> Vec<f64> {
                 0 => 0.02 + 1e-3 * z.abs(),
                 // Two routes.
                 1 => (if rng.unit() < 0.5 { 0.02 } else { 0.04 }) + 5e-4 * z,
-                // One packet in two hundred takes a second.
+                // A packet in two hundred takes a second.
                 2 => (if rng.unit() < 0.005 { 1.0 } else { 0.02 }) + 1e-3 * z,
                 // Spikes of 100 ms once a second, which decay in 20 ms, and packets each 10 ms.
                 _ => {

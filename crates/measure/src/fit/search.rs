@@ -26,7 +26,7 @@ pub(super) fn maximise(low: f64, high: f64, points: u32, f: impl Fn(f64) -> f64)
     f64::midpoint(left, right)
 }
 
-/// Where `f` is greatest near `start`, and its value there: the simplex of Nelder & Mead (1965, The Computer Journal 7(4)), begun anew once from where it
+/// The place near `start` at which `f` is greatest, and the value there: the simplex of Nelder & Mead (1965, The Computer Journal 7(4)), begun anew once from where it
 /// settled. `None` if `f` is minus infinity at all corners of the first simplex, which lie one `step` from `start` along each axis.
 pub(super) fn climb<const N: usize>(start: [f64; N], step: [f64; N], f: impl Fn([f64; N]) -> f64) -> Option<([f64; N], f64)> {
     let first = simplex(start, step, &f)?;

@@ -60,7 +60,7 @@ impl FileSchema {
     }
 }
 
-/// What stands under a name within a value: a key of a table, or an entry of a list by its name or place.
+/// The form of the value under a name within a value: a key of a table, or an entry of a list by its name or place.
 fn within(form: &'static Form, name: &str) -> Option<&'static Form> {
     if let Form::List(entry) = form {
         Some(entry)
@@ -71,7 +71,7 @@ fn within(form: &'static Form, name: &str) -> Option<&'static Form> {
     }
 }
 
-/// What stands under a name of a table.
+/// The form of the value under a name of a table.
 fn form_of(table: &'static Table, name: &str) -> Option<&'static Form> {
     table.keys().find(|key| key.name == name).map(|key| &key.form).or(table.others)
 }

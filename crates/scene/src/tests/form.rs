@@ -65,7 +65,7 @@ fn a_line_of_any_length_is_cut_around_the_place() {
     let shown = error.to_string();
     let lines: Vec<&str> = shown.lines().collect();
     let caret = lines[3].chars().position(|c| c == '^').unwrap();
-    assert_eq!(lines[2].chars().nth(caret), Some('{'), "{shown}");
+    assert_eq!(lines[2].chars().nth(caret), Some('1'), "{shown}");
 }
 
 #[test]

@@ -408,7 +408,7 @@ fn a_modulator_that_cannot_be_is_refused() {
     let mut wrong = Vec::new();
     for (text, expected) in [
         ("modulators = [{ name = \"m\", states = [] }]", "5:38: modulators.m.states: no state: expected at least one"),
-        ("modulators = [{ states = [] }]", "5:15: modulators.0.name: missing key"),
+        ("modulators = [{ states = [{ name = \"a\" }] }]", "5:15: modulators.0.name: missing key"),
         (
             "modulators = [{ name = \"m\", states = [{ name = \"a\", sojourn = \"1s\" }] }]",
             "5:39: modulators.m.states.a: the state \"a\" ends, and no other",

@@ -165,7 +165,7 @@ impl Line {
     }
 }
 
-/// How many states a link's chain has: its places, and in each of them those of its losses.
+/// Number of states of a link's chain: its places, and in each of them those of its losses.
 fn chain_states(line: &Line) -> usize {
     match &line.chance {
         None => 1,
@@ -178,7 +178,7 @@ fn chain_states(line: &Line) -> usize {
 fn outcomes(line: &Line, tick: usize, sends: &[u64], frame: u64) -> Vec<Vec<Outcome>> {
     let Some((hazards, chain)) = &line.chance else { return Vec::new() };
     let window = hazards.window(tick);
-    // Nothing arrives, and no place is counted anew.
+    // A sample that does not arrive leaves the count of places as it is.
     if hazards.at[tick].is_empty() && (hazards.places == 1 && chain.is_none() || window.before == window.after) {
         return Vec::new();
     }

@@ -41,7 +41,7 @@ impl At {
 }
 
 impl<G: Fn(i64) -> f64> Bursts<'_, G> {
-    /// How many states the link has.
+    /// Number of states of the link.
     pub(crate) fn states(&self) -> usize {
         self.hazards.places * self.chain.states()
     }
@@ -89,7 +89,7 @@ impl<G: Fn(i64) -> f64> Bursts<'_, G> {
         for (base, state) in (0..window.places).flat_map(|place| (0..own).map(move |state| (place, state))) {
             let (from, base) = (base * own + state, window.before + i64::try_from(base).unwrap_or(i64::MAX));
             let certain: Vec<f64> = (0..own).map(|other| f64::from(u8::from(other == state))).collect();
-            // Those to which nothing newer comes; and, if that may be, to which the oldest sample does.
+            // States to which no newer sample comes; and, if that may be, states to which the oldest sample comes.
             let mut all: Vec<(usize, Option<i64>, f64)> = Vec::new();
             let taken = if base == window.before { of(base).arriving[state] / of(base).waiting[state].max(f64::MIN_POSITIVE) } else { 0.0 };
             for (to, probability) in ends(base, &certain) {

@@ -284,7 +284,7 @@ fn jitter_that_changes_no_tick_changes_nothing_about_bursts() {
     }
 }
 
-/// What a link brings over a chain of losses is what independent losses bring if both states lose alike, whatever the chain does.
+/// A chain of losses is the same as independent losses if both states lose alike, whatever the chain does.
 #[test]
 fn a_chain_that_loses_alike_in_both_states_is_independent_loss() {
     let jitter = ["scene.count=2", "link.jitter={ sd = '1500us', distribution = 'gamma' }", "link.delay=20ms"];

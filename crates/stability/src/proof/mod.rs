@@ -217,7 +217,7 @@ pub enum ProofError {
         coefficients: usize,
         /// Gains and weights that vary.
         others: usize,
-        /// How many may vary.
+        /// The number that may vary.
         most: usize,
     },
 }

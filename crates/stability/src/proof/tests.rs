@@ -334,12 +334,12 @@ fn family(set: &[&str], x: &str, y: &str) -> Family {
 
 const GAINS: [&str; 2] = ["coordination.stiffness=100..6000", "coordination.damping=0..60"];
 
-/// How many points within proven boxes of a region were looked at: single radii with their own bounds agree at all of them. Fails where one does not.
+/// Number of points within proven boxes of a region that were looked at: single radii with their own bounds agree at all of them. Fails where one does not.
 fn agreeing(family: &Family, region: &ProvenRegion) -> usize {
     let mut scratch = crate::FamilyScratch::default();
     let mut decided = 0;
     for (number, one) in region.boxes.iter().enumerate().filter(|(_, one)| one.guarantee != Guarantee::Undecided) {
-        // Each box has other points, spread by the golden ratio.
+        // Points differ from box to box, spread by the golden ratio.
         let share = |place: usize, irrational: f64| (count(number + 1) * (count(place) + irrational) * 0.618_033_988_749_894_9).fract();
         let between = |[low, high]: [f64; 2], share: f64| (low + share * (high - low)).clamp(low, high);
         let inside = (0..6).map(|place| [between(one.x, share(place, 0.3)), between(one.y, share(place, 0.7))]);

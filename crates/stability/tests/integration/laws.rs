@@ -79,7 +79,7 @@ fn ages_by_clocks_are_followed_until_clocks_drift_apart() {
     assert!(
         matches!(cohaptic_stability::mean_square(&lossy), Err(AnalysisError::ChanceWithoutMoments { why, .. }) if why.contains("clocks that differ"))
     );
-    // All clocks run fast alike: the numbers of ticks are what counts.
+    // Clocks run fast alike: ages are numbers of ticks.
     let [fast, regular] = [&["peer.clock.drift=0.01", "link.delay=0s"], &["peer.clock.drift=0", "link.delay=0s"]].map(|keys| extrapolated(keys));
     assert!(analyse(&fast, Method::Reduced).is_ok() && analyse(&regular, Method::Reduced).is_ok());
     let apart = extrapolated(&["peers.peer2.clock.drift=0.0625"]);

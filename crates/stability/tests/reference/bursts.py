@@ -42,7 +42,7 @@ def gilbert(p, r, h=0.0, k=1.0):
 
 
 def bursts(loss, length):
-    """All samples of a burst are lost, and none outside: p of a burst follows from the mean loss."""
+    """Samples of a burst are lost, and no others: p of a burst follows from the mean loss."""
     r = 1 / length
     p = loss * r / (1 - loss)
     return Chain(f"{{ bursts = {{ loss = {loss}, length = {length} }} }}", [[1 - p, p], [r, 1 - r]], [0.0, 1.0])
@@ -125,7 +125,7 @@ class Frame:
                 z[4 * peer + 2 : 4 * peer + 4] = copy @ np.array([x, v, coupling - pull])
         positions = np.arange(self.size) % 2 == 0
         z -= np.outer(positions, z[2])
-        # One unit for all, so that the entries are of one size; and without the position that all others are relative to.
+        # A common unit, so that the entries are of one size; and without the position that all others are relative to.
         unit = np.where(positions, 1.0, 0.1)
         z = z * np.outer(1 / unit, unit)
         return np.delete(np.delete(z, 2, 0), 2, 1)

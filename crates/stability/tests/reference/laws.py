@@ -24,6 +24,19 @@ from scene import EXTRAPOLATED, LOCAL_LAG, SMOOTHED, parse
 from text import arm, scene
 
 
+# Ticks of 0.5, 1 and 2 ms, offsets, phases, plants and delays.
+EVERYTHING_DIFFERENT = {
+    "delay": "12.5ms",
+    "bo": 0.3,
+    "peers": [
+        EVERY_DIFFERENT[0] + '; clock = { offset = "123456ns" }',
+        EVERY_DIFFERENT[1].replace("phase = 5", "phase = 3") + '; tick = "2ms"; compute-delay = 1',
+        EVERY_DIFFERENT[2] + '; clock = { offset = "3ms" }; tick = "500us"',
+    ],
+    "links": [(0, 2, 'delay = "31ms"'), (2, 0, 'delay = "1ns"')],
+}
+
+
 def smoothed(n, kt, lag="10ms", **keys):
     return scene(n, kt, strategy=SMOOTHED, own=f'lag = "{lag}"', **keys)
 
@@ -75,14 +88,7 @@ def radii_of_smoothed():
         smoothed(
             3,
             600.0,
-            delay="12.5ms",
-            bo=0.3,
-            peers=[
-                EVERY_DIFFERENT[0] + '; clock = { offset = "123456ns" }',
-                EVERY_DIFFERENT[1].replace("phase = 5", "phase = 3") + '; tick = "2ms"; compute-delay = 1',
-                EVERY_DIFFERENT[2] + '; clock = { offset = "3ms" }; tick = "500us"',
-            ],
-            links=[(0, 2, 'delay = "31ms"'), (2, 0, 'delay = "1ns"')],
+            **EVERYTHING_DIFFERENT,
         ),
         "ticks of 0.5, 1 and 2 ms, each with its own a",
     )
@@ -137,14 +143,7 @@ def radii_of_extrapolated():
             3,
             300.0,
             "17ms",
-            delay="12.5ms",
-            bo=0.3,
-            peers=[
-                EVERY_DIFFERENT[0] + '; clock = { offset = "123456ns" }',
-                EVERY_DIFFERENT[1].replace("phase = 5", "phase = 3") + '; tick = "2ms"; compute-delay = 1',
-                EVERY_DIFFERENT[2] + '; clock = { offset = "3ms" }; tick = "500us"',
-            ],
-            links=[(0, 2, 'delay = "31ms"'), (2, 0, 'delay = "1ns"')],
+            **EVERYTHING_DIFFERENT,
         ),
         "ticks, offsets, phases, plants and delays",
     )
@@ -181,14 +180,7 @@ def radii_of_local_lag():
             3,
             200.0,
             "7ms",
-            delay="12.5ms",
-            bo=0.3,
-            peers=[
-                EVERY_DIFFERENT[0] + '; clock = { offset = "123456ns" }',
-                EVERY_DIFFERENT[1].replace("phase = 5", "phase = 3") + '; tick = "2ms"; compute-delay = 1',
-                EVERY_DIFFERENT[2] + '; clock = { offset = "3ms" }; tick = "500us"',
-            ],
-            links=[(0, 2, 'delay = "31ms"'), (2, 0, 'delay = "1ns"')],
+            **EVERYTHING_DIFFERENT,
         ),
         "14, 7 and 4 ticks of 0.5, 1 and 2 ms",
     )

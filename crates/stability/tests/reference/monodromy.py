@@ -86,7 +86,7 @@ class Frame:
             return instant
 
         def seen(pair):
-            """What a peer extrapolates: the age is what its own clock shows less what the sender's showed, at least zero."""
+            """The state that a peer extrapolates to now: the age is what its own clock shows less what the sender's showed, at least zero."""
             if not ageing:
                 return held[pair]
             sent_at, now = (at - scene.peers[peer].offset for peer, at in zip(pair, (since[pair], instant)))

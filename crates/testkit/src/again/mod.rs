@@ -36,7 +36,7 @@ pub(crate) struct Again {
 pub(crate) struct Drawn {
     /// The packets that links lost by chance, the first [`MOST_LOST`].
     pub(crate) lost: Vec<PacketName>,
-    /// Whether programs or connections of TCP have drawn random numbers, or links were changed during the run.
+    /// `true` if programs or connections of TCP have drawn random numbers, or links were changed during the run.
     pub(crate) has_drawn: bool,
 }
 
@@ -86,14 +86,14 @@ impl Again {
         std::iter::once(self.said.every()).chain(self.said.links().map(|(_, words)| words))
     }
 
-    /// Whether anything but the losses depends on the seed.
+    /// Returns whether anything but the losses depends on the seed.
     fn has_other_chance(&self, drawn: &Drawn) -> bool {
         // A law may draw: one that is no words, or one that flips a bit.
         let draws = self.laws.iter().any(|law| law.words().is_none_or(Hit::draws));
         drawn.has_drawn || draws || self.words().any(|words| words.chance() == Chance::Other)
     }
 
-    /// Whether links draw.
+    /// Returns whether links draw.
     pub(crate) fn has_chance(&self) -> bool {
         self.words().any(|words| words.chance() != Chance::Nothing)
     }
@@ -135,7 +135,7 @@ impl Again {
                 Some(words) => lines.push(format!(".link({from:?}, {to:?}, {words:?})")),
             }
         }
-        // They come before other laws, of which one might delay a packet that was lost.
+        // Losses come before other laws, of which one might delay a packet that was lost.
         for (path, numbers) in lost.into_iter().flatten() {
             lines.push(format!(".hit({:?}, {:?}, {:?})", name(path.from), name(path.to), Hit::dropping(numbers.iter().copied()).to_string()));
         }

@@ -125,7 +125,7 @@ fn string(text: &str) -> Option<usize> {
     None
 }
 
-/// Whether a raw string begins at that place, and not a name that has an `r` in it.
+/// Returns whether a raw string begins at that place, and not a name that has an `r` in it.
 fn is_raw(text: &str, place: usize) -> bool {
     let before = text[..place].chars().next_back();
     let is_word = before.is_some_and(|before| before.is_alphanumeric() || before == '_') && !text[..place].ends_with('b');

@@ -103,8 +103,7 @@ impl Artefacts {
     }
 
     /// The lines about a run that has failed: in which task, if a task has panicked, a test that does the same again, where what happened is, how to run it
-    /// again, and
-    /// which laws hit nothing. Whatever goes wrong is told too, and no more: the test has failed for another reason.
+    /// again, and which laws hit nothing. Whatever goes wrong is told too, and no more: the test has failed for another reason.
     pub(crate) fn report(&self, task: Option<String>, again: String, record: Record) -> Vec<String> {
         let (hits, seed) = (record.hits().to_vec(), record.seed().clone());
         let task = task.map(|task| format!("{task} has panicked"));

@@ -196,14 +196,13 @@ impl Testbed {
     }
 
     /// Until when the program may run, in its own time; an hour if it is not said. A run that goes on is given up, with the network, each task, and what the
-    /// task
-    /// waits for since when: a program that asks again and again over a network that answers nothing would never end. [`Duration::MAX`] is no limit.
+    /// task waits for since when: a program that asks again and again over a network that answers nothing would never end. [`Duration::MAX`] is no limit.
     pub const fn time_limit(mut self, limit: Duration) -> Self {
         self.settings.limits.time = limit;
         self
     }
 
-    /// How often the tasks of a run may be polled; twenty million times if it is not said, which takes some seconds. A run that goes on is given up as with
+    /// Limit of the polls of all tasks of a run; twenty million if it is not said, which takes some seconds. A run that goes on is given up as with
     /// [`Testbed::time_limit`]. `u64::MAX` is no limit.
     pub const fn step_limit(mut self, polls: u64) -> Self {
         self.settings.limits.steps = polls;

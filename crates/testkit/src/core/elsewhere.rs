@@ -99,7 +99,7 @@ impl Shared {
         });
     }
 
-    /// Whether [`Shared::attend`] has something to do.
+    /// Returns whether [`Shared::attend`] has something to do.
     #[cfg(feature = "tokio")]
     pub(crate) fn is_left_something(&self) -> bool {
         self.elsewhere.is_any.load(Ordering::Acquire)

@@ -41,8 +41,7 @@ impl Entropy {
 }
 
 /// Random bytes for the programs of each host, and for those of no host. Each host has a stream of its own, by its name: what other hosts ask for, and which
-/// hosts there
-/// are besides, changes none of the bytes.
+/// hosts there are besides, changes none of the bytes.
 #[derive(Debug)]
 pub(crate) struct ByHost {
     seed: u64,
@@ -69,7 +68,7 @@ impl ByHost {
         })
     }
 
-    /// Whether any were asked for.
+    /// Returns whether any were asked for.
     pub(super) fn was_asked(&self) -> bool {
         !self.streams.is_empty()
     }

@@ -85,7 +85,7 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
-    /// Whether a task with that waker waits for a datagram.
+    /// Returns whether a task with that waker waits for a datagram.
     fn is_awaited_by(&self, waker: &Waker) -> bool {
         // A reader that waits again is known to the inlet alone.
         self.readers.has(waker) || self.inlet.is_waited_for() && self.readers.first().is_some_and(|first| first.will_wake(waker))

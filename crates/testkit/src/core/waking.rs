@@ -58,7 +58,7 @@ impl Waiters {
         !self.first_waits && self.others.is_empty()
     }
 
-    /// Whether that task waits.
+    /// Returns whether that task waits.
     pub(super) fn has(&self, waker: &Waker) -> bool {
         let first = self.first.as_ref().filter(|_| self.first_waits);
         first.into_iter().chain(&self.others).any(|waiting| waiting.will_wake(waker))

@@ -9,7 +9,7 @@ pub(crate) use searching::Searching;
 /// Lines about a run, made when they are printed: they may write a trace.
 pub(crate) type Lines = Box<dyn FnOnce() -> Vec<String>>;
 
-/// Whether this thread tries values of a strategy.
+/// Returns whether this thread tries values of a strategy.
 pub(crate) fn is_searching() -> bool {
     #[cfg(feature = "strategies")]
     return searching::is_searching();

@@ -1,6 +1,5 @@
 //! Failures of properties: while a value of a [strategy](crate::strategies) may shrink, its property fails again and again. Each failure replaces the one
-//! before, and the
-//! last is printed when the search is over, before proptest says the message of the panic and the smallest input.
+//! before, and the last is printed when the search is over, before proptest says the message of the panic and the smallest input.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::cell::{Cell, RefCell};
@@ -13,7 +12,7 @@ use std::thread;
 use super::{Lines, print};
 
 thread_local! {
-    /// How many values of strategies this thread has that may shrink.
+    /// Number of values of strategies of this thread that may shrink.
     static SEARCHES: Cell<usize> = const { Cell::new(0) };
     static KEPT: RefCell<Kept> = const { RefCell::new(Kept::NOTHING) };
 }
@@ -100,7 +99,7 @@ impl Drop for Searching {
         SEARCHES.set(left);
         if left == 0 {
             let kept = KEPT.replace(Kept::NOTHING);
-            // Where nothing shrinks, a panic after the run is all that tells of the failure.
+            // A panic after the run alone tells of the failure where nothing shrinks.
             let failed = kept.failed.or_else(|| kept.panic.map(|panic| Failed { panic: Some(panic), lines: kept.last }));
             if let Some(Failed { panic, lines }) = failed {
                 print(&panic.map(|panic| panic.words()).unwrap_or_default(), lines.unwrap_or_else(|| Box::new(Vec::new)));
@@ -109,7 +108,7 @@ impl Drop for Searching {
     }
 }
 
-/// Whether this thread tries values of a strategy.
+/// Returns whether this thread tries values of a strategy.
 pub(super) fn is_searching() -> bool {
     SEARCHES.get() > 0
 }
@@ -172,7 +171,7 @@ fn trimmed(backtrace: &str) -> String {
         }
     }
     let end = frames.iter().position(|frame| frame.contains("__rust_begin_short_backtrace")).unwrap_or(frames.len());
-    // What catches panics, below, has such names too.
+    // The code below that catches panics has such names too.
     let is_machinery = |frame: &String| frame.contains("panicking::") || frame.contains("rust_begin_unwind");
     let begin = frames[..end].iter().rposition(is_machinery).map_or(0, |place| place + 1);
     frames[begin..end].iter().fold(String::new(), |text, frame| text + frame + "\n")

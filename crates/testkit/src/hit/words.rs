@@ -76,7 +76,7 @@ impl Hit {
         Self { action: Action::Drop, which: Which::Numbers(ranges) }
     }
 
-    /// Whether what becomes of a packet that is hit is random.
+    /// Returns whether what becomes of a packet that is hit is random.
     pub(crate) const fn draws(&self) -> bool {
         matches!(self.action, Action::Corrupt)
     }

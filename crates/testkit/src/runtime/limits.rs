@@ -21,7 +21,7 @@ pub(crate) struct Limits {
 /// Longer than any test means to run. A program that asks five times a second has asked 18,000 times by then, which takes a tenth of a second.
 const TIME: Duration = Duration::from_secs(3600);
 
-/// Some seconds by the wall clock.
+/// A number of polls that takes some seconds by the wall clock.
 const STEPS: u64 = 20_000_000;
 
 impl Default for Limits {
@@ -49,7 +49,7 @@ impl Limits {
     }
 }
 
-/// How many lines of a kind a message has.
+/// Lines of a kind that a message has at most.
 const SHOWN: usize = 8;
 
 fn write_lines<T: std::fmt::Display>(text: &mut String, what: &str, lines: impl ExactSizeIterator<Item = T>) {

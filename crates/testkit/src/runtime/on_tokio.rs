@@ -88,7 +88,7 @@ impl Idle {
         }
     }
 
-    /// Whether the run is beyond its time limit: tasks of tokio alone may keep it going, which the executor does not see.
+    /// Returns whether the run is beyond its time limit: tasks of tokio alone may keep it going, which the executor does not see.
     fn must_end(&self, core: &mut Core) -> bool {
         let (parked, now) = (self.parked.load(Ordering::Relaxed), core.now());
         self.parked.store(now.as_nanos(), Ordering::Relaxed);
@@ -272,9 +272,9 @@ async fn drive(
             return Poll::Ready(());
         }
         if all_wait {
-            // It never ends.
+            // The task never ends.
             let _: Poll<()> = pump.as_mut().poll(cx);
-            // Where no task was polled, nothing has looked yet at what other threads and tasks of tokio have left.
+            // Messages of other threads and tasks of tokio have not been looked at yet where no task was polled.
             if left == POLLS {
                 shared.attend();
             }

@@ -288,7 +288,7 @@ impl<A: Clone> Wire<A> {
     pub(crate) fn set_link(&mut self, at: Instant, path: Path, link: LinkModel) {
         let changed = self.network.set_link(at, path.from, path.to, link);
         debug_assert_eq!(changed, Ok(()), "hosts are checked, and time does not go back");
-        // What the new link draws is not in the words with which the run began.
+        // Random numbers of the new link are not in the words with which the run began.
         self.drawn.has_drawn = true;
         self.recording.note(at, Happening::Relinked(path));
     }

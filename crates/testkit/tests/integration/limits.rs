@@ -81,7 +81,7 @@ fn both_limits_can_be_set() {
         assert!(text.starts_with("the run goes on beyond its step limit of 1000 polls of tasks: it is 0.00"), "{text}");
         assert!(text.contains("`Testbed::step_limit` sets another limit"), "{text}");
     }
-    // What ends at the limit has ended.
+    // A run that ends at the limit has ended.
     for bed in [silent(), silent().on_tokio()] {
         bed.time_limit(short).run(|_| time::sleep(short));
     }
@@ -111,7 +111,7 @@ fn a_property_over_any_network_does_not_hang_with_a_program_that_tries_for_ever(
         Testbed::new(["client", "server"]).network(&network).run(asks);
         Ok(())
     });
-    // Any delay of more than 200 ms there and back is too long for a program that waits for the answer to its last question.
+    // A delay of more than 200 ms there and back is too long for a program that waits for the answer to its last question.
     let Err(TestError::Fail(why, network)) = failed else { panic!("{failed:?}") };
     assert!(why.message().starts_with("the run goes on beyond its time limit of 3600s"), "{why}");
     let delays: Vec<Duration> = network.links().map(|(_, _, link)| link.config().delay.mean()).collect();

@@ -22,7 +22,7 @@ use core::fmt;
 
 pub use attoseconds::Attoseconds;
 
-/// One row: a packet, or what the path did from that time on.
+/// A row: a packet, or what the path did from that time on.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct DelayRow {
     /// The line of the file, from 1.
@@ -35,7 +35,7 @@ pub struct DelayRow {
     pub loss: String,
 }
 
-/// Why a file is no table of delays. Lines count from 1.
+/// The reason why a file is no table of delays. Lines count from 1.
 #[derive(Clone, PartialEq, Debug)]
 pub enum DelayTableError {
     /// A column is missing, twice there, or excluded by another.
@@ -53,7 +53,7 @@ pub enum DelayTableError {
         column: String,
         /// The text of the cell.
         found: String,
-        /// What was expected.
+        /// The expected content.
         expected: &'static str,
     },
     /// A time is before that of the row above.

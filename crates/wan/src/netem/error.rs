@@ -50,7 +50,7 @@ pub enum NetemErrorKind {
         option: &'static str,
         /// The word.
         word: String,
-        /// What each notation reads, and what would have been right.
+        /// The reading of each notation, and the words that would have been right.
         readings: String,
     },
     /// The end, where an option lacks a value.

@@ -71,7 +71,7 @@ enum Scaled {
     Real(f64),
 }
 
-/// What notations read where a number has no unit, and what would have been right; `None` for a number with a unit, for zero and for a word that is no number.
+/// The readings of a number without unit in each notation, and the words that would have been right; `None` for a number with a unit, for zero and for a word that is no number.
 ///
 /// `tc` changed the unit of a delay between versions, and a number in a scene is a fraction where the same word of `tc` is a percentage.
 pub(super) fn without_unit(text: &str, kind: Plain) -> Option<String> {
@@ -91,7 +91,7 @@ pub(super) fn without_unit(text: &str, kind: Plain) -> Option<String> {
     })
 }
 
-/// What a number without unit stands for.
+/// The meaning of a number without unit.
 #[derive(Clone, Copy)]
 pub(super) enum Plain {
     Percentage,

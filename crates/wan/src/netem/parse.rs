@@ -278,7 +278,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         number::without_unit(text, kind).map_or(Ok(value), |readings| Err(no_unit(readings)))
     }
 
-    /// Whether the next word begins with a digit, as optional values do.
+    /// Returns whether the next word begins with a digit, as optional values do.
     fn number_follows(&mut self) -> bool {
         self.words.peek().is_some_and(|word| word.text.starts_with(|c: char| c.is_ascii_digit()))
     }

@@ -23,7 +23,7 @@ pub struct Contents {
     pub seen_again: usize,
     /// Datagrams that hold several packets, because the network card cuts or joins them.
     pub super_packets: usize,
-    /// Whether the file ends within a block. It was read up to there.
+    /// `true` if the file ends within a block. It was read up to there.
     pub cut_off: bool,
 }
 
@@ -46,7 +46,7 @@ impl fmt::Display for Contents {
 /// A datagram of a capture.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Datagram {
-    /// When it was captured, in nanoseconds since 1970.
+    /// Time of capture, in nanoseconds since 1970.
     pub(super) nanos: i128,
     pub(super) destination_port: u16,
     /// The IPv4 identification.
@@ -57,7 +57,7 @@ pub(super) struct Datagram {
     pub(super) hash: u64,
     /// Hash of where the frame was seen.
     pub(super) place: u64,
-    /// Where the payload that was captured lies in [`Capture::bytes`].
+    /// Place in [`Capture::bytes`] of the payload that was captured.
     range: Range<usize>,
 }
 

@@ -1,4 +1,4 @@
-//! Which datagram of one capture is which of the other.
+//! Pairs of datagrams: a datagram of one capture, and the same datagram in the other.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -10,15 +10,15 @@ use super::views;
 pub(super) struct Pairs {
     /// Number of the receiver's datagram, indexed by that of the sender.
     pub(super) arrival_of: Vec<Option<usize>>,
-    /// Whether a datagram of the sender shows a packet that another one shows already; such a datagram is no packet of its own.
+    /// `true` if a datagram of the sender shows a packet that another one shows already; such a datagram is no packet of its own.
     pub(super) is_again: Vec<bool>,
-    /// Whether a datagram of the sender may have arrived within a long datagram of which the receiver's capture shows the first packet alone.
+    /// `true` if a datagram of the sender may have arrived within a long datagram of which the receiver's capture shows the first packet alone.
     pub(super) is_hidden: Vec<bool>,
-    /// Whether a datagram of the receiver has a counterpart.
+    /// `true` if a datagram of the receiver has a counterpart.
     pub(super) taken: Vec<bool>,
     /// Datagrams of the receiver that show a packet again and are matched with nothing.
     is_copy: Vec<bool>,
-    /// Whether a datagram of the sender equals another one in everything that matching looks at.
+    /// `true` if a datagram of the sender equals another one in everything that matching looks at.
     pub(super) is_ambiguous: Vec<bool>,
 }
 
@@ -47,7 +47,7 @@ impl Pairs {
         let is_again = views::again(sent, |number| pairs.arrival_of[number].is_some());
         let is_copy = views::again(arrived, |number| pairs.taken[number]);
         (pairs.is_again, pairs.is_copy) = (is_again, is_copy);
-        // Some paths rewrite identifications.
+        // Identifications are rewritten on some paths.
         pairs.pair(sent, arrived, false, |_, datagram| Some((datagram.length, datagram.captured(), datagram.hash)));
         pairs.pair(sent, arrived, false, prefix);
         pairs
@@ -92,7 +92,7 @@ impl Pairs {
     }
 }
 
-/// Whether two datagrams have one length, and payloads that agree as far as both were captured.
+/// Returns whether two datagrams have one length, and payloads that agree as far as both were captured.
 pub(super) fn agree(one: &Capture, number: usize, other: &Capture, other_number: usize) -> bool {
     let (first, second) = (&one.datagrams[number], &other.datagrams[other_number]);
     let octets = first.captured().min(second.captured());

@@ -1,6 +1,6 @@
 //! Measurements from a pair of captures, one of each end.
 //!
-//! Both files are read for UDP datagrams. A datagram of the sender's file is matched with one of the receiver's that has the same payload and the same IP
+//! UDP datagrams are read from both files. A datagram of the sender's file is matched with one of the receiver's that has the same payload and the same IP
 //! identification, the first with the first, the second with the second, and so on; the rest is then matched by payload alone, for paths that rewrite
 //! identifications. Addresses and ports do not count: they may be translated. A datagram of the sender that has no match is lost.
 //!
@@ -150,7 +150,7 @@ fn without_datagrams(port: Option<u16>, contents: &Contents) -> String {
     format!("has no UDP datagrams{wanted} that can be read: expected those of the link, found {contents}{cut}")
 }
 
-/// Whether a file that begins like this is a capture: pcap of either order of octets, with microseconds or nanoseconds, also in its "modified" form, or
+/// Returns whether a file that begins like this is a capture: pcap of either order of octets, with microseconds or nanoseconds, also in its "modified" form, or
 /// pcapng.
 #[must_use]
 pub fn is_capture(beginning: &[u8]) -> bool {

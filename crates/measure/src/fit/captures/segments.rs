@@ -42,7 +42,7 @@ pub(super) fn split(sent: &mut Capture, arrived: &mut Capture, pairs: &Pairs) ->
         (octets[0][number], octets[1][arrival]) = (common, common);
     }
     let [octets_sent, octets_arrived] = octets;
-    // Both are split, whatever the first one finds.
+    // Each capture is split, whatever is found in the first.
     let are_split = [replace(sent, &octets_sent), replace(arrived, &octets_arrived)];
     are_split.contains(&true)
 }

@@ -49,7 +49,7 @@ pub struct LawFit {
     /// The probability of a distance that is larger, if the law were true and its parameters not fitted: 2·Σ(−1)ᵏ⁻¹·e^(−2k²mD²) for m independent delays
     /// (Smirnov 1948, The Annals of Mathematical Statistics 19(2)). It is too large for fitted parameters.
     pub p_value: f64,
-    /// Whether the distance is within the limit ([`Goodness::kolmogorov_limit`](super::Goodness::kolmogorov_limit)).
+    /// `true` if the distance is within the limit ([`Goodness::kolmogorov_limit`](super::Goodness::kolmogorov_limit)).
     pub fits: bool,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct Candidate {
     pub(super) asked: Asked,
 }
 
-/// What a link is told of a law \[s\]. A law that is cut at zero has other moments.
+/// Parameters of a law as a link is told them \[s\]. A law that is cut at zero has other moments.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Asked {
     pub(super) mean: f64,
@@ -102,19 +102,19 @@ impl Moments {
         [self.mean + self.mean_error * mean.clamp(-1.0, 1.0), self.sd + self.sd_error * sd.clamp(-1.0, 1.0)]
     }
 
-    /// Whether the law delivers these moments: one that is cut at zero has others than it was asked for. Rounding is granted.
+    /// Returns whether the law delivers these moments: one that is cut at zero has others than it was asked for. Rounding is granted.
     fn has(&self, law: &Law) -> bool {
         let near = |found: f64, wanted: f64, error: f64| (found - wanted).abs() <= error + 1e-9 * self.sd;
         near(law.mean(), self.mean, self.mean_error) && near(law.sd(), self.sd, self.sd_error)
     }
 }
 
-/// How far from the data a law may be that fits.
+/// The largest distance from the data at which a law fits.
 pub(super) fn limit(effective: f64) -> f64 {
     NEAR + KOLMOGOROV_99 / effective.max(LEAST_EFFECTIVE).sqrt()
 }
 
-/// All laws, those that fit first, the best first of each. `cells` hold delays that are not all equal and none of which is negative.
+/// The laws that fit and then the others, each in order from the best. `cells` hold delays that are not all equal and none of which is negative.
 pub(super) fn fit_all(cells: &Cells, moments: &Moments, effective: f64) -> Vec<Candidate> {
     let (coarse, judged) = (cells.coarse(), cells.judged());
     let of_law = |name: DelayLaw| {
@@ -132,7 +132,7 @@ pub(super) fn fit_all(cells: &Cells, moments: &Moments, effective: f64) -> Vec<C
     all
 }
 
-/// Whether the floor of a law is a parameter of its own.
+/// Returns whether the floor of a law is a parameter of its own.
 const fn begins_at_floor(name: DelayLaw) -> bool {
     matches!(name, DelayLaw::Lognormal | DelayLaw::Gamma | DelayLaw::Weibull)
 }

@@ -22,7 +22,7 @@ use super::{Measurement, Measurements};
 /// A step of the least delay.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Step {
-    /// When the first packet with the new least delay was sent \[s\].
+    /// Instant at which the first packet with the new least delay was sent \[s\].
     pub at_s: f64,
     /// By how much the least delay grew; negative if it fell \[s\].
     pub by_s: f64,
@@ -62,7 +62,7 @@ struct Found {
     middle_s: f64,
     /// \[s\]
     by_s: f64,
-    /// How far the blocks lie apart \[s\].
+    /// Distance between blocks \[s\].
     gap_s: f64,
 }
 

@@ -177,7 +177,7 @@ impl Tcp {
         u32::from_le_bytes(self.entropy.of(Some(host), names).bytes())
     }
 
-    /// Whether any connection has drawn a number.
+    /// Returns whether any connection has drawn a number.
     pub(super) fn has_drawn(&self) -> bool {
         self.entropy.was_asked()
     }

@@ -87,7 +87,7 @@ impl Node for Beats {
     }
 }
 
-/// What a child of this process prints whose test of that name fails.
+/// Output of a child of this process whose test of that name fails.
 fn printed(test: &str, environment: &[(&str, &str)]) -> String {
     let output = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", &format!("again::{test}"), "--nocapture"])

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cohaptic_testkit::{Bed, time};
 
-/// How many of five letters arrive that are sent once, 10 ms apart.
+/// Number of letters that arrive, of five that are sent once, 10 ms apart.
 pub(super) async fn count_letters(bed: Bed) -> u8 {
     arrived(&bed).await.len().try_into().unwrap()
 }

@@ -117,7 +117,7 @@ fn sockets_without_a_host_and_programs_that_never_end() {
         })
     });
     assert_begin_shown(&message, "\n");
-    // What the page shows.
+    // The example of the page.
     let (network, _) = message.split_once("\n  the task").unwrap();
     super::assert_shown(network);
 }

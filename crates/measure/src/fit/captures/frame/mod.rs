@@ -48,7 +48,7 @@ pub(super) fn datagram<'a>(frame: &Frame<'a>) -> Result<Found<'a>, Kind> {
     let payload = &carried.udp[8..];
     let payload = &payload[..payload.len().min(length)];
     if payload.is_empty() && length > 0 && carried.identification.is_none_or(|number| number == 0) {
-        // Nothing tells such a datagram from another one of its length.
+        // Such a datagram cannot be told from another one of its length.
         return Err("UDP cut before its payload".into());
     }
     let mut place = DefaultHasher::new();

@@ -2,7 +2,7 @@
 
 use super::{CUT, Kind, link};
 
-/// Whether frames of that link type begin with a header that differs from frame to frame.
+/// Returns whether frames of that link type begin with a header that differs from frame to frame.
 pub(super) const fn is_wireless(link_type: u16) -> bool {
     link_type == 105 || link_type == 127
 }

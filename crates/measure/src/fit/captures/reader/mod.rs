@@ -21,7 +21,7 @@ pub(super) struct Frame<'a> {
     pub(super) length: usize,
 }
 
-/// How a file ends.
+/// The end of a file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Ending {
     /// After a block.
@@ -46,7 +46,7 @@ pub(super) fn for_each_frame(from: impl Read, each: impl FnMut(Frame<'_>)) -> Re
     }
 }
 
-/// Whether a file that begins like this is a capture.
+/// Returns whether a file that begins like this is a capture.
 pub(super) fn is_capture(beginning: &[u8]) -> bool {
     beginning.first_chunk().is_some_and(|magic| *magic == pcapng::SECTION_HEADER || pcap::Format::of(*magic).is_some())
 }

@@ -15,7 +15,7 @@ pub(super) struct Format {
 }
 
 impl Format {
-    /// `None` for another kind of file.
+    /// The form of a file by its first octets; `None` for another kind of file.
     pub(super) const fn of(magic: [u8; 4]) -> Option<Self> {
         let big = u32::from_be_bytes(magic);
         let order = match big {

@@ -165,7 +165,7 @@ fn a_capture_without_datagrams_says_what_it_holds() {
         said(&file(&[arp.clone(), arp.clone()])[..40], None),
         "the capture of the receiver holds no frame, then the file ends within a block: expected UDP datagrams of the link"
     );
-    // Nothing of the payload, and no identification: one datagram cannot be told from another.
+    // A datagram without an identification, of whose payload nothing was captured, cannot be told from another.
     let short = cut(&packet(0, 0, b"hi"), 42);
     assert_eq!(
         said(&file(&[arp, short]), None),

@@ -176,7 +176,7 @@ fn super_packets_are_matched_with_the_packets_that_they_become() {
     for identified in [true, false] {
         for (ours, theirs) in [(&[5][..], &[1][..]), (&[5], &[2]), (&[1], &[3]), (&[4, 1], &[1, 2])] {
             let is_lost = |number: u32| number % 15 == 7;
-            // What both ends show as one datagram arrives as one.
+            // A datagram that both ends show as one arrives as one.
             let sent = groups(ours, |number| u64::from(number / 5 * 5) * MS, |_| false, identified);
             let received = groups(theirs, |number| u64::from(number / 5 * 5 + 20) * MS, is_lost, identified);
             let matched = read(&sent, &received);
