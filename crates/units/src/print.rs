@@ -77,13 +77,16 @@ pub fn six_digits(number: f64) -> f64 {
     format!("{number:.5e}").parse().unwrap_or(number)
 }
 
-/// A number as messages say it: to six digits, as [`Number`]. `0.0311812`, `1.83285e189`.
+/// A number as messages say it: to six digits, as [`Number`], in powers of ten where digits before the point are cut off. `0.0311812`, `1.23457e8`.
 #[derive(Clone, Copy, Debug)]
 pub struct SixDigits(pub f64);
 
 impl fmt::Display for SixDigits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(&Number(six_digits(self.0)), f)
+        let rounded = six_digits(self.0);
+        // Zeros in the place of digits that were cut off would be read as digits.
+        let size = if rounded < 0.0 { -rounded } else { rounded };
+        if size >= 1e6 && rounded.to_bits() != self.0.to_bits() { write!(f, "{rounded:e}") } else { fmt::Display::fmt(&Number(rounded), f) }
     }
 }
 
@@ -140,7 +143,8 @@ mod tests {
     fn messages_have_six_digits() {
         let print = |number| format!("{}", SixDigits(number));
         assert_eq!([print(0.031_181_185_153), print(1000.0), print(-7.692_307_692_3), print(0.0)], ["0.0311812", "1000", "-7.69231", "0"]);
-        assert_eq!([print(1.832_847e189), print(-1.234_567_89e-300), print(123_456_789.0)], ["1.83285e189", "-1.23457e-300", "123457000"]);
+        assert_eq!([print(1.832_847e189), print(-1.234_567_89e-300), print(123_456_789.0)], ["1.83285e189", "-1.23457e-300", "1.23457e8"]);
+        assert_eq!([print(1_000_000.0), print(-1_234_567.0), print(999_999.7)], ["1000000", "-1.23457e6", "1e6"]);
         assert_eq!([print(f64::INFINITY), print(f64::MAX)], ["inf", "1.79769e308"]);
     }
 

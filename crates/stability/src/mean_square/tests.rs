@@ -461,7 +461,7 @@ fn the_mean_of_many_runs_is_what_the_operator_says() {
 fn what_has_no_second_moment_is_refused_in_words() {
     let refused = |overrides: &[&str]| mean_square(&scene(overrides)).unwrap_err().to_string();
     let bursts = "link.loss={ gilbert-elliott = { p = 0.01, r = 0.4 } }";
-    assert!(refused(&[bursts, "scene.count=6"]).contains("1073741824 joint states"));
+    assert!(refused(&[bursts, "scene.count=6"]).contains("1.07374e9 joint states"));
     assert!(refused(&[bursts, "scene.count=100"]).contains("simulate"));
     assert!(refused(&["link.jitter={ sd = '5ms' }", "link.delay=24ms", "link.order=in-order"]).contains("in-order"));
 }
