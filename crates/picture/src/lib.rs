@@ -54,7 +54,7 @@ pub use content::{Band, Content, HeatMap, Line, Region, Rug, cell_edges};
 pub use gauge::Gauge;
 pub use legend::LegendPlace;
 pub use look::{Fill, Look, Marker};
-pub use motion::{Motion, MotionRun};
+pub use motion::{Motion, MotionHand, MotionRun};
 pub use panel::Panel;
 pub use picture::Picture;
 pub use size::{Size, SizeError};

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_harness::TickRow;
-use cohaptic_picture::{Motion, MotionRun};
+use cohaptic_picture::{Motion, MotionHand, MotionRun};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -17,13 +17,20 @@ use crate::file::write_file;
 const STEP: Duration = Duration::from_millis(50);
 const STEP_S: f64 = 0.05;
 
-/// Where the copies are at each frame.
+/// Positions of the copies and of their devices at each frame.
 pub(super) struct Places {
     peers: usize,
-    /// By frame, then peer; a place that is not known yet is that of the frame before.
-    frames: Vec<Vec<[f64; 2]>>,
-    /// The next frame of each peer.
+    /// Positions indexed by frame, then by peer. A position that is not known yet is that of the frame before.
+    frames: Vec<Vec<Place>>,
+    /// Next frame of each peer.
     next: Vec<usize>,
+}
+
+/// Positions of a peer along the first two axes \[m\].
+#[derive(Clone, Copy)]
+struct Place {
+    copy: [f64; 2],
+    device: [f64; 2],
 }
 
 impl Places {
@@ -35,14 +42,15 @@ impl Places {
         Instant::ZERO.saturating_add(STEP.saturating_mul(u32::try_from(frame).unwrap_or(u32::MAX)))
     }
 
-    /// Whether a frame of some peer is due.
+    /// Returns whether a frame of some peer is due.
     pub(super) fn wants(&self, at: Instant) -> bool {
         self.next.iter().any(|frame| Self::due(*frame) <= at)
     }
 
     /// Takes the first tick of each peer at or after each frame.
     pub(super) fn add(&mut self, row: &TickRow<'_>) {
-        let place = [0, 1].map(|axis| row.object.position.get(axis).copied().unwrap_or(0.0));
+        let [copy, device] = [row.object, row.device].map(|state| [0, 1].map(|axis| state.position.get(axis).copied().unwrap_or(0.0)));
+        let place = Place { copy, device };
         while Self::due(self.next[row.peer]) <= row.at {
             let frame = self.next[row.peer];
             if frame == self.frames.len() {
@@ -53,16 +61,27 @@ impl Places {
             self.next[row.peer] += 1;
         }
     }
+
+    /// The frames of a picture, in which the devices of `held` peers are hands.
+    fn run(&self, title: String, names: Vec<String>, held: &[usize]) -> MotionRun {
+        let hand = |copy: usize| MotionHand { copy, frames: self.frames.iter().map(|places| places[copy].device).collect() };
+        let frames = self.frames.iter().map(|places| places.iter().map(|place| place.copy).collect()).collect();
+        MotionRun { title, names, frames, hands: held.iter().copied().map(hand).collect() }
+    }
 }
 
 /// Draws one run, or two beside each other.
 pub(super) fn draw(file: &Path, arguments: &RunArguments, scene: &Scene, runs: [Option<&Run>; 2]) -> Result<(), Failure> {
     let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
+    let held: Vec<usize> = (0..scene.peers.len()).filter(|peer| scene.peers[*peer].hand.is_some()).collect();
     let against = arguments.against.iter().map(|set| set.split_once('=').map_or(set.as_str(), |(_, value)| value));
     let titles = [scene.coordination.strategy.name().to_owned(), against.collect::<Vec<_>>().join(", ")];
-    let shown = runs.into_iter().zip(titles).filter_map(|(run, title)| {
-        let places = run?.places.as_ref()?;
-        Some(MotionRun { title, names: names.clone(), frames: places.frames.clone() })
-    });
-    write_file(file, Motion::new(scene.title.as_str(), STEP_S, shown.collect()).svg())
+    let shown = runs.into_iter().zip(titles).filter_map(|(run, title)| Some(run?.places.as_ref()?.run(title, names.clone(), &held)));
+    let links = scene.used_links();
+    let note = match &links[..] {
+        [] => String::new(),
+        [(link, _)] => format!("Each link between two peers: {}", link.words()),
+        links => format!("{} kinds of links between the peers", links.len()),
+    };
+    write_file(file, Motion::new(scene.title.as_str(), note, STEP_S, shown.collect()).svg())
 }
