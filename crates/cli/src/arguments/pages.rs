@@ -14,7 +14,7 @@ pub(crate) struct InitArguments {
     #[arg(value_name = "FILE", default_value = "scene.toml")]
     pub(crate) file: PathBuf,
     /// The scene to begin with, such as paper/5-1 or network/jitter-normal; --list names all
-    #[arg(long, value_name = "NAME", default_value = "paper/5-1")]
+    #[arg(long, value_name = "NAME", default_value = "coordination/two-people")]
     pub(crate) from: String,
     /// How many peers [default: as many as the scene has]. With another number what the scene expects is left out
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]

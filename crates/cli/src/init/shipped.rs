@@ -59,6 +59,7 @@ shipped![
     "coordination/topology-relay",
     "coordination/topology-ring",
     "coordination/topology-star",
+    "coordination/two-people",
     "coordination/wave-throw",
     "coordination/wave",
     "network/cells",
