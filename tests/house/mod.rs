@@ -1,8 +1,7 @@
-//! Rules that the project keeps to: its packages and their licences, the systems they build on, and the language of its texts.
+//! Rules that the project keeps to: its packages and their licences, the systems on which they build, and the terms of its pages.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 
 mod dependencies;
-mod language;
 mod metadata;
 mod packages;
 mod systems;
