@@ -94,6 +94,7 @@ pages! {
     live_control: "docs/live-control.md",
     measured_cluster: "docs/measured-cluster.md",
     measured_router: "docs/measured-router.md",
+    gallery: "docs/gallery.md",
     model: "docs/model.md",
     netem: "docs/netem.md",
     python: "python/README.md",
