@@ -1,5 +1,5 @@
-//! Crates outside of the workspace that depend on the test kit alone, as those of somebody else would: one finds the bug planted in its protocol, one is the first
-//! test of docs/tutorial-network-test.md, and one is its last.
+//! Crates outside of the workspace that depend on the test kit alone, as those of somebody else would: one finds the bug planted in its protocol, one has tokio's
+//! sockets in production (docs/how-to-dev-dependency.md), one is the first test of docs/tutorial-network-test.md, and one is its last.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use std::path::{Path, PathBuf};
@@ -65,6 +65,11 @@ fn the_planted_bug_is_found_and_the_others_fail_as_their_pages_say() {
         "only_then::no_impairment_that_keeps_the_order_of_packets_shows_it",
         "only_then::whenever_messages_are_missing_an_acknowledgement_came_behind_a_retransmission",
     ] {
+        assert!(text.contains(&format!("test {test} ... ok\n")), "{test} did not run:\n{text}");
+    }
+    let (has_passed, text) = test("beside-tokio");
+    assert!(has_passed, "{text}");
+    for test in ["tests::a_phone_gets_the_time", "tests::two_lost_questions_are_asked_again"] {
         assert!(text.contains(&format!("test {test} ... ok\n")), "{test} did not run:\n{text}");
     }
     let (has_passed, text) = test("first-test");
