@@ -10,7 +10,6 @@
 pub mod bare;
 pub mod bare_pair;
 pub mod by_hand;
-pub mod clocks;
 pub mod effort;
 pub mod kernel;
 pub mod large;

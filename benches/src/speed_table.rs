@@ -6,13 +6,12 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use cohaptic_benches::bare::Queue;
-use cohaptic_benches::clocks::{PPM, with_own_clocks};
 use cohaptic_benches::effort::Effort;
 use cohaptic_benches::large::{self, Large, heavy_mesh};
 use cohaptic_benches::machine::{medians_in_turn, own_memory, peak_memory, time};
 use cohaptic_benches::records;
 use cohaptic_benches::scaling::{THREADS, Window};
-use cohaptic_benches::watched::{Onlooker, Plotter, WithEvents, checked, with_all_measures, with_expectations};
+use cohaptic_benches::watched::{Onlooker, Plotter, checked, with_all_measures, with_expectations};
 use cohaptic_benches::{LINKS, Mesh, bare};
 use cohaptic_harness::measures::Measures;
 use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side};
@@ -69,7 +68,6 @@ fn main() -> Result<(), String> {
     let memory = memory(work);
     one_run(work);
     queues(work);
-    own_clocks(work);
     many_runs(work);
     threads(work)?;
     many_peers(work)?;
@@ -151,34 +149,6 @@ fn queues(work: Work) {
             let bare = nanos[scenes.len()..].get(place).map_or_else(|| "|".to_owned(), |bare| format!("{bare:.0} | {:.2}", nanos[place] / bare));
             println!("| {peers} | {name} | {:.0} | {:.2} | {asked} | {bare} |", nanos[place], nanos[place] / nanos[0]);
         }
-    }
-    println!();
-}
-
-/// Peers that tick at instants of their own, beside peers that tick together and beside the events that they need where more than ticks are watched.
-fn own_clocks(work: Work) {
-    println!("## Clocks of their own\n");
-    println!(
-        "The mesh above whose peers tick together, or have offsets within a tick and drifts of up to {PPM} ppm either way: in windows in which each ticks at most once, and with\nevents, which an observer of samples makes necessary. The median of {} rounds in which all of them alternate.\n",
-        work.rounds
-    );
-    println!("| peers | links | together | in windows | times as long | with events | times as long as windows |");
-    println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: |");
-    let sizes = [10, 50, 200];
-    let meshes: Vec<Mesh> = sizes.into_iter().flat_map(|peers| [false, true].map(|impaired| Mesh { peers, impaired })).collect();
-    let ticks = |mesh: Mesh| work.most * 250 / (mesh.peers * mesh.peers) as u64 + 400;
-    let scenes: Vec<[Scene; 2]> = meshes.iter().map(|mesh| [mesh.scene(ticks(*mesh), 1), with_own_clocks(mesh.scene(ticks(*mesh), 1))]).collect();
-    let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
-    for [together, own] in &scenes {
-        works.push(Box::new(|| drop(black_box(Mesh::run(together)))));
-        works.push(Box::new(|| drop(black_box(Mesh::run(own)))));
-        works.push(Box::new(|| drop(black_box(Simulation::new(own, Model::Least).run(&mut WithEvents)))));
-    }
-    let times = medians_in_turn(&works, work.rounds);
-    for (mesh, times) in meshes.into_iter().zip(times.chunks(3)) {
-        let [together, windows, events] = [0, 1, 2].map(|run: usize| ticks(mesh) as f64 / 1e3 / times[run].as_secs_f64());
-        let (peers, links) = (mesh.peers, mesh.links());
-        println!("| {peers} | {links} | {together:.0}× | {windows:.0}× | {:.2} | {events:.1}× | {:.1} |", together / windows, windows / events);
     }
     println!();
 }

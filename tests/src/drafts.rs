@@ -144,15 +144,6 @@ pub fn changing(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = V
     of_one_shape(scenes, link_or_delay(), true)
 }
 
-/// One scene of [`alike`] or of [`changing`] that needs no events with any clocks: over direct links, which the timeline does not change.
-pub fn direct() -> impl Strategy<Value = Draft> {
-    (of_one_shape(Just(1), direct_link(), true), any::<bool>()).prop_map(|(mut drafts, changes)| {
-        let mut draft = drafts.remove(0);
-        draft.timeline.retain(|entry| changes && !entry.contains("link ="));
-        draft
-    })
-}
-
 fn of_one_shape(
     scenes: impl Strategy<Value = usize>,
     link: impl Strategy<Value = String> + Clone + 'static,
@@ -236,11 +227,6 @@ pub fn fixed_link() -> impl Strategy<Value = String> + Clone {
 /// Keys of a [`link`], in half of the cases of nothing but a constant delay.
 fn link_or_delay() -> impl Strategy<Value = String> + Clone {
     prop_oneof![link(), constant_delay()]
-}
-
-/// Keys of a link for which the arrival of a packet is known as the packet is sent: in half of the cases of nothing but a constant delay.
-fn direct_link() -> impl Strategy<Value = String> + Clone {
-    prop_oneof![link_with(&["tail-drop"], Just(None)), constant_delay()]
 }
 
 fn constant_delay() -> impl Strategy<Value = String> + Clone {

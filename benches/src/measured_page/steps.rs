@@ -143,7 +143,6 @@ one link alone, a stability map, and what each of the others does not model: [me
                 let tables = &[
                     ("## A full mesh", ALL_ROWS),
                     ("## Queues and chains", ALL_ROWS),
-                    ("## Clocks of their own", ALL_ROWS),
                     ("## Many runs of one scene", ALL_ROWS),
                     ("## One scene on many threads", ALL_ROWS),
                     ("## Many peers", ALL_ROWS),

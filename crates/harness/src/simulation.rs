@@ -8,7 +8,7 @@ use cohaptic_units::Instant;
 use crate::arrays::{self, Onlooker, Shape, Ticks};
 use crate::disturbance::Disturbance;
 use crate::measures::Measures;
-use crate::observer::{AnyObserver, Ended, Erased, InstantRow, Observer, TickRow, instants_between_questions};
+use crate::observer::{AnyObserver, Ended, Erased, InstantRow, Observer, instants_between_questions};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{NoRemote, Remote, Step, Watch, World};
@@ -90,25 +90,8 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     /// `None` if the run needs events: the observer has seen nothing.
     fn run_in_arrays(&self, plan: &Plan, observer: &mut AnyObserver<'_>) -> Option<Result<Summary, Ended>> {
         let watch = Watch::of(observer);
-        let (shape, law) = self.arrays(plan, watch)?;
-        Some(if shape.has_windows() {
-            self.run_in_windows(plan, (shape, law), watch, observer)
-        } else {
-            self.run_in_lockstep(plan, (shape, law), watch, observer)
-        })
-    }
-
-    fn run_in_windows(&self, plan: &Plan, law: (Shape, BuiltIn), watch: Watch, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
-        let summary = if watch == Watch::NOTHING {
-            arrays::run_in_windows(self.scene, law, &mut |now| observer.keep_going(now))
-        } else {
-            let mut watching = Watching { observer, watch, result: Ok(()) };
-            let summary = arrays::run_in_watched_windows(self.scene, law, plan, &mut watching);
-            watching.result?;
-            summary
-        };
-        // Which tick comes after the one that diverged is known with events. Rows are not given twice.
-        summary.map_or_else(|| self.run_again(plan, observer), Ok)
+        let law = self.arrays(plan, watch)?;
+        Some(self.run_in_lockstep(plan, law, watch, observer))
     }
 
     fn run_in_lockstep(&self, plan: &Plan, (shape, law): (Shape, BuiltIn), watch: Watch, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
@@ -169,21 +152,10 @@ struct Watching<'o, 'a> {
 }
 
 impl Onlooker for Watching<'_, '_> {
-    fn wants_ticks(&self) -> bool {
-        self.watch.ticks
-    }
-
     fn on_ticks(&mut self, ticks: &Ticks<'_>) {
         if self.watch.ticks {
             self.result = self.observer.on_ticks(ticks);
         }
-    }
-
-    fn on_tick(&mut self, row: &TickRow<'_>) -> bool {
-        if self.result.is_ok() {
-            self.result = self.observer.on_tick(row);
-        }
-        self.result.is_ok()
     }
 
     fn on_instant(&mut self, row: &InstantRow) -> bool {

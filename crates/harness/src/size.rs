@@ -76,8 +76,6 @@ impl Way {
     fn of(scene: &Scene, model: Model, watched: bool) -> Self {
         let in_arrays = if watched || model != Model::Least { None } else { Shape::of(scene, &Plan::new(scene, model, false), &FromScene).ok() };
         match in_arrays {
-            // A run in windows that diverges is run again with events.
-            Some((shape, _)) if shape.has_windows() => Self::Events,
             Some((shape, _)) if shape.is_broadcast() => Self::Broadcast,
             Some(_) => Self::Packets,
             None => Self::Events,
@@ -145,7 +143,7 @@ mod tests {
         assert_eq!(peer, 23_170);
         assert!(reason.contains("at most 23170 peers: expected fewer peers, or to look at nothing but counters"), "{reason}");
         assert!(reason.contains("takes 39 MB"), "{reason}");
-        // Drifting peers would fit, but not if they diverge.
+        // Peers with clocks of their own need events.
         let mut drifting = constant.clone();
         drifting.peers.iter_mut().for_each(|peer| peer.clock.drift = Drift::from_fraction(1e-5).unwrap());
         assert_eq!(refused(&drifting, false, u64::MAX).map(|(peer, _)| peer), Some(23_170));

@@ -77,7 +77,7 @@ pub use line::model::{KernelNetem, LINK_KIND_PARAMETERS, LinkModel};
 pub use line::name::LinkName;
 pub use line::pipeline::TimeWentBack;
 pub use link::Link;
-pub use network::direct_links::{Arrivals, DirectLinks, OfferedAt};
+pub use network::direct_links::{Arrivals, DirectLinks};
 pub use network::id::{LinkId, NodeId, Path};
 pub use network::stepped_links::SteppedLinks;
 pub use network::{AccessLine, MOST_NODES, MereArrival, Network, NetworkConfig, NetworkError};

@@ -5,8 +5,6 @@
 
 mod block;
 mod law;
-mod rests;
-mod spans;
 
 use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
 use cohaptic_peer::{Contact, Enclosure, HandForce, Motion, State, StepMap};
@@ -22,8 +20,6 @@ pub(super) use block::Block;
 use block::{Forces, Late, RESTING, ZERO_MAP, set_map};
 use law::memory_of_lane;
 pub(super) use law::{LawOfLanes, law_of_lanes};
-pub(super) use rests::Rests;
-use spans::Spans;
 
 /// All bodies on all axes.
 #[derive(Clone, Debug)]
@@ -39,11 +35,8 @@ pub(super) struct Blocks {
     past: Vec<Motions>,
     /// The oldest of those ticks.
     oldest: usize,
-    /// How copies move in a tick, if no clock drifts.
+    /// How copies move in a tick. One map for all: a map for each block cost ten peers 3 %.
     object_map: StepMap<Lanes>,
-    /// The maps of each span between two ticks of a peer, if clocks drift. Only there blocks are asked for their maps: a map for each block, with equal clocks
-    /// too, cost ten peers 3 %.
-    spans: Option<Box<Spans>>,
     /// The forces computed at the latest tick, where anybody applies them a tick late.
     late: Option<Vec<Late>>,
     /// The walls of each run, where any has some.
@@ -112,7 +105,6 @@ impl Blocks {
     /// The bodies of runs of these scenes, all of which have that law, with numbers of their own. `devices` says what stands for the device of each peer, if anybody
     /// looks; otherwise only those move that ever touch their copies.
     pub(super) fn new<const A: usize>(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
-        let mut spans = Spans::of(places, scenes, A).map(Box::new);
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
         for axis in 0..A {
@@ -132,14 +124,8 @@ impl Blocks {
                     set_map(&mut block.device_map, spot.lane, &RESTING);
                     continue;
                 }
-                let (plant, (short, long)) = (spec.device.plant(spec.hand.as_ref()), spec.clock.spans());
-                let map = plant.step(short, scenes[run].integrator);
+                let map = spec.device.plant(spec.hand.as_ref()).step(spec.clock.tick, scenes[run].integrator);
                 block.is_tied |= !map.is_free();
-                if let Some(spans) = &mut spans {
-                    let longer = plant.step(long, scenes[run].integrator);
-                    block.is_tied |= !longer.is_free();
-                    spans.set_device(spot, (&map, &longer));
-                }
                 set_map(&mut block.device_map, spot.lane, &map);
                 block.device.velocity.0[spot.lane] = device.velocity[axis];
                 block.coupling.stiffness.0[spot.lane] = config.coupling.stiffness;
@@ -159,7 +145,6 @@ impl Blocks {
             axes: A,
             blocks,
             object_map: object_map(scenes),
-            spans,
             late: any_late.then_some(late),
             walls: walls.iter().any(Option::is_some).then_some(walls),
             goes_on: Mask::ALL,
@@ -272,9 +257,6 @@ impl Blocks {
 
     /// The damping of copies from now on is that of these scenes, in each run.
     pub(super) fn set_damping(&mut self, scenes: &[&Scene]) {
-        if let Some(spans) = &mut self.spans {
-            spans.set_objects(self.places, scenes);
-        }
         self.object_map = object_map(scenes);
     }
 
@@ -338,7 +320,7 @@ impl Blocks {
                 *low = low.smaller(block.object.position);
                 *high = high.larger(block.object.position);
                 let coupling = grasped.coupling(place);
-                if coupling.is_none() && self.walls.is_none() && self.late.is_none() && self.spans.is_none() && block.contacts.is_none() {
+                if coupling.is_none() && self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
                     block.tick(law, &past, lead, memory, &self.object_map);
                 } else {
                     let coupling = coupling.copied().unwrap_or_else(|| block.coupling(&block.object));
@@ -349,8 +331,7 @@ impl Blocks {
                     if let Some(late) = &mut self.late {
                         forces = late[place].exchange(forces);
                     }
-                    let object_map = self.spans.as_ref().map_or(&self.object_map, |spans| spans.object_map(place - axis * per_axis));
-                    block.advance(object_map, &forces);
+                    block.advance(&self.object_map, &forces);
                 }
                 size = size + block.size();
             }
@@ -372,23 +353,6 @@ impl Blocks {
         // A sum of sizes is finite only if they all are. Were it not for overflow it would also be so the other way round.
         let [a, b, c, d, e, f, g, h] = (size & self.goes_on).0;
         if ((a + e) + (b + f)) + ((c + g) + (d + h)) < f64::INFINITY { [true; L] } else { self.look_at_each() }
-    }
-
-    /// Whether everything in the first run is finite.
-    pub(super) fn are_finite(&self) -> bool {
-        self.look_at_each::<1>()[0]
-    }
-
-    /// Whether everything of a peer is finite in the first run.
-    pub(super) fn is_finite(&self, peer: usize) -> bool {
-        (0..self.axes).all(|axis| {
-            let Spot { block, lane } = self.places.spot(axis, peer, 0);
-            let block = &self.blocks[block];
-            [&block.device, &block.object]
-                .map(|motions| lane_of(motions, lane))
-                .iter()
-                .all(|motion| motion.position.is_finite() && motion.velocity.is_finite())
-        })
     }
 
     #[cold]

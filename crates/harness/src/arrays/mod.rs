@@ -1,8 +1,7 @@
 //! Scenes that need no events: all numbers of all peers in arrays, one scene or several of one shape side by side.
 //!
-//! Where everybody ticks together and nobody watches more than ticks, a run is a loop over ticks: sending, arrivals, forces, motion. Peers that tick at
-//! instants of their own go from window to window in the same way ([`windows`]). Here that loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what
-//! [`crate::world::World`] does, with the same operations in the same order on each number, the same random numbers at the same addresses and the same
+//! Where everybody ticks together and nobody watches more than ticks, a run is a loop over ticks: sending, arrivals, forces, motion. Here that loop works on
+//! arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what [`crate::world::World`] does, with the same operations in the same order on each number, the same random numbers at the same addresses and the same
 //! counters, and comes to the same [`Summary`] to the bit.
 //!
 //! With events, a second of ten peers takes 5.1 times as long over constant delays, and 2.0 times over jitter and loss.
@@ -22,7 +21,6 @@ mod ticks;
 mod translations;
 mod turn;
 mod turning;
-mod windows;
 
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
@@ -52,7 +50,6 @@ pub use side_by_side::{run_side_by_side, same_shape};
 pub use ticks::Ticks;
 use translations::Translations;
 use turning::{PAIRS, TurningBlocks};
-pub(crate) use windows::{run_in_watched_windows, run_in_windows};
 
 /// A run of a scene of that shape with that law, to its end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
 pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dyn FnMut(Instant) -> bool) -> Summary {
@@ -389,10 +386,6 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     /// The counters of each link from a peer after that number of ticks, if what arrives by an instant is delivered and all links have that constant delay.
     fn broadcast_stats(&self, from: usize, delay: Duration, ticks: u64, until: Instant) -> LinkStats {
         let delay = nanos(delay);
-        if let (true, Samples::Broadcast(samples)) = (self.shape.has_windows(), &self.samples) {
-            let (offered, delivered) = ((self.next_send[from] - self.shape.phases[from]) / self.shape.send_every, samples.arrived(from));
-            return LinkStats::counted(offered, delivered, u128::from(delivered) * u128::from(delay), []);
-        }
         // Such a link need not count: sent at phase, phase + M, phase + 2M …
         let sent_before = |ticks: u64| ticks.saturating_sub(self.shape.phases[from]).div_ceil(self.shape.send_every);
         let last = until.as_nanos().checked_sub(delay).map(|nanos| nanos / crate::arrays::nanos(self.shape.tick));

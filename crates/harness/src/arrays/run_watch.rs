@@ -41,14 +41,8 @@ impl<B, const A: usize, const P: usize> RunWatch<B, A, P> for Unwatched<'_> {
 
 /// An observer of ticks and instants, of any type.
 pub(crate) trait Onlooker {
-    /// Whether ticks are looked at.
-    fn wants_ticks(&self) -> bool;
-
     /// See [`crate::Observer::on_ticks`].
     fn on_ticks(&mut self, ticks: &Ticks<'_>);
-
-    /// See [`crate::Observer::on_tick`]. Gives whether the run goes on.
-    fn on_tick(&mut self, row: &TickRow<'_>) -> bool;
 
     /// See [`crate::Observer::on_instant`]. Gives whether the run goes on: nothing has failed.
     fn on_instant(&mut self, row: &InstantRow) -> bool;
@@ -95,58 +89,6 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize> RunWatch<B, A, P> for Watc
     #[inline(always)]
     fn after_motion(&mut self, now: Instant, discrepancy: f64) -> bool {
         self.onlooker.on_instant(&InstantRow { at: now, discrepancy })
-    }
-}
-
-/// The observer of a run in windows, which is not compiled for each kind.
-pub(super) enum WindowWatch<'a> {
-    Unwatched(Unwatched<'a>),
-    Watched(WatchedTicks<'a>),
-}
-
-impl WindowWatch<'_> {
-    /// Whether ticks are looked at.
-    pub(super) fn wants_ticks(&self) -> bool {
-        matches!(self, Self::Watched(watch) if watch.onlooker.wants_ticks())
-    }
-
-    /// Whether instants are looked at.
-    pub(super) const fn wants_instants(&self) -> bool {
-        matches!(self, Self::Watched(_))
-    }
-
-    /// A peer ticks that was so before it moved, in that lane; gives whether the run goes on.
-    pub(super) fn on_tick<const A: usize>(&mut self, (at, peer): (Instant, usize), seen: &SeenPlace<A>) -> bool {
-        match self {
-            Self::Unwatched(_) => true,
-            Self::Watched(WatchedTicks { onlooker, damping, shown }) => {
-                let place = Place { at, peer, damping: &damping[peer], shown: *shown, attitude: None, device: None };
-                place.hand_on(seen, &mut |row| onlooker.on_tick(row))
-            }
-        }
-    }
-
-    /// That is how far copies are apart at an instant \[m\]; gives whether the run goes on.
-    pub(super) fn on_instant(&mut self, at: Instant, discrepancy: f64) -> bool {
-        match self {
-            Self::Unwatched(_) => true,
-            Self::Watched(watch) => watch.onlooker.on_instant(&InstantRow { at, discrepancy }),
-        }
-    }
-
-    /// Asked as [`crate::Observer::keep_going`] is.
-    pub(super) fn goes_on(&mut self, now: Instant) -> bool {
-        match self {
-            Self::Unwatched(watch) => (watch.0)(now),
-            Self::Watched(watch) => watch.onlooker.keep_going(now),
-        }
-    }
-
-    /// The damping of the law from now on is that of this scene.
-    pub(super) fn change_damping(&mut self, scene: &Scene) {
-        if let Self::Watched(watch) = self {
-            watch.damping = damping(scene);
-        }
     }
 }
 

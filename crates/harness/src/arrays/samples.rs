@@ -1,7 +1,7 @@
 //! Samples between peers: those in flight, and those that each peer holds of the others. A sample is P pairs of numbers.
 
-pub(super) use broadcast::{Broadcast, TOGETHER};
-pub(super) use per_packet::{NextTick, PerPacket};
+pub(super) use broadcast::Broadcast;
+pub(super) use per_packet::PerPacket;
 
 use cohaptic_peer::State;
 

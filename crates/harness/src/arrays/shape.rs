@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{Clock, Coordination, EXACT_FROM, Integrator};
+use cohaptic_peer::{Coordination, EXACT_FROM, Integrator};
 use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
 use cohaptic_units::print::Span;
 use cohaptic_units::{Bytes, Instant};
@@ -41,8 +41,6 @@ pub(crate) struct Shape {
     pub(super) delay: Option<Duration>,
     /// The neighbours of each peer, if they are not all others.
     pub(super) topology: Option<Arc<Topology>>,
-    /// The clocks of the peers, if not all tick together: then a run goes window by window.
-    pub(super) clocks: Option<Vec<Clock>>,
     /// Ticks between two calls of [`Observer::keep_going`](crate::Observer::keep_going): a power of two.
     pub(super) between_questions: u64,
 }
@@ -84,16 +82,6 @@ impl Shape {
     /// Whether a sample reaches all others together, so that links take no memory.
     pub(crate) const fn is_broadcast(&self) -> bool {
         self.delay.is_some()
-    }
-
-    /// The longest span between two ticks of a peer.
-    pub(super) fn longest_span(&self) -> Duration {
-        self.clocks.iter().flatten().map(|clock| clock.spans().1).max().unwrap_or(self.tick)
-    }
-
-    /// Whether peers tick at instants of their own.
-    pub(crate) const fn has_windows(&self) -> bool {
-        self.clocks.is_some()
     }
 
     /// How the queues of these links are simulated, and why; `None` if no link has one.
@@ -143,7 +131,6 @@ impl Shape {
         // All tick together, so that all have one law.
         let law = strategies.law(scene, 0).ok_or("the strategy is not a law of the registry")?;
         let clock = scene.peers[0].clock;
-        let tick_together = plan.ticking == Ticking::Lockstep;
         let load = load(scene);
         let links = scene.used_links();
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
@@ -154,19 +141,14 @@ impl Shape {
         let may_have_past = || has_past(law) || !scene.timeline.is_empty() && scene.laws_in_time(0).any(has_past);
         // Of strategies that are not the scene's own nobody knows the law after a change.
         let changes_law = |change: &Change| matches!(change.what, ChangeKind::Coordination(_) | ChangeKind::Parameters(_));
-        let clocks = || scene.peers.iter().map(|peer| &peer.clock);
         let fits = [
             (!plan.general_links, "everything is modelled"),
-            (clocks().all(|other| other.tick == clock.tick), "the ticks of peers differ in length"),
-            (clocks().all(|clock| !clock.spans().0.is_zero()), "two ticks of a peer fall on one instant"),
-            (tick_together || scene.rotation.is_none(), "peers tick at instants of their own, and the object turns"),
+            (scene.peers.iter().all(|peer| peer.clock.tick == clock.tick), "the ticks of peers differ in length"),
+            (plan.ticking == Ticking::Lockstep, "peers tick at instants of their own, by offsets or drifts"),
             (links.iter().all(|(link, _)| !link.may_damage()), "a link damages packets"),
             (models_to_come(scene).all(|link| !link.may_damage()), "the timeline makes a link damage packets"),
             (scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()), "packets of several links share an access line"),
             (late.is_none(), late.unwrap_or_default()),
-            // In windows a packet is put into the wheel as the packet is sent, and the arrival says where.
-            (tick_together || !links_change, "peers tick at instants of their own, and the timeline changes links"),
-            (tick_together || are_direct, "peers tick at instants of their own, and the arrival over some link is not known when a packet is sent"),
             (!sends_by_difference(scene), "there are dead bands"),
             (!scene.has_gains_by_peer(), "the gains follow the weight that a peer hears, so they differ from peer to peer"),
             (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
@@ -201,7 +183,6 @@ impl Shape {
             way: if are_direct { Way::Direct } else { Way::Stepped },
             delay,
             topology: scene.topology.clone(),
-            clocks: (!tick_together).then(|| clocks().copied().collect()),
             between_questions: u64::from(instants_between_questions(packets.max(peers))),
         };
         Ok((shape, law))
@@ -244,7 +225,7 @@ fn why_known_late(link: &LinkModel) -> Option<&'static str> {
 fn load(scene: &Scene) -> Load {
     let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
     let ticks = |peer: usize| u32::try_from(scene.samples_every(peer)).unwrap_or(u32::MAX);
-    let gaps = scene.peers.iter().enumerate().map(|(peer, spec)| spec.clock.spans().0.saturating_mul(ticks(peer)));
+    let gaps = scene.peers.iter().enumerate().map(|(peer, spec)| spec.clock.tick.saturating_mul(ticks(peer)));
     Load { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), gap: gaps.min().unwrap_or(Duration::ZERO) }
 }
 
@@ -291,8 +272,6 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             change("link = \"all\", set = { rate = \"1Mbit\" }"),
             change("peer = \"peer1\", set = { hand = { force = 1 } }"),
             change("coordination = { stiffness = 2 }"),
-            "peer.clock.drift=\"10ppm\"\nlink.loss=0.1".to_owned(),
-            "peer.clock.drift=\"10ppm\"\nlink.rate=\"1kbit\"".to_owned(),
         ] {
             assert_eq!(refusal(&fits), None, "{fits}");
         }
@@ -304,11 +283,8 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             (change("link = \"all\", set = { limit = \"9 packets\" }"), "a link has a limit"),
             (format!("link={{ replay = '{SHIPPED}/network/data/fates.csv' }}"), "a link replays a log"),
             ("link={ netem = \"delay 20ms\", netem-profile = \"kernel-6.6\" }".to_owned(), "netem as a kernel computes it"),
-            (
-                "peer.clock.drift=\"10ppm\"\nlink.rate=\"1kbit\"\nlink.queue={ limit = \"9 packets\", discipline = \"head-drop\" }".to_owned(),
-                "not known when a packet is sent",
-            ),
-            (change("link = \"all\", set = { delay = \"1ms\" }") + "\npeer.clock.drift=\"10ppm\"", "the timeline changes links"),
+            ("peer.clock.drift=\"10ppm\"".to_owned(), "tick at instants of their own"),
+            ("peers=[{ name = \"peer1\", clock.offset = \"1ms\" }]".to_owned(), "tick at instants of their own"),
             ("link.corrupt=0.1".to_owned(), "a link damages"),
             (change("link = \"all\", set = { corrupt = 0.1 }"), "the timeline makes a link damage"),
             ("coordination.send-when={ position = 0.001 }".to_owned(), "dead bands"),

@@ -42,11 +42,8 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
 /// Lanes that nobody needs cost what the others do. Where samples travel together, eight runs of three peers take a third of the time of eight alone, of ten
 /// peers half of it. Where each packet has an arrival of its own, that is most of the work and done for each run by itself: eight runs of three peers take
 /// half, of ten peers five sixths, and from sixteen peers on more than alone, since eight times the samples in flight do not fit into the nearest cache.
-/// Exact means are those of one run, and so are windows.
+/// Exact means are those of one run.
 fn pays(shape: &Shape, alike: usize) -> bool {
-    if shape.has_windows() {
-        return false;
-    }
     if shape.delay.is_some() { alike >= 5 && shape.peers <= EXACT_FROM } else { alike >= 7 && shape.peers <= 12 && shape.way == Way::Direct }
 }
 

@@ -46,7 +46,6 @@ pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
 fn why_together(shape: &Shape) -> Option<&'static str> {
     let whys = [
         (shape.delay.is_some(), "all samples travel together: a tick takes less time than threads take to meet"),
-        (shape.has_windows(), "peers tick at instants of their own: threads would meet in each window"),
         (shape.turns.is_some(), "the object turns: how far copies are turned apart is a matter of all of them"),
     ];
     whys.into_iter().find_map(|(is_so, why)| is_so.then_some(why))

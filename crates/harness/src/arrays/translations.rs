@@ -21,13 +21,6 @@ pub(super) struct Translations<const A: usize> {
 }
 
 impl<const A: usize> Translations<A> {
-    /// Hands take the force of an instant of each peer.
-    pub(super) fn move_hands_each(&mut self, at: impl Fn(usize) -> Instant) {
-        for (peer, run, hand) in &self.hands {
-            self.blocks.set_hand(*peer, *run, hand.at(at(*peer)));
-        }
-    }
-
     /// [`Bodies::advance`] of devices that hold those points.
     #[inline(always)]
     pub(super) fn advance_grasped<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>, grasped: &impl Grasped) -> Moved<L> {

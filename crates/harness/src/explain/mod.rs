@@ -75,7 +75,6 @@ struct Nanos {
 
 const WITH_EVENTS: Nanos = Nanos { a_tick: 12.0, a_packet: 20.0, an_impaired_packet: 45.0 };
 const IN_ARRAYS: Nanos = Nanos { a_tick: 8.0, a_packet: 1.0, an_impaired_packet: 25.0 };
-const IN_WINDOWS: Nanos = Nanos { a_tick: 20.0, a_packet: 1.0, an_impaired_packet: 30.0 };
 
 /// Bytes of a row of `trajectory.csv` (for its first axis and for each further one) and of `packets.csv`, in scenes of ordinary size.
 const BYTES_A_TICK: f64 = 20.0;
@@ -112,25 +111,14 @@ pub fn explain(scene: &Scene) -> Explanation {
     };
     let nanos = match &arrays {
         None => WITH_EVENTS,
-        Some(shape) => {
-            let nanos = if shape.has_windows() { IN_WINDOWS } else { IN_ARRAYS };
-            if shape.is_broadcast() {
-                Nanos { an_impaired_packet: nanos.a_packet, ..nanos }
-            } else {
-                Nanos { a_packet: nanos.an_impaired_packet, ..nanos }
-            }
-        }
+        Some(shape) if shape.is_broadcast() => Nanos { an_impaired_packet: IN_ARRAYS.a_packet, ..IN_ARRAYS },
+        Some(_) => Nanos { a_packet: IN_ARRAYS.an_impaired_packet, ..IN_ARRAYS },
     };
     if let Some(shape) = arrays {
-        let (peers, ticks) = if shape.has_windows() {
-            ("eight peers of one run, in windows in which each peer ticks at most once", "ticks are equally long by peers' own clocks")
-        } else {
-            ("eight peers of one run or one peer of eight runs", "all tick together")
-        };
         rows.model(
             "runs of which nobody watches more than ticks",
-            format!("in arrays: binary64 in eight lanes, {peers}"),
-            format!("{ticks}, and the fate of each packet is known before the next one comes; a run that is recorded has events, since packets are recorded"),
+            "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
+            "all tick together, and the fate of each packet is known before the next one comes; a run that is recorded has events, since packets are recorded",
         );
         if let Some((queues, why)) = shape.queues(&used_links(scene)) {
             rows.model("queues of such a run", queues, why);

@@ -2,8 +2,6 @@
 //!
 //! Then all hold the same of a sender, and a sample is one thing for all its receivers, on the way and when it is held.
 
-mod heard;
-
 use std::collections::VecDeque;
 
 use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
@@ -12,10 +10,8 @@ use cohaptic_units::Instant;
 use super::quads::{self, Quad};
 use super::{Sample, count};
 use crate::arrays::bodies::Bodies;
-use heard::Heard;
-pub(in crate::arrays) use heard::TOGETHER;
 
-/// The samples in flight, and those held from each sender. Time counts ticks, or nanoseconds where peers tick at instants of their own.
+/// The samples in flight, and those held from each sender. Time counts ticks.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct Broadcast<const P: usize, const L: usize> {
     delay: u64,
@@ -29,8 +25,6 @@ pub(in crate::arrays) struct Broadcast<const P: usize, const L: usize> {
     /// How many samples of each sender have arrived.
     arrived: Vec<u64>,
     changed: Changed,
-    /// Where peers tick at instants of their own.
-    heard: Option<Box<Heard<P, L>>>,
 }
 
 /// The senders whose samples have arrived since the means were computed.
@@ -63,7 +57,6 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
             sums: None,
             arrived: vec![0; peers],
             changed: Changed::More,
-            heard: None,
         };
         for (sender, sample) in initial.iter().enumerate() {
             broadcast.hold(sender, sample);
@@ -75,14 +68,14 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
 
     /// A peer sends to all others.
     #[inline(always)]
-    pub(in crate::arrays) fn send<const A: usize>(&mut self, now: u64, sender: usize, bodies: &impl Bodies<A, P>) {
-        let due = now.saturating_add(self.delay);
+    pub(in crate::arrays) fn send<const A: usize>(&mut self, tick: u64, sender: usize, bodies: &impl Bodies<A, P>) {
+        let due = tick.saturating_add(self.delay);
         self.on_the_way.push_back(Sent { due, sender, sample: bodies.sample(sender) });
     }
 
     /// What has arrived is held from now on.
-    pub(in crate::arrays) fn deliver(&mut self, now: u64) {
-        while let Some(Sent { sender, sample, .. }) = self.next_due(now) {
+    pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
+        while let Some(Sent { sender, sample, .. }) = self.next_due(tick) {
             self.hold(sender, &sample);
             self.arrived[sender] += 1;
             self.changed = if self.changed == Changed::Nothing { Changed::From(sender) } else { Changed::More };
@@ -91,8 +84,8 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
 
     /// The next sample that has arrived, which is on the way no more.
     #[inline(always)]
-    fn next_due(&mut self, now: u64) -> Option<Sent<P, L>> {
-        let sent = *self.on_the_way.front().filter(|sent| sent.due <= now)?;
+    fn next_due(&mut self, tick: u64) -> Option<Sent<P, L>> {
+        let sent = *self.on_the_way.front().filter(|sent| sent.due <= tick)?;
         self.on_the_way.pop_front();
         Some(sent)
     }
@@ -135,11 +128,6 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
                 None => self.first.velocity[axis][run],
             }),
         })
-    }
-
-    /// How many samples of a sender have arrived.
-    pub(in crate::arrays) fn arrived(&self, sender: usize) -> u64 {
-        self.arrived[sender]
     }
 
     /// Whether nothing that anybody holds has changed since the means were computed.

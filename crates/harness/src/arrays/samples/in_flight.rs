@@ -90,18 +90,6 @@ impl<const P: usize> InFlight<P> {
         self.packets_at((ticks, due), overtakes).push(packet);
     }
 
-    /// How many ticks lie between two instants, rounded up; the later one is not before the other.
-    #[inline(always)]
-    pub(super) fn count(&self, since: Instant, until: Instant) -> u64 {
-        self.ticks.count(until.as_nanos() - since.as_nanos())
-    }
-
-    /// A packet that is known at this tick and due at that one.
-    #[inline(always)]
-    pub(super) fn push_due(&mut self, (tick, due): (u64, u64), packet: Packet<P>, overtakes: bool) {
-        self.packets_at((due - tick, due), overtakes).push(packet);
-    }
-
     /// Where a packet goes that is due at a tick, which is that number of ticks ahead.
     ///
     /// The packet itself is handed to no call: it would be put together on the stack for that, and copied from there in words wider than its parts, for which a
@@ -132,22 +120,6 @@ impl<const P: usize> InFlight<P> {
     /// All of them, in no order.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Packet<P>> {
         self.wheel.iter().flatten().chain(self.beyond.values().flat_map(|bucket| bucket.in_order.iter().chain(&bucket.overtaking)))
-    }
-
-    /// Takes out all that have arrived by an instant.
-    pub(super) fn take_arrived(&mut self, until: Instant) -> Vec<Packet<P>> {
-        let mut arrived = Vec::new();
-        let beyond = self.beyond.values_mut().flat_map(|bucket| [&mut bucket.in_order, &mut bucket.overtaking]);
-        for packets in self.wheel.iter_mut().chain(beyond) {
-            packets.retain(|packet| {
-                let has_arrived = packet.arrival <= until;
-                if has_arrived {
-                    arrived.push(*packet);
-                }
-                !has_arrived
-            });
-        }
-        arrived
     }
 
     /// Takes back the memory of a bucket whose packets are gone.

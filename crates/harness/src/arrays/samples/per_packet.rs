@@ -3,7 +3,6 @@
 //! Peers look at what has arrived at their ticks alone, and all tick together. So samples in flight lie in a wheel, by the tick at which it is in force, and
 //! nothing is sorted but the samples that are due together on a link on which one overtook another.
 
-mod in_turn;
 mod neighbours;
 
 use std::ops::Range;
@@ -22,7 +21,6 @@ use crate::arrays::bodies::Bodies;
 use crate::arrays::processor::on_widest;
 use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
-pub(in crate::arrays) use in_turn::NextTick;
 
 /// Set in the sequence number of a link on which one of the samples that are due overtakes another.
 const IS_OVERTAKEN: u64 = 1 << 63;
@@ -95,7 +93,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             end: shape.end,
             links,
             sends: vec![false; peers],
-            in_flight: InFlight::new(nanos(shape.longest_span())),
+            in_flight: InFlight::new(nanos(shape.tick)),
             held: std::array::from_fn(|_| quads::empty(places)),
             sums: Vec::new(),
             next: vec![0; places * L],

@@ -47,13 +47,6 @@ pub(super) fn swap<const L: usize>(quads: &mut [Quad<L>], one: usize, other: &mu
 #[inline(always)]
 pub(super) fn mean<const L: usize>(quads: &[Quad<L>], count: f64) -> ([f64; L], [f64; L]) {
     let mut sums: Quad<L> = [[0.0; L]; 8];
-    add(&mut sums, quads);
-    mean_of(&sums, count)
-}
-
-/// Adds each place of quads to the sum in that place.
-#[inline(always)]
-pub(super) fn add<const L: usize>(sums: &mut Quad<L>, quads: &[Quad<L>]) {
     for quad in quads {
         for place in 0..8 {
             for run in 0..L {
@@ -61,11 +54,6 @@ pub(super) fn add<const L: usize>(sums: &mut Quad<L>, quads: &[Quad<L>]) {
             }
         }
     }
-}
-
-/// The mean position and velocity of each run, of this number of samples with these sums.
-#[inline(always)]
-pub(super) fn mean_of<const L: usize>(sums: &Quad<L>, count: f64) -> ([f64; L], [f64; L]) {
     let mean = |first: usize| -> [f64; L] {
         std::array::from_fn(|run| ((sums[first][run] + sums[first + 1][run]) + (sums[first + 2][run] + sums[first + 3][run])) / count)
     };

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use cohaptic_units::{Instant, Probability};
 
 use super::kind::{Losses, Verdict};
-use super::{Arrivals, DirectLinks, LinkState, OfferedAt};
+use super::{Arrivals, DirectLinks, LinkState};
 use crate::laws::delay::GammaCubics;
 use crate::line::direct::Words;
 use crate::random::PacketDraws;
@@ -86,7 +86,7 @@ impl Chains {
     pub(super) fn offer(
         &self,
         (links, states, first): (&mut [LinkState], &mut ChainStates, usize),
-        (now, until): (impl OfferedAt, Instant),
+        (now, until): (Instant, Instant),
         excluded: u8,
         arrivals: &mut Arrivals,
     ) {
@@ -115,7 +115,6 @@ impl Chains {
                 } else if nanos[place] == GammaCubics::UNKNOWN {
                     slow |= bit;
                 } else {
-                    let now = now.of(place);
                     let at = now.saturating_add_nanos(nanos[place]);
                     normals[place] = following[place];
                     arrivals.at[place] = at;
@@ -137,13 +136,13 @@ impl Chains {
     fn offer_slowly(
         &self,
         (links, normals): (&mut [LinkState], &mut [f64; DirectLinks::AT_ONCE]),
-        (now, until): (impl OfferedAt, Instant),
+        (now, until): (Instant, Instant),
         slow: u8,
         arrivals: &mut Arrivals,
     ) {
         for (place, link) in links.iter_mut().enumerate().filter(|(place, _)| slow >> place & 1 == 1) {
             let packet = link.draws.packet(arrivals.sequences[place]);
-            let ([_, word], now) = (packet.loss_and_jitter(), now.of(place));
+            let [_, word] = packet.loss_and_jitter();
             let at = now.saturating_add_nanos(self.delays.draw_nanos(&mut normals[place], word, packet));
             arrivals.at[place] = at;
             arrivals.arrive |= 1 << place;

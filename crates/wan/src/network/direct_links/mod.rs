@@ -2,7 +2,6 @@
 
 mod chains;
 mod kind;
-mod offered_at;
 
 use alloc::vec::Vec;
 
@@ -10,7 +9,6 @@ use cohaptic_units::Instant;
 
 use chains::ChainStates;
 use kind::{Kind, Line, Remembered, Verdict};
-pub use offered_at::OfferedAt;
 
 use super::id::LinkId;
 use crate::fates::fate::DropCause;
@@ -179,18 +177,17 @@ impl DirectLinks {
         matches!(&self.kinds[..], [(_, Kind { chains: Some(_), .. })] if self.others.is_empty())
     }
 
-    /// [`DirectLinks::offer`], at one instant or each packet at one of its own, for a driver that asked before a loop
-    /// [which links they are](DirectLinks::are_chains). Both in one loop take two instructions more for a packet of links with jitter and loss.
+    /// [`DirectLinks::offer`], for a driver that asked before a loop [which links they are](DirectLinks::are_chains). Both in one loop take two instructions more for a packet of links with jitter and loss.
     ///
     /// # Panics
     ///
     /// As [`DirectLinks::offer`].
     #[inline(always)]
-    pub fn offer_as<const CHAINS: bool>(&mut self, now: impl OfferedAt, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
+    pub fn offer_as<const CHAINS: bool>(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         (arrivals.arrive, arrivals.overtake) = (0, 0);
         let first = first.index();
         #[cfg(debug_assertions)]
-        (0..count).filter(|place| excluded >> place & 1 == 0).for_each(|place| self.assert_load(now.of(place), first + place));
+        (0..count).filter(|place| excluded >> place & 1 == 0).for_each(|place| self.assert_load(now, first + place));
         let (links, span) = (&mut self.links[first..first + count], (now, self.until));
         // Drawing for eight links what two need takes longer than one by one.
         let are_few = count == Self::AT_ONCE && excluded.count_zeros() <= 2;
@@ -210,11 +207,11 @@ impl DirectLinks {
     }
 
     #[inline(never)]
-    fn offer_one_by_one(&mut self, now: impl OfferedAt, first: usize, count: usize, excluded: u8, arrivals: &mut Arrivals) {
+    fn offer_one_by_one(&mut self, now: Instant, first: usize, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         for place in (0..count).filter(|place| excluded >> place & 1 == 0) {
             let link = LinkId::new(first + place);
             arrivals.sequences[place] = self.offered(link);
-            if let Some((at, overtakes)) = self.offer_alone(now.of(place), link) {
+            if let Some((at, overtakes)) = self.offer_alone(now, link) {
                 arrivals.at[place] = at;
                 arrivals.arrive |= 1 << place;
                 arrivals.overtake |= u8::from(overtakes) << place;
@@ -360,7 +357,7 @@ fn draw(is_random: bool, links: &[LinkState], sequences: &mut [u64; DirectLinks:
 fn alike<const REMEMBER: bool>(
     kind: &mut Kind,
     (links, remembered): (&mut [LinkState], &mut [Remembered]),
-    (now, until): (impl OfferedAt, Instant),
+    (now, until): (Instant, Instant),
     excluded: u8,
     arrivals: &mut Arrivals,
 ) {
@@ -369,7 +366,7 @@ fn alike<const REMEMBER: bool>(
     for place in 0..links.len().min(DirectLinks::AT_ONCE) {
         let (link, words) = (&mut links[place], words[place]);
         if excluded & bit == 0 {
-            let (draws, now) = (link.draws.packet(link.offered), now.of(place));
+            let draws = link.draws.packet(link.offered);
             let verdict = if REMEMBER { kind.verdict(now, &mut remembered[place], words, draws) } else { kind.fate(now, words, draws) };
             link.offered += 1;
             match verdict {

@@ -133,7 +133,7 @@ fn chains_decide_what_whole_links_decide() {
     }
 }
 
-/// All links at once, in groups of eight and of five, packets at one instant and a microsecond apart, against each as a [`Link`]: the same packets at the same
+/// All links at once, in groups of eight and of five, against each as a [`Link`]: the same packets at the same
 /// instants, the same counters at the end.
 fn compare(direct: &[LinkModel]) {
     compare_under(OF_TESTS, direct);
@@ -141,12 +141,10 @@ fn compare(direct: &[LinkModel]) {
 
 /// [`compare`], where links know of that load, whose gap is at most 6 ms.
 fn compare_under(load: Load, direct: &[LinkModel]) {
-    [(DirectLinks::AT_ONCE, 0), (5, 0), (DirectLinks::AT_ONCE, 1000), (5, 1000)]
-        .into_iter()
-        .for_each(|groups| compare_in_groups(load, direct, groups));
+    [DirectLinks::AT_ONCE, 5].into_iter().for_each(|together| compare_in_groups(load, direct, together));
 }
 
-fn compare_in_groups(load: Load, direct: &[LinkModel], (together, apart): (usize, u64)) {
+fn compare_in_groups(load: Load, direct: &[LinkModel], together: usize) {
     let until = Instant::from_nanos(500 * 8_000_000);
     let mut links = DirectLinks::new(until, load);
     let name = |place: usize| LinkName::between("a", &format!("b{place}"));
@@ -160,19 +158,13 @@ fn compare_in_groups(load: Load, direct: &[LinkModel], (together, apart): (usize
         // Every third packet is not offered to the second link.
         let excluded = if number % 3 == 0 { 0b10 } else { 0 };
         for (place, link) in whole.iter_mut().enumerate().filter(|(place, _)| u32::from(excluded) >> place & 1 == 0) {
-            link.handle_packet(now.saturating_add_nanos(apart * place as u64), PacketInfo::from(Bytes::new(64)), 0)
-                .unwrap_or_else(|error| panic!("{place}: {error}"));
+            link.handle_packet(now, PacketInfo::from(Bytes::new(64)), 0).unwrap_or_else(|error| panic!("{place}: {error}"));
         }
         let mut offered = Arrivals::NONE;
         for first in (0..direct.len()).step_by(together) {
             let count = together.min(direct.len() - first);
             let (link, excluded) = (LinkId::new(first), if first == 0 { excluded } else { 0 });
-            let instants = core::array::from_fn(|place| now.saturating_add_nanos(apart * (first + place) as u64));
-            match links.are_chains() {
-                _ if apart == 0 => links.offer(now, link, count, excluded, &mut offered),
-                true => links.offer_as::<true>(&instants, link, count, excluded, &mut offered),
-                false => links.offer_as::<false>(&instants, link, count, excluded, &mut offered),
-            }
+            links.offer(now, link, count, excluded, &mut offered);
             for place in offered.places() {
                 let so_far = &mut arrivals[first + place];
                 assert_eq!(offered.overtakes(place), so_far.iter().any(|(at, _)| *at > offered.at[place]));
