@@ -3,13 +3,15 @@
 
 use std::sync::Arc;
 
-use cohaptic_harness::{Model, NoObserver, Simulation, run_side_by_side, same_shape};
+use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side, same_shape};
+use cohaptic_peer::Gains;
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_scene::{Scene, Topology};
+use cohaptic_scene::{Change, ChangeKind, Scene, Topology};
 use cohaptic_tests::{Draft, cases, drafts};
+use cohaptic_units::Instant;
 use proptest::prelude::*;
 
-use super::arrays::{difference, run, run_interrupted};
+use super::arrays::{difference, mesh, run, run_interrupted};
 use super::watched::found;
 
 /// How many bits a second a line sends, of those that are offered: the samples of a link, a little less, a little more, or far more.
@@ -114,5 +116,30 @@ proptest! {
         }
         let interrupted = |model| run_interrupted(&scene, model, breaths);
         prop_assert_eq!(difference(&interrupted(Model::Least), &interrupted(Model::General)), None, "{}", draft.link);
+    }
+}
+
+/// Queues decide about all that happens until the next sample. A run that diverges ends in between: what did not happen by then is not counted, the observer is
+/// asked once at each instant, and sees the rows that events show.
+#[test]
+fn a_run_that_diverges_has_counted_what_happened() {
+    let codel = |ecn: bool| format!("{{ codel = {{ target = \"5ms\", interval = \"30ms\", ecn = {ecn} }} }}");
+    let red = |ecn: bool| {
+        let curve = "min = \"64B\", max = \"320B\", max-probability = 0.5, weight = 0.1, mean-packet = \"64B\"";
+        format!("{{ red = {{ {curve}, ecn = {ecn} }} }}")
+    };
+    for discipline in ["\"head-drop\"".to_owned(), codel(false), codel(true), red(false), red(true)] {
+        // Samples come every 8 ms, and take 8.5 ms each.
+        let link = format!("delay = \"9ms\", jitter = \"2ms\", rate = \"60kbit\", queue = {{ limit = \"9 packets\", discipline = {discipline} }}");
+        for shift in [0, 2, 5] {
+            let mut scene = mesh(11, &link);
+            let what = ChangeKind::Coordination(Gains { stiffness: 3e7, damping: 5.0 });
+            scene.timeline.push(Change { at: Instant::from_nanos((1500 + shift) * 1_000_000), what });
+            assert!(same_shape(&scene, &scene), "it is run in arrays");
+            let expected = run(&scene, Model::General);
+            assert!(matches!(expected.ending, Ending::Diverged(_)), "{discipline}");
+            assert_eq!(difference(&run_interrupted(&scene, Model::Least, usize::MAX), &expected), None, "{discipline}");
+            assert_eq!(found(&scene, |_| ()), None, "{discipline}");
+        }
     }
 }

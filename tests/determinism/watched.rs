@@ -166,7 +166,7 @@ fn devices_that_touch_nothing_are_seen() {
     }
 }
 
-/// Queues look ahead of the end of a run that diverges. Its rows are given once.
+/// Rows of a run that diverges are given once.
 #[test]
 fn runs_that_diverge_are_seen_to_their_end() {
     for link in

@@ -95,30 +95,20 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     }
 
     fn run_in_lockstep(&self, plan: &Plan, (shape, law): (Shape, BuiltIn), watch: Watch, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
-        let looks_ahead = shape.looks_ahead();
-        let summary = if watch == Watch::NOTHING {
+        if watch == Watch::NOTHING {
             let threads = self.threads.clamp(1, shape.threads().0);
             if (threads > 1 || shape.pays_in_groups())
+                // Groups that diverge know it later than it happens: then all run together from the beginning.
                 && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
             {
                 return Ok(summary);
             }
-            arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now))
-        } else {
-            let mut watching = Watching { observer, watch, result: Ok(()) };
-            let summary = arrays::run_watched(self.scene, (shape, law), plan, &mut watching);
-            watching.result?;
-            summary
-        };
-        // The counters of queues that have looked ahead are those of a later instant. Rows have none, and are not given twice.
-        let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
-        if has_looked_too_far { self.run_again(plan, observer) } else { Ok(summary) }
-    }
-
-    /// Runs with events what the observer has seen in arrays.
-    fn run_again(&self, plan: &Plan, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
-        let asked: &mut AnyObserver<'_> = &mut Asked(observer);
-        self.run_with_events(plan, asked)
+            return Ok(arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now)));
+        }
+        let mut watching = Watching { observer, watch, result: Ok(()) };
+        let summary = arrays::run_watched(self.scene, (shape, law), plan, &mut watching);
+        watching.result?;
+        Ok(summary)
     }
 
     fn run_with_events(&self, plan: &Plan, observer: &mut (impl Observer<Error = Ended> + ?Sized)) -> Result<Summary, Ended> {
@@ -167,17 +157,6 @@ impl Onlooker for Watching<'_, '_> {
 
     fn keep_going(&mut self, now: Instant) -> bool {
         self.observer.keep_going(now)
-    }
-}
-
-/// An observer that has seen everything, and is still asked whether to go on.
-struct Asked<'o, 'a>(&'o mut AnyObserver<'a>);
-
-impl Observer for Asked<'_, '_> {
-    type Error = Ended;
-
-    fn keep_going(&mut self, now: Instant) -> bool {
-        self.0.keep_going(now)
     }
 }
 

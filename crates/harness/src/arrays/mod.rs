@@ -225,9 +225,6 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     /// in the places of those that are here what each of them sends.
     #[inline(always)]
     fn begin(&mut self, tick: u64) -> bool {
-        if self.shape.has_queues() && self.shape.is_asked_before(tick) {
-            self.pass(tick);
-        }
         let sends = tick == self.earliest_send;
         if sends {
             self.gather(tick);
@@ -315,7 +312,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     fn send(&mut self, tick: u64, now: Instant) {
         if let Samples::PerPacket(samples) = &mut self.samples {
             let change = self.changes.next_at();
-            let next = |sender: usize| until(&self.shape, tick, self.next_send[sender]).min(change);
+            let next = |sender: usize| next_offer(&self.shape, self.next_send[sender]).min(change);
             samples.send(self.processor, (tick, now), &self.senders, &self.sent, next);
         }
     }
@@ -325,7 +322,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     fn pass(&mut self, tick: u64) {
         if let Samples::PerPacket(samples) = &mut self.samples {
             let change = self.changes.next_at();
-            samples.pass(self.shape.before(tick), &|sender| until(&self.shape, tick, self.next_send[sender]).min(change));
+            samples.pass(self.shape.before(tick), &|sender| next_offer(&self.shape, self.next_send[sender]).min(change));
         }
     }
 
@@ -367,7 +364,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             && let Samples::PerPacket(samples) = &mut self.samples
         {
             let Shape { tick, send_every, phases, .. } = &self.shape;
-            samples.end_early(run, |sender, sequence| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick)));
+            samples.end_early(run, delivered_until, |sender, sequence| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick)));
         }
         delivered_until
     }
@@ -479,9 +476,9 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnO
     }
 }
 
-/// Until when a queue may look at this tick: until its sender sends next, and not beyond the latest tick before the run may be interrupted.
-fn until(shape: &Shape, tick: u64, next_send: u64) -> Instant {
-    Instant::from_nanos(next_send.min(shape.asked_after(tick) - 1) * nanos(shape.tick))
+/// When a peer sends next, at that tick: until then its links may look ahead.
+fn next_offer(shape: &Shape, next_send: u64) -> Instant {
+    Instant::from_nanos(next_send.saturating_mul(nanos(shape.tick)))
 }
 
 /// A span of at most a year.

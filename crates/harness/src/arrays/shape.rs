@@ -111,11 +111,6 @@ impl Shape {
         threads::groups_pay(self)
     }
 
-    /// Whether a run that diverges is to be run once more with events: queues have looked ahead of the end.
-    pub(crate) fn looks_ahead(&self) -> bool {
-        self.has_queues()
-    }
-
     /// Whether the fate of a packet on some link is decided before it happens.
     pub(super) fn has_queues(&self) -> bool {
         self.way == Way::Stepped

@@ -53,6 +53,16 @@ pub(crate) struct Seldom {
     pub(crate) dropped: [u64; DropCause::ALL.len()],
 }
 
+impl Seldom {
+    /// Takes back that a packet was dropped for that cause, or that it was marked.
+    pub(crate) const fn take_back(&mut self, dropped: Option<DropCause>) {
+        match dropped {
+            Some(cause) => self.dropped[cause.index()] -= 1,
+            None => self.marked -= 1,
+        }
+    }
+}
+
 impl LinkStats {
     /// What was counted elsewhere: packets offered, delivered, and dropped for a cause; the delays of those delivered in all \[ns\].
     #[must_use]

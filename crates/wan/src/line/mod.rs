@@ -115,6 +115,11 @@ impl<P, T: Clone> Line<P, T> {
         self.rare().seldom.dropped[cause.index()] += 1;
     }
 
+    /// Takes back that a packet was dropped for that cause, or that it was marked.
+    pub(crate) fn take_back(&mut self, dropped: Option<DropCause>) {
+        self.rare().seldom.take_back(dropped);
+    }
+
     /// Hands the packet that was offered last to the engine, with the marks that lines before this one left on it.
     pub(crate) fn enter(&mut self, now: Instant, info: PacketInfo, marks: Marks, item: T, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         // The packet itself is counted already.

@@ -415,10 +415,14 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         self.stale[usize::from(packet.receiver) * L + packet.place as usize % L] += 1;
     }
 
-    /// A run ends before the end of the scene: samples still in flight in it never arrive.
+    /// A run ends at an instant before the end of the scene: samples still in flight in it never arrive, and links do nothing more.
     ///
     /// `sent` says when a packet of a sender was sent.
-    pub(in crate::arrays) fn end_early(&mut self, run: usize, sent: impl Fn(usize, u64) -> Instant) {
+    pub(in crate::arrays) fn end_early(&mut self, run: usize, at: Instant, sent: impl Fn(usize, u64) -> Instant) {
+        if let Links::Stepped(links) = &mut self.links {
+            // There is one run.
+            links.stop(at);
+        }
         for packet in self.in_flight.iter().filter(|packet| packet.place as usize % L == run) {
             let receiver = usize::from(packet.receiver);
             let column = self.rows.column_of(receiver, packet.place as usize / L);

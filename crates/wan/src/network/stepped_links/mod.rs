@@ -1,5 +1,6 @@
 //! Many links in which packets wait, each driven from one offer to the next, for drivers that keep the packets on the way themselves.
 
+mod ahead;
 mod queued;
 
 use alloc::boxed::Box;
@@ -7,6 +8,7 @@ use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
 
+use self::ahead::Ahead;
 use super::id::LinkId;
 use crate::fates::fate::Fate;
 use crate::fates::stats::LinkStats;
@@ -20,7 +22,8 @@ use queued::{QueuedKind, QueuedLink};
 /// Links of any kind, for a driver that knows when it will offer the next packet to each.
 ///
 /// What a queue does with a packet may depend on those that come later, but never before they come. So a link that is told when its next packet comes decides at
-/// once all that happens until then: no queue of events wakes it. It does what [`crate::Network`] does with such links, with the same random numbers at the
+/// once all that happens until then: no queue of events wakes it. A driver that stops earlier [says so](SteppedLinks::stop), and what has not happened by then is
+/// not counted. It does what [`crate::Network`] does with such links, with the same random numbers at the
 /// same addresses and the same counters. Packets with the payload `T` come out in no order of time, each with its number and the word whether one that came out
 /// before it arrives later or at the same instant.
 ///
@@ -28,6 +31,8 @@ use queued::{QueuedKind, QueuedLink};
 #[derive(Clone, Debug)]
 pub struct SteppedLinks<T> {
     until: Instant,
+    /// The latest instant given. A driver does not stop before it.
+    now: Instant,
     info: PacketInfo,
     links: Vec<Stepped<T>>,
     /// What links have in common on which nothing waits but before a line of one rate.
@@ -49,6 +54,7 @@ enum Stepped<T> {
 struct Other<T> {
     line: Line<(), Sent<T>>,
     latest: Instant,
+    ahead: Ahead,
 }
 
 /// A packet, its number, and when it was offered.
@@ -79,14 +85,16 @@ impl<T: Clone> SteppedLinks<T> {
     /// No links, for such packets; those that arrive by `until` will count as delivered.
     #[must_use]
     pub const fn new(until: Instant, info: PacketInfo) -> Self {
-        Self { until, info, links: Vec::new(), kinds: Vec::new(), outputs: Vec::new(), arrivals: Vec::new() }
+        Self { until, now: Instant::ZERO, info, links: Vec::new(), kinds: Vec::new(), outputs: Vec::new(), arrivals: Vec::new() }
     }
 
     /// Adds a link that can be [taken](SteppedLinks::takes).
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) {
         let link = match self.kind(model) {
             Some(place) => Stepped::Queued(place, QueuedLink::new(seed, name, &self.kinds[usize::from(place)].1)),
-            None => Stepped::Other(Box::new(Other { line: Line::new(seed, name, model.clone(), false), latest: Instant::ZERO })),
+            None => {
+                Stepped::Other(Box::new(Other { line: Line::new(seed, name, model.clone(), false), latest: Instant::ZERO, ahead: Ahead::default() }))
+            }
         };
         self.links.push(link);
     }
@@ -114,11 +122,12 @@ impl<T: Clone> SteppedLinks<T> {
     pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
         // What happens after the end is not counted.
         let (until, next) = (self.until, next.min(self.until));
+        self.now = now;
         match &mut self.links[link.index()] {
             Stepped::Queued(kind, link) => {
                 let kind = &self.kinds[usize::from(*kind)].1;
                 link.offer((now, until), kind, item, &mut arrives);
-                link.pass((next, until), kind, arrives);
+                link.pass((now, next, until), kind, arrives);
             }
             Stepped::Other(_) => self.offer_to_other((now, next, until), link, item, arrives),
         }
@@ -133,7 +142,7 @@ impl<T: Clone> SteppedLinks<T> {
     ) {
         let Self { info, links, outputs, arrivals, .. } = self;
         let Stepped::Other(other) = &mut links[link.index()] else { return };
-        let Other { line, latest } = &mut **other;
+        let Other { line, latest, ahead } = &mut **other;
         let fate = match line.offer(now, None) {
             Outcome::Arrives(at) => Some(Ok(at)),
             Outcome::Dropped(cause) => Some(Err(cause)),
@@ -149,7 +158,14 @@ impl<T: Clone> SteppedLinks<T> {
             }
             Some(Err(cause)) => line.drop(cause),
             None => {
-                line.enter(now, *info, Marks::default(), Sent { at: now, number, item }, outputs, &mut Arriving(arrivals));
+                line.enter(
+                    now,
+                    *info,
+                    Marks::default(),
+                    Sent { at: now, number, item },
+                    outputs,
+                    &mut Arriving { arrivals, ahead, span: (now, now) },
+                );
                 self.pass_on_other(next, link, arrives);
             }
         }
@@ -164,18 +180,19 @@ impl<T: Clone> SteppedLinks<T> {
         // What happens after the end is not counted.
         let (until, next) = (self.until, next.min(self.until));
         match &mut self.links[link.index()] {
-            Stepped::Queued(kind, link) => link.pass((next, until), &self.kinds[usize::from(*kind)].1, arrives),
+            Stepped::Queued(kind, link) => link.pass((self.now, next, until), &self.kinds[usize::from(*kind)].1, arrives),
             Stepped::Other(_) => self.pass_on_other(next, link, arrives),
         }
     }
 
     /// Lets time pass on a link with stages besides a line, until `next` or the end at most. Generic, because most packets over such a link come here.
     fn pass_on_other(&mut self, next: Instant, link: LinkId, mut arrives: impl FnMut(Instant, bool, u64, T)) {
-        let Self { until, links, outputs, arrivals, .. } = self;
+        let Self { until, now, links, outputs, arrivals, .. } = self;
         let Stepped::Other(other) = &mut links[link.index()] else { return };
-        let Other { line, latest } = &mut **other;
-        if line.next_wake().is_some_and(|wake| wake <= next) {
-            line.wake(next, outputs, &mut Arriving(arrivals));
+        let Other { line, latest, ahead } = &mut **other;
+        // One instant after another, so that it is known when a packet that leaves was marked.
+        while let Some(wake) = line.next_wake().filter(|wake| *wake <= next) {
+            line.wake(wake, outputs, &mut Arriving { arrivals, ahead, span: (*now, wake) });
         }
         for (at, Sent { at: sent, number, item }) in arrivals.drain(..) {
             line.flow().deliver_by(*until, sent, at);
@@ -197,6 +214,7 @@ impl<T: Clone> SteppedLinks<T> {
         model: LinkModel,
         arrives: &mut dyn FnMut(Instant, bool, u64, T),
     ) {
+        self.now = now;
         self.pass(now, link, arrives);
         let (until, info, kind) = (self.until, self.info, self.kind(&model));
         let Self { links, kinds, outputs, arrivals, .. } = self;
@@ -208,12 +226,25 @@ impl<T: Clone> SteppedLinks<T> {
             }
             (Stepped::Queued(place, queued), None) => {
                 let mut other = queued.clone().into_other(now, &kinds[usize::from(*place)].1, info);
-                other.line.reconfigure(now, seed, name, model, outputs, &mut Arriving(arrivals));
+                other.reconfigure(now, (seed, name), model, outputs, arrivals);
                 *changed = Stepped::Other(Box::new(other));
             }
-            (Stepped::Other(other), _) => other.line.reconfigure(now, seed, name, model, outputs, &mut Arriving(arrivals)),
+            (Stepped::Other(other), _) => other.reconfigure(now, (seed, name), model, outputs, arrivals),
         }
         self.pass(now, link, arrives);
+    }
+
+    /// The driver stops at an instant, which is not before the latest one given: takes back that packets were dropped or marked later than that.
+    pub fn stop(&mut self, at: Instant) {
+        for link in &mut self.links {
+            match link {
+                Stepped::Queued(_, link) => link.stop(at),
+                Stepped::Other(other) => {
+                    let Other { line, ahead, .. } = &mut **other;
+                    ahead.after(at).for_each(|dropped| line.take_back(dropped));
+                }
+            }
+        }
     }
 
     /// Takes back that a packet is delivered: nobody will look when it arrives.
@@ -244,15 +275,42 @@ impl<T: Clone> SteppedLinks<T> {
     }
 }
 
+impl<T: Clone> Other<T> {
+    fn reconfigure(
+        &mut self,
+        now: Instant,
+        (seed, name): (u64, &LinkName),
+        model: LinkModel,
+        outputs: &mut Outputs<Sent<T>>,
+        arrivals: &mut Vec<(Instant, Sent<T>)>,
+    ) {
+        let Self { line, ahead, .. } = self;
+        line.reconfigure(now, seed, name, model, outputs, &mut Arriving { arrivals, ahead, span: (now, now) });
+    }
+}
+
 /// Where packets that leave a line's stages go.
-struct Arriving<'a, T>(&'a mut Vec<(Instant, Sent<T>)>);
+struct Arriving<'a, T> {
+    arrivals: &'a mut Vec<(Instant, Sent<T>)>,
+    ahead: &'a mut Ahead,
+    /// The latest instant given to the links, and that at which these packets leave.
+    span: (Instant, Instant),
+}
 
 impl<T> Sink<Sent<T>> for Arriving<'_, T> {
-    fn arrives(&mut self, at: Instant, packet: Sent<T>, _copy: u8, _marks: Marks) {
-        self.0.push((at, packet));
+    fn arrives(&mut self, at: Instant, packet: Sent<T>, _copy: u8, marks: Marks) {
+        if marks.congestion {
+            // No line before this one marks packets.
+            self.ahead.note(self.span, None);
+        }
+        self.arrivals.push((at, packet));
     }
 
-    fn happened(&mut self, _at: Instant, _fate: Fate, _packet: Sent<T>, _copy: u8, _marks: Marks) {}
+    fn happened(&mut self, at: Instant, fate: Fate, _packet: Sent<T>, _copy: u8, _marks: Marks) {
+        if let Fate::Dropped(cause) = fate {
+            self.ahead.note((self.span.0, at), Some(cause));
+        }
+    }
 }
 
 #[cfg(test)]

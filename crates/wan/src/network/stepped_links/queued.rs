@@ -9,6 +9,7 @@ use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 
+use super::ahead::Ahead;
 use super::{Other, Sent};
 use crate::fates::fate::DropCause;
 use crate::fates::stats::{Flow, LinkStats, Seldom};
@@ -86,8 +87,15 @@ pub(super) struct QueuedLink<T> {
     flow: Flow,
     latest: Instant,
     line: Option<LineState<T>>,
-    /// In a box, as whatever is seldom.
-    seldom: Option<Box<Seldom>>,
+    /// Boxed, because few packets are dropped.
+    drops: Option<Box<Drops>>,
+}
+
+/// Counters of dropped packets, and the drops that the driver of the link has not come to.
+#[derive(Clone, Debug, Default)]
+struct Drops {
+    counted: Seldom,
+    ahead: Ahead,
 }
 
 /// The packets on a line and before it.
@@ -139,7 +147,7 @@ impl<T> QueuedLink<T> {
     /// An idle link of that kind.
     pub(super) fn new(seed: u64, name: &LinkName, kind: &QueuedKind) -> Self {
         let line = kind.line.as_ref().map(LineState::new);
-        Self { direct: Direct::new(seed, name, &kind.config), flow: Flow::default(), latest: Instant::ZERO, line, seldom: None }
+        Self { direct: Direct::new(seed, name, &kind.config), flow: Flow::default(), latest: Instant::ZERO, line, drops: None }
     }
 
     /// See [`SteppedLinks::offer`](super::SteppedLinks::offer).
@@ -150,9 +158,9 @@ impl<T> QueuedLink<T> {
         let packet = Offered { at: now, number, item };
         let draws = self.direct.draws;
         match (self.direct.dropped(now, number, self.direct.words(number)), &mut self.line, &kind.line) {
-            (Some(cause), ..) => self.count_drop(cause),
+            (Some(cause), ..) => self.count_drop(now, cause),
             (None, Some(line), Some(kind)) => {
-                let dropped = |cause| count_drop(&mut self.seldom, cause);
+                let dropped = |cause| count_drop(&mut self.drops, (now, now), cause);
                 line.take(now, kind, packet, || draws.packet(number).first(Purpose::Queue), dropped);
             }
             (None, ..) => self.propagate((now, until), packet, &mut arrives),
@@ -161,10 +169,15 @@ impl<T> QueuedLink<T> {
 
     /// See [`SteppedLinks::pass`](super::SteppedLinks::pass).
     #[inline(always)]
-    pub(super) fn pass(&mut self, (next, until): (Instant, Instant), kind: &QueuedKind, mut arrives: impl FnMut(Instant, bool, u64, T)) {
+    pub(super) fn pass(
+        &mut self,
+        (now, next, until): (Instant, Instant, Instant),
+        kind: &QueuedKind,
+        mut arrives: impl FnMut(Instant, bool, u64, T),
+    ) {
         let Some(kind) = &kind.line else { return };
         while let Some(line) = &mut self.line
-            && let Some((leaves, packet)) = line.leave(next, kind, |cause| count_drop(&mut self.seldom, cause))
+            && let Some((leaves, packet)) = line.leave(next, kind, |at, cause| count_drop(&mut self.drops, (now, at), cause))
         {
             self.propagate((leaves, until), packet, &mut arrives);
         }
@@ -179,8 +192,15 @@ impl<T> QueuedLink<T> {
     }
 
     #[inline(never)]
-    fn count_drop(&mut self, cause: DropCause) {
-        count_drop(&mut self.seldom, cause);
+    fn count_drop(&mut self, now: Instant, cause: DropCause) {
+        count_drop(&mut self.drops, (now, now), cause);
+    }
+
+    /// See [`SteppedLinks::stop`](super::SteppedLinks::stop).
+    pub(super) fn stop(&mut self, at: Instant) {
+        if let Some(Drops { counted, ahead }) = self.drops.as_deref_mut() {
+            ahead.after(at).for_each(|dropped| counted.take_back(dropped));
+        }
     }
 
     /// The link is of another kind from now on: see [`Staged::reconfigure`](crate::line::staged::Staged::reconfigure).
@@ -209,13 +229,14 @@ impl<T> QueuedLink<T> {
     where
         T: Clone,
     {
-        let Self { direct, flow, latest, line, seldom } = self;
-        let stats = LinkStats { flow, seldom: seldom.map_or_else(Seldom::default, |seldom| *seldom) };
+        let Self { direct, flow, latest, line, drops } = self;
+        let Drops { counted, ahead } = drops.map_or_else(Drops::default, |drops| *drops);
+        let stats = LinkStats { flow, seldom: counted };
         let pipeline = match (line, &kind.line) {
             (Some(line), Some(line_kind)) => Pipeline::resumed(now, direct, kind.config.clone(), line.into_stage(line_kind, info)),
             _ => Pipeline::Direct(Box::new(direct)),
         };
-        Other { line: Line::resumed(stats, pipeline), latest }
+        Other { line: Line::resumed(stats, pipeline), latest, ahead }
     }
 
     /// Takes back that a packet is delivered.
@@ -225,12 +246,15 @@ impl<T> QueuedLink<T> {
 
     /// The counters.
     pub(super) fn stats(&self) -> LinkStats {
-        LinkStats { flow: self.flow, seldom: self.seldom.as_ref().map_or_else(Seldom::default, |seldom| **seldom) }
+        LinkStats { flow: self.flow, seldom: self.drops.as_ref().map_or_else(Seldom::default, |drops| drops.counted) }
     }
 }
 
-fn count_drop(seldom: &mut Option<Box<Seldom>>, cause: DropCause) {
-    seldom.get_or_insert_default().dropped[cause.index()] += 1;
+/// Counts a packet that is dropped at an instant, as is known at the first one.
+fn count_drop(drops: &mut Option<Box<Drops>>, span: (Instant, Instant), cause: DropCause) {
+    let Drops { counted, ahead } = &mut **drops.get_or_insert_default();
+    counted.dropped[cause.index()] += 1;
+    ahead.note(span, Some(cause));
 }
 
 impl<T> LineState<T> {
@@ -278,10 +302,10 @@ impl<T> LineState<T> {
 
     /// The packet that leaves the line by `next`, and when; the first that waits is on the line then.
     #[inline(always)]
-    fn leave(&mut self, next: Instant, kind: &LineKind, dropped: impl FnMut(DropCause)) -> Option<(Instant, Offered<T>)> {
+    fn leave(&mut self, next: Instant, kind: &LineKind, mut dropped: impl FnMut(Instant, DropCause)) -> Option<(Instant, Offered<T>)> {
         let OnLine { packet, leaves, .. } = self.on_line.take_if(|on_line| on_line.leaves <= next)?;
         match self.waiting.pop_front() {
-            Some(first) => self.serve(leaves, kind, first, dropped),
+            Some(first) => self.serve(leaves, kind, first, |cause| dropped(leaves, cause)),
             None => self.run_empty(leaves),
         }
         Some((leaves, packet))

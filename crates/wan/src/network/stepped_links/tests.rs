@@ -96,6 +96,35 @@ fn they_decide_what_whole_links_decide() {
     }
 }
 
+/// A driver that stops 2 ms after a packet, before the next one, has counted what has happened by then: no drop and no mark of which the link knows that they come later.
+#[test]
+fn what_is_ahead_of_a_driver_that_stops_is_taken_back() {
+    let (name, info, until) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn_capable: true }, millis(2_900));
+    let offered = bursts();
+    for (discipline, layout) in (0..DISCIPLINES).map(discipline).flat_map(|discipline| [(discipline, Layout::Physical), (discipline, Layout::Netem)])
+    {
+        let model = with(discipline, 100_000, layout);
+        for last in 20..50 {
+            let mut whole = Link::new(7, &name, model.clone());
+            let mut stepped = SteppedLinks::new(until, info);
+            stepped.add(7, &name, &model);
+            let mut arrivals = Vec::new();
+            for (now, next) in offered[..=last].iter().zip(&offered[1..]) {
+                whole.handle_packet(*now, info, ()).unwrap();
+                stepped.offer((*now, *next), LinkId(0), (), |at, _, number: u64, ()| arrivals.push((at, usize::try_from(number).unwrap())));
+            }
+            let stop = offered[last].saturating_add(Duration::from_millis(2));
+            whole.handle_timeout(stop).unwrap();
+            while whole.poll_event().is_some() {}
+            stepped.stop(stop);
+            for (at, number) in arrivals.into_iter().filter(|(at, _)| *at > stop) {
+                stepped.forget(LinkId(0), offered[number], at);
+            }
+            assert_eq!(stepped.stats(LinkId(0)), whole.stats(), "{}, stopped after {last}", model.words());
+        }
+    }
+}
+
 /// From a packet of the first burst on, which finds others on the line and before it, a link is another one: of another rate, discipline or limit, without a queue, with a
 /// stage that needs an engine, and back.
 #[test]
