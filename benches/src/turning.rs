@@ -4,9 +4,6 @@ use std::time::Duration;
 
 use cohaptic_peer::rotation::{Attitude, Matrix3, RotationStep, Spin, Triple, aligning_torque};
 use cohaptic_peer::{Gains, Integrator};
-use cohaptic_scene::Scene;
-
-use crate::Mesh;
 
 /// A copy and what it holds of the others.
 #[derive(Clone, Copy, Debug)]
@@ -172,33 +169,9 @@ pub fn example() -> (Copy, Attitude) {
     (copy, Attitude { rate: [3.0, 12.0, -5.0], ..Attitude::REST })
 }
 
-/// A mesh whose object turns: held off its centre by devices that do not.
-///
-/// # Panics
-///
-/// If it is no scene, which a test would show.
-#[must_use]
-pub fn mesh(mesh: Mesh, ticks: u64) -> Scene {
-    let keys = ["scene.axes=3", "object.inertia=[1.2e-4, 2e-4, 2.6e-4]", "peer.grasp=[0.03, 0.01, -0.02]", "peers.peer1.hand.force=[1.5, 0.5, 0]"];
-    Scene::parse(&mesh.text(ticks, 1), "turning.toml".as_ref(), &keys.map(str::to_owned)).expect("the mesh is a scene")
-}
-
 #[cfg(test)]
 mod tests {
-    use cohaptic_harness::{Model, Simulation, same_shape};
-
     use super::*;
-    use crate::watched::WithEvents;
-
-    /// And it turns, in arrays if nobody watches.
-    #[test]
-    fn a_mesh_that_turns_runs_both_ways() {
-        let scene = mesh(Mesh { peers: 3, impaired: true }, 500);
-        assert!(same_shape(&scene, &scene));
-        let Ok(events) = Simulation::new(&scene, Model::Least).run(&mut WithEvents);
-        assert_eq!(Mesh::run(&scene), events);
-        assert!(events.max_rotation_discrepancy.is_some_and(|angle| angle > 0.01));
-    }
 
     /// From equal states: some fifty roundings a tick, relative to the fastest rate, which turns near an unstable axis let grow thirty times in 100 ticks. At
     /// 600 rad/s they grow by far more, so ticks are compared one by one.

@@ -70,18 +70,6 @@ impl Observer for Plotter {
     }
 }
 
-/// Sees every sample held and keeps nothing: the least that makes a run have events.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct WithEvents;
-
-impl Observer for WithEvents {
-    type Error = Infallible;
-
-    fn wants_holds(&self) -> bool {
-        true
-    }
-}
-
 /// The scene with expectations that hold: how far apart copies are, where that of the first peer is at the end, and when it has moved a centimetre.
 #[must_use]
 pub fn with_expectations(scene: Scene) -> Scene {

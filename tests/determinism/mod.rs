@@ -9,5 +9,5 @@ mod models;
 mod queues;
 mod threads;
 mod topologies;
-mod turning_arrays;
+mod turning;
 mod watched;

@@ -10,7 +10,6 @@ use cohaptic_units::Instant;
 use proptest::prelude::*;
 
 use super::arrays::{difference, mesh};
-use super::turning_arrays::alike;
 
 /// Keeps the bits of all rows, until it has had enough.
 pub(super) struct Keeper {
@@ -62,12 +61,6 @@ impl Observer for Keeper {
             kept.extend(bits(state.position.iter().chain(state.velocity)));
         }
         kept.extend(bits(row.coupling_force.iter().chain(row.coordination_force)));
-        if let Some(turn) = row.turn {
-            for attitude in [Some(turn.object), turn.device].into_iter().flatten() {
-                kept.extend(bits(attitude.orientation.iter().chain(&attitude.rate)));
-            }
-            kept.extend(bits(turn.coupling_torque.iter().chain(turn.coordination_torque)));
-        }
         self.keep(kept)
     }
 
@@ -79,7 +72,7 @@ impl Observer for Keeper {
                 assert_eq!(ticks.position(row.peer, axis).to_bits(), position.to_bits());
                 assert_eq!(ticks.positions(axis).nth(row.peer).map(f64::to_bits), Some(position.to_bits()));
             }
-            assert_eq!((ticks.at(), ticks.attitude(row.peer)), (row.at, row.turn.map(|turn| *turn.object)));
+            assert_eq!(ticks.at(), row.at);
             self.on_tick(row)
         })
     }
@@ -123,12 +116,6 @@ proptest! {
     #[test]
     fn rows_of_a_run_in_arrays_are_those_of_its_events(drafts in drafts::alike(Just(1))) {
         let found = found(&drafts[0].scene(), |_| ());
-        prop_assert!(found.is_none(), "{}", found.unwrap());
-    }
-
-    #[test]
-    fn rows_of_what_turns_are_those_of_its_events(scenes in alike(Just(1))) {
-        let found = found(&scenes[0], |_| ());
         prop_assert!(found.is_none(), "{}", found.unwrap());
     }
 }

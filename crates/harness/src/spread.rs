@@ -17,7 +17,7 @@ pub(crate) struct Spread {
 
 /// The square of the chord between two orientations, of which q and −q are one.
 #[inline(always)]
-pub(crate) fn squared_chord(one: &[f64; 4], other: &[f64; 4]) -> f64 {
+fn squared_chord(one: &[f64; 4], other: &[f64; 4]) -> f64 {
     let square = |sign: f64| {
         let [w, x, y, z] = std::array::from_fn(|part| (one[part] - sign * other[part]) * (one[part] - sign * other[part]));
         w + x + y + z
@@ -45,19 +45,6 @@ impl Spread {
     /// The largest angle \[rad\].
     pub(crate) fn angle(&self) -> f64 {
         4.0 * libm::asin((0.5 * libm::sqrt(self.longest)).min(1.0))
-    }
-
-    /// The copy to which chords are measured, if all are there.
-    #[inline(always)]
-    pub(crate) fn reference(&self) -> usize {
-        self.reference
-    }
-
-    /// Whether no two of the copies can be farther apart than any were so far, if these are the squares of the longest chord to the reference and of the next.
-    #[inline(always)]
-    pub(crate) fn holds(&self, two_longest: [f64; 2]) -> bool {
-        let [first, second] = two_longest.map(f64::sqrt);
-        first + second <= self.longest.sqrt()
     }
 
     /// Takes in all pairs of the copies that are there now.

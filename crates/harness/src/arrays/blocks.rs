@@ -14,7 +14,6 @@ use pulp::NullaryFnOnce;
 use super::lanes::{Lanes, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 use super::processor::on_widest;
-use super::samples::Sample;
 use crate::plan::{DeviceChoice, touches};
 pub(super) use block::Block;
 use block::{Forces, Late, RESTING, ZERO_MAP, set_map};
@@ -61,23 +60,6 @@ pub(super) struct Seen {
     pub(super) coupling: Lanes,
     /// FT without what the law damps.
     pub(super) coordination: Lanes,
-}
-
-/// What devices hold.
-pub(super) trait Grasped {
-    /// FC in the place of a block; `None` if devices hold the centres of their copies.
-    fn coupling(&self, place: usize) -> Option<&Lanes>;
-}
-
-/// They hold the centres of their copies.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Centres;
-
-impl Grasped for Centres {
-    #[inline(always)]
-    fn coupling(&self, _place: usize) -> Option<&Lanes> {
-        None
-    }
 }
 
 /// Positions along each axis, the least and the greatest of each run.
@@ -175,12 +157,6 @@ impl Blocks {
         })
     }
 
-    /// Copies and devices in that place.
-    #[inline(always)]
-    pub(super) fn block(&self, place: usize) -> &Block {
-        &self.blocks[place]
-    }
-
     /// How many runs there are.
     pub(super) const fn runs(&self) -> usize {
         self.places.runs
@@ -191,17 +167,17 @@ impl Blocks {
         &self.blocks
     }
 
-    /// What rows say of the peers in a place, before they move. `grasped` is FC of devices that hold no centres.
-    pub(super) fn seen(&self, place: usize, law: &BuiltIn<Lanes>, grasped: Option<Lanes>) -> Seen {
-        law.visit(Look { blocks: self, place, grasped })
+    /// What rows say of the peers in a place, before they move.
+    pub(super) fn seen(&self, place: usize, law: &BuiltIn<Lanes>) -> Seen {
+        law.visit(Look { blocks: self, place })
     }
 
-    fn seen_by(&self, law: &impl LawOfLanes, place: usize, grasped: Option<Lanes>) -> Seen {
+    fn seen_by(&self, law: &impl LawOfLanes, place: usize) -> Seen {
         let (block, remembered, lag) = (&self.blocks[place], law.remembered() * WIDTH, law.looks_back());
         let past = if lag > 0 { self.past[self.oldest * self.blocks.len() + place] } else { block.object };
         let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
         let mut memory = self.memory[place * remembered..(place + 1) * remembered].to_vec();
-        let coupling = grasped.unwrap_or_else(|| block.coupling(&block.object));
+        let coupling = block.coupling();
         let (mut coordination, mut target) = (Lanes::ZERO, block.mean);
         for lane in 0..WIDTH {
             let seen = block.observation(&past, lead, lane);
@@ -210,16 +186,6 @@ impl Blocks {
             set_lane(&mut target, lane, law.target(&seen));
         }
         Seen { device: block.device, object: block.object, target, coupling, coordination }
-    }
-
-    /// Puts positions and velocities of a peer into what it sends.
-    #[inline(always)]
-    pub(super) fn add_to<const A: usize, const P: usize, const L: usize>(&self, sample: &mut Sample<P, L>, peer: usize) {
-        for axis in 0..A {
-            for run in 0..L {
-                (sample.position[axis][run], sample.velocity[axis][run]) = self.object(axis, peer, run);
-            }
-        }
     }
 
     /// Replaces the mean of the samples that a peer holds, in all runs.
@@ -294,16 +260,16 @@ impl Blocks {
         self.oldest = 0;
     }
 
-    /// Everybody computes forces by the law and moves to the next tick. `grasped` says what devices hold.
+    /// Everybody computes forces by the law and moves to the next tick.
     ///
     /// The law is chosen at each tick: all loops over ticks, one for each kind of bodies and of observers, then call one piece of code for each law.
     #[inline(always)]
-    pub(super) fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>, grasped: &impl Grasped) -> Moved<L> {
-        law.visit(Advance::<_, L> { blocks: self, processor, grasped })
+    pub(super) fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>) -> Moved<L> {
+        law.visit(Advance::<L> { blocks: self, processor })
     }
 
     #[inline(always)]
-    fn advance_by<const L: usize>(&mut self, law: &impl LawOfLanes, grasped: &impl Grasped) -> Moved<L> {
+    fn advance_by<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L> {
         let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
         let per_axis = self.places.blocks();
         let (remembered, lag) = (law.remembered() * WIDTH, law.looks_back());
@@ -319,12 +285,10 @@ impl Blocks {
                 let [low, high] = &mut self.extremes;
                 *low = low.smaller(block.object.position);
                 *high = high.larger(block.object.position);
-                let coupling = grasped.coupling(place);
-                if coupling.is_none() && self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
+                if self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
                     block.tick(law, &past, lead, memory, &self.object_map);
                 } else {
-                    let coupling = coupling.copied().unwrap_or_else(|| block.coupling(&block.object));
-                    let mut forces = block.forces(coupling, law, &past, lead, memory);
+                    let mut forces = block.forces(block.coupling(), law, &past, lead, memory);
                     if let Some(walls) = &self.walls {
                         block.add_walls(walls, &mut forces.on_object);
                     }
@@ -375,37 +339,35 @@ pub(super) fn moves(scene: &Scene, peer: usize, devices: Option<&[DeviceChoice]>
 }
 
 /// [`Blocks::advance`] by a law of its own type.
-struct Advance<'a, G, const L: usize> {
+struct Advance<'a, const L: usize> {
     blocks: &'a mut Blocks,
     processor: pulp::Arch,
-    grasped: &'a G,
 }
 
-impl<G: Grasped, const L: usize> LawVisitor<Lanes> for Advance<'_, G, L> {
+impl<const L: usize> LawVisitor<Lanes> for Advance<'_, L> {
     type Output = Moved<L>;
 
     #[inline(always)]
     fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> Moved<L> {
-        let Self { blocks, processor, grasped } = self;
-        let tick = Tick { blocks, law, grasped };
+        let Self { blocks, processor } = self;
+        let tick = Tick { blocks, law };
         // With wide registers a run of three or ten peers over constant delays takes six tenths of the time.
         on_widest(processor, tick)
     }
 }
 
 /// The motion of a tick.
-struct Tick<'a, W, G, const L: usize> {
+struct Tick<'a, W, const L: usize> {
     blocks: &'a mut Blocks,
     law: &'a W,
-    grasped: &'a G,
 }
 
-impl<W: LawOfLanes, G: Grasped, const L: usize> NullaryFnOnce for Tick<'_, W, G, L> {
+impl<W: LawOfLanes, const L: usize> NullaryFnOnce for Tick<'_, W, L> {
     type Output = Moved<L>;
 
     #[inline(always)]
     fn call(self) -> Moved<L> {
-        self.blocks.advance_by(self.law, self.grasped)
+        self.blocks.advance_by(self.law)
     }
 }
 
@@ -413,14 +375,13 @@ impl<W: LawOfLanes, G: Grasped, const L: usize> NullaryFnOnce for Tick<'_, W, G,
 struct Look<'a> {
     blocks: &'a Blocks,
     place: usize,
-    grasped: Option<Lanes>,
 }
 
 impl LawVisitor<Lanes> for Look<'_> {
     type Output = Seen;
 
     fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> Seen {
-        self.blocks.seen_by(law, self.place, self.grasped)
+        self.blocks.seen_by(law, self.place)
     }
 }
 

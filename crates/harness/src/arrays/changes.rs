@@ -2,15 +2,12 @@
 
 use std::slice;
 
-use cohaptic_peer::Gains;
 use cohaptic_peer::coordination::{BuiltIn, Law, LawSettings};
-use cohaptic_peer::rotation::Triple;
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
 use super::blocks::law_of_lanes;
-use super::bodies::Bodies;
 use super::{Arrays, Samples};
 
 /// The changes to come, which are the same in all runs, and what follows from them in each.
@@ -19,8 +16,6 @@ pub(super) struct Changes<'a, const L: usize> {
     to_come: slice::Iter<'a, Change>,
     /// The laws of the scenes after each of them, the next ones last; empty if their strategies are no laws.
     laws: Vec<[BuiltIn; L]>,
-    /// KR and BR after each of them that changes these, the next ones last; empty if the object does not turn.
-    gains_of_turns: Vec<[Gains<Triple>; L]>,
 }
 
 impl<'a, const L: usize> Changes<'a, L> {
@@ -28,13 +23,11 @@ impl<'a, const L: usize> Changes<'a, L> {
     pub(super) fn new(scenes: &[&'a Scene; L]) -> Self {
         let to_come = scenes[0].timeline.iter();
         if to_come.as_slice().is_empty() {
-            return Self { to_come, laws: Vec::new(), gains_of_turns: Vec::new() };
+            return Self { to_come, laws: Vec::new() };
         }
         let mut laws = side_by_side(scenes.map(|scene| scene.laws_in_time(0).skip(1)));
-        let mut gains_of_turns = side_by_side(scenes.map(|scene| scene.rotation_gains_in_time().skip(1)));
         laws.reverse();
-        gains_of_turns.reverse();
-        Self { to_come, laws, gains_of_turns }
+        Self { to_come, laws }
     }
 
     /// When something changes next; never, if nothing does.
@@ -52,7 +45,7 @@ fn side_by_side<T, I: Iterator<Item = T>, const L: usize>(mut iterators: [I; L])
     together
 }
 
-impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_, B, A, P, L> {
+impl<const A: usize, const L: usize> Arrays<'_, A, L> {
     /// The tick at which something changes next.
     pub(super) fn next_change(&self) -> u64 {
         self.shape.tick_at(self.changes.next_at())
@@ -74,7 +67,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
                 }
                 ChangeKind::Contact { peer, contact } => {
                     if let Some(peer) = self.member(*peer) {
-                        self.bodies.set_contact(peer, *contact);
+                        self.bodies.blocks_mut().set_contact(peer, *contact);
                     }
                 }
                 ChangeKind::Hand { peer, hand } => {
@@ -82,21 +75,17 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
                         self.bodies.set_hand(peer, hand.as_ref());
                     }
                 }
-                ChangeKind::HandTorque { peer, torque } => {
-                    if let Some(peer) = self.member(*peer) {
-                        self.bodies.set_hand_torque(peer, torque.as_ref());
-                    }
-                }
                 ChangeKind::Coordination(_) => {
                     self.law = law_of_lanes(&laws.expect("the shape of a scene says that its own law changes"));
-                    self.change_gains_of_turns();
                 }
-                ChangeKind::RotationalGains(_) => self.change_gains_of_turns(),
                 ChangeKind::Parameters(settings) => {
                     let laws = laws.expect("the shape of a scene says that its own law changes");
                     self.change_parameters(settings, &laws, damped);
                 }
                 ChangeKind::SendWhen(_) => unreachable!("the shape of a scene says that it has no dead bands"),
+                ChangeKind::HandTorque { .. } | ChangeKind::RotationalGains(_) => {
+                    unreachable!("the shape of a scene says that its object does not turn")
+                }
             }
         }
         if self.shape.has_queues() {
@@ -122,12 +111,6 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
         }
     }
 
-    fn change_gains_of_turns(&mut self) {
-        if let Some(gains) = self.changes.gains_of_turns.pop() {
-            self.bodies.set_gains_of_turns(&gains);
-        }
-    }
-
     /// As [`cohaptic_peer::Peer::set_parameters`] does.
     fn change_parameters(&mut self, settings: &LawSettings, laws: &[BuiltIn; L], damped: &mut dyn FnMut(&Scene)) {
         self.law = law_of_lanes(laws);
@@ -141,7 +124,7 @@ impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'_,
         }
         self.bodies.blocks_mut().set_lag(Law::<f64>::lag(&laws[0]));
         let then = self.scenes.map(|scene| scene.with_parameters(settings));
-        self.bodies.set_damping(&then.each_ref());
+        self.bodies.blocks_mut().set_damping(&then.each_ref());
         damped(&then[0]);
     }
 }

@@ -18,9 +18,6 @@ mod shape;
 mod side_by_side;
 mod threads;
 mod ticks;
-mod translations;
-mod turn;
-mod turning;
 
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
@@ -48,8 +45,6 @@ use samples::{Broadcast, PerPacket, Sample};
 pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
 pub use ticks::Ticks;
-use translations::Translations;
-use turning::{PAIRS, TurningBlocks};
 
 /// A run of a scene of that shape with that law, to its end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
 pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dyn FnMut(Instant) -> bool) -> Summary {
@@ -61,9 +56,8 @@ pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dy
 fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
     let watch = Unwatched(keep_going);
     match scenes[0].axes {
-        Axes::Three if scenes[0].rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, L>::new(scenes, shape, laws, None).run(watch),
-        Axes::One => Arrays::<Translations<1>, 1, 1, L>::new(scenes, shape, laws, None).run(watch),
-        Axes::Two | Axes::Three => Arrays::<Translations<3>, 3, 3, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::One => Arrays::<1, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::Two | Axes::Three => Arrays::<3, L>::new(scenes, shape, laws, None).run(watch),
     }
 }
 
@@ -71,9 +65,8 @@ fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; 
 pub(crate) fn run_watched(scene: &Scene, (shape, law): (Shape, BuiltIn), plan: &Plan, onlooker: &mut dyn Onlooker) -> Summary {
     let (watch, scenes, laws, devices) = (WatchedTicks::new(scene, onlooker), [scene], [law], Some(plan.devices.as_slice()));
     let [summary] = match scene.axes {
-        Axes::Three if scene.rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, 1>::new(scenes, shape, laws, devices).run(watch),
-        Axes::One => Arrays::<Translations<1>, 1, 1, 1>::new(scenes, shape, laws, devices).run(watch),
-        Axes::Two | Axes::Three => Arrays::<Translations<3>, 3, 3, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::One => Arrays::<1, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::Two | Axes::Three => Arrays::<3, 1>::new(scenes, shape, laws, devices).run(watch),
     };
     summary
 }
@@ -87,21 +80,21 @@ pub(crate) fn run_on_threads(
     keep_going: &mut dyn FnMut(Instant) -> bool,
 ) -> Option<Summary> {
     match scene.axes {
-        Axes::One => threads::run::<Translations<1>, 1, 1>(scene, shape, law, threads, keep_going),
-        Axes::Two | Axes::Three => threads::run::<Translations<3>, 3, 3>(scene, shape, law, threads, keep_going),
+        Axes::One => threads::run::<1>(scene, shape, law, threads, keep_going),
+        Axes::Two | Axes::Three => threads::run::<3>(scene, shape, law, threads, keep_going),
     }
 }
 
-/// Some or all peers of L runs of scenes of one shape with A axes, with bodies of that kind.
+/// Some or all peers of L runs of scenes of one shape with A axes.
 #[derive(Debug)]
-struct Arrays<'a, B, const A: usize, const P: usize, const L: usize> {
+struct Arrays<'a, const A: usize, const L: usize> {
     scenes: [&'a Scene; L],
     shape: Shape,
     law: BuiltIn<Lanes>,
     /// The peers that are here; they are counted from 0 in what follows, unless it is said otherwise.
     members: Range<usize>,
-    bodies: B,
-    samples: Samples<P, L>,
+    bodies: Bodies<A>,
+    samples: Samples<A, L>,
     changes: Changes<'a, L>,
     /// Up to which age samples are extrapolated in each run \[s\], and how far they have come by peer and run, if the law does that.
     leads: Option<([f64; L], Vec<[Lead<A>; L]>)>,
@@ -110,7 +103,7 @@ struct Arrays<'a, B, const A: usize, const P: usize, const L: usize> {
     earliest_send: u64,
     /// The peers of the scene that send now, and what each sent last, where each link is one by itself.
     senders: Vec<usize>,
-    sent: Vec<Sample<P, L>>,
+    sent: Vec<Sample<A, L>>,
     max_discrepancy: [f64; L],
     finite: [bool; L],
     summaries: [Option<Summary>; L],
@@ -120,22 +113,29 @@ struct Arrays<'a, B, const A: usize, const P: usize, const L: usize> {
 /// How samples travel.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one a run, and a box would be another look-up a packet")]
-enum Samples<const P: usize, const L: usize> {
-    Broadcast(Broadcast<P, L>),
-    PerPacket(PerPacket<P, L>),
+enum Samples<const A: usize, const L: usize> {
+    Broadcast(Broadcast<A, L>),
+    PerPacket(PerPacket<A, L>),
 }
 
-impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'a, B, A, P, L> {
+impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     /// The scenes at their beginning, all of that shape; `devices` as for [`Bodies::new`].
     fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L], devices: Option<&[DeviceChoice]>) -> Self {
         let members = 0..shape.peers;
-        let bodies = bodies_of::<B, A, P, L>(&scenes, &members, &laws, devices);
-        let initial: Vec<Sample<P, L>> = members.clone().map(|peer| bodies.sample(peer)).collect();
+        let bodies = bodies_of::<A, L>(&scenes, &members, &laws, devices);
+        let initial: Vec<Sample<A, L>> = members.clone().map(|peer| bodies.sample(peer)).collect();
         Self::of_members(scenes, shape, laws, members, bodies, &initial)
     }
 
     /// Those peers with their bodies; `initial` has the samples with which all peers of the scene begin.
-    fn of_members(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L], members: Range<usize>, bodies: B, initial: &[Sample<P, L>]) -> Self {
+    fn of_members(
+        scenes: [&'a Scene; L],
+        shape: Shape,
+        laws: [BuiltIn; L],
+        members: Range<usize>,
+        bodies: Bodies<A>,
+        initial: &[Sample<A, L>],
+    ) -> Self {
         let samples = match shape.delay {
             Some(delay) => Samples::Broadcast(Broadcast::new(initial, nanos(delay).div_ceil(nanos(shape.tick)))),
             None => Samples::PerPacket(PerPacket::new(&scenes, initial, &shape, members.clone())),
@@ -163,7 +163,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     }
 
     /// Runs all of them to their end.
-    fn run(mut self, mut watch: impl RunWatch<B, A, P>) -> [Summary; L] {
+    fn run(mut self, mut watch: impl RunWatch<A>) -> [Summary; L] {
         let (mut tick, last) = (0, self.shape.tick_at(self.shape.end));
         loop {
             let until = self.next_change().min(last);
@@ -185,7 +185,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     }
 
     /// Runs all of them over those ticks, or until they have all ended.
-    fn run_over(&mut self, ticks: Range<u64>, watch: &mut impl RunWatch<B, A, P>) -> ControlFlow<()> {
+    fn run_over(&mut self, ticks: Range<u64>, watch: &mut impl RunWatch<A>) -> ControlFlow<()> {
         let tick_nanos = nanos(self.shape.tick);
         for tick in ticks {
             let now = Instant::from_nanos(tick * tick_nanos);
@@ -203,7 +203,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     }
 
     /// The scenes end after that number of ticks.
-    fn finish(&mut self, ticks: u64, watch: &mut impl RunWatch<B, A, P>) {
+    fn finish(&mut self, ticks: u64, watch: &mut impl RunWatch<A>) {
         let end = self.shape.end;
         self.change(ticks, end, &mut |scene| watch.change_damping(scene));
         if let Samples::PerPacket(samples) = &mut self.samples {
@@ -214,7 +214,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// Everything that happens at a tick. Gives how far copies are apart \[m\].
     #[inline(always)]
-    fn step(&mut self, tick: u64, now: Instant, watch: &mut impl RunWatch<B, A, P>) -> [f64; L] {
+    fn step(&mut self, tick: u64, now: Instant, watch: &mut impl RunWatch<A>) -> [f64; L] {
         if self.begin(tick) {
             self.send(tick, now);
         }
@@ -234,7 +234,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// What happens at a tick after all have sent. Gives how far copies are apart \[m\].
     #[inline(always)]
-    fn go_on(&mut self, now: Instant, tick: u64, watch: &mut impl RunWatch<B, A, P>) -> [f64; L] {
+    fn go_on(&mut self, now: Instant, tick: u64, watch: &mut impl RunWatch<A>) -> [f64; L] {
         match &mut self.samples {
             Samples::Broadcast(samples) => samples.deliver(tick),
             Samples::PerPacket(samples) => samples.deliver(tick),
@@ -253,9 +253,9 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// Means and motion of a tick.
     #[inline(always)]
-    fn motion(&mut self, now: Instant, watch: &mut impl RunWatch<B, A, P>) -> Moved<L> {
+    fn motion(&mut self, now: Instant, watch: &mut impl RunWatch<A>) -> Moved<L> {
         if !matches!(&self.samples, Samples::Broadcast(samples) if samples.is_settled()) {
-            on_widest(self.processor, Means::<B, A, P, L> { samples: &mut self.samples, bodies: &mut self.bodies });
+            on_widest(self.processor, Means::<A, L> { samples: &mut self.samples, bodies: &mut self.bodies });
         }
         watch.before_motion(now, &self.bodies, &self.law);
         self.bodies.advance::<L>(self.processor, &self.law)
@@ -377,7 +377,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             Samples::PerPacket(samples) => samples.stale_samples(peer, run),
         };
         let name = self.scenes[run].peers[self.members.start + peer].name.clone();
-        PeerSummary { name, position, velocity, attitude: self.bodies.attitude(peer, run), stale_samples, refused_samples: 0 }
+        PeerSummary { name, position, velocity, attitude: None, stale_samples, refused_samples: 0 }
     }
 
     /// The counters of each link from a peer after that number of ticks, if what arrives by an instant is delivered and all links have that constant delay.
@@ -393,12 +393,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 }
 
 /// What the links did of a run that ended after that number of ticks; the peers are here and there.
-fn links<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
-    parts: &[Arrays<'_, B, A, P, L>],
-    run: usize,
-    ticks: u64,
-    until: Instant,
-) -> LinkSummaries {
+fn links<const A: usize, const L: usize>(parts: &[Arrays<'_, A, L>], run: usize, ticks: u64, until: Instant) -> LinkSummaries {
     let peers = parts[0].shape.peers;
     if let Some(delay) = parts[0].shape.delay {
         return LinkSummaries::by_sender((0..peers).map(|from| parts[0].broadcast_stats(from, delay, ticks, until)).collect());
@@ -422,8 +417,8 @@ fn links<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
 }
 
 /// What a run came to after that number of ticks, with the packets that arrived by an instant; the peers are here and there.
-fn summary<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
-    parts: &[Arrays<'_, B, A, P, L>],
+fn summary<const A: usize, const L: usize>(
+    parts: &[Arrays<'_, A, L>],
     run: usize,
     ticks: u64,
     ending: Ending,
@@ -444,34 +439,35 @@ fn summary<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
         // The shape of a scene says that it has none.
         access_lines: Vec::new(),
         max_discrepancy,
-        max_rotation_discrepancy: parts[0].bodies.max_rotation_discrepancy(run),
+        // The shape of a scene says that its object does not turn.
+        max_rotation_discrepancy: None,
     }
 }
 
 /// The bodies of some peers.
-fn bodies_of<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
+fn bodies_of<const A: usize, const L: usize>(
     scenes: &[&Scene; L],
     members: &Range<usize>,
     laws: &[BuiltIn; L],
     devices: Option<&[DeviceChoice]>,
-) -> B {
-    B::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0], devices)
+) -> Bodies<A> {
+    Bodies::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0], devices)
 }
 
 /// The means of the samples held.
-struct Means<'a, B, const A: usize, const P: usize, const L: usize> {
-    samples: &'a mut Samples<P, L>,
-    bodies: &'a mut B,
+struct Means<'a, const A: usize, const L: usize> {
+    samples: &'a mut Samples<A, L>,
+    bodies: &'a mut Bodies<A>,
 }
 
-impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce for Means<'_, B, A, P, L> {
+impl<const A: usize, const L: usize> NullaryFnOnce for Means<'_, A, L> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
         match self.samples {
-            Samples::Broadcast(samples) => samples.refresh(self.bodies),
-            Samples::PerPacket(samples) => samples.refresh(self.bodies),
+            Samples::Broadcast(samples) => samples.refresh(self.bodies.blocks_mut()),
+            Samples::PerPacket(samples) => samples.refresh(self.bodies.blocks_mut()),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Samples between peers: those in flight, and those that each peer holds of the others. A sample is P pairs of numbers.
+//! Samples between peers: those in flight, and those that each peer holds of the others. A sample is position and velocity along each axis.
 
 pub(super) use broadcast::Broadcast;
 pub(super) use per_packet::PerPacket;
@@ -11,18 +11,18 @@ mod per_packet;
 mod quads;
 mod rows;
 
-/// A sample of every run: pairs of numbers, of which those of the axes are positions and velocities.
+/// A sample of every run.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sample<const P: usize, const L: usize> {
-    pub(super) position: [[f64; L]; P],
-    pub(super) velocity: [[f64; L]; P],
+pub(super) struct Sample<const A: usize, const L: usize> {
+    pub(super) position: [[f64; L]; A],
+    pub(super) velocity: [[f64; L]; A],
 }
 
-impl<const P: usize, const L: usize> Sample<P, L> {
-    pub(super) const ZERO: Self = Self { position: [[0.0; L]; P], velocity: [[0.0; L]; P] };
+impl<const A: usize, const L: usize> Sample<A, L> {
+    pub(super) const ZERO: Self = Self { position: [[0.0; L]; A], velocity: [[0.0; L]; A] };
 
     /// That of a run.
-    fn state(&self, run: usize) -> State<P> {
+    fn state(&self, run: usize) -> State<A> {
         State { position: self.position.map(|runs| runs[run]), velocity: self.velocity.map(|runs| runs[run]) }
     }
 }

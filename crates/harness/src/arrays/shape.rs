@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{Coordination, EXACT_FROM, Integrator};
 use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
 use cohaptic_units::print::Span;
 use cohaptic_units::{Bytes, Instant};
@@ -25,8 +25,6 @@ pub(crate) struct Shape {
     pub(super) lag: usize,
     pub(super) peers: usize,
     pub(super) axes: usize,
-    /// How turns between ticks are computed, and by how many steps a tick, if the object turns.
-    pub(super) turns: Option<(Integrator, u32)>,
     pub(super) tick: Duration,
     pub(super) end: Instant,
     /// Ticks from one sample to the next.
@@ -132,13 +130,12 @@ impl Shape {
         let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, load));
         let delay = one_delay(scene, load).filter(|_| !links_change);
         let late = links.iter().find_map(|(link, _)| why_known_late(link)).or_else(|| models_to_come(scene).find_map(why_known_late));
-        let has_past = |law: BuiltIn| Law::<f64>::lag(&law) > 0 || Law::<f64>::memory(&law) > 0;
-        let may_have_past = || has_past(law) || !scene.timeline.is_empty() && scene.laws_in_time(0).any(has_past);
         // Of strategies that are not the scene's own nobody knows the law after a change.
         let changes_law = |change: &Change| matches!(change.what, ChangeKind::Coordination(_) | ChangeKind::Parameters(_));
         let fits = [
             (!plan.general_links, "everything is modelled"),
             (scene.peers.iter().all(|peer| peer.clock.tick == clock.tick), "the ticks of peers differ in length"),
+            (scene.rotation.is_none(), "the object turns"),
             (plan.ticking == Ticking::Lockstep, "peers tick at instants of their own, by offsets or drifts"),
             (links.iter().all(|(link, _)| !link.may_damage()), "a link damages packets"),
             (models_to_come(scene).all(|link| !link.may_damage()), "the timeline makes a link damage packets"),
@@ -147,8 +144,6 @@ impl Shape {
             (!sends_by_difference(scene), "there are dead bands"),
             (!scene.has_gains_by_peer(), "the gains follow the weight that a peer hears, so they differ from peer to peer"),
             (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
-            (scene.rotation.is_none() || scene.peers.len() <= EXACT_FROM, "more than 256 peers turn, and their mean is an exact sum"),
-            (scene.rotation.is_none() || !may_have_past(), "the law remembers, and the object turns"),
             // What each packet carries counts them in 16 bits.
             (scene.peers.len() <= usize::from(u16::MAX) || delay.is_some(), "there are more than 65,535 peers, over links that take memory"),
             (scene.duration <= LONGEST && clock.tick <= LONGEST, "it lasts longer than a year"),
@@ -169,7 +164,6 @@ impl Shape {
             lag: Law::<f64>::lag(&law),
             peers,
             axes: plan.axes.count(),
-            turns: scene.rotation.as_ref().map(|rotation| (scene.integrator, rotation.steps)),
             tick: clock.tick,
             end: Instant::ZERO.saturating_add(scene.duration),
             send_every: scene.samples_every(0),
@@ -218,10 +212,9 @@ fn why_known_late(link: &LinkModel) -> Option<&'static str> {
 
 /// The samples that each link of a scene is offered.
 fn load(scene: &Scene) -> Load {
-    let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
     let ticks = |peer: usize| u32::try_from(scene.samples_every(peer)).unwrap_or(u32::MAX);
     let gaps = scene.peers.iter().enumerate().map(|(peer, spec)| spec.clock.tick.saturating_mul(ticks(peer)));
-    Load { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), gap: gaps.min().unwrap_or(Duration::ZERO) }
+    Load { size: Bytes::new(SampleKind::State.datagram_len(scene.axes.count()) as u64), gap: gaps.min().unwrap_or(Duration::ZERO) }
 }
 
 /// The delay of all links for the samples of a scene, if they do nothing else, and lead from all to all.
@@ -284,6 +277,7 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             (change("link = \"all\", set = { corrupt = 0.1 }"), "the timeline makes a link damage"),
             ("coordination.send-when={ position = 0.001 }".to_owned(), "dead bands"),
             (change("coordination = { send-when = { position = 0.001 } }"), "dead bands"),
+            ("scene.axes=3\nobject.inertia=[1, 1, 1]".to_owned(), "the object turns"),
             ("coordination.strategy=\"wave\"\ncoordination.wave.impedance=1".to_owned(), "not a law"),
             ("scene.duration=\"9000h\"".to_owned(), "longer than a year"),
         ] {

@@ -44,10 +44,7 @@ pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
 
 /// Why all peers move together, if they do.
 fn why_together(shape: &Shape) -> Option<&'static str> {
-    let whys = [
-        (shape.delay.is_some(), "all samples travel together: a tick takes less time than threads take to meet"),
-        (shape.turns.is_some(), "the object turns: how far copies are turned apart is a matter of all of them"),
-    ];
+    let whys = [(shape.delay.is_some(), "all samples travel together: a tick takes less time than threads take to meet")];
     whys.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
 }
 
@@ -66,17 +63,17 @@ fn groups(shape: &Shape, members: &Range<usize>, held_by_a_group: usize) -> Vec<
 }
 
 /// A run of a scene on that number of threads, to its end; `None` if it diverged, which is known later than it happens.
-pub(super) fn run<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
+pub(super) fn run<const A: usize>(
     scene: &Scene,
     shape: &Shape,
     law: BuiltIn,
     threads: usize,
     keep_going: &mut dyn FnMut(Instant) -> bool,
 ) -> Option<Summary> {
-    run_in_groups::<B, A, P>(scene, shape, law, (threads, HELD_BY_A_GROUP), keep_going)
+    run_in_groups::<A>(scene, shape, law, (threads, HELD_BY_A_GROUP), keep_going)
 }
 
-fn run_in_groups<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
+fn run_in_groups<const A: usize>(
     scene: &Scene,
     shape: &Shape,
     law: BuiltIn,
@@ -85,20 +82,21 @@ fn run_in_groups<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
 ) -> Option<Summary> {
     let shares = (0..threads).map(|place| place * shape.peers / threads..(place + 1) * shape.peers / threads);
     let groups: Vec<Vec<Range<usize>>> = shares.map(|share| groups(shape, &share, held_by_a_group)).collect();
-    let bodies: Vec<Vec<B>> =
-        groups.iter().map(|groups| groups.iter().map(|members| bodies_of::<B, A, P, 1>(&[scene], members, &[law], None)).collect()).collect();
+    let bodies: Vec<Vec<Bodies<A>>> =
+        groups.iter().map(|groups| groups.iter().map(|members| bodies_of::<A, 1>(&[scene], members, &[law], None)).collect()).collect();
     let all = bodies.iter().flatten().zip(groups.iter().flatten());
-    let initial: Vec<Sample<P, 1>> = all.flat_map(|(bodies, members)| (0..members.len()).map(|peer| bodies.sample(peer))).collect();
+    let initial: Vec<Sample<A, 1>> = all.flat_map(|(bodies, members)| (0..members.len()).map(|peer| bodies.sample(peer))).collect();
     let exchange = Exchange::new(threads);
-    let part = |place: usize, bodies: Vec<B>, keep_going: Option<&mut dyn FnMut(Instant) -> bool>| {
+    let part = |place: usize, bodies: Vec<Bodies<A>>, keep_going: Option<&mut dyn FnMut(Instant) -> bool>| {
         let _broken_if_panicking = exchange.guard();
         let groups = &groups[place];
         let members = groups.first().map_or(0..0, |first| first.start..groups[groups.len() - 1].end);
-        let of_members = |(bodies, members): (B, &Range<usize>)| Arrays::of_members([scene], shape.clone(), [law], members.clone(), bodies, &initial);
+        let of_members =
+            |(bodies, members): (Bodies<A>, &Range<usize>)| Arrays::of_members([scene], shape.clone(), [law], members.clone(), bodies, &initial);
         let groups = bodies.into_iter().zip(groups).map(of_members).collect();
         Part { groups, thread: Thread::new(&exchange, place, members), keep_going }.run()
     };
-    let ended: Vec<Option<Ended<'_, B, A, P>>> = std::thread::scope(|scope| {
+    let ended: Vec<Option<Ended<'_, A>>> = std::thread::scope(|scope| {
         let mut bodies = bodies.into_iter();
         let first = bodies.next()?;
         let part = &part;
@@ -107,15 +105,15 @@ fn run_in_groups<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
         let others = others.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         Some(std::iter::once(first).chain(others).collect())
     })?;
-    let ended: Vec<Ended<'_, B, A, P>> = ended.into_iter().collect::<Option<_>>()?;
+    let ended: Vec<Ended<'_, A>> = ended.into_iter().collect::<Option<_>>()?;
     let Ended { ending, ticks, until, max_discrepancy, .. } = ended[0];
     let groups: Vec<_> = ended.into_iter().flat_map(|ended| ended.groups).collect();
     Some(summary(&groups, 0, ticks, ending, until, max_discrepancy))
 }
 
 /// The peers of a thread at the end of the run.
-struct Ended<'a, B, const A: usize, const P: usize> {
-    groups: Vec<Arrays<'a, B, A, P, 1>>,
+struct Ended<'a, const A: usize> {
+    groups: Vec<Arrays<'a, A, 1>>,
     ending: Ending,
     ticks: u64,
     /// Until when packets were delivered.
@@ -124,9 +122,9 @@ struct Ended<'a, B, const A: usize, const P: usize> {
 }
 
 /// The run of a thread, which has one group at least.
-struct Part<'a, 'e, 'k, B, const A: usize, const P: usize> {
-    groups: Vec<Arrays<'a, B, A, P, 1>>,
-    thread: Thread<'e, P>,
+struct Part<'a, 'e, 'k, const A: usize> {
+    groups: Vec<Arrays<'a, A, 1>>,
+    thread: Thread<'e, A>,
     keep_going: Option<&'k mut dyn FnMut(Instant) -> bool>,
 }
 
@@ -137,8 +135,8 @@ enum Early {
     Interrupted(u64),
 }
 
-impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> Part<'a, '_, '_, B, A, P> {
-    fn run(mut self) -> Option<Ended<'a, B, A, P>> {
+impl<'a, const A: usize> Part<'a, '_, '_, A> {
+    fn run(mut self) -> Option<Ended<'a, A>> {
         let shape = self.groups[0].shape.clone();
         let (mut tick, last) = (0, shape.tick_at(shape.end));
         let (ending, ticks) = loop {
@@ -237,7 +235,6 @@ mod tests {
     use cohaptic_scene::FromScene;
 
     use super::*;
-    use crate::arrays::Translations;
     use crate::plan::{Model, Plan};
 
     /// 43 peers over these links, with these settings besides.
@@ -266,7 +263,7 @@ mod tests {
                 *asked > 0
             }
         });
-        let in_groups = run_in_groups::<Translations<1>, 1, 1>(scene, &shape, law, (threads, 1), &mut one);
+        let in_groups = run_in_groups::<1>(scene, &shape, law, (threads, 1), &mut one);
         (in_groups, crate::arrays::run(scene, shape, law, &mut other))
     }
 

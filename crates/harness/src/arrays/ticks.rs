@@ -1,13 +1,12 @@
 //! All peers at one instant.
 
-use cohaptic_peer::rotation::Attitude;
 use cohaptic_units::Instant;
 
 use super::blocks::Block;
 use super::lanes::WIDTH;
 use crate::observer::TickRow;
 
-/// All peers of a scene at an instant at which all of them tick, with the forces of that instant, before any of them moves.
+/// All peers of a scene whose object does not turn, at an instant at which all of them tick, with the forces of that instant, before any of them moves.
 ///
 /// Positions cost little; what [`Ticks::each`] has beyond them is computed when it is called.
 #[derive(Clone, Copy)]
@@ -20,9 +19,6 @@ pub struct Ticks<'a> {
 
 /// Where rows come from.
 pub(super) trait Source {
-    /// How a copy is turned.
-    fn attitude(&self, peer: usize) -> Option<Attitude>;
-
     /// Hands the rows on, in the order of the peers, until that gives `false`.
     fn each(&self, on: &mut dyn FnMut(&TickRow<'_>) -> bool);
 }
@@ -67,16 +63,6 @@ impl<'a> Ticks<'a> {
     pub fn position(&self, peer: usize, axis: usize) -> f64 {
         assert!(peer < self.peers, "there are {} peers", self.peers);
         self.blocks[axis * self.peers.div_ceil(WIDTH) + peer / WIDTH].positions()[peer % WIDTH]
-    }
-
-    /// How the copy of a peer is turned; `None` if the object does not turn.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such peer.
-    #[must_use]
-    pub fn attitude(&self, peer: usize) -> Option<Attitude> {
-        self.source.attitude(peer)
     }
 
     /// Hands each peer's row to `on`, in the order of the peers.

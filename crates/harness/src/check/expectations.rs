@@ -106,7 +106,7 @@ impl Observer for Positions {
     }
 
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Infallible> {
-        self.see(ticks.at(), |peer, axis| Some(ticks.position(peer, axis)), |peer| ticks.attitude(peer));
+        self.see(ticks.at(), |peer, axis| Some(ticks.position(peer, axis)), |_| None);
         Ok(())
     }
 }

@@ -139,16 +139,10 @@ impl Block {
         }
     }
 
-    /// The motion of a copy.
+    /// FC.
     #[inline(always)]
-    pub(in crate::arrays) fn object_of(&self, lane: usize) -> Motion {
-        lane_of(&self.object, lane)
-    }
-
-    /// FC of devices that touch these points.
-    #[inline(always)]
-    pub(in crate::arrays) fn coupling(&self, points: &Motions) -> Lanes {
-        let apart = |lane| lane_of(&self.device, lane).relative_to(lane_of(points, lane));
+    pub(super) fn coupling(&self) -> Lanes {
+        let apart = |lane| lane_of(&self.device, lane).relative_to(lane_of(&self.object, lane));
         let mut coupling = Lanes::ZERO;
         for lane in 0..WIDTH {
             coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), apart(lane));

@@ -9,19 +9,20 @@ use cohaptic_units::Instant;
 
 use super::quads::{self, Quad};
 use super::{Sample, count};
+use crate::arrays::blocks::Blocks;
 use crate::arrays::bodies::Bodies;
 
 /// The samples in flight, and those held from each sender. Time counts ticks.
 #[derive(Clone, Debug)]
-pub(in crate::arrays) struct Broadcast<const P: usize, const L: usize> {
+pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     delay: u64,
-    on_the_way: VecDeque<Sent<P, L>>,
+    on_the_way: VecDeque<Sent<A, L>>,
     peers: usize,
-    /// The samples held from each sender but the first, by pair of numbers, as the first peer holds it; and from the first.
-    held: [Vec<Quad<L>>; P],
-    first: Sample<P, L>,
+    /// The samples held from each sender but the first, by axis, as the first peer holds it; and from the first.
+    held: [Vec<Quad<L>>; A],
+    first: Sample<A, L>,
     /// The sums of the samples held from all, if their means are exact.
-    sums: Option<ExactMeans<P>>,
+    sums: Option<ExactMeans<A>>,
     /// How many samples of each sender have arrived.
     arrived: Vec<u64>,
     changed: Changed,
@@ -37,16 +38,16 @@ enum Changed {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Sent<const P: usize, const L: usize> {
+struct Sent<const A: usize, const L: usize> {
     /// When it is in force.
     due: u64,
     sender: usize,
-    sample: Sample<P, L>,
+    sample: Sample<A, L>,
 }
 
-impl<const P: usize, const L: usize> Broadcast<P, L> {
+impl<const A: usize, const L: usize> Broadcast<A, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new(initial: &[Sample<P, L>], delay: u64) -> Self {
+    pub(in crate::arrays) fn new(initial: &[Sample<A, L>], delay: u64) -> Self {
         let peers = initial.len();
         let mut broadcast = Self {
             delay,
@@ -68,7 +69,7 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
 
     /// A peer sends to all others.
     #[inline(always)]
-    pub(in crate::arrays) fn send<const A: usize>(&mut self, tick: u64, sender: usize, bodies: &impl Bodies<A, P>) {
+    pub(in crate::arrays) fn send(&mut self, tick: u64, sender: usize, bodies: &Bodies<A>) {
         let due = tick.saturating_add(self.delay);
         self.on_the_way.push_back(Sent { due, sender, sample: bodies.sample(sender) });
     }
@@ -84,14 +85,14 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
 
     /// The next sample that has arrived, which is on the way no more.
     #[inline(always)]
-    fn next_due(&mut self, tick: u64) -> Option<Sent<P, L>> {
+    fn next_due(&mut self, tick: u64) -> Option<Sent<A, L>> {
         let sent = *self.on_the_way.front().filter(|sent| sent.due <= tick)?;
         self.on_the_way.pop_front();
         Some(sent)
     }
 
     /// The sample held from a sender in the first run: with this number of peers there are no others.
-    fn held_from(&self, sender: usize) -> State<P> {
+    fn held_from(&self, sender: usize) -> State<A> {
         match sender.checked_sub(1) {
             None => self.first.state(0),
             Some(place) => quads::state(&self.held, place, 0),
@@ -99,7 +100,7 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
     }
 
     #[inline(always)]
-    fn hold(&mut self, sender: usize, sample: &Sample<P, L>) {
+    fn hold(&mut self, sender: usize, sample: &Sample<A, L>) {
         if self.sums.is_some() {
             let before = self.held_from(sender);
             self.sums.iter_mut().for_each(|sums| sums.replace(&before, &sample.state(0)));
@@ -108,19 +109,15 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
             self.first = *sample;
             return;
         };
-        for pair in 0..P {
+        for axis in 0..A {
             for run in 0..L {
-                quads::set(&mut self.held[pair], place, run, sample.position[pair][run], sample.velocity[pair][run]);
+                quads::set(&mut self.held[axis], place, run, sample.position[axis][run], sample.velocity[axis][run]);
             }
         }
     }
 
     /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
-    pub(in crate::arrays) fn moving<const A: usize>(
-        &self,
-        (peer, run): (usize, usize),
-        sent: impl Fn(usize, u64) -> Instant,
-    ) -> impl Iterator<Item = Moving<A>> {
+    pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         (0..self.peers).filter(move |sender| *sender != peer).map(move |sender| Moving {
             sent: self.arrived[sender].checked_sub(1).map_or(Instant::ZERO, |newest| sent(sender, newest)),
             velocity: std::array::from_fn(|axis| match sender.checked_sub(1) {
@@ -147,23 +144,23 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
 
     /// The means are those of the samples held.
     #[inline(always)]
-    pub(in crate::arrays) fn refresh<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
+    pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks) {
         self.changed = Changed::Nothing;
         if self.sums.is_some() {
-            self.refresh_exactly(bodies);
+            self.refresh_exactly(blocks);
             return;
         }
         let count = count(self.peers - 1);
-        for pair in 0..P {
-            let held = &mut self.held[pair];
+        for axis in 0..A {
+            let held = &mut self.held[axis];
             // From one receiver to the next, its own sample is replaced by that of the receiver before.
-            let mut own = (self.first.position[pair], self.first.velocity[pair]);
+            let mut own = (self.first.position[axis], self.first.velocity[axis]);
             for peer in 0..self.peers {
                 if peer > 0 {
                     quads::swap(held, peer - 1, &mut own);
                 }
                 let (x, v) = quads::mean(held, count);
-                bodies.set_target(pair, peer, x, v);
+                blocks.set_target(axis, peer, x, v);
             }
             // And back.
             for peer in (1..self.peers).rev() {
@@ -174,12 +171,12 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
 
     /// [`Broadcast::refresh`] of many: what all hold together without the receiver's own.
     #[cold]
-    fn refresh_exactly<const A: usize>(&self, bodies: &mut impl Bodies<A, P>) {
+    fn refresh_exactly(&self, blocks: &mut Blocks) {
         let Some(sums) = &self.sums else { return };
         for peer in 0..self.peers {
             let mean = sums.mean_without(&self.held_from(peer), self.peers - 1);
-            for pair in 0..P {
-                bodies.set_target(pair, peer, [mean.position[pair]; L], [mean.velocity[pair]; L]);
+            for axis in 0..A {
+                blocks.set_target(axis, peer, [mean.position[axis]; L], [mean.velocity[axis]; L]);
             }
         }
     }

@@ -17,38 +17,38 @@ fn slot(tick: u64) -> usize {
 
 /// The samples in flight, by the tick at which they are in force.
 #[derive(Clone, Debug)]
-pub(super) struct InFlight<const P: usize> {
+pub(super) struct InFlight<const A: usize> {
     ticks: Ticks,
-    wheel: Box<[Vec<Packet<P>>; SLOTS]>,
-    beyond: BTreeMap<u64, Bucket<P>>,
+    wheel: Box<[Vec<Packet<A>>; SLOTS]>,
+    beyond: BTreeMap<u64, Bucket<A>>,
     /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
-    emptied: Vec<Vec<Packet<P>>>,
+    emptied: Vec<Vec<Packet<A>>>,
 }
 
 /// The samples in force at a tick.
 #[derive(Clone, Debug)]
-pub(super) struct Bucket<const P: usize> {
+pub(super) struct Bucket<const A: usize> {
     /// Those of each link in the order in which they arrive.
-    pub(super) in_order: Vec<Packet<P>>,
+    pub(super) in_order: Vec<Packet<A>>,
     /// Those that may arrive before others that were put here earlier.
-    pub(super) overtaking: Vec<Packet<P>>,
+    pub(super) overtaking: Vec<Packet<A>>,
 }
 
-impl<const P: usize> Default for Bucket<P> {
+impl<const A: usize> Default for Bucket<A> {
     fn default() -> Self {
         Self { in_order: Vec::new(), overtaking: Vec::new() }
     }
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Packet<const P: usize> {
+pub(super) struct Packet<const A: usize> {
     pub(super) arrival: Instant,
     pub(super) sequence: u64,
     /// Where its receiver holds what it says, by place, then run.
     pub(super) place: u32,
     pub(super) receiver: u16,
-    pub(super) position: [f64; P],
-    pub(super) velocity: [f64; P],
+    pub(super) position: [f64; A],
+    pub(super) velocity: [f64; A],
 }
 
 /// How many ticks a span takes, rounded up.
@@ -75,7 +75,7 @@ impl Ticks {
     }
 }
 
-impl<const P: usize> InFlight<P> {
+impl<const A: usize> InFlight<A> {
     /// Nothing in flight, with ticks of that length.
     pub(super) fn new(tick_nanos: u64) -> Self {
         Self { ticks: Ticks::new(tick_nanos), wheel: Box::new(std::array::from_fn(|_| Vec::new())), beyond: BTreeMap::new(), emptied: Vec::new() }
@@ -83,7 +83,7 @@ impl<const P: usize> InFlight<P> {
 
     /// A packet that is known at this tick and instant; whether it may arrive before another of its link that was put here earlier.
     #[inline(always)]
-    pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<P>, overtakes: bool) {
+    pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, overtakes: bool) {
         // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
         let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
         let due = tick.saturating_add(ticks);
@@ -95,7 +95,7 @@ impl<const P: usize> InFlight<P> {
     /// The packet itself is handed to no call: it would be put together on the stack for that, and copied from there in words wider than its parts, for which a
     /// processor waits. It took an eighth of the time of a thousand peers.
     #[inline(always)]
-    fn packets_at(&mut self, (ticks, due): (u64, u64), overtakes: bool) -> &mut Vec<Packet<P>> {
+    fn packets_at(&mut self, (ticks, due): (u64, u64), overtakes: bool) -> &mut Vec<Packet<A>> {
         if ticks >= HORIZON {
             return self.packets_beyond(due, overtakes);
         }
@@ -108,7 +108,7 @@ impl<const P: usize> InFlight<P> {
     }
 
     #[cold]
-    fn packets_beyond(&mut self, due: u64, overtakes: bool) -> &mut Vec<Packet<P>> {
+    fn packets_beyond(&mut self, due: u64, overtakes: bool) -> &mut Vec<Packet<A>> {
         let Bucket { in_order, overtaking } = self.beyond.entry(due).or_default();
         let packets = if overtakes { overtaking } else { in_order };
         if packets.capacity() == 0 {
@@ -118,12 +118,12 @@ impl<const P: usize> InFlight<P> {
     }
 
     /// All of them, in no order.
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Packet<P>> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Packet<A>> {
         self.wheel.iter().flatten().chain(self.beyond.values().flat_map(|bucket| bucket.in_order.iter().chain(&bucket.overtaking)))
     }
 
     /// Takes back the memory of a bucket whose packets are gone.
-    pub(super) fn reuse(&mut self, Bucket { in_order, overtaking }: Bucket<P>) {
+    pub(super) fn reuse(&mut self, Bucket { in_order, overtaking }: Bucket<A>) {
         for mut packets in [overtaking, in_order] {
             if packets.capacity() > 0 {
                 packets.clear();
@@ -134,7 +134,7 @@ impl<const P: usize> InFlight<P> {
 
     /// The samples that are due at that tick, if there are any.
     #[inline(always)]
-    pub(super) fn due(&mut self, tick: u64) -> Option<Bucket<P>> {
+    pub(super) fn due(&mut self, tick: u64) -> Option<Bucket<A>> {
         if !self.beyond.is_empty() {
             self.come_near(tick);
         }

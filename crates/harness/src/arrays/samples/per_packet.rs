@@ -17,7 +17,7 @@ use super::in_flight::{Bucket, InFlight, Packet};
 use super::quads::{self, Quad};
 use super::rows::Rows;
 use super::{Sample, count};
-use crate::arrays::bodies::Bodies;
+use crate::arrays::blocks::Blocks;
 use crate::arrays::processor::on_widest;
 use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
@@ -31,20 +31,20 @@ const TAKEN_TOGETHER: usize = 16;
 ///
 /// Work goes from receiver to receiver: what one holds lies together, and receivers may be shared out among threads.
 #[derive(Clone, Debug)]
-pub(in crate::arrays) struct PerPacket<const P: usize, const L: usize> {
+pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     rows: Rows,
     /// The receivers, counted from 0 below.
     receivers: Range<usize>,
     end: Instant,
     /// By receiver, then sender, then run, as [`Rows`] says.
-    links: Links<P>,
+    links: Links<A>,
     /// Whether each peer of the scene sends now.
     sends: Vec<bool>,
-    in_flight: InFlight<P>,
-    /// Samples held, by pair of numbers, then receiver, then sender. Each receiver has whole quads, of which the last may be empty.
-    held: [Vec<Quad<L>>; P],
+    in_flight: InFlight<A>,
+    /// Samples held, by axis, then receiver, then sender. Each receiver has whole quads, of which the last may be empty.
+    held: [Vec<Quad<L>>; A],
     /// By receiver the sums of its samples, if its mean is exact: then there is one run. Empty if no mean is.
-    sums: Vec<Option<ExactMeans<P>>>,
+    sums: Vec<Option<ExactMeans<A>>>,
     /// By place, then run: the lowest sequence number that is newer than the sample held.
     next: Vec<u64>,
     /// By receiver: bit r says whether a sample has arrived in run r since the means were computed.
@@ -55,15 +55,15 @@ pub(in crate::arrays) struct PerPacket<const P: usize, const L: usize> {
 
 /// The links.
 #[derive(Clone, Debug)]
-enum Links<const P: usize> {
+enum Links<const A: usize> {
     Direct(DirectLinks),
     /// They are told when each sender sends next. Only in single runs: scenes side by side have direct links, and `const { L > 1 }` spares the compiler the rest.
-    Stepped(SteppedLinks<State<P>>),
+    Stepped(SteppedLinks<State<A>>),
 }
 
-impl<const P: usize, const L: usize> PerPacket<P, L> {
+impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// The receivers hold the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new(scenes: &[&Scene], initial: &[Sample<P, L>], shape: &Shape, receivers: Range<usize>) -> Self {
+    pub(in crate::arrays) fn new(scenes: &[&Scene], initial: &[Sample<A, L>], shape: &Shape, receivers: Range<usize>) -> Self {
         let peers = scenes[0].peers.len();
         let info = PacketInfo { size: shape.load.size, ecn_capable: true };
         let mut links = match shape.way {
@@ -107,8 +107,8 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             let column = rows.column_of(receiver, place);
             let (sample, weight) = (&initial[rows.sender(receiver, column)], rows.weight(receiver, column));
             let weighed = |number: f64| weight.map_or(number, |weight| number * weight);
-            for (pair, run) in (0..P).flat_map(|pair| (0..L).map(move |run| (pair, run))) {
-                quads::set(&mut held[pair], place, run, weighed(sample.position[pair][run]), weighed(sample.velocity[pair][run]));
+            for (axis, run) in (0..A).flat_map(|axis| (0..L).map(move |run| (axis, run))) {
+                quads::set(&mut held[axis], place, run, weighed(sample.position[axis][run]), weighed(sample.velocity[axis][run]));
             }
         }
         if (0..count).any(|receiver| rows.held(receiver).len() >= EXACT_FROM) {
@@ -127,7 +127,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
         processor: pulp::Arch,
         (tick, now): (u64, Instant),
         senders: &[usize],
-        sent: &[Sample<P, L>],
+        sent: &[Sample<A, L>],
         next: impl Fn(usize) -> Instant,
     ) {
         let Rows::All { peers, .. } = self.rows else {
@@ -157,7 +157,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                     for run in 0..L {
                         let link = LinkId::new((receiver * peers + sender) * L + run);
                         links.offer((now, next(sender)), link, sent[sender].state(run), |arrival, overtakes, sequence, state| {
-                            in_flight.push((tick, now), rows.packet::<P, L>((receiver, sender, run), &state, arrival, sequence), overtakes);
+                            in_flight.push((tick, now), rows.packet::<A, L>((receiver, sender, run), &state, arrival, sequence), overtakes);
                         });
                     }
                 }
@@ -177,7 +177,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                 let (next, first) = (next(rows.sender(receiver, column)), rows.link(receiver, column) * L);
                 for run in 0..L {
                     links.pass(next, LinkId::new(first + run), &mut |arrival, overtakes, sequence, state| {
-                        in_flight.push(latest, rows.packet::<P, L>((receiver, column, run), &state, arrival, sequence), overtakes);
+                        in_flight.push(latest, rows.packet::<A, L>((receiver, column, run), &state, arrival, sequence), overtakes);
                     });
                 }
             }
@@ -209,7 +209,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             let link = LinkId::new(rows.link(receiver, column) * L + run);
             let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
             links.set_model(at, link, (scene.seed, &name), model.clone(), &mut |arrival, overtakes, sequence, state| {
-                in_flight.push(latest, rows.packet::<P, L>((receiver, column, run), &state, arrival, sequence), overtakes)
+                in_flight.push(latest, rows.packet::<A, L>((receiver, column, run), &state, arrival, sequence), overtakes)
             });
         }
     }
@@ -223,11 +223,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     }
 
     /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
-    pub(in crate::arrays) fn moving<const A: usize>(
-        &self,
-        (peer, run): (usize, usize),
-        sent: impl Fn(usize, u64) -> Instant,
-    ) -> impl Iterator<Item = Moving<A>> {
+    pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         self.rows.held(peer).map(move |place| {
             let sender = self.rows.sender(peer, self.rows.column_of(peer, place));
             let newest = self.next[place * L + run].checked_sub(1);
@@ -245,27 +241,27 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// The means are those of the samples held.
     #[inline(always)]
-    pub(in crate::arrays) fn refresh<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
+    pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks) {
         // Ten peers hear something new in seven of ten ticks: to ask for each of them how rows lie took 2 % of a run.
-        let Rows::All { peers, .. } = self.rows else { return self.refresh_unequal(bodies) };
+        let Rows::All { peers, .. } = self.rows else { return self.refresh_unequal(blocks) };
         if !self.sums.is_empty() {
-            return self.refresh_unequal(bodies);
+            return self.refresh_unequal(blocks);
         }
         let (quads, count) = ((peers - 1).div_ceil(4), count(peers - 1));
         for (peer, changed) in self.changed.iter_mut().enumerate() {
             if std::mem::take(changed) == 0 {
                 continue;
             }
-            for pair in 0..P {
-                let (x, v) = quads::mean(&self.held[pair][peer * quads..(peer + 1) * quads], count);
-                bodies.set_target(pair, peer, x, v);
+            for axis in 0..A {
+                let (x, v) = quads::mean(&self.held[axis][peer * quads..(peer + 1) * quads], count);
+                blocks.set_target(axis, peer, x, v);
             }
         }
     }
 
     /// [`PerPacket::refresh`] where peers hear different numbers of others, or means are exact.
     #[inline(never)]
-    fn refresh_unequal<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
+    fn refresh_unequal(&mut self, blocks: &mut Blocks) {
         let Self { rows, held, sums, changed, .. } = self;
         for (peer, changed) in changed.iter_mut().enumerate() {
             if std::mem::take(changed) == 0 {
@@ -274,15 +270,15 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
             let places = rows.held(peer);
             if let Some(Some(sums)) = sums.get(peer) {
                 let mean = sums.mean(places.len());
-                for pair in 0..P {
-                    bodies.set_target(pair, peer, [mean.position[pair]; L], [mean.velocity[pair]; L]);
+                for axis in 0..A {
+                    blocks.set_target(axis, peer, [mean.position[axis]; L], [mean.velocity[axis]; L]);
                 }
                 continue;
             }
             let (quads, count) = (places.start / 4..places.end.div_ceil(4), count(places.len()));
-            for (pair, held) in held.iter().enumerate() {
+            for (axis, held) in held.iter().enumerate() {
                 let (x, v) = quads::mean(&held[quads.clone()], count);
-                bodies.set_target(pair, peer, x, v);
+                blocks.set_target(axis, peer, x, v);
             }
         }
     }
@@ -304,7 +300,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// receiver to receiver, but for those on links on which one overtakes another: those come last, in order. To sort all of them took two thirds of the time
     /// of a thousand peers, and left them in an order in which each missed the cache.
     #[inline(never)]
-    fn take_in(&mut self, mut bucket: Bucket<P>) {
+    fn take_in(&mut self, mut bucket: Bucket<A>) {
         for packet in &bucket.overtaking {
             self.next[packet.place as usize] |= IS_OVERTAKEN;
         }
@@ -322,7 +318,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// Takes in the samples of the links on which none overtakes; puts the others behind those that overtake.
     #[inline(always)]
-    fn take_in_order(&mut self, bucket: &mut Bucket<P>) {
+    fn take_in_order(&mut self, bucket: &mut Bucket<A>) {
         for packet in &bucket.in_order {
             if self.is_newest(packet, &mut bucket.overtaking) {
                 self.hold(packet);
@@ -333,14 +329,14 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// [`PerPacket::take_in_order`] where means are exact, and samples held are more than a cache has room for: some samples at once, whose memory is asked for before any
     /// of them is added to a sum. One by one took 5 % longer for a thousand peers.
     #[inline(always)]
-    fn take_in_together(&mut self, bucket: &mut Bucket<P>) {
+    fn take_in_together(&mut self, bucket: &mut Bucket<A>) {
         for packets in bucket.in_order.chunks(TAKEN_TOGETHER) {
             let (mut newest, mut count) = ([0; TAKEN_TOGETHER], 0);
             for (place, packet) in packets.iter().enumerate() {
                 newest[count] = place;
                 count += usize::from(self.is_newest(packet, &mut bucket.overtaking));
             }
-            let mut before = [State { position: [0.0; P], velocity: [0.0; P] }; TAKEN_TOGETHER];
+            let mut before = [State { position: [0.0; A], velocity: [0.0; A] }; TAKEN_TOGETHER];
             for (place, before) in newest[..count].iter().zip(&mut before) {
                 let packet = &packets[*place];
                 *before = quads::state(&self.held, packet.place as usize / L, packet.place as usize % L);
@@ -354,7 +350,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// Whether a sample is newer than the one held, which it is from then on; puts one of a link on which some overtake behind those.
     #[inline(always)]
-    fn is_newest(&mut self, packet: &Packet<P>, overtaking: &mut Vec<Packet<P>>) -> bool {
+    fn is_newest(&mut self, packet: &Packet<A>, overtaking: &mut Vec<Packet<A>>) -> bool {
         let next = &mut self.next[packet.place as usize];
         let is_newest = packet.sequence >= *next;
         if is_newest {
@@ -368,7 +364,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
     }
 
     /// Takes in all samples of the links on which some overtake, which are the first ones.
-    fn take_in_overtaking(&mut self, packets: &mut [Packet<P>], overtaking: usize) {
+    fn take_in_overtaking(&mut self, packets: &mut [Packet<A>], overtaking: usize) {
         for packet in &packets[..overtaking] {
             self.next[packet.place as usize] &= !IS_OVERTAKEN;
         }
@@ -380,7 +376,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// Takes in a sample after all that arrived before it.
     #[inline(always)]
-    fn take_in_one(&mut self, packet: &Packet<P>) {
+    fn take_in_one(&mut self, packet: &Packet<A>) {
         let next = &mut self.next[packet.place as usize];
         if packet.sequence >= *next {
             *next = packet.sequence + 1;
@@ -394,7 +390,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// A sample takes the place of the one before it in the sums of its receiver, if there are any.
     #[inline(always)]
-    fn replace(&mut self, before: &State<P>, packet: &Packet<P>) {
+    fn replace(&mut self, before: &State<A>, packet: &Packet<A>) {
         if let Some(Some(sums)) = self.sums.get_mut(usize::from(packet.receiver)) {
             sums.replace(before, &State { position: packet.position, velocity: packet.velocity });
         }
@@ -402,16 +398,16 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 
     /// A sample is held.
     #[inline(always)]
-    fn hold(&mut self, packet: &Packet<P>) {
+    fn hold(&mut self, packet: &Packet<A>) {
         let (place, run) = (packet.place as usize / L, packet.place as usize % L);
-        for pair in 0..P {
-            quads::set(&mut self.held[pair], place, run, packet.position[pair], packet.velocity[pair]);
+        for axis in 0..A {
+            quads::set(&mut self.held[axis], place, run, packet.position[axis], packet.velocity[axis]);
         }
         self.changed[usize::from(packet.receiver)] |= 1 << run;
     }
 
     #[cold]
-    fn count_stale(&mut self, packet: &Packet<P>) {
+    fn count_stale(&mut self, packet: &Packet<A>) {
         self.stale[usize::from(packet.receiver) * L + packet.place as usize % L] += 1;
     }
 
@@ -453,7 +449,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
 /// The packets of a tick over links that know at once when each arrives, between all peers.
 ///
 /// Compiled for any processor and for one that has AVX2, whose instructions take 2 % off a run of ten peers over links with jitter and loss.
-struct DirectSending<'a, const P: usize, const L: usize> {
+struct DirectSending<'a, const A: usize, const L: usize> {
     /// Of the scene.
     peers: usize,
     receivers: Range<usize>,
@@ -461,17 +457,17 @@ struct DirectSending<'a, const P: usize, const L: usize> {
     senders: &'a [usize],
     /// Whether each peer of the scene is one of them.
     sends: &'a [bool],
-    sent: &'a [Sample<P, L>],
-    in_flight: &'a mut InFlight<P>,
+    sent: &'a [Sample<A, L>],
+    in_flight: &'a mut InFlight<A>,
     at: (u64, Instant),
 }
 
 /// One function for each way: two in one have too few registers, and take ten instructions more for a packet of links with jitter and loss.
-struct BySender<'a, const P: usize, const L: usize>(DirectSending<'a, P, L>);
-struct ByChain<'a, const P: usize, const L: usize>(DirectSending<'a, P, L>);
-struct ByLink<'a, const P: usize, const L: usize>(DirectSending<'a, P, L>);
+struct BySender<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
+struct ByChain<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
+struct ByLink<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
 
-impl<const P: usize, const L: usize> NullaryFnOnce for BySender<'_, P, L> {
+impl<const A: usize, const L: usize> NullaryFnOnce for BySender<'_, A, L> {
     type Output = ();
 
     #[inline(always)]
@@ -480,7 +476,7 @@ impl<const P: usize, const L: usize> NullaryFnOnce for BySender<'_, P, L> {
     }
 }
 
-impl<const P: usize, const L: usize> NullaryFnOnce for ByChain<'_, P, L> {
+impl<const A: usize, const L: usize> NullaryFnOnce for ByChain<'_, A, L> {
     type Output = ();
 
     #[inline(always)]
@@ -489,7 +485,7 @@ impl<const P: usize, const L: usize> NullaryFnOnce for ByChain<'_, P, L> {
     }
 }
 
-impl<const P: usize, const L: usize> NullaryFnOnce for ByLink<'_, P, L> {
+impl<const A: usize, const L: usize> NullaryFnOnce for ByLink<'_, A, L> {
     type Output = ();
 
     #[inline(always)]
@@ -498,7 +494,7 @@ impl<const P: usize, const L: usize> NullaryFnOnce for ByLink<'_, P, L> {
     }
 }
 
-impl<const P: usize, const L: usize> DirectSending<'_, P, L> {
+impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
     /// Link by link, those to one receiver after those to another, without a gap: ten links to each of ten receivers are thirteen times eight, and not twenty
     /// times eight or fewer. It took 3 % off a run of ten peers, and 9 % off one of three.
     #[inline(always)]
@@ -556,14 +552,14 @@ impl<const P: usize, const L: usize> DirectSending<'_, P, L> {
 /// The packet over a link to a receiver, which is that peer of the scene, if all hear all. Links are counted by sender, then run.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
-fn packet<const P: usize, const L: usize>(
+fn packet<const A: usize, const L: usize>(
     peers: usize,
     (receiver, peer): (usize, usize),
     link: usize,
-    sent: &[Sample<P, L>],
+    sent: &[Sample<A, L>],
     arrival: Instant,
     sequence: u64,
-) -> Packet<P> {
+) -> Packet<A> {
     let (sender, run) = (link / L, link % L);
     let sample = &sent[sender];
     Packet {
@@ -571,7 +567,7 @@ fn packet<const P: usize, const L: usize>(
         sequence,
         place: ((receiver * (peers - 1).next_multiple_of(4) + sender - usize::from(sender > peer)) * L + run) as u32,
         receiver: receiver as u16,
-        position: std::array::from_fn(|pair| sample.position[pair][run]),
-        velocity: std::array::from_fn(|pair| sample.velocity[pair][run]),
+        position: std::array::from_fn(|axis| sample.position[axis][run]),
+        velocity: std::array::from_fn(|axis| sample.velocity[axis][run]),
     }
 }

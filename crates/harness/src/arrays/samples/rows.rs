@@ -133,13 +133,13 @@ impl Rows {
     /// The packet to a receiver over the link in a column, in one of L runs.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
-    pub(super) fn packet<const P: usize, const L: usize>(
+    pub(super) fn packet<const A: usize, const L: usize>(
         &self,
         (receiver, column, run): (usize, usize, usize),
-        state: &State<P>,
+        state: &State<A>,
         arrival: Instant,
         sequence: u64,
-    ) -> Packet<P> {
+    ) -> Packet<A> {
         let weight = self.weight(receiver, column);
         let weighed = |number: f64| weight.map_or(number, |weight| number * weight);
         Packet {

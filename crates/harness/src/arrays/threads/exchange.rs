@@ -9,24 +9,24 @@ use crate::arrays::lanes::{larger, smaller};
 use crate::arrays::samples::Sample;
 
 /// The words that threads exchange.
-pub(super) struct Exchange<const P: usize> {
+pub(super) struct Exchange<const A: usize> {
     /// The words of each thread, in turns: an early thread tells the next while others still read the last.
-    told: [Vec<Mutex<Told<P>>>; 2],
+    told: [Vec<Mutex<Told<A>>>; 2],
     barrier: Barrier,
     goes_on: AtomicBool,
 }
 
 /// The words of a thread at a tick.
-struct Told<const P: usize> {
-    samples: Vec<(usize, Sample<P, 1>)>,
+struct Told<const A: usize> {
+    samples: Vec<(usize, Sample<A, 1>)>,
     /// The least and the greatest position of its copies along each axis, at each tick since it last told.
     extremes: Vec<(f64, f64)>,
     is_finite: bool,
 }
 
 /// A thread's side of the exchange.
-pub(super) struct Thread<'e, const P: usize> {
-    exchange: &'e Exchange<P>,
+pub(super) struct Thread<'e, const A: usize> {
+    exchange: &'e Exchange<A>,
     place: usize,
     members: Range<usize>,
     turn: usize,
@@ -40,7 +40,7 @@ pub(super) struct Thread<'e, const P: usize> {
     max_discrepancy: f64,
 }
 
-impl<const P: usize> Exchange<P> {
+impl<const A: usize> Exchange<A> {
     pub(super) fn new(threads: usize) -> Self {
         let told = || (0..threads).map(|_| Mutex::new(Told { samples: Vec::new(), extremes: Vec::new(), is_finite: true })).collect();
         Self { told: [told(), told()], barrier: Barrier::new(threads), goes_on: AtomicBool::new(true) }
@@ -52,9 +52,9 @@ impl<const P: usize> Exchange<P> {
     }
 }
 
-impl<'e, const P: usize> Thread<'e, P> {
+impl<'e, const A: usize> Thread<'e, A> {
     /// The thread in that place, which has these peers.
-    pub(super) const fn new(exchange: &'e Exchange<P>, place: usize, members: Range<usize>) -> Self {
+    pub(super) const fn new(exchange: &'e Exchange<A>, place: usize, members: Range<usize>) -> Self {
         Self {
             exchange,
             place,
@@ -80,7 +80,7 @@ impl<'e, const P: usize> Thread<'e, P> {
 
     /// Of how many ticks since it last told it knows where copies are.
     pub(super) const fn ticks_noted(&self) -> usize {
-        self.extremes.len() / P
+        self.extremes.len() / A
     }
 
     /// Whether all numbers of some of its peers are finite.
@@ -90,7 +90,7 @@ impl<'e, const P: usize> Thread<'e, P> {
 
     /// Where some of its copies are at most, along each axis, in the tick in that place of the ticks since it last told.
     pub(super) fn note_extremes(&mut self, tick: usize, extremes: impl Iterator<Item = (f64, f64)>) {
-        let extremes = extremes.enumerate().map(|(axis, extremes)| (tick * P + axis, extremes));
+        let extremes = extremes.enumerate().map(|(axis, extremes)| (tick * A + axis, extremes));
         for (place, (low, high)) in extremes {
             match self.extremes.get_mut(place) {
                 Some(all) => *all = (smaller(low, all.0), larger(high, all.1)),
@@ -100,7 +100,7 @@ impl<'e, const P: usize> Thread<'e, P> {
     }
 
     /// At this tick these peers of the scene send: puts what those of other threads send into their places in `sent`, where those of this one are already.
-    pub(super) fn exchange(&mut self, senders: &[usize], sent: &mut [Sample<P, 1>]) {
+    pub(super) fn exchange(&mut self, senders: &[usize], sent: &mut [Sample<A, 1>]) {
         let told = &self.exchange.told[self.turn];
         self.turn = 1 - self.turn;
         {

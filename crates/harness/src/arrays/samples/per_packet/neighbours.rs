@@ -6,14 +6,14 @@ use cohaptic_wan::{Arrivals, DirectLinks, LinkId};
 use super::super::Sample;
 use super::{Links, PerPacket};
 
-impl<const P: usize, const L: usize> PerPacket<P, L> {
+impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// [`PerPacket::send`] where each receiver has senders of its own.
     #[inline(never)]
     pub(super) fn send_to_neighbours(
         &mut self,
         (tick, now): (u64, Instant),
         senders: &[usize],
-        sent: &[Sample<P, L>],
+        sent: &[Sample<A, L>],
         next: impl Fn(usize) -> Instant,
     ) {
         let Self { rows, receivers, links, sends, in_flight, .. } = self;
@@ -38,7 +38,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                         for place in arrivals.places() {
                             let (column, run) = ((first + place) / L, (first + place) % L);
                             let state = sent[rows.sender(receiver, column)].state(run);
-                            let packet = rows.packet::<P, L>((receiver, column, run), &state, arrivals.at[place], arrivals.sequences[place]);
+                            let packet = rows.packet::<A, L>((receiver, column, run), &state, arrivals.at[place], arrivals.sequences[place]);
                             in_flight.push((tick, now), packet, arrivals.overtakes(place));
                         }
                     }
@@ -56,7 +56,7 @@ impl<const P: usize, const L: usize> PerPacket<P, L> {
                             LinkId::new(first_link + number),
                             sent[sender].state(run),
                             |arrival, overtakes, sequence, state| {
-                                in_flight.push((tick, now), rows.packet::<P, L>((receiver, column, run), &state, arrival, sequence), overtakes);
+                                in_flight.push((tick, now), rows.packet::<A, L>((receiver, column, run), &state, arrival, sequence), overtakes);
                             },
                         );
                     }
