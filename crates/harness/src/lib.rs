@@ -2,8 +2,8 @@
 //!
 //! You need it if you run scenes from Rust: to record them, to watch every tick, or to drive a session.
 //!
-//! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that write each sample as a datagram and send it through a
-//! [`cohaptic_wan::Network`]; the datagram is read once for all its receivers. A scene that needs no events, and of which no observer wants more than ticks, runs in arrays, which hold
+//! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that send their samples through a
+//! [`cohaptic_wan::Network`]. A sample has the size of its datagram and is handed on as numbers; its bytes are made where they are damaged, or leave by a socket. A scene that needs no events, and of which no observer wants more than ticks, runs in arrays, which hold
 //! numbers alone: no peers, no datagrams, no packets. An [`Observer`] sees every tick and every packet; [`record`] has observers that write CSV files and plots while the scene runs. [`check`] compares a
 //! run with the scene's expectations, [`mod@explain`] says what a scene makes the program model. [`live`] runs a scene some of whose peers are remote.
 //!
@@ -29,9 +29,9 @@
 
 mod arrays;
 pub mod check;
-mod datagrams;
 mod disturbance;
 pub mod explain;
+mod in_flight;
 pub mod live;
 pub mod measures;
 mod observer;

@@ -80,7 +80,7 @@ pub use link::Link;
 pub use network::direct_links::{Arrivals, DirectLinks};
 pub use network::id::{LinkId, NodeId, Path};
 pub use network::stepped_links::SteppedLinks;
-pub use network::{AccessLine, MOST_NODES, MereArrival, Network, NetworkConfig, NetworkError};
+pub use network::{AccessLine, MOST_NODES, Network, NetworkConfig, NetworkError};
 pub use packet::PacketInfo;
 pub use packet::damage::Damage;
 pub use ring::Ring;

@@ -3,11 +3,11 @@
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
-use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, PacketInfo, Path};
+use cohaptic_units::Instant;
+use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, Path};
 
 use super::{Arriving, DeviceModel, Remote, Step, Watch, World, row};
-use crate::datagrams::Handle;
+use crate::in_flight::Handle;
 use crate::live::{
     Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, PulledDevice, RemotePeers, SampleError, Seat, SeatStats, Transmit, TurnState,
     UnsimulatedDevice,
@@ -101,7 +101,8 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
             return Err(SampleError::NoSeat { peer: place });
         };
         let peers = self.members.len();
-        let read = read_sample::<A>(datagram, self.kind, self.axes, session, (place, peers)).inspect_err(|_| seat.stats.refused += 1);
+        let kind = self.samples.kind();
+        let read = read_sample::<A>(datagram, kind, self.axes, session, (place, peers)).inspect_err(|_| seat.stats.refused += 1);
         let (mut sample, extra) = read?;
         seat.admit(sample.sequence)?;
         let joins = seat.hear(at);
@@ -123,21 +124,18 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
             turning.latest[place] = extra.attitude;
         }
         self.change(at);
-        let copies = if self.kind.is_personal() { 1 } else { peers - 1 };
-        let stored = if self.kind == SampleKind::State {
-            self.datagrams.store(copies, self.axes, |bytes| sample.encode(self.axes, bytes))
+        let copies = if kind.is_personal() { 1 } else { peers - 1 };
+        let handle = if kind == SampleKind::State {
+            self.samples.store(copies, sample)
         } else {
-            self.datagrams.store_extended(copies, self.axes, self.kind, &sample, |numbers| numbers.push(extra.numbers))
+            let stored = self.samples.store_extended((copies, self.axes), sample, extra.attitude, |numbers| numbers.push(extra.numbers));
+            stored.expect("numbers that were decoded are finite")
         };
-        let (handle, len) = stored.expect("what was decoded can be decoded again");
-        if self.kind == SampleKind::Attitude {
-            self.datagrams.set_attitude(handle, extra.attitude);
-        }
-        let (info, from) = (PacketInfo { size: Bytes::new(len as u64), ecn_capable: true }, NodeId::new(place));
-        let sent = if self.kind.is_personal() {
-            self.network.handle_packet(at, from, NodeId::new(extra.receiver as usize), info, handle)
+        let from = NodeId::new(place);
+        let sent = if kind.is_personal() {
+            self.network.handle_packet(at, from, NodeId::new(extra.receiver as usize), self.packet, handle)
         } else {
-            self.network.handle_broadcast(at, from, info, handle)
+            self.network.handle_broadcast(at, from, self.packet, handle)
         };
         sent.expect("instants come in order");
         self.remote.undrained = Some(at);
@@ -247,9 +245,9 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
             return None;
         }
         Some(match &event.damage {
-            None => self.take_in(now, ends, sample.sample, sample.extra, receiver),
-            Some(damage) => match Sample::decode_as(sample.datagram(Some(damage), &mut buffer), sample.kind, sample.axes) {
-                Ok((_, extra)) if sample.kind.is_personal() && extra.receiver as usize != ends.1 => {
+            None => self.take_in(now, ends, sample.sample(), &sample.extra(), receiver),
+            Some(damage) => match Sample::decode_as(sample.datagram(Some(damage), &mut buffer), sample.kind(), sample.axes) {
+                Ok((_, extra)) if sample.kind().is_personal() && extra.receiver as usize != ends.1 => {
                     Err(ReceiveError::Receiver { receiver: extra.receiver })
                 }
                 Ok((damaged, extra)) => self.take_in(now, ends, &damaged, &extra, receiver),

@@ -12,14 +12,14 @@ use std::time::Duration;
 
 use cohaptic_peer::coordination::Role;
 use cohaptic_peer::rotation::Attitude;
-use cohaptic_peer::wire::{Extra, SampleKind};
-use cohaptic_peer::{Contact, Device, LastSent, Reception, SendWhen, State, Strategy};
+use cohaptic_peer::wire::{Sample, SampleKind};
+use cohaptic_peer::{Contact, Device, LastSent, Peer, Reception, SendWhen, State, Strategy};
 use cohaptic_scene::{Change, Scene, Topology};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{AccessLine, Fate, LinkModel, MereArrival, Network, NetworkConfig, NodeId, PacketInfo};
+use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketEvent, PacketInfo, Path};
 
-use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
+use crate::in_flight::{Handle, SamplesInFlight};
 use crate::observer::{Ended, HoldRow, InstantRow, Observer, SendRow, StateRow, TickRow};
 use crate::plan::Plan;
 use crate::schedule::Schedule;
@@ -38,9 +38,9 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     names: Vec<String>,
     members: Vec<Member<A, S, E::Device>>,
     network: Network<Handle>,
-    datagrams: Datagrams<A>,
-    /// What samples carry beyond the state.
-    kind: SampleKind,
+    samples: SamplesInFlight<A>,
+    /// What each sample is for the network.
+    packet: PacketInfo,
     /// Which samples are sent, if not all.
     send_when: Option<SendWhen>,
     /// Up to which age receivers extrapolate samples \[s\], if they do.
@@ -105,14 +105,14 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             axes: scene.axes.count(),
             names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
             latest: members.iter().map(|member| member.peer.object().state().position).collect(),
-            kind: members[0].peer.kind(),
+            packet: packet(members[0].peer.kind(), scene),
+            samples: SamplesInFlight::new(members[0].peer.kind()),
             send_when: scene.coordination.send_when,
             horizon: members[0].peer.strategy().horizon(),
             parameters: parameter_changes(scene),
             turning: Turning::new(scene),
             members,
             network: network(scene, plan),
-            datagrams: Datagrams::default(),
             schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
             changes: scene.timeline.iter().rev().cloned().collect(),
             coordination_factors: (0..if scene.has_gains_by_peer() { scene.peers.len() } else { 1 })
@@ -229,132 +229,53 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 }
                 member.last_sent = Some(LastSent { at: local_time, state: *own });
             }
-            if self.kind != SampleKind::State {
-                let sent = self.send_extended(now, from, local_time);
-                if let Some((packets, size)) = sent.filter(|_| watch.sends) {
-                    observer.on_send(&SendRow { at: now, peer: from, packets, size })?;
-                }
+            let role = member.peer.role();
+            let packets = match role {
+                Role::Copy => self.topology.as_ref().map_or(self.names.len() - 1, |topology| topology.neighbours(from).len()),
+                Role::Client { .. } => 1,
+            };
+            let sample = member.peer.next_sample(local_time);
+            let handle = if self.samples.kind() == SampleKind::State {
+                self.samples.store(packets, sample)
+            } else if let Some(handle) =
+                store_extended(&mut self.samples, (packets, self.axes), sample, (from, self.names.len() - 1, &mut member.peer))
+            {
+                handle
+            } else {
+                // The states are finite, or the run had ended, but a number made of them is not.
+                self.finite = false;
                 continue;
-            }
-            let others = self.topology.as_ref().map_or(self.names.len() - 1, |topology| topology.neighbours(from).len());
-            let stored = self.datagrams.store(others, self.axes, |datagram| member.peer.sample(local_time, datagram));
-            let (handle, len) = stored.expect("a run ends before a state that is not finite is sent");
-            // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but a marked packet arrives.
-            let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
-            self.network.handle_broadcast(now, NodeId::new(from), info, handle).expect("instants come in order");
+            };
+            let sender = NodeId::new(from);
+            let sent = match role {
+                Role::Copy => self.network.handle_broadcast(now, sender, self.packet, handle),
+                Role::Client { server } => {
+                    let server = if server < from { server } else { server + 1 };
+                    self.network.handle_packet(now, sender, NodeId::new(server), self.packet, handle)
+                }
+            };
+            sent.expect("instants come in order");
             if watch.sends {
-                observer.on_send(&SendRow { at: now, peer: from, packets: others as u64, size: info.size })?;
+                observer.on_send(&SendRow { at: now, peer: from, packets: packets as u64, size: self.packet.size })?;
             }
         }
         self.earliest_send = self.members.iter().map(|member| member.next_send).min().unwrap_or(0);
         Ok(())
     }
 
-    /// A peer sends a sample with extra numbers: to this number of others, in packets of that size.
-    fn send_extended(&mut self, now: Instant, from: usize, local_time: Instant) -> Option<(u64, Bytes)> {
-        let peer = &mut self.members[from].peer;
-        let others = self.names.len() - 1;
-        let sample = peer.next_sample(local_time);
-        let (role, kind) = (peer.role(), self.kind);
-        let copies = if role == Role::Copy { others } else { 1 };
-        let write = |numbers: &mut Vec<[f64; A]>| {
-            if kind.is_personal() {
-                numbers.extend((0..from).map(|other| peer.extra(other)));
-                numbers.push([0.0; A]);
-                numbers.extend((from..others).map(|other| peer.extra(other)));
-            } else {
-                numbers.push(peer.extra(0));
-            }
-            peer.all_sent();
-        };
-        let Ok((handle, len)) = self.datagrams.store_extended(copies, self.axes, kind, &sample, write) else {
-            // The states are finite, or the run had ended, but a number made of them is not.
-            self.finite = false;
-            return None;
-        };
-        if kind == SampleKind::Attitude {
-            self.datagrams.set_attitude(handle, peer.attitude());
-        }
-        let (info, from) = (PacketInfo { size: Bytes::new(len as u64), ecn_capable: true }, NodeId::new(from));
-        let sent = match role {
-            Role::Copy => self.network.handle_broadcast(now, from, info, handle),
-            Role::Client { server } => {
-                let server = if server < from.index() { server } else { server + 1 };
-                self.network.handle_packet(now, from, NodeId::new(server), info, handle)
-            }
-        };
-        sent.expect("instants come in order");
-        Some((copies as u64, info.size))
-    }
-
     /// Step 2: whatever has arrived is handed to its receiver.
     fn deliver(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
-        self.network.handle_timeout(now).expect("instants come in order");
-        let has_mere_arrivals = E::IS_EMPTY && !watch.packets;
+        let Self { network, members, samples, remote, axes, .. } = self;
+        network.handle_timeout(now).expect("instants come in order");
+        let mut receivers = Receivers { members, samples, remote, axes: *axes };
         loop {
-            if has_mere_arrivals {
-                self.deliver_mere_arrivals(now, observer, watch)?;
-                if self.network.has_mere_arrivals_alone() {
-                    return Ok(());
-                }
+            // Nearly all events are mere arrivals. Handed on by themselves, most parts of an event are never made.
+            while let Some(taken) = network.take_mere_arrival(|event| receivers.take(now, &event, observer, watch)) {
+                taken?;
             }
-            let Some(event) = self.network.poll_event() else { return Ok(()) };
-            if let Fate::Delivered(_) = event.fate {
-                let to = event.path.to.index();
-                let receiver = &mut self.members[to];
-                let extended;
-                let extra = if self.kind == SampleKind::State {
-                    &Extra::NONE
-                } else {
-                    extended = extra(&self.datagrams, self.kind, event.payload, to);
-                    &extended
-                };
-                let sample = Arriving { sample: self.datagrams.sample(event.payload), kind: self.kind, extra, axes: self.axes };
-                match self.remote.receive(now, &event, &sample, &mut receiver.peer) {
-                    Some(Ok(Reception::Newest)) if watch.holds => {
-                        observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
-                    }
-                    None | Some(Ok(Reception::Newest)) => {}
-                    Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
-                    Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,
-                    Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),
-                }
-            }
-            if event.fate == Fate::Duplicated {
-                self.datagrams.retain(event.payload);
-            } else {
-                self.datagrams.release(event.payload);
-            }
-            // Making a copy is no end: the packet and its copy each have one.
-            if watch.packets && event.fate.is_end() {
-                observer.on_packet(&event.record)?;
-            }
+            let Some(event) = network.poll_event() else { return Ok(()) };
+            receivers.take(now, &event, observer, watch)?;
         }
-    }
-
-    /// What has arrived undamaged, with nothing else to happen before it, where nobody looks at packets. It took a tenth of the instructions of ten peers off.
-    #[inline(always)]
-    fn deliver_mere_arrivals(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
-        let arrived = |MereArrival { path, offered, payload, .. }: MereArrival<Handle>| (path, offered, payload);
-        while let Some((path, offered, payload)) = self.network.take_mere_arrival(arrived) {
-            let to = path.to.index();
-            let (receiver, sample) = (&mut self.members[to], self.datagrams.sample(payload));
-            let received = if self.kind == SampleKind::State {
-                receiver.peer.handle_sample(sample)
-            } else {
-                receiver.peer.handle_extended(sample, &extra(&self.datagrams, self.kind, payload, to))
-            };
-            match received {
-                Ok(Reception::Newest) if watch.holds => {
-                    observer.on_hold(&HoldRow { at: now, from: path.from.index(), to, sampled: offered })?;
-                }
-                Ok(Reception::Newest) => {}
-                Ok(Reception::Stale) => receiver.stale_samples += 1,
-                Err(error) => unreachable!("peers of one scene understand each other: {error}"),
-            }
-            self.datagrams.release(payload);
-        }
-        Ok(())
     }
 
     /// Steps 3 and 4: each peer that ticks computes forces and moves to the next tick.
@@ -506,10 +427,75 @@ fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
     if scene.relay { network.with_relay() } else { network }
 }
 
-/// What a datagram says to a receiver beyond position and velocity.
-fn extra<const A: usize>(datagrams: &Datagrams<A>, kind: SampleKind, datagram: Handle, to: usize) -> Extra<A> {
-    let receiver = if kind.is_personal() { u32::try_from(to).unwrap_or(u32::MAX) } else { 0 };
-    Extra { receiver, numbers: datagrams.extra(datagram, to), attitude: datagrams.attitude(datagram) }
+/// What each sample of a scene is for the network.
+fn packet(kind: SampleKind, scene: &Scene) -> PacketInfo {
+    // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but a marked packet arrives.
+    PacketInfo { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), ecn_capable: true }
+}
+
+/// Stores a sample with its attitude and extra numbers, which the peer in the place `from` has for each of the others, or for all; `None` if one is not finite.
+fn store_extended<const A: usize, D: Device<A>, S: Strategy<A>>(
+    samples: &mut SamplesInFlight<A>,
+    packets: (usize, usize),
+    sample: Sample<A>,
+    (from, others, peer): (usize, usize, &mut Peer<A, D, S>),
+) -> Option<Handle> {
+    let kind = samples.kind();
+    samples.store_extended(packets, sample, peer.attitude(), |numbers| {
+        if kind.is_personal() {
+            numbers.extend((0..from).map(|other| peer.extra(other)));
+            numbers.push([0.0; A]);
+            numbers.extend((from..others).map(|other| peer.extra(other)));
+        } else {
+            numbers.push(peer.extra(0));
+        }
+        peer.all_sent();
+    })
+}
+
+/// The peers to which the network hands packets.
+struct Receivers<'a, const A: usize, S, E: Remote<A>> {
+    members: &'a mut [Member<A, S, E::Device>],
+    samples: &'a mut SamplesInFlight<A>,
+    remote: &'a mut E,
+    axes: usize,
+}
+
+impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
+    /// Takes what has become of a packet.
+    #[inline(always)]
+    fn take(
+        &mut self,
+        now: Instant,
+        event: &PacketEvent<Handle, Path>,
+        observer: &mut (impl Observer<Error = Ended> + ?Sized),
+        watch: Watch,
+    ) -> Result<(), Ended> {
+        if let Fate::Delivered(_) = event.fate {
+            let to = event.path.to.index();
+            let receiver = &mut self.members[to];
+            let sample = Arriving { samples: self.samples, handle: event.payload, to, axes: self.axes };
+            match self.remote.receive(now, event, &sample, &mut receiver.peer) {
+                Some(Ok(Reception::Newest)) if watch.holds => {
+                    observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
+                }
+                None | Some(Ok(Reception::Newest)) => {}
+                Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
+                Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,
+                Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),
+            }
+        }
+        if event.fate == Fate::Duplicated {
+            self.samples.retain(event.payload);
+        } else {
+            self.samples.release(event.payload);
+        }
+        // Making a copy is no end: the packet and its copy each have one.
+        if watch.packets && event.fate.is_end() {
+            observer.on_packet(&event.record)?;
+        }
+        Ok(())
+    }
 }
 
 fn row<const A: usize>(state: &State<A>, axes: usize) -> StateRow<'_> {

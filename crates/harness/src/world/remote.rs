@@ -6,7 +6,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{Damage, PacketEvent, Path};
 
 use super::DeviceModel;
-use crate::datagrams::Handle;
+use crate::in_flight::{Handle, SamplesInFlight};
 use crate::observer::{Ended, Observer};
 
 /// The peers of a running scene that are remote: in other processes, or with their device in somebody's hand.
@@ -74,7 +74,8 @@ impl<const A: usize> Remote<A> for NoRemote {
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>> {
         Some(match &event.damage {
-            None => receiver.handle_extended(sample.sample, sample.extra),
+            None if sample.kind() == SampleKind::State => receiver.handle_sample(sample.sample()),
+            None => receiver.handle_extended(sample.sample(), &sample.extra()),
             Some(damage) => receiver.handle_datagram(sample.datagram(Some(damage), &mut [0; MAX_LEN])),
         })
     }
@@ -95,17 +96,35 @@ impl<const A: usize> Remote<A> for NoRemote {
 /// A sample that arrives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arriving<'a, const A: usize> {
-    pub(crate) sample: &'a Sample<A>,
-    pub(crate) kind: SampleKind,
-    pub(crate) extra: &'a Extra<A>,
+    pub(super) samples: &'a SamplesInFlight<A>,
+    pub(super) handle: Handle,
+    /// The place of the receiver.
+    pub(super) to: usize,
     /// How many axes the scene has.
-    pub(crate) axes: usize,
+    pub(super) axes: usize,
 }
 
 impl<const A: usize> Arriving<'_, A> {
-    /// Its bytes.
+    #[inline(always)]
+    pub(super) fn kind(&self) -> SampleKind {
+        self.samples.kind()
+    }
+
+    /// Position and velocity.
+    #[inline(always)]
+    pub(super) fn sample(&self) -> &Sample<A> {
+        self.samples.sample(self.handle)
+    }
+
+    /// What else the sample says to its receiver.
+    #[inline(always)]
+    pub(super) fn extra(&self) -> Extra<A> {
+        self.samples.extra(self.handle, self.to)
+    }
+
+    /// Its bytes, which nobody has made before.
     pub(super) fn datagram<'b>(&self, damage: Option<&Damage>, buffer: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let len = self.sample.encode_as(self.kind, self.extra, self.axes, buffer);
+        let len = self.sample().encode_as(self.kind(), &self.extra(), self.axes, buffer);
         if let Some(damage) = damage {
             damage.apply(&mut buffer[..len]);
         }

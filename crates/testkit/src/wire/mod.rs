@@ -12,7 +12,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{DropCause, Fate, LinkModel, LinkStats, MereArrival, Network, NetworkConfig, NodeId, PacketInfo, Path};
+use cohaptic_wan::{DropCause, Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketInfo, Path};
 
 use exits::{Out, counted};
 pub(crate) use held::{BYTE_LIMIT, Held, Where};
@@ -218,9 +218,9 @@ impl<A: Clone> Wire<A> {
         }
         let Self { network, cut, held, .. } = self;
         let is_cut = |path: Path| !cut.is_empty() && cut.contains(&path);
-        network.take_mere_arrival(|MereArrival { path, at, payload, .. }| {
-            held.remove(Where::Links, Held::cost(payload.bytes.len()));
-            take(path, at, is_cut(path), payload, held)
+        network.take_mere_arrival(|event| {
+            held.remove(Where::Links, Held::cost(event.payload.bytes.len()));
+            take(event.path, event.at, is_cut(event.path), event.payload, held)
         })
     }
 

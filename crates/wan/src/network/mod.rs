@@ -36,6 +36,7 @@ use paths::Paths;
 use pending::{InNetwork, LineId, Pending, SizeAndMarks};
 use traffic::Traffic;
 
+use crate::fates::fate::Fate;
 use crate::fates::record::PacketEvent;
 use crate::fates::stats::LinkStats;
 use crate::line::Line;
@@ -80,19 +81,6 @@ pub struct Network<P> {
     has_filters: bool,
     /// Whether what a node sends to all passes its uplink once.
     has_relay: bool,
-}
-
-/// A packet that has arrived undamaged, of which nothing else is told.
-#[derive(PartialEq, Eq, Debug)]
-pub struct MereArrival<P> {
-    /// From where to where.
-    pub path: Path,
-    /// When it was offered to the network.
-    pub offered: Instant,
-    /// When it arrived.
-    pub at: Instant,
-    /// What it carries.
-    pub payload: P,
 }
 
 impl<P: Clone> Network<P> {
@@ -416,25 +404,18 @@ impl<P: Clone> Network<P> {
         None
     }
 
-    /// Whether mere arrivals are all that can come: no packet can be dropped, marked, copied or damaged on its way, and none was dropped that was not polled.
-    #[must_use]
+    /// As [`Network::poll_event`], if the next event is an arrival and nothing but the time until then could happen to packets on their way: `take` is given the event. `None` says
+    /// nothing about other events: ask [`Network::poll_event`] then. Parts of the event that `take` does not use are not made, which takes a tenth off the time of a packet.
     #[inline(always)]
-    pub fn has_mere_arrivals_alone(&self) -> bool {
-        !self.has_inner_events && self.traffic.happened.is_empty()
-    }
-
-    /// As [`Network::poll_event`], as long as [`Network::has_mere_arrivals_alone`]: `take` is given the packet. `None` says nothing
-    /// about other events: ask [`Network::poll_event`] then.
-    #[inline(always)]
-    pub fn take_mere_arrival<T>(&mut self, take: impl FnOnce(MereArrival<P>) -> T) -> Option<T> {
-        if !self.has_mere_arrivals_alone() {
+    pub fn take_mere_arrival<T>(&mut self, take: impl FnOnce(PacketEvent<P, Path>) -> T) -> Option<T> {
+        if self.has_inner_events || !self.traffic.happened.is_empty() {
             return None;
         }
         let Self { now, traffic, lines, .. } = self;
-        // Without inner events nobody is woken, and no packet has another line before it.
-        let taken = traffic.pending.take_due(*now, |Pending { at, offered, entered, turn, path, payload, .. }| {
+        // Without inner events nobody is woken, and no packet has another line before it, nor damage.
+        let taken = traffic.pending.take_due(*now, |Pending { at, sequence, offered, entered, turn, path, size, payload }| {
             lines.link_mut(turn.link()).deliver(entered, at);
-            payload.map(|payload| take(MereArrival { path, offered, at, payload }))
+            payload.map(|payload| take(InNetwork { sequence, offered, entered, path, size, payload }.event(at, Fate::Delivered(at), None)))
         });
         taken.flatten()
     }

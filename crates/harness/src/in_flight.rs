@@ -1,0 +1,179 @@
+//! The samples on their way: what all receivers get is stored once, however many there are.
+
+use std::num::NonZeroU32;
+
+use cohaptic_peer::rotation::Attitude;
+use cohaptic_peer::wire::{Extra, Sample, SampleKind};
+
+/// A sample in the store.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Handle(NonZeroU32);
+
+/// Stores samples until their last copy has arrived or was dropped. Its memory is bounded by the samples on the way at once.
+///
+/// A sample is stored as its numbers. Its bytes are made where somebody reads them: by a receiver of a damaged packet, or by a socket.
+#[derive(Clone, Debug)]
+pub(crate) struct SamplesInFlight<const A: usize> {
+    kind: SampleKind,
+    slots: Vec<Slot<A>>,
+    free: Vec<Handle>,
+    /// For each slot the numbers beyond position and velocity. Empty where samples have none.
+    extended: Vec<Extended<A>>,
+}
+
+#[derive(Clone, Debug)]
+struct Slot<const A: usize> {
+    sample: Sample<A>,
+    copies: usize,
+}
+
+/// What a sample says beyond position and velocity.
+#[derive(Clone, Debug)]
+struct Extended<const A: usize> {
+    /// By the place of the receiver, or a single entry where all receivers get the same.
+    numbers: Vec<[f64; A]>,
+    attitude: Attitude,
+}
+
+impl<const A: usize> SamplesInFlight<A> {
+    /// Returns an empty store for samples of that kind.
+    pub(crate) const fn new(kind: SampleKind) -> Self {
+        Self { kind, slots: Vec::new(), free: Vec::new(), extended: Vec::new() }
+    }
+
+    /// Returns the kind of the samples.
+    #[inline(always)]
+    pub(crate) const fn kind(&self) -> SampleKind {
+        self.kind
+    }
+
+    /// Stores a sample of `copies` packets (at least one).
+    #[inline]
+    pub(crate) fn store(&mut self, copies: usize, sample: Sample<A>) -> Handle {
+        let slot = Slot { sample, copies };
+        match self.free.pop() {
+            Some(handle) => {
+                *self.slot_mut(handle) = slot;
+                handle
+            }
+            None => self.grow(slot),
+        }
+    }
+
+    /// Stores a sample with an attitude and with the extra numbers that `write` appends: by the place of the receiver, or one entry for all.
+    ///
+    /// `None` if an extra number of the first `axes` axes is not finite: no receiver would take the sample.
+    pub(crate) fn store_extended(
+        &mut self,
+        (copies, axes): (usize, usize),
+        sample: Sample<A>,
+        attitude: Attitude,
+        write: impl FnOnce(&mut Vec<[f64; A]>),
+    ) -> Option<Handle> {
+        let handle = self.store(copies, sample);
+        let slot = handle.place();
+        if self.extended.len() <= slot {
+            self.extended.resize(slot + 1, Extended { numbers: Vec::new(), attitude: Attitude::REST });
+        }
+        let extended = &mut self.extended[slot];
+        extended.attitude = attitude;
+        extended.numbers.clear();
+        write(&mut extended.numbers);
+        if extended.numbers.iter().flat_map(|numbers| &numbers[..axes]).all(|number| number.is_finite()) {
+            return Some(handle);
+        }
+        self.free.push(handle);
+        None
+    }
+
+    /// Returns what a sample says beyond position and velocity to the receiver in that place of the session.
+    #[inline(always)]
+    pub(crate) fn extra(&self, handle: Handle, receiver: usize) -> Extra<A> {
+        if self.kind == SampleKind::State { Extra::NONE } else { self.stored_extra(handle, receiver) }
+    }
+
+    fn stored_extra(&self, handle: Handle, receiver: usize) -> Extra<A> {
+        let Extended { numbers, attitude } = &self.extended[handle.place()];
+        let numbers = if let [one] = numbers[..] { one } else { numbers[receiver] };
+        let receiver = if self.kind.is_personal() { u32::try_from(receiver).unwrap_or(u32::MAX) } else { 0 };
+        Extra { receiver, numbers, attitude: *attitude }
+    }
+
+    /// Returns position and velocity of a sample, and what names it.
+    #[inline]
+    pub(crate) fn sample(&self, handle: Handle) -> &Sample<A> {
+        &self.slots[handle.place()].sample
+    }
+
+    /// One copy more is on the way.
+    pub(crate) fn retain(&mut self, handle: Handle) {
+        self.slot_mut(handle).copies += 1;
+    }
+
+    /// One copy less is on the way.
+    #[inline]
+    pub(crate) fn release(&mut self, handle: Handle) {
+        let slot = self.slot_mut(handle);
+        slot.copies -= 1;
+        if slot.copies == 0 {
+            self.free.push(handle);
+        }
+    }
+
+    fn grow(&mut self, slot: Slot<A>) -> Handle {
+        self.slots.push(slot);
+        let number = u32::try_from(self.slots.len()).ok().and_then(NonZeroU32::new);
+        Handle(number.expect("fewer than 2^32 samples, 400 GB of them, are on the way at once"))
+    }
+
+    #[inline]
+    fn slot_mut(&mut self, handle: Handle) -> &mut Slot<A> {
+        &mut self.slots[handle.place()]
+    }
+}
+
+impl Handle {
+    #[inline(always)]
+    const fn place(self) -> usize {
+        self.0.get() as usize - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_peer::State;
+    use cohaptic_units::Instant;
+
+    use super::*;
+
+    fn sample(sequence: u64) -> Sample<1> {
+        Sample { session: 1, sender: 0, sequence, sent: Instant::ZERO, state: State::<1>::REST }
+    }
+
+    #[test]
+    fn a_slot_is_used_again_when_its_last_copy_is_released() {
+        let mut samples = SamplesInFlight::<1>::new(SampleKind::State);
+        let first = samples.store(2, sample(1));
+        let second = samples.store(1, sample(2));
+        samples.release(first);
+        assert_eq!((samples.sample(first).sequence, samples.sample(second).sequence), (1, 2));
+        samples.release(first);
+        let third = samples.store(1, sample(3));
+        assert_eq!(third, first);
+        assert_eq!(samples.slots.len(), 2);
+    }
+
+    /// A number of an axis that the scene does not have goes to nobody.
+    #[test]
+    fn a_number_that_is_not_finite_takes_no_slot() {
+        let mut samples = SamplesInFlight::<3>::new(SampleKind::Wave);
+        let wide = Sample::<3> { session: 1, sender: 0, sequence: 0, sent: Instant::ZERO, state: State::REST };
+        let mut store = |numbers: [f64; 3]| {
+            samples.store_extended((2, 2), wide, Attitude::REST, |all| all.extend([[0.0; 3], numbers])).map(|handle| samples.extra(handle, 1))
+        };
+        assert_eq!(store([0.0, f64::INFINITY, 0.0]), None);
+        let extra = store([1.0, 2.0, f64::INFINITY]).map(|extra| (extra.receiver, extra.numbers));
+        assert_eq!(extra, Some((1, [1.0, 2.0, f64::INFINITY])));
+        assert_eq!(samples.slots.len(), 1);
+    }
+}
