@@ -275,7 +275,7 @@ impl Rows {
         self.model(
             "samples",
             format!("{len} bytes {receivers} every {}{}", Span(spec.update), dead_bands(spec.send_when.as_ref())),
-            "encoded, sent and decoded as they would be live",
+            "with the size and the numbers of the datagrams of a live session",
         );
     }
 
