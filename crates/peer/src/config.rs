@@ -1,4 +1,4 @@
-//! The parameters of a peer. Each is finite and not negative, a mass above zero: the function that makes one checks that.
+//! Parameters of a peer. Every number is finite and not negative, and masses are above zero. The caller that makes a parameter checks this.
 
 use crate::tick::grasp;
 use crate::{Motion, Number, Signal};
@@ -22,7 +22,7 @@ pub struct Gains<C = f64> {
 }
 
 impl<C: Copy> Gains<C> {
-    /// Each gain replaced by what `gain` makes of it, the stiffness first.
+    /// Returns the gains with `gain` applied to each, the stiffness first.
     #[must_use]
     #[inline(always)]
     pub fn map<D>(&self, mut gain: impl FnMut(&C) -> D) -> Gains<D> {
@@ -31,7 +31,7 @@ impl<C: Copy> Gains<C> {
 }
 
 impl<N: Number> Gains<N> {
-    /// The force of the spring and the damper \[N\], where `apart` is the motion of one end relative to the other.
+    /// Returns the force of the spring and the damper \[N\], where `apart` is the motion of one end relative to the other end.
     #[must_use]
     #[inline(always)]
     pub fn force(&self, apart: Motion<N>) -> N {
@@ -40,14 +40,14 @@ impl<N: Number> Gains<N> {
 }
 
 impl Gains {
-    /// Both gains times `factor`.
+    /// Returns both gains times `factor`.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self { stiffness: self.stiffness * factor, damping: self.damping * factor }
     }
 }
 
-/// One peer's copy of the shared virtual object.
+/// Mass and damping of a peer's copy of the shared virtual object.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CopyConfig {
     /// Mass of this copy, mO/N where the object's mass is split \[kg\], above zero.
@@ -56,7 +56,7 @@ pub struct CopyConfig {
     pub damping: f64,
 }
 
-/// The impedance of an arm that holds the device.
+/// Impedance of an arm that holds the device.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ArmConfig {
     /// Mass that the arm adds to the device \[kg\].
@@ -67,22 +67,22 @@ pub struct ArmConfig {
     pub stiffness: f64,
 }
 
-/// What the user's hand does to the device.
+/// Action of the user's hand on the device.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Hand {
     /// A force on the device \[N\], sampled at each tick and held.
     Force(Signal),
-    /// An arm of that impedance around a wanted motion \[m\], itself sampled at each tick and held.
+    /// An arm with an impedance around a wanted motion, sampled at each tick and held.
     Arm {
-        /// The impedance.
+        /// Impedance of the arm.
         arm: ArmConfig,
-        /// The wanted motion \[m\].
+        /// Wanted motion \[m\].
         follows: Signal,
     },
 }
 
 impl Hand {
-    /// The impedance of an arm; `None` for a force.
+    /// Returns the impedance of an arm; `None` for a force.
     #[must_use]
     pub const fn arm(&self) -> Option<ArmConfig> {
         match self {
@@ -92,15 +92,15 @@ impl Hand {
     }
 }
 
-/// How the device touches the copy of the object.
+/// Contact between the device and the copy of the object.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Contact {
-    /// Coupled both ways, on every axis: FC = KC·(xH − xO) + BC·(vH − vO).
+    /// Coupling in both directions, on every axis: FC = KC·(xH − xO) + BC·(vH − vO).
     #[default]
     Grasp,
-    /// Not at all: FC = 0.
+    /// No contact: FC = 0.
     None,
-    /// One-sided: the device is a frictionless finger that can push the object in one direction and cannot pull it.
+    /// One-sided contact: the device is a frictionless finger that can push the object in one direction and cannot pull it.
     ///
     /// While the device is past the object's surface in that direction (s·(xH − xO) > 0 with s = ±1) the force along it is
     /// max(0, s·(KC·(xH − xO) + BC·(vH − vO))); otherwise, and on the other axes, it is zero.
@@ -108,7 +108,7 @@ pub enum Contact {
 }
 
 impl Contact {
-    /// FC along an axis \[N\], through a coupling KC and BC, of a device with the motion `apart` relative to the copy: xH − xO and vH − vO.
+    /// Returns FC along an axis \[N\], through a coupling KC and BC, of a device with the motion `apart` relative to the copy: xH − xO and vH − vO.
     #[must_use]
     #[inline(always)]
     pub fn force_along(self, axis: usize, coupling: &Gains, apart: Motion) -> f64 {
@@ -116,11 +116,13 @@ impl Contact {
             Self::None => 0.0,
             Self::Grasp => grasp(coupling, apart),
             Self::Push(direction) => {
+                // In coordinates that point in the direction of the push, every finger pushes towards plus.
                 let sign = if direction.positive { 1.0 } else { -1.0 };
                 let inwards = Motion { position: sign * apart.position, velocity: sign * apart.velocity };
                 if axis != direction.axis || inwards.position <= 0.0 {
                     return 0.0;
                 }
+                // A finger that leaves fast would be pulled back by the damper; a contact can only push.
                 sign * grasp(coupling, inwards).max(0.0)
             }
         }
@@ -130,8 +132,8 @@ impl Contact {
 /// A direction along an axis: `+x`, `-z`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Direction {
-    /// The axis, 0 for x, 1 for y, 2 for z.
+    /// Index of the axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// Towards larger coordinates.
+    /// Whether the direction points towards larger coordinates.
     pub positive: bool,
 }

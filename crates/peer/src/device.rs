@@ -1,4 +1,4 @@
-//! Haptic devices: the trait, and the simulated device with the hand that moves it.
+//! Haptic devices: the trait, and a simulated device in a simulated hand.
 
 use alloc::boxed::Box;
 use core::time::Duration;
@@ -9,14 +9,14 @@ use crate::stepper::Stepper;
 use crate::tick::on_device;
 use crate::{ArmConfig, Clock, DeviceConfig, Hand, Integrator, Plant, Signal, State};
 
-/// What a peer needs of a haptic device, simulated or real.
+/// A haptic device, simulated or real, as a peer uses it.
 pub trait Device<const A: usize> {
-    /// Position and velocity of the device at the present tick. It is asked several times a tick and must give the same answer each time.
+    /// Returns position and velocity of the device at the present tick. A peer asks several times per tick, and every answer of a tick must be the same.
     fn state(&self) -> State<A>;
 
-    /// Holds the coupling force FC, which the device feels with the opposite sign, from `now` until the next tick, `span` later.
+    /// Holds the coupling force FC \[N\], which acts on the device with the opposite sign, from `now` until the next tick, `span` later.
     ///
-    /// A simulated device moves there. A real one sends the force to its motors and reads its state when it is next asked.
+    /// A simulated device moves to the next tick. A real device sends the force to its motors, and reads its state at the next call of [`Device::state`].
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]);
 }
 
@@ -30,10 +30,10 @@ impl<const A: usize, D: Device<A> + ?Sized> Device<A> for Box<D> {
     }
 }
 
-/// A device that nobody moves and that touches nothing: it stays where it is.
+/// A device at a fixed position: no hand moves the device, and forces have no effect.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RestingDevice<const A: usize> {
-    /// Where it is.
+    /// Position of the device \[m\].
     pub position: [f64; A],
 }
 
@@ -55,20 +55,23 @@ pub struct SimulatedDevice<const A: usize> {
     hand: HandForce<A>,
 }
 
-/// The force of the hand that is held over a tick. The rest of an arm is part of the plant: see [`DeviceConfig::plant`].
+/// Force of the hand that is held over a tick. Mass, spring and damper of an arm are part of the plant: see [`DeviceConfig::plant`].
 #[derive(Clone, Debug)]
 pub struct HandForce<const A: usize>(Kind<A>);
 
 #[derive(Clone, Debug)]
 enum Kind<const A: usize> {
+    /// A constant force \[N\]. No signal is evaluated at the ticks.
     Constant([f64; A]),
+    /// A force \[N\] as a function of time.
     Force(Signal),
+    /// The force of an arm's spring and damper at the wanted motion.
     Arm { arm: ArmConfig, follows: Signal },
 }
 
 impl DeviceConfig {
-    /// The device with the arm that holds it, if the hand is one: the arm's mass moves with the device; its spring and damper end at the wanted motion, which
-    /// enters as a held force.
+    /// Returns the plant of the device with the arm that holds it, if the hand is an arm. The arm's mass moves with the device. The arm's spring and damper
+    /// end at the wanted motion, which acts as a held force.
     #[must_use]
     pub fn plant(self, hand: Option<&Hand>) -> Plant {
         let arm = hand.and_then(Hand::arm).unwrap_or(ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 });
@@ -77,36 +80,37 @@ impl DeviceConfig {
 }
 
 impl<const A: usize> SimulatedDevice<A> {
-    /// A device in that state with that hand; `None` is no hand.
+    /// Returns a device in the state `state` with the hand `hand`; `None` without a hand.
     #[must_use]
     pub fn new(device: DeviceConfig, hand: Option<&Hand>, state: State<A>, integrator: Integrator, clock: &Clock) -> Self {
         Self { state, stepper: Stepper::new(device.plant(hand), integrator, clock), hand: HandForce::of(hand) }
     }
 
-    /// Puts the device into that state.
+    /// Sets position and velocity of the device.
     pub const fn set_state(&mut self, state: State<A>) {
         self.state = state;
     }
 
-    /// Changes what the hand does. An arm stays the arm that the device was made with; only its wanted motion changes.
+    /// Sets the hand. An arm stays the arm with which the device was made; only its wanted motion changes.
     pub fn set_hand(&mut self, hand: Option<&Hand>) {
         self.hand = HandForce::of(hand);
     }
 }
 
 impl<const A: usize> HandForce<A> {
-    /// The force of that hand; `None` is no hand.
+    /// Returns the force of a hand; zero for `None`.
     #[must_use]
     pub fn of(hand: Option<&Hand>) -> Self {
         Self(match hand {
             None => Kind::Constant([0.0; A]),
+            // A constant signal is evaluated here once, and costs nothing at the ticks.
             Some(Hand::Force(signal)) if signal.is_constant() => Kind::Constant(signal.value(Instant::ZERO)),
             Some(Hand::Force(signal)) => Kind::Force(signal.clone()),
             Some(Hand::Arm { arm, follows }) => Kind::Arm { arm: *arm, follows: follows.clone() },
         })
     }
 
-    /// The force, if it is the same at all times.
+    /// Returns the force \[N\] if it is constant.
     #[must_use]
     pub const fn constant(&self) -> Option<[f64; A]> {
         match &self.0 {
@@ -115,19 +119,21 @@ impl<const A: usize> HandForce<A> {
         }
     }
 
-    /// The force that is held from that instant over a tick \[N\].
+    /// Returns the force \[N\] held over the tick from `now` on.
     #[must_use]
     #[inline(always)]
     pub fn at(&self, now: Instant) -> [f64; A] {
         if let Kind::Constant(force) = &self.0 { *force } else { self.varying(now) }
     }
 
+    /// Returns a force that depends on time \[N\]. Not inlined, so that the tick of a constant hand stays short.
     #[inline(never)]
     fn varying(&self, now: Instant) -> [f64; A] {
         match &self.0 {
             Kind::Constant(force) => *force,
             Kind::Force(signal) => signal.value(now),
             Kind::Arm { arm, follows } => {
+                // Stiffness and damping of the arm already act in the plant, so only the wanted motion is left here.
                 let (wanted, speed) = (follows.value::<A>(now), follows.slope::<A>(now));
                 core::array::from_fn(|axis| arm.stiffness * wanted[axis] + arm.damping * speed[axis])
             }

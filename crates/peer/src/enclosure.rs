@@ -19,22 +19,23 @@ pub struct Enclosure {
 }
 
 impl Enclosure {
-    /// The force of the walls on an object in that state \[N\]; zero inside.
+    /// Returns the force of the walls on an object in the state `object` \[N\]; zero inside.
     #[must_use]
     pub fn force<const A: usize>(&self, object: &State<A>) -> [f64; A] {
         core::array::from_fn(|axis| self.force_along(axis, object.position[axis], object.velocity[axis]))
     }
 
-    /// The force of the walls of one axis on an object there \[N\], at `x` \[m\] and with `v` [m/s].
+    /// Returns the force of the walls of `axis` \[N\] on an object at `x` \[m\] with the velocity `v` [m/s].
     #[must_use]
     #[inline]
     pub fn force_along(&self, axis: usize, x: f64, v: f64) -> f64 {
+        // Depth and force have the sign of the axis: positive beyond the upper end, negative beyond the lower end.
         let push = |depth: f64| self.stiffness * depth + self.damping * v;
         if x > self.max[axis] {
-            // Pushes down only.
+            // A wall at the upper end pushes down only.
             -push(x - self.max[axis]).max(0.0)
         } else if x < self.min[axis] {
-            // Pushes up only.
+            // A wall at the lower end pushes up only.
             -push(x - self.min[axis]).min(0.0)
         } else {
             0.0
@@ -55,9 +56,10 @@ mod tests {
     #[test]
     fn a_wall_pushes_back_and_never_pulls() {
         assert_eq!(force(0.0, 9.0).abs(), 0.0);
+        // 10 mm beyond the upper end and 20 mm beyond the lower end, at 1000 N/m.
         assert!((force(0.04, 0.0) + 10.0).abs() < 1e-12);
         assert!((force(-0.04, 0.0) - 20.0).abs() < 1e-12);
-        // Leaving fast: the damper would pull, the wall does not.
+        // The object leaves fast: a damper alone would pull, the wall does not.
         assert_eq!(force(0.031, -5.0).abs(), 0.0);
         assert_eq!(force(-0.021, 5.0).abs(), 0.0);
     }

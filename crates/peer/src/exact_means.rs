@@ -5,14 +5,15 @@ use alloc::vec::Vec;
 use crate::State;
 use crate::exact_sum::ExactSum;
 
-/// Sums of states without any rounding, and their means.
+/// Exact sums of states, and means that round once.
 #[derive(Clone, Debug, Default)]
 pub struct ExactMeans<const A: usize> {
+    /// Sums of position and of velocity, indexed by axis.
     sums: Vec<[ExactSum; 2]>,
 }
 
 impl<const A: usize> ExactMeans<A> {
-    /// The sums of these states.
+    /// Returns the sums of `states`.
     pub fn new<'a>(states: impl IntoIterator<Item = &'a State<A>>) -> Self {
         let mut means = Self { sums: (0..A).map(|_| Default::default()).collect() };
         for state in states {
@@ -24,7 +25,7 @@ impl<const A: usize> ExactMeans<A> {
         means
     }
 
-    /// One state takes the place of another.
+    /// Replaces the state `before`, which must be among the summed states, by `now`.
     #[inline]
     pub fn replace(&mut self, before: &State<A>, now: &State<A>) {
         for (axis, [position, velocity]) in self.sums.iter_mut().enumerate() {
@@ -33,13 +34,13 @@ impl<const A: usize> ExactMeans<A> {
         }
     }
 
-    /// The mean of that number of states.
+    /// Returns the mean of `count` states, which is the number of summed states.
     #[must_use]
     pub fn mean(&self, count: usize) -> State<A> {
         self.each(count, |_, sum, count| sum.mean(count))
     }
 
-    /// The mean of that number of states without one of them.
+    /// Returns the mean of the `count` states that remain without `state`.
     #[must_use]
     pub fn mean_without(&self, state: &State<A>, count: usize) -> State<A> {
         self.each(count, |number, sum, count| sum.mean_without(number(state), count))

@@ -1,4 +1,4 @@
-//! Means that do not depend on the order of what they are the mean of.
+//! Exact sums of binary64 numbers, and means that do not depend on the order of their numbers.
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
@@ -9,22 +9,24 @@
 
 /// Bits of a digit.
 const BITS: u32 = 32;
-/// Digits that hold any number and the carries above: bit 0 of digit [`FRACTION`] is the least bit of the smallest number, 2^−1074.
+/// Number of digits, enough for any binary64 number and the carries above. Bit 0 of digit [`FRACTION`] is the least bit of the smallest number, 2^−1074.
 const DIGITS: usize = 71;
-/// Digits below all numbers, for the fraction of a mean.
+/// Number of digits below all binary64 numbers. Only the quotient of a mean uses them.
 const FRACTION: usize = 3;
-/// After this number of additions digits must be carried.
+/// Number of additions after which digits must be carried: an addition changes a digit by less than 2³², so 2³⁰ additions stay below 2⁶².
 const MOST_ADDITIONS: u32 = 1 << 30;
 
-/// A sum of numbers without any rounding, from which numbers can be taken away again.
+/// A sum of binary64 numbers without rounding, from which numbers can be subtracted again.
 ///
-/// Each number is added to the three digits of base 2³² that it reaches, in an integer that holds all finite numbers (the small superaccumulator of Neal 2015,
-/// *Fast exact summation using small and large superaccumulators*). So the sum is that of any order, and [`ExactSum::mean`] rounds once.
+/// Each number is added to three digits of base 2³² in an integer that can hold all finite numbers (the small superaccumulator of Neal 2015, *Fast exact
+/// summation using small and large superaccumulators*). The sum is therefore the same in any order, and [`ExactSum::mean`] rounds once.
 #[derive(Clone, Debug)]
 pub struct ExactSum {
+    /// Digits of base 2³² with signs, the least digit first. Between two carries a digit may exceed its base.
     digits: [i64; DIGITS],
-    /// The first digit ever reached, and the one behind the last.
+    /// First digit ever changed, and the digit after the last digit ever changed.
     reached: (u8, u8),
+    /// Additions since the last carry.
     additions: u32,
 }
 
@@ -35,28 +37,28 @@ impl Default for ExactSum {
 }
 
 impl ExactSum {
-    /// Zero.
+    /// Returns a sum of zero.
     #[must_use]
     pub const fn new() -> Self {
         Self { digits: [0; DIGITS], reached: (DIGITS as u8, 0), additions: 0 }
     }
 
-    /// Adds a finite number; of anything else the sum is unspecified.
+    /// Adds a finite number. After an infinite number or a NaN the sum is unspecified.
     #[inline]
     pub fn add(&mut self, number: f64) {
         self.change(number.to_bits());
     }
 
-    /// Takes a finite number away.
+    /// Subtracts a finite number.
     #[inline]
     pub fn subtract(&mut self, number: f64) {
         self.change((-number).to_bits());
     }
 
-    /// A finite number takes the place of another: [`ExactSum::subtract`] and [`ExactSum::add`], which two numbers near each other need once.
+    /// Subtracts the finite number `before` and adds the finite number `now`. Two close numbers need one change of digits instead of two.
     ///
-    /// The difference of such numbers is a number itself (Sterbenz 1974), and the error of any difference is found by [Knuth's][1] six operations. Additions to
-    /// the digits that the one before has changed wait for it, so that half of them took 5 % off the time of a thousand peers.
+    /// The difference of close numbers is exact (Sterbenz 1974), and six operations compute the error of any difference ([Knuth's 2Sum][1]). A second change
+    /// of the same digits must wait for the first one to be stored, so one change per replacement is preferred.
     ///
     /// [1]: https://en.wikipedia.org/wiki/2Sum
     #[inline]
@@ -67,19 +69,22 @@ impl ExactSum {
         if error == 0.0 {
             self.change(difference.to_bits());
         } else {
-            // Also where the difference is no finite number.
+            // A rounded difference takes two changes. A difference that overflows has a NaN as its error, and comes here too.
             self.subtract(before);
             self.add(now);
         }
     }
 
+    /// Adds the finite number with the bits `bits` to its three digits.
     #[inline]
     fn change(&mut self, bits: u64) {
+        // Fields of binary64: one bit of sign, 11 bits of exponent, 52 bits of mantissa. Normal numbers have a hidden bit.
         let exponent = ((bits >> 52) & 0x7ff) as usize;
         let mantissa = (bits & ((1 << 52) - 1)) | (u64::from(exponent != 0) << 52);
-        // The place of the least bit: numbers below the normal ones have that of the smallest normal one.
+        // Place of the least bit, from 2^−1074. Subnormal numbers have the place of the smallest normal number.
         let place = exponent.max(1) - 1;
         let (digit, shift) = (place / BITS as usize + FRACTION, place % BITS as usize);
+        // 53 bits shifted by at most 31 fill at most 84 bits, which are three digits.
         let wide = u128::from(mantissa) << shift;
         let sign = 1 - 2 * (bits >> 63).cast_signed();
         for (part, digit) in self.digits[digit..digit + 3].iter_mut().enumerate() {
@@ -92,21 +97,23 @@ impl ExactSum {
         }
     }
 
-    /// Brings every digit but the last back below 2³².
+    /// Reduces every digit except the last to 0 ≤ digit < 2³².
     #[cold]
     fn carry(&mut self) {
+        // A carry can pass beyond the last changed digit, so the loop goes to the end.
         let (first, end) = (usize::from(self.reached.0), DIGITS - 1);
         for digit in first..end {
+            // The arithmetic shift rounds down, so the rest is not negative.
             let carried = self.digits[digit] >> BITS;
             self.digits[digit] -= carried << BITS;
             self.digits[digit + 1] += carried;
         }
         self.reached.1 = DIGITS as u8;
-        // Each digit is as large as one addition makes it.
+        // Each digit now has the size of a digit after a single addition.
         self.additions = 1;
     }
 
-    /// The nearest number to the sum over `count`, of two the even one. Zero has the sign +.
+    /// Returns the binary64 number nearest to the sum divided by `count`; the even one of two equally near numbers. Zero has the sign +.
     ///
     /// # Panics
     ///
@@ -115,10 +122,13 @@ impl ExactSum {
     pub fn mean(&self, count: u32) -> f64 {
         assert!(count > 0, "a mean is one of something");
         let Some((digits, is_negative)) = self.magnitude() else { return 0.0 };
+        // Digits below FRACTION are zero, so the most significant digit is at FRACTION or above, and `top - 3` does not underflow.
         let top = (FRACTION..DIGITS).rev().find(|digit| digits[*digit] != 0).unwrap_or(FRACTION);
-        // Long division. The first digit of the quotient may be zero, the second is not then: four have more bits than a number and a half.
+        // Long division by four digits. The first digit of the quotient can be zero, but then the second digit is not: four digits have more bits than a
+        // mantissa of 53 bits and a rounding bit.
         let (mut rest, mut quotient, last) = (0_u64, 0_u128, top - 3);
         for digit in (last..=top).rev() {
+            // `rest` is below `count`, so the dividend fits into 64 bits and the quotient digit into 32.
             let dividend = rest << BITS | u64::from(digits[digit]);
             quotient = quotient << BITS | u128::from(dividend / u64::from(count));
             rest = dividend % u64::from(count);
@@ -128,7 +138,7 @@ impl ExactSum {
         if is_negative { -magnitude } else { magnitude }
     }
 
-    /// [`ExactSum::mean`] of the sum without one of its numbers.
+    /// Returns [`ExactSum::mean`] of the `count` numbers that remain without `number`.
     #[must_use]
     pub fn mean_without(&self, number: f64, count: u32) -> f64 {
         let mut others = self.clone();
@@ -136,10 +146,10 @@ impl ExactSum {
         others.mean(count)
     }
 
-    /// The digits of the absolute value, each below 2³², and the sign; `None` if it is zero.
+    /// Returns the digits of the absolute value, each below 2³², and whether the sum is negative; `None` for a sum of zero.
     fn magnitude(&self) -> Option<([u32; DIGITS], bool)> {
         let (first, end) = (usize::from(self.reached.0), usize::from(self.reached.1));
-        // The carry out of the last digit says the sign.
+        // The carry out of the last digit is negative exactly for a negative sum.
         let carry = self.digits.get(first..end)?.iter().fold(0, |carry, digit| (digit + carry) >> BITS);
         let sign = if carry < 0 { -1 } else { 1 };
         let (mut digits, mut carry, mut all) = ([0; DIGITS], 0_i64, 0);
@@ -147,6 +157,7 @@ impl ExactSum {
             if place >= end && carry == 0 {
                 break;
             }
+            // The sign makes the number positive before the carries, so every digit ends below the base.
             let sum = sign * sum + carry;
             *digit = sum as u32;
             carry = sum >> BITS;
@@ -156,18 +167,20 @@ impl ExactSum {
     }
 }
 
-/// The number nearest to `quotient` and a bit more, if there is more, where bit 0 of the quotient is bit 0 of that digit.
+/// Returns the binary64 number nearest to `quotient`, plus a remainder below its bit 0 if `is_more`. Bit 0 of the quotient is bit 0 of the digit `digit`.
 fn nearest(quotient: u128, digit: usize, is_more: bool) -> f64 {
-    // The exponents of the least bit of the quotient and of the result.
+    // Exponents of the least bit of the quotient and of the result.
     let least = (BITS as i32) * (digit as i32 - FRACTION as i32) - 1074;
     let bits = 128 - quotient.leading_zeros() as i32;
+    // Subnormal results keep the least bit 2^−1074 and have fewer than 53 bits.
     let unit = (least + bits - 53).max(-1074);
     let shift = unit - least;
     let (mantissa, cut) = (quotient >> shift, quotient & ((1 << shift) - 1));
     let half = 1_u128 << (shift - 1);
+    // Round half to even. A remainder below the quotient makes a half more than a half.
     let is_up = cut > half || cut == half && (is_more || mantissa & 1 == 1);
     let mantissa = (mantissa + u128::from(is_up)) as u64;
-    // Both factors and the product are exact.
+    // Both factors and their product are exact.
     let power = if unit >= -1022 { ((unit + 1023) as u64) << 52 } else { 1 << (unit + 1074) };
     mantissa as f64 * f64::from_bits(power)
 }
@@ -186,7 +199,7 @@ mod tests {
         sum
     }
 
-    /// A number as a multiple of 2^−90, which those of the test are.
+    /// Returns a number as a multiple of 2^−90. The numbers of the test are such multiples.
     fn units(number: f64) -> i128 {
         let scaled = number * 2_f64.powi(45);
         // Two steps, since a whole number beyond 2^63 is exact as an i128 only if the number is.
@@ -195,7 +208,7 @@ mod tests {
     }
 
     proptest! {
-        /// No other number is nearer to the exact mean: multiples of 2^−30 below 2^30, whose sum and mean are whole in units of 2^−90.
+        /// No other number is nearer to the exact mean. The inputs are multiples of 2^−30 below 2^30, whose sum and mean are whole in units of 2^−90.
         #[test]
         fn a_mean_is_the_nearest_number(numbers in prop::collection::vec(-(1_i64 << 60)..1 << 60, 1..50), cuts in 0..60_u32) {
             let numbers: Vec<f64> = numbers.iter().map(|number| (number >> cuts) as f64 * 2_f64.powi(-30)).collect();
@@ -210,7 +223,7 @@ mod tests {
             prop_assert!(mean != 0.0 || exact == 0);
         }
 
-        /// Any finite numbers in any order, with others that came and went: the same bits.
+        /// Any finite numbers in any order, with other numbers added and subtracted before, give the same bits.
         #[test]
         fn the_order_and_the_past_do_not_matter(
             numbers in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO, 1..40),
@@ -232,7 +245,7 @@ mod tests {
             prop_assert_eq!(other.mean_without(1.5, count).to_bits(), mean.to_bits());
         }
 
-        /// Of equal numbers it is that number, of a number and its opposite zero.
+        /// The mean of equal numbers is that number. The mean of a number and its opposite is zero.
         #[test]
         fn the_mean_of_equal_numbers_is_that_number(number in prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL, count in 1..200_u32) {
             let mut sum = sum_of(&Vec::from_iter((0..count).map(|_| number)));
@@ -245,7 +258,7 @@ mod tests {
     }
 
     proptest! {
-        /// Numbers near each other, of which most differences are exact, and others of which none is.
+        /// Pairs of close numbers, whose differences are mostly exact, and pairs of distant numbers, whose differences never are.
         #[test]
         fn a_number_takes_the_place_of_another(pairs in prop::collection::vec((-1e3..1e3_f64, -1.0..1.0_f64, -60..4_i32), 1..40)) {
             let near = |(number, part, power): &(f64, f64, i32)| number + part * 2_f64.powi(*power);

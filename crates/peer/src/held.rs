@@ -1,4 +1,7 @@
-//! The newest sample from each of the other peers, and their mean.
+//! Newest sample of each sender, and the mean of these samples.
+//!
+//! In: decoded samples. Out: held states, their mean, and the mean lead of extrapolated samples. This module does not know the own state of the holder except
+//! in `Held::refresh_around`.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -9,50 +12,51 @@ use crate::State;
 use crate::exact_means::ExactMeans;
 use crate::lead::{Lead, Moving};
 
-/// What a peer knows of the others: per sender, the sample with the highest sequence number that has arrived.
+/// Knowledge of a peer about the other peers: per sender, the arrived sample with the highest sequence number.
 ///
-/// Before anything has arrived from a sender it holds the sender's initial state. The mean is kept until a sample changes it.
+/// Until the first arrival, the initial state of a sender is held. The mean is stored until a sample changes it.
 ///
-/// Of fewer than [`EXACT_FROM`] samples it is a sum in a fixed order over their number; of more it is the exact mean, rounded once ([`ExactSum`](crate::ExactSum)), and takes a
-/// time that does not grow with their number.
+/// Below [`EXACT_FROM`] samples the mean is a sum in a fixed order, divided by the number of samples. From [`EXACT_FROM`] samples on it is the exact mean,
+/// rounded once ([`ExactSum`](crate::ExactSum)), and an update takes a time that does not grow with the number of samples.
 #[derive(Clone, Debug)]
 pub struct Held<const A: usize> {
+    /// Held samples, indexed by place: the senders in the order of peers, without the holder.
     samples: Vec<HeldSample<A>>,
     mean: State<A>,
-    /// The sums of the samples, from [`EXACT_FROM`] samples on.
+    /// Exact sums of the samples; `None` below [`EXACT_FROM`] samples.
     sums: Option<Box<ExactMeans<A>>>,
-    /// How each sample moves on while it is held, if anybody asks for it.
+    /// Extrapolation of the samples; `None` unless [`Held::keep_ages`] was called.
     motions: Option<Motions<A>>,
-    /// The senders, if they are not all others with equal weights.
+    /// Senders and weights; `None` if the holder hears all other peers with equal weights.
     heard: Option<Box<Heard>>,
-    /// Places of the senders from which the last number of all has come. [`HeldSample::next`] cannot say that nothing is newer.
+    /// Places of the senders whose sample 2⁶⁴ − 1 has arrived. [`HeldSample::next`] has no number above this sample.
     ended: Vec<usize>,
 }
 
-/// Senders that are some of the others, or differ in weight.
+/// Senders of a holder that hears only some peers, or gives different weights.
 #[derive(Clone, Debug)]
 struct Heard {
-    /// Their places in the session, in order.
+    /// Places of the senders in the session, in ascending order.
     senders: Vec<u32>,
-    /// By what their states are multiplied; empty if by nothing.
+    /// Factors on the held states, indexed by place; empty if all weights are equal.
     weights: Vec<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct HeldSample<const A: usize> {
     state: State<A>,
-    /// The lowest sequence number that is newer than the sample held.
+    /// Lowest sequence number that counts as newer than the held sample.
     next: u64,
 }
 
-/// How the samples move on while they are held.
+/// Extrapolation of the held samples.
 #[derive(Clone, Debug)]
 struct Motions<const A: usize> {
-    /// Up to which age \[s\].
+    /// Greatest age to which a sample is extrapolated \[s\].
     horizon: f64,
     samples: Vec<Moving<A>>,
     lead: Lead<A>,
-    /// The lead as of the last [`Held::move_on`].
+    /// Lead at the last [`Held::move_on`] \[m\].
     now: [f64; A],
 }
 
@@ -63,14 +67,14 @@ impl<const A: usize> Motions<A> {
     }
 }
 
-/// From that number of samples on their mean is exact but for one rounding.
+/// Number of samples from which the mean is exact except for one rounding.
 ///
-/// A sum in a fixed order takes a time that grows with their number, and binds every engine to that order. Below this number it takes less time than
-/// exact sums do.
+/// A sum in a fixed order takes a time that grows with the number of samples, and every engine must then use the same order. With fewer samples than this
+/// constant, the fixed order takes less time than exact sums.
 pub const EXACT_FROM: usize = 256;
 
 impl<const A: usize> Held<A> {
-    /// Holds the initial state of each other peer, in the order of the peers with the holder left out.
+    /// Returns the initial states of all other peers as held samples, in the order of the peers without the holder.
     #[must_use]
     pub fn new(initial: impl IntoIterator<Item = State<A>>) -> Self {
         let samples: Vec<_> = initial.into_iter().map(|state| HeldSample { state, next: 0 }).collect();
@@ -80,8 +84,9 @@ impl<const A: usize> Held<A> {
         held
     }
 
-    /// Holds the initial states of some of the other peers, with their places in the session, in order. `weights`, over their mean, are those of a weighted mean;
-    /// `None`: all are equal. States are held times their weights, so that their mean is the weighted one.
+    /// Returns the initial states of some other peers as held samples. `initial` contains the places of these peers in the session, in ascending order.
+    /// `weights` are the weights of a weighted mean, each already divided by the mean weight; `None` gives equal weights. Each state is held times its
+    /// weight, so that the plain mean of held states is the weighted mean.
     #[must_use]
     pub fn of_some(initial: impl IntoIterator<Item = (u32, State<A>)>, weights: Option<Vec<f64>>) -> Self {
         let (senders, states): (Vec<u32>, Vec<State<A>>) = initial.into_iter().unzip();
@@ -92,91 +97,97 @@ impl<const A: usize> Held<A> {
         held
     }
 
-    /// The place of a peer of the session among those held by the one in the place `own`; `None` if it is not heard.
+    /// Returns the index of the sender `sender` among the samples held by the peer `own`, both places in the session; `None` for a sender that the holder
+    /// does not hear.
     #[inline(always)]
     pub(crate) fn place_of(&self, sender: u32, own: u32) -> Option<usize> {
         if let Some(heard) = &self.heard {
             return heard.senders.binary_search(&sender).ok();
         }
         let (sender, own) = (sender as usize, own as usize);
+        // Without `heard` all other peers are held in order, so places above the own place move down by one.
         let place = if sender < own { sender } else { sender.wrapping_sub(1) };
         (sender != own && place < self.samples.len()).then_some(place)
     }
 
-    /// A state as it is held.
+    /// Returns a state times the weight of its sender.
     #[inline]
     fn weighed(&self, place: usize, state: State<A>) -> State<A> {
         let weight = self.heard.as_ref().and_then(|heard| heard.weights.get(place));
         weight.map_or(state, |weight| state.times(*weight))
     }
 
-    /// Keeps send times and velocities for [`Held::lead`] from now on, for samples that move on up to an age of `horizon` \[s\]: the samples held so far count as sampled at the instant 0 of their senders' clocks.
+    /// Keeps send times and velocities for [`Held::lead`] from now on. Samples are extrapolated up to an age of `horizon` \[s\]. The samples held so far
+    /// count as sampled at the instant 0 of their senders' clocks.
     pub fn keep_ages(&mut self, horizon: f64) {
         let moving = |sample: &HeldSample<A>| Moving { sent: Instant::ZERO, velocity: sample.state.velocity };
         self.motions = Some(Motions { horizon, samples: self.samples.iter().map(moving).collect(), lead: Lead::STALE, now: [0.0; A] });
     }
 
-    /// Samples move on up to an age of `horizon` \[s\] from now on, if [`Held::keep_ages`] was called.
+    /// Sets the greatest age `horizon` \[s\] of extrapolation from now on. No effect unless [`Held::keep_ages`] was called.
     pub(crate) fn set_horizon(&mut self, horizon: f64) {
         if let Some(motions) = self.motions.as_mut().filter(|motions| motions.horizon.to_bits() != horizon.to_bits()) {
             (motions.horizon, motions.lead) = (horizon, Lead::STALE);
         }
     }
 
-    /// How many other peers are heard.
+    /// Returns the number of senders.
     #[must_use]
     pub fn len(&self) -> usize {
         self.samples.len()
     }
 
-    /// Whether no other peer is heard.
+    /// Returns whether there is no sender.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
 
-    /// The state held from the sender in that place, times its weight if weights differ; `None` beyond the last.
+    /// Returns the state held for the sender with index `place`, times its weight if weights differ; `None` beyond the last sender.
     #[must_use]
     pub fn state(&self, place: usize) -> Option<&State<A>> {
         self.samples.get(place).map(|sample| &sample.state)
     }
 
-    /// The mean of the states held, as of the last [`Held::refresh`]; at rest at the origin if there is no other peer.
+    /// Returns the mean of the held states, as of the last [`Held::refresh`]; [`State::REST`] without other peers.
     #[must_use]
     pub fn mean(&self) -> &State<A> {
         &self.mean
     }
 
-    /// The holder's own clock shows `now`: samples have moved on since they were sent.
+    /// Extrapolates the samples to the time `now` on the holder's own clock.
     pub fn move_on(&mut self, now: Instant) {
         let Some(motions) = &mut self.motions else { return };
+        // The lead is linear in time until a sample reaches its send time or its horizon. A new sum is needed only then.
         if !motions.lead.holds_at(now) {
             motions.lead = Lead::of(motions.samples.iter().copied(), now, motions.horizon);
         }
         motions.now = motions.lead.at(now);
     }
 
-    /// By how much the samples held have moved on since they were sent, on average, as of the last [`Held::move_on`] \[m\]: the mean of
-    /// min(age, horizon)·velocity. Zero unless [`Held::keep_ages`] was called.
+    /// Returns the mean lead of the held samples as of the last [`Held::move_on`] \[m\]: the mean of min(age, horizon)·velocity. Zero unless
+    /// [`Held::keep_ages`] was called.
     #[must_use]
     pub fn lead(&self) -> [f64; A] {
         self.motions.as_ref().map_or([0.0; A], |motions| motions.now)
     }
 
-    /// Takes in a sample that was sent at `sent` on its sender's clock if it is newer than the one held, and says whether it was: a late or repeated sample
-    /// changes nothing.
+    /// Takes in a sample sent at `sent` on its sender's clock, and returns whether it is newer than the held sample. A late or repeated sample changes
+    /// nothing.
     ///
-    /// Call [`Held::refresh`] before the mean is used again.
+    /// [`Held::refresh`] must be called before the next use of the mean.
     ///
     /// # Panics
     ///
-    /// If there is no sender in that place.
+    /// If the index `place` is out of range.
     #[inline]
     pub fn accept(&mut self, place: usize, sequence: u64, sent: Instant, state: State<A>) -> bool {
+        // Sequence number 2^64 − 1 has no successor for `next`, so `ended` notes its arrival.
         let newer = sequence >= self.samples[place].next && (sequence < u64::MAX || self.take_last(place));
         if newer {
             let state = self.weighed(place, state);
             self.replace(place, HeldSample { state, next: sequence.saturating_add(1) });
+            // The lead uses the weighted velocity, as the mean uses the weighted position.
             if let Some(motions) = &mut self.motions {
                 motions.set(place, Moving { sent, velocity: state.velocity });
             }
@@ -184,7 +195,7 @@ impl<const A: usize> Held<A> {
         newer
     }
 
-    /// Whether a sample with the number 2^64 − 1 is the first one from that sender: nothing is newer.
+    /// Returns whether the sample 2⁶⁴ − 1 of this sender arrives for the first time, and notes the arrival. No later sample of the sender is newer.
     #[cold]
     fn take_last(&mut self, place: usize) -> bool {
         let is_first = !self.ended.contains(&place);
@@ -194,11 +205,11 @@ impl<const A: usize> Held<A> {
         is_first
     }
 
-    /// Holds that state, sampled at `sent` on the sender's clock, from that sender, as if nothing had ever arrived from it: any sample is newer.
+    /// Holds `state`, sampled at `sent` on the sender's clock, as if nothing had ever arrived from this sender: any sample is newer.
     ///
     /// # Panics
     ///
-    /// If there is no sender in that place.
+    /// If the index `place` is out of range.
     pub fn hold(&mut self, place: usize, sent: Instant, state: State<A>) {
         let state = self.weighed(place, state);
         self.ended.retain(|ended| *ended != place);
@@ -208,7 +219,7 @@ impl<const A: usize> Held<A> {
         }
     }
 
-    /// Replaces the state held from a sender, whose newest sample stays as new as it was, and the velocity with which it moves on.
+    /// Replaces the state held for a sender, and the velocity of its extrapolation \[m/s\]. Sequence number and send time stay those of the newest sample.
     pub(crate) fn replace_state(&mut self, place: usize, state: State<A>, velocity: [f64; A]) {
         self.replace(place, HeldSample { state, ..self.samples[place] });
         if let Some(motions) = &mut self.motions {
@@ -217,6 +228,7 @@ impl<const A: usize> Held<A> {
     }
 
     #[inline]
+    /// Replaces a held sample, and updates the exact sums.
     fn replace(&mut self, place: usize, sample: HeldSample<A>) {
         if let Some(sums) = &mut self.sums {
             sums.replace(&self.samples[place].state, &sample.state);
@@ -224,7 +236,7 @@ impl<const A: usize> Held<A> {
         self.samples[place] = sample;
     }
 
-    /// [`Held::refresh`] for a mean of the differences from the holder's own state, so that senders that are held exactly there leave exactly that.
+    /// Like [`Held::refresh`], but sums differences from the holder's `own` state, so that senders held exactly at `own` leave the mean exactly at `own`.
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub(crate) fn refresh_around(&mut self, own: &State<A>) {
         let count = self.samples.len() as f64;
@@ -239,10 +251,10 @@ impl<const A: usize> Held<A> {
         }
     }
 
-    /// Computes the mean anew.
+    /// Computes the mean from the held samples.
     ///
-    /// Below [`EXACT_FROM`] samples four partial sums, added in pairs: the same order whatever the machine, a quarter of the latency of one sum, and an error of at most
-    /// (n/4 + 2)·2⁻⁵³·Σ|x|, a quarter of that of one sum.
+    /// Below [`EXACT_FROM`] samples there are four partial sums, added in pairs. The order is the same on every machine, the latency is a quarter of the
+    /// latency of one sum, and the error is at most (n/4 + 2)·2⁻⁵³·Σ|x|, a quarter of the error of one sum.
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub fn refresh(&mut self) {
         if let Some(sums) = &self.sums {
@@ -260,6 +272,7 @@ impl<const A: usize> Held<A> {
             }
         };
         let mut quads = self.samples.chunks_exact(4);
+        // Four independent additions at a time; a remainder of at most three samples goes to the first sums.
         for quad in &mut quads {
             add(0, &quad[0]);
             add(1, &quad[1]);
@@ -271,6 +284,7 @@ impl<const A: usize> Held<A> {
         }
         let count = self.samples.len() as f64;
         let [a, b, c, d] = sums;
+        // Pairs in a fixed order: another order would give other bits.
         let mean = |a: f64, b: f64, c: f64, d: f64| ((a + b) + (c + d)) / count;
         self.mean = State {
             position: core::array::from_fn(|i| mean(a.position[i], b.position[i], c.position[i], d.position[i])),
@@ -307,12 +321,12 @@ mod tests {
         assert!(held.accept(0, u64::MAX, Instant::ZERO, at(2.0)));
         assert!(!held.accept(0, u64::MAX, Instant::ZERO, at(3.0)), "the same number twice");
         assert_eq!(held.state(0), Some(&at(2.0)));
-        // As if nothing had ever arrived.
+        // `hold` resets the sequence numbers, so the sample 2^64 − 1 is new again.
         held.hold(0, Instant::ZERO, at(0.0));
         assert!(held.accept(0, u64::MAX, Instant::ZERO, at(4.0)) && !held.accept(0, u64::MAX, Instant::ZERO, at(5.0)));
     }
 
-    /// Ages 30 ms and, beyond the horizon, 33 ms: (0.030·(−1) + 0.033·(−2))/2; none below zero.
+    /// Ages of 30 ms and, limited by the horizon, 33 ms give (0.030·(−1) + 0.033·(−2))/2. No age is below zero.
     #[test]
     fn samples_move_on_up_to_the_horizon() {
         let at_ms = |ms: u64| Instant::from_nanos(ms * 1_000_000);
@@ -321,25 +335,29 @@ mod tests {
             held.move_on(at_ms(ms));
             held.lead()
         };
+        // Without `keep_ages` there is no lead.
         assert_eq!(lead(&mut held, 10), [0.0]);
         held.keep_ages(0.033);
         held.accept(0, 0, at_ms(10), at(1.0));
         held.hold(1, at_ms(5), at(2.0));
         assert_eq!(lead(&mut held, 40), [-0.048]);
+        // At 1 ms the holder's clock is before both send times, so no sample has moved.
         assert_eq!(lead(&mut held, 1), [0.0]);
         assert!(!held.accept(0, 0, at_ms(39), at(7.0)));
         assert_eq!(lead(&mut held, 40), [-0.048]);
+        // A replaced velocity changes the lead, a stale sample does not.
         held.replace_state(1, at(3.0), [0.0]);
         assert_eq!(lead(&mut held, 40), [-0.015]);
     }
 
-    /// Whatever came before, and in whatever order: the mean of equal states is that state, of others the nearest to theirs.
+    /// The mean of equal states is that state, in any order of arrival and after any earlier samples.
     #[test]
     fn the_mean_of_many_is_exact() {
         let count = EXACT_FROM;
         let value = |place: usize| 0.1 + (place as f64).sin() * 1e-3;
         let mut held = Held::new((0..count).map(|place| at(value(place))));
         let mut reversed = Held::new((0..count).rev().map(|place| at(value(place))));
+        // The sums of both orders are exact, so the means are equal to the bit.
         assert_eq!(held.mean(), reversed.mean());
         for place in 0..count {
             held.accept(place, 0, Instant::ZERO, at(1e9 / (place as f64 + 1.0)));
@@ -352,7 +370,7 @@ mod tests {
         assert_eq!((*held.mean(), *reversed.mean()), (at(0.1), at(0.1)));
     }
 
-    /// Weights 1 and 3: the mean of 0.5·x and 1.5·y, and so are leads; a peer that is not heard has no place.
+    /// Weights 1 and 3 give the mean of 0.5·x and 1.5·y, for states and for leads. A peer that the holder does not hear has no index.
     #[test]
     fn a_weighted_mean_is_that_of_what_states_weigh() {
         let mut held = Held::of_some([(2, at(4.0)), (7, at(8.0))], Some(vec![0.5, 1.5]));

@@ -1,4 +1,4 @@
-//! By how much held samples have moved on since they were sent.
+//! Mean displacement of extrapolated samples since they were sent.
 
 use core::time::Duration;
 
@@ -6,35 +6,38 @@ use cohaptic_units::Instant;
 
 const NANOS_A_SECOND: f64 = 1e9;
 
-/// A sample that moves on while it is held.
+/// An extrapolated sample.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moving<const A: usize> {
-    /// When it was sampled, on the sender's clock.
+    /// Send time on the sender's clock.
     pub sent: Instant,
-    /// How fast it moves on \[m/s\].
+    /// Velocity of the extrapolation \[m/s\].
     pub velocity: [f64; A],
 }
 
-/// The mean of min(age, horizon)·velocity over the samples that a peer holds \[m\].
+/// Mean of min(age, horizon)·velocity over the samples that a peer holds \[m\].
 ///
-/// It is summed over the samples when one of them changes and when one of them begins or ends to move; between these instants it moves by the mean velocity,
-/// so a tick takes as long however many samples there are.
+/// The sum over the samples is computed when a sample changes, and when a sample begins or ends to move. Between these instants the lead grows linearly by
+/// the mean velocity, so a tick takes the same time for any number of samples.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Lead<const A: usize> {
+    /// Instant of the sum, on the holder's clock.
     since: Instant,
+    /// First instant at which a sample begins or ends to move.
     until: Instant,
+    /// Lead at `since` \[m\].
     value: [f64; A],
-    /// How fast it grows, in metres a nanosecond.
+    /// Growth of the lead [m/ns].
     rate: [f64; A],
 }
 
 impl<const A: usize> Lead<A> {
-    /// One that is to be summed before it is used.
+    /// A lead that is valid at no instant, so that the next use computes the sum.
     pub const STALE: Self = Self { since: Instant::ZERO, until: Instant::ZERO, value: [0.0; A], rate: [0.0; A] };
 
-    /// The sum over all samples when the holder's clock shows `now`, with `horizon` \[s\] to the nearest nanosecond. At rest if there are none.
+    /// Sums over all samples at the time `now` on the holder's clock, with `horizon` \[s\] rounded to the nearest nanosecond. Zero without samples.
     ///
-    /// Four partial sums, as in [`crate::Held::refresh`]. Ages are whole nanoseconds, exact below 104 days.
+    /// Sums are four partial sums, as in [`crate::Held::refresh`]. Ages are whole nanoseconds, exact below 104 days.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "ages of held samples and the number of peers are far below 2^53")]
     pub fn of(samples: impl Iterator<Item = Moving<A>>, now: Instant, horizon: f64) -> Self {
@@ -44,8 +47,9 @@ impl<const A: usize> Lead<A> {
         let mut count = 0;
         for Moving { sent, velocity } in samples {
             let end = sent.saturating_add_nanos(horizon);
+            // A sample moves from its send time until the horizon, and stands still before and after.
             let moves = sent <= now && now < end;
-            // One that was sent later than now, by the sender's clock, begins to move then; one that is older than the horizon has stopped.
+            // A sample with a send time after `now` (clocks may differ) begins to move at its send time. A sample older than the horizon has stopped.
             let next = if sent > now { sent } else { end };
             if next > now && next < until {
                 until = next;
@@ -58,19 +62,20 @@ impl<const A: usize> Lead<A> {
             }
             count += 1;
         }
+        // Without samples the sums are zero; a divisor of at least one sample keeps NaN away.
         let divisor = NANOS_A_SECOND * count.max(1) as f64;
         let mean = |[a, b, c, d]: [[f64; A]; 4]| core::array::from_fn(|axis| ((a[axis] + b[axis]) + (c[axis] + d[axis])) / divisor);
         Self { since: now, until, value: mean(led), rate: mean(moved) }
     }
 
-    /// Whether it moves evenly from the instant of its sum to that one.
+    /// Returns whether the lead is linear from the instant of its sum to `now`.
     #[must_use]
     #[inline]
     pub fn holds_at(&self, now: Instant) -> bool {
         self.since <= now && now < self.until
     }
 
-    /// Its value at an instant at which it [holds](Lead::holds_at) \[m\].
+    /// Returns the lead at an instant for which [`Lead::holds_at`] is true \[m\].
     #[must_use]
     #[inline]
     #[expect(clippy::cast_precision_loss, reason = "a lead is summed again long before 2^53 ns")]
@@ -88,8 +93,8 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Followed over ticks it is the mean of min(age, horizon)·velocity, summed sample by sample. Each side rounds every product and every sum: fewer than
-        /// 40 roundings of numbers of at most 2 m/s times a quarter of a second.
+        /// The lead, followed over ticks, is the mean of min(age, horizon)·velocity, summed sample by sample. Each side rounds every product and every sum:
+        /// fewer than 40 roundings of numbers of at most 2 m/s times a quarter of a second.
         #[test]
         fn followed_it_is_the_sum_at_every_tick(
             samples in vec((0..400_u64, -2.0..2.0_f64), 1..20), horizon in 0..250_u64, ticks in vec(1..30_u64, 1..20),

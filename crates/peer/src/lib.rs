@@ -1,14 +1,15 @@
-//! One participant of a networked haptic cooperation, and nothing of how its samples travel.
+//! One participant of a networked haptic cooperation: device, copy of the shared object, coordination law, and wire format of samples.
 //!
-//! You need it if you simulate a peer in your own program, or write a coordination law or a device.
+//! You need it if you simulate a peer in your own program, add a coordination law, or connect a device. The crate has no sockets and no clock: the caller
+//! transports datagrams and passes instants.
 //!
 //! ```text
 //!   hand ──Fh──► device ──FC──► copy of the object ──FT──► coordination ◄── samples of the other peers
 //!                (mH, bH)  KC, BC     (mO, bO)      KT, BT
 //! ```
 //!
-//! The model is that of Rakhsha & Constantinescu (2015), equations (7) to (10). A [`Peer`] owns a [`Device`], its copy of the shared virtual object,
-//! and a coordination [`Strategy`]; both traits are open to other implementations. What happens at one tick, in which order, is written at [`Peer`].
+//! The model is that of Rakhsha & Constantinescu (2015), equations (7) to (10). A [`Peer`] owns a [`Device`], its copy of the shared virtual object, and a
+//! coordination [`Strategy`]. Other crates can implement both traits. The documentation of [`Peer`] lists the steps of a tick in their order.
 //!
 //! Symbols of the paper appear only in the functions that compute its equations:
 //!

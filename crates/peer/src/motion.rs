@@ -12,7 +12,7 @@ pub struct Motion<N = f64> {
 }
 
 impl<N: Number> Motion<N> {
-    /// The motion relative to `other`: the differences of position and velocity.
+    /// Returns the motion relative to `other`: the differences of position and velocity.
     #[must_use]
     #[inline(always)]
     pub fn relative_to(self, other: Self) -> Self {
@@ -21,7 +21,7 @@ impl<N: Number> Motion<N> {
 }
 
 impl<const A: usize> State<A> {
-    /// The motion along one axis.
+    /// Returns the motion along one axis.
     #[must_use]
     #[inline(always)]
     pub const fn along(&self, axis: usize) -> Motion {

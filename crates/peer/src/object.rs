@@ -14,7 +14,7 @@ pub struct ObjectCopy<const A: usize> {
 }
 
 impl CopyConfig {
-    /// The copy on one axis: nothing ties it to ground.
+    /// Returns the plant of the copy along one axis. No spring ties the copy to ground.
     #[must_use]
     pub const fn plant(self) -> Plant {
         Plant { mass: self.mass, damping: self.damping, stiffness: 0.0 }
@@ -22,37 +22,38 @@ impl CopyConfig {
 }
 
 impl<const A: usize> ObjectCopy<A> {
-    /// A copy in that state.
+    /// Returns a copy in the state `state`.
     #[must_use]
     pub fn new(copy: CopyConfig, state: State<A>, integrator: Integrator, clock: &Clock) -> Self {
         Self { state, stepper: Stepper::new(copy.plant(), integrator, clock) }
     }
 
-    /// Where it is and how fast it moves.
+    /// Returns position and velocity of the copy.
     #[must_use]
     #[inline]
     pub const fn state(&self) -> &State<A> {
         &self.state
     }
 
-    /// Puts it into that state.
+    /// Sets position and velocity of the copy.
     pub const fn set_state(&mut self, state: State<A>) {
         self.state = state;
     }
 
-    /// Another damping towards ground [N·s/m], from the next step on.
+    /// Sets the damping towards ground [N·s/m], from the next step on.
     pub(crate) fn set_damping(&mut self, damping: f64) {
         self.stepper.set_damping(damping);
     }
 
-    /// How a force F that is subtracted from `force` moves it over `span`.
+    /// Predicts the motion of the copy over `span`, for a force F that is subtracted from `force` \[N\].
     pub(crate) fn ahead(&self, span: Duration, force: [f64; A]) -> Prediction<A> {
+        // Displacement = by_velocity·v + compliance·(force − F): the position has no effect on a free body.
         let ([[_, by_velocity], _], [compliance, _]) = self.stepper.map(span).coefficients();
         let free = core::array::from_fn(|axis| by_velocity * self.state.velocity[axis] + compliance * force[axis]);
         Prediction { free, compliance }
     }
 
-    /// Moves it over `span` under a held force.
+    /// Moves the copy over `span` under a held force \[N\].
     #[inline]
     pub(crate) fn advance(&mut self, span: Duration, force: [f64; A]) {
         self.stepper.advance(&mut self.state, span, force);

@@ -1,4 +1,7 @@
 //! One participant, tick by tick.
+//!
+//! In: datagrams of other peers, instants, and the state of the device. Out: datagrams of this peer, and the forces of each tick. This module knows neither
+//! how datagrams travel nor how late the packets are.
 
 use alloc::boxed::Box;
 use core::time::Duration;
@@ -11,30 +14,30 @@ use crate::tick::on_object;
 use crate::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
 use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
 
-/// What a peer is, apart from its device, its copy of the object and its strategy.
+/// Parameters of a peer, apart from device, copy of the object and strategy.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PeerConfig {
-    /// The session: samples of another one are refused.
+    /// Number of the session. Samples of other sessions are refused.
     pub session: u64,
-    /// The place of this peer in the session, from 0.
+    /// Place of this peer in the session, counted from 0.
     pub place: u32,
-    /// How many axes a sample has, at most the A of the peer.
+    /// Number of axes in a sample, 1 to 3 and at most the A of the peer.
     pub axes: usize,
-    /// How the device touches the copy.
+    /// Contact between device and copy.
     pub contact: Contact,
-    /// KC and BC.
+    /// Gains KC [N/m] and BC [N·s/m] of the virtual coupling.
     pub coupling: Gains,
-    /// The period of the tick on the peer's own clock, which shows 0 at the first one.
+    /// Period of the tick on the peer's own clock, which shows 0 at the first tick.
     pub tick: Duration,
-    /// Whether forces are applied one tick after they were computed.
+    /// Whether forces have a compute delay: each force acts a tick after its computation.
     pub compute_delay: bool,
-    /// β, by how much the strategy damps the copy [N·s/m]; part of the copy's plant, and of FT on the record.
+    /// β [N·s/m], the damping of the copy by the strategy. Part of the copy's plant, and added to FT in the record.
     pub own_damping: f64,
-    /// The walls around the object, if there are any.
+    /// Walls around the object; `None` without walls.
     pub enclosure: Option<Enclosure>,
 }
 
-/// One participant: a device, a coupling, a copy of the object, and a strategy that ties it to the others.
+/// A participant: a device, a coupling, a copy of the object, and a strategy between this copy and the copies of other peers.
 ///
 /// At each of its ticks the driver calls, in this order,
 ///
@@ -43,37 +46,39 @@ pub struct PeerConfig {
 /// 3. [`Peer::compute`], once,
 /// 4. [`Peer::advance`], once, which moves the peer to its next tick under the forces just computed.
 ///
-/// A peer does not know the time but by the instants it is given, and nothing of how datagrams travel.
+/// A peer has no clock: each step takes the instant from the driver.
 #[derive(Clone, Debug)]
 pub struct Peer<const A: usize, D, S> {
     config: PeerConfig,
     device: D,
     object: ObjectCopy<A>,
     strategy: S,
-    /// What the strategy asks for beyond what every strategy has.
+    /// Answers of the strategy that were asked once, in [`Peer::new`].
     asked: Asked,
     held: Held<A>,
-    /// The part that turns, if the object has an inertia.
+    /// Rotation of copy and device, for an object with an inertia. Boxed, because most scenes do not rotate.
     rotation: Option<Box<Rotation>>,
-    /// Whether a sample has changed since the mean was computed.
+    /// Whether a sample has changed since the last computation of the mean.
     stale_mean: bool,
     next_sequence: u64,
-    /// What the peer's own clock shows.
+    /// Time on the peer's own clock: 0 at the first tick.
     local_time: Instant,
-    /// The period of the tick in nanoseconds, which are counted on at each tick.
+    /// Period of the tick \[ns\], added to `local_time` at each tick.
     tick_nanos: u64,
+    /// Forces computed at the latest tick.
     computed: Acting<A>,
+    /// Forces that act over the present tick: `computed` of this tick, or of the tick before with a compute delay.
     applied: Acting<A>,
 }
 
-/// What a strategy asks for beyond what every strategy has.
+/// Answers of a strategy about its needs beyond position and velocity.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Asked {
     kind: SampleKind,
     role: Role,
     prediction: bool,
     horizon: bool,
-    /// Whether it asks for [`Peer::heard`].
+    /// Whether [`Peer::heard`] has anything to do at a tick.
     any: bool,
 }
 
@@ -85,71 +90,73 @@ impl Asked {
     }
 }
 
-/// The forces that act over a tick: on the device, and in all on the copy.
+/// Forces that act over a tick: FC on the device, and the sum of forces on the copy.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Acting<const A: usize> {
-    /// FC, which the device feels with the opposite sign \[N\].
+    /// FC \[N\]. Acts on the device with the opposite sign.
     pub coupling: [f64; A],
-    /// The sum of all forces on the copy but its own damping: FC − FT and the walls \[N\].
+    /// Sum of all forces on the copy except its own damping \[N\]: FC − FT and the walls.
     pub on_object: [f64; A],
 }
 
-/// The forces computed at a tick, for the record.
+/// Forces computed at a tick, for the record.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Forces<const A: usize> {
     /// FC, the coupling force on the copy \[N\].
     pub coupling: [f64; A],
     /// FT, the coordination force, which acts on the copy with the opposite sign \[N\].
     pub coordination: [f64; A],
-    /// The part of FT that is held over a tick \[N\]: all but what [`PeerConfig::own_damping`] adds.
+    /// Part of FT that is held over a tick \[N\]: FT without the share of [`PeerConfig::own_damping`].
     pub commanded: [f64; A],
-    /// Where the strategy wants the copy to be.
+    /// State to which the strategy draws the copy.
     pub target: State<A>,
 }
 
-/// What became of a sample that was understood.
+/// Effect of a valid sample on the receiver.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Reception {
-    /// It is the newest from its sender and is held from now on.
+    /// The sample is the newest of its sender and is held from now on.
     Newest,
-    /// It is late or repeated: nothing changed.
+    /// The sample is late or repeated. Nothing changed.
     Stale,
 }
 
-/// Why a datagram was refused. Nothing changed.
+/// Reason for the refusal of a datagram. The peer is unchanged.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum ReceiveError {
-    /// It is no sample.
+    /// The datagram is no sample in the format of this session.
     #[error(transparent)]
     Decode(#[from] DecodeError),
-    /// It belongs to another session.
+    /// The sample belongs to another session.
     #[error("a sample of session {found:#x}")]
     Session {
-        /// The session it belongs to.
+        /// Session in the sample.
         found: u64,
     },
-    /// It is for another peer.
+    /// The sample is for another peer.
     #[error("a sample for peer {receiver}")]
     Receiver {
-        /// The receiver that it names.
+        /// Place of the receiver in the sample.
         receiver: u32,
     },
-    /// It is from nobody else in this session.
+    /// The sender is this peer itself, or is no peer of this session that this peer hears.
     #[error("a sample from peer {sender}, which is not another peer of this session")]
     Sender {
-        /// The sender that it names.
+        /// Place of the sender in the sample.
         sender: u32,
     },
 }
 
 impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
-    /// A peer that holds the initial states of the others.
+    /// Returns a peer that holds the initial states `held` of the other peers.
     #[must_use]
     pub fn new(config: PeerConfig, device: D, object: ObjectCopy<A>, strategy: S, mut held: Held<A>) -> Self {
         let none = Acting { coupling: [0.0; A], on_object: [0.0; A] };
+        // Lead and age of samples cost time at each tick, so only a strategy with a horizon pays for them.
         if let Some(horizon) = strategy.horizon() {
             held.keep_ages(horizon);
         }
+        // The answers of the strategy are asked once: calls through a boxed strategy at every tick would repeat them.
         let (asked, local_time) = (Asked::by(&strategy), Instant::ZERO);
         let (rotation, stale_mean, next_sequence) = (None, false, 0);
         let tick_nanos = u64::try_from(config.tick.as_nanos()).unwrap_or(u64::MAX);
@@ -157,7 +164,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         Self { config, device, object, strategy, asked, held, rotation, stale_mean, next_sequence, local_time, tick_nanos, computed, applied }
     }
 
-    /// The peer with a copy that turns, for a strategy that is a law: its samples carry attitudes.
+    /// Adds a rotating copy. The samples of such a peer carry attitudes, so its strategy must be a law without extra numbers.
     #[must_use]
     pub fn with_rotation(mut self, rotation: Rotation) -> Self {
         debug_assert!(self.asked.kind == SampleKind::State, "samples with attitudes have no extra numbers");
@@ -166,13 +173,14 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self
     }
 
-    /// Step 1: writes the sample that this peer sends now into `datagram` and gives its length. `local_time` is what the peer's own clock shows.
+    /// Step 1: writes the present sample of this peer into `datagram` and returns its length \[byte\]. `local_time` is the time on the peer's own clock.
     ///
-    /// For a strategy whose samples are personal, see [`Peer::personal_samples`].
+    /// A strategy with personal samples needs [`Peer::personal_samples`] instead.
     #[inline(always)]
     pub fn sample(&mut self, local_time: Instant, datagram: &mut [u8; MAX_LEN]) -> usize {
         let sample = self.next_sample(local_time);
         let (kind, axes) = (self.asked.kind, self.config.axes);
+        // Laws have no extra numbers, and `Strategy::sent` is not called for them.
         if kind == SampleKind::State {
             return sample.encode(axes, datagram);
         }
@@ -181,12 +189,13 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         sample.encode_as(kind, &extra, axes, datagram)
     }
 
-    /// Step 1 for a strategy whose samples are personal: hands `send` the place of each receiver in the session and the datagram for it, each with a sequence
-    /// number of its own.
+    /// Step 1 for a strategy with personal samples: calls `send` with the place of each receiver in the session and the datagram for this receiver. Each
+    /// datagram has a sequence number of its own.
     pub fn personal_samples(&mut self, local_time: Instant, mut send: impl FnMut(u32, &[u8])) {
         let Self { config: PeerConfig { place, axes, .. }, asked: Asked { kind, role, .. }, .. } = *self;
         let mut datagram = [0; MAX_LEN];
         for (other, receiver) in (0..).filter(|receiver| *receiver != place).take(self.held.len()).enumerate() {
+            // A client talks to its server only.
             if matches!(role, Role::Client { server } if server != other) {
                 continue;
             }
@@ -195,13 +204,13 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             let len = sample.encode_as(kind, &Extra { receiver, numbers, ..Extra::NONE }, axes, &mut datagram);
             send(receiver, &datagram[..len]);
         }
+        // Once per tick, after the last receiver: `Strategy::sent` ends the interval between two samples.
         self.all_sent();
     }
 
-    /// The sample that this peer sends now, without the extra numbers of its strategy.
+    /// Returns the present sample of this peer, without the extra numbers of its strategy, and counts its sequence number.
     ///
-    /// A driver that has no use for datagrams calls this, [`Peer::extra`] for each receiver if the strategy has a [kind](Peer::kind), and then
-    /// [`Peer::all_sent`].
+    /// A driver without datagrams calls this method, [`Peer::extra`] for each receiver if the strategy has a [kind](Peer::kind), and then [`Peer::all_sent`].
     #[inline]
     pub fn next_sample(&mut self, local_time: Instant) -> Sample<A> {
         let sequence = self.next_sequence;
@@ -213,55 +222,56 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         Sample { session: self.config.session, sender: self.config.place, sequence, sent: local_time, state }
     }
 
-    /// The extra numbers of the sample that is sent now to another peer, which counts in order with this peer left out; `receiver` is 0 where they are the
-    /// same for all.
+    /// Returns the extra numbers of the present sample for `receiver`, an index into the other peers in their order without this peer; 0 for kinds that are
+    /// equal for all receivers.
     #[inline]
     pub fn extra(&mut self, receiver: usize) -> [f64; A] {
         self.strategy.extra(receiver, self.object.state(), &self.held)
     }
 
-    /// The attitude of the copy, for samples that carry one.
+    /// Returns the attitude of the copy, or [`Attitude::REST`] without rotation.
     #[must_use]
     pub fn attitude(&self) -> Attitude {
         self.rotation.as_ref().map_or(Attitude::REST, |rotation| *rotation.copy())
     }
 
-    /// The samples of this tick have been made for all receivers.
+    /// Tells the strategy that the samples of this tick are complete for all receivers.
     pub fn all_sent(&mut self) {
         self.strategy.sent(self.object.state());
     }
 
-    /// What samples carry beyond the state.
+    /// Returns the kind of data in samples beyond position and velocity.
     #[must_use]
     pub const fn kind(&self) -> SampleKind {
         self.asked.kind
     }
 
-    /// Which part of the object the peer has.
+    /// Returns the role of the peer: owner of a copy, or client of a server.
     #[must_use]
     pub const fn role(&self) -> Role {
         self.asked.role
     }
 
-    /// Step 2: takes in a datagram from another peer.
+    /// Step 2: takes in a datagram of another peer.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
+    /// [`ReceiveError`] for a datagram that is no sample for this peer. Nothing changed.
     #[inline]
     pub fn handle_datagram(&mut self, datagram: &[u8]) -> Result<Reception, ReceiveError> {
         let (sample, extra) = Sample::decode_as(datagram, self.asked.kind, self.config.axes)?;
+        // A personal sample for another peer carries numbers that mean nothing here.
         if self.asked.kind.is_personal() && extra.receiver != self.config.place {
             return Err(ReceiveError::Receiver { receiver: extra.receiver });
         }
         self.handle_extended(&sample, &extra)
     }
 
-    /// Step 2 with a datagram that was decoded already: many peers may receive the same one.
+    /// Step 2 with a decoded datagram. Many peers can receive the same datagram, and one decoding is enough for them.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
+    /// [`ReceiveError`] for a sample that is not for this peer. Nothing changed.
     #[inline(always)]
     pub fn handle_sample(&mut self, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
         if self.asked.kind != SampleKind::State {
@@ -270,11 +280,11 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         Ok(self.accept(sample)?.map_or(Reception::Stale, |_| Reception::Newest))
     }
 
-    /// [`Peer::handle_sample`] with what a sample for this peer says beyond position and velocity.
+    /// Like [`Peer::handle_sample`], with the `extra` data of a sample beyond position and velocity.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
+    /// [`ReceiveError`] for a sample that is not for this peer. Nothing changed.
     #[inline(always)]
     pub fn handle_extended(&mut self, sample: &Sample<A>, extra: &Extra<A>) -> Result<Reception, ReceiveError> {
         let Some(place) = self.accept(sample)? else { return Ok(Reception::Stale) };
@@ -287,35 +297,40 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         Ok(Reception::Newest)
     }
 
-    /// Takes in position and velocity, and gives the place of their sender; `None` if they are not the newest.
+    /// Takes in position and velocity, and returns the index of the sender in [`Held`]; `None` for a late or repeated sample.
     #[inline(always)]
     fn accept(&mut self, sample: &Sample<A>) -> Result<Option<usize>, ReceiveError> {
+        // The session first: a sender's place has a meaning only inside its session.
         if sample.session != self.config.session {
             return Err(ReceiveError::Session { found: sample.session });
         }
         let Some(place) = self.place_of(sample.sender) else { return Err(ReceiveError::Sender { sender: sample.sender }) };
         let is_newest = self.held.accept(place, sample.sequence, sample.sent, sample.state);
+        // The mean waits until the tick: several samples may arrive before.
         self.stale_mean |= is_newest;
         Ok(is_newest.then_some(place))
     }
 
-    /// Step 3: computes the forces of this tick, where the next one follows after the period of the tick.
+    /// Step 3: computes the forces of this tick. The next tick follows after [`PeerConfig::tick`].
     #[inline(always)]
     pub fn compute(&mut self, now: Instant) -> Forces<A> {
         self.compute_over(now, self.config.tick)
     }
 
-    /// Step 3: computes the forces of this tick, where the next one follows after `span`.
+    /// Step 3: computes the forces of this tick. The next tick follows after `span`.
     #[inline(always)]
     pub fn compute_over(&mut self, now: Instant, span: Duration) -> Forces<A> {
+        // One mean for all samples of a tick: several samples may arrive between two ticks.
         if self.stale_mean {
             self.held.refresh();
             self.stale_mean = false;
         }
+        // Before the copy is read: a client takes its copy from the newest sample of the server.
         let heard = if self.asked.any { self.heard() } else { None };
         let own = self.object.state();
         let coupling = heard.unwrap_or_else(|| self.coupling_force(own));
         let walls = self.config.enclosure.as_ref().map(|enclosure| enclosure.force(own));
+        // The prediction needs the coupling and the walls of this tick, so it follows both.
         let ahead = if self.asked.prediction {
             let walls = walls.unwrap_or([0.0; A]);
             self.object.ahead(span, core::array::from_fn(|axis| coupling[axis] + walls[axis]))
@@ -330,11 +345,13 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             }
         }
         let computed = Acting { coupling, on_object };
+        // With a compute delay the forces of the tick before act now, and the new forces wait one tick.
         if self.config.compute_delay {
             self.applied = core::mem::replace(&mut self.computed, computed);
         } else {
             self.applied = computed;
         }
+        // β is part of the copy's plant and acts between ticks too; only the record adds it to FT.
         let damped = self.config.own_damping > 0.0;
         let recorded = |axis: usize| if damped { command.force[axis] + self.config.own_damping * own.velocity[axis] } else { command.force[axis] };
         Forces { coupling, coordination: core::array::from_fn(recorded), commanded: command.force, target: command.target }
@@ -344,6 +361,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     #[inline(always)]
     pub fn advance(&mut self, now: Instant, span: Duration) {
         self.device.advance(now, span, self.applied.coupling);
+        // The copy of a client is the state of the server, without dynamics.
         if self.asked.role == Role::Copy {
             self.object.advance(span, self.applied.on_object);
         }
@@ -353,7 +371,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.local_time = self.local_time.saturating_add_nanos(self.tick_nanos);
     }
 
-    /// What the peer's own clock shows: 0 at its first tick, and a tick more at each one after it.
+    /// Returns the time on the peer's own clock: 0 at the first tick, and one period more at each following tick.
     #[must_use]
     pub const fn local_time(&self) -> Instant {
         self.local_time
@@ -364,68 +382,69 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.local_time = local_time;
     }
 
-    /// The device.
+    /// Returns the device.
     #[must_use]
     pub const fn device(&self) -> &D {
         &self.device
     }
 
-    /// The device, to change what its hand does.
+    /// Returns the device, for a change of its hand.
     pub const fn device_mut(&mut self) -> &mut D {
         &mut self.device
     }
 
-    /// The copy of the object.
+    /// Returns the copy of the object.
     #[must_use]
     #[inline]
     pub const fn object(&self) -> &ObjectCopy<A> {
         &self.object
     }
 
-    /// The copy of the object, to put it into a state.
+    /// Returns the copy of the object, for a change of its state.
     pub const fn object_mut(&mut self) -> &mut ObjectCopy<A> {
         &mut self.object
     }
 
-    /// The part that turns, if the object has an inertia.
+    /// Returns the rotation of copy and device; `None` for an object without inertia.
     #[must_use]
     pub fn rotation(&self) -> Option<&Rotation> {
         self.rotation.as_deref()
     }
 
-    /// The part that turns, to put it into a state or to change its gains.
+    /// Returns the rotation of copy and device, for a change of its state or gains.
     pub fn rotation_mut(&mut self) -> Option<&mut Rotation> {
         self.rotation.as_deref_mut()
     }
 
-    /// Holds that state, sampled at `sent` on the sender's clock, from another peer (see [`Held::hold`]); the others count in order, with this peer left out.
+    /// Holds `state` for the other peer with index `other`, sampled at `sent` on the clock of that peer (see [`Held::hold`]). The index counts the other
+    /// peers in their order, without this peer.
     ///
     /// # Panics
     ///
-    /// If there is no such peer.
+    /// If the index `other` is out of range.
     pub fn hold(&mut self, other: usize, sent: Instant, state: State<A>) {
         self.held.hold(other, sent, state);
         self.stale_mean = true;
     }
 
-    /// Changes KC and BC, from the next tick on.
+    /// Sets KC and BC, from the next tick on.
     pub const fn set_coupling(&mut self, coupling: Gains) {
         self.config.coupling = coupling;
     }
 
-    /// The forces computed at the latest tick, which act over the next one if forces are applied one tick late.
+    /// Returns the forces computed at the latest tick. With a compute delay they act over the next tick.
     #[must_use]
     pub const fn computed(&self) -> &Acting<A> {
         &self.computed
     }
 
-    /// The forces that act over the tick that begins now, as of the latest [`Peer::compute`].
+    /// Returns the forces that act over the tick that begins now, as of the latest [`Peer::compute`].
     #[must_use]
     pub const fn applied(&self) -> &Acting<A> {
         &self.applied
     }
 
-    /// Whether forces are applied one tick after they were computed.
+    /// Returns whether forces have a compute delay of a tick.
     #[must_use]
     pub const fn compute_delay(&self) -> bool {
         self.config.compute_delay
@@ -436,66 +455,71 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.computed = computed;
     }
 
-    /// The strategy.
+    /// Returns the strategy.
     #[must_use]
     pub const fn strategy(&self) -> &S {
         &self.strategy
     }
 
-    /// The strategy, to change its gains.
+    /// Returns the strategy, for a change of its gains.
     pub const fn strategy_mut(&mut self) -> &mut S {
         &mut self.strategy
     }
 
-    /// New values of the parameters that the strategy has of its own, from the next tick on, with β as it is then [N·s/m] and the damping of the copy with β
-    /// in it. Send times of samples are kept for a strategy that had a horizon when the peer was made.
+    /// Sets the parameters `own` of the strategy from the next tick on, with the new β `own_damping` [N·s/m] and the new `damping` of the copy, which
+    /// contains β [N·s/m]. A new horizon takes effect only for a strategy that had a horizon in [`Peer::new`], because send times are not kept otherwise.
     pub fn set_parameters(&mut self, own: &LawValues, own_damping: f64, damping: f64) {
         self.strategy.set_parameters(own);
         if let Some(horizon) = self.strategy.horizon() {
             self.held.set_horizon(horizon);
         }
+        // New step maps cost matrix exponentials: only a changed β needs them.
         if own_damping.to_bits() != self.config.own_damping.to_bits() {
             self.config.own_damping = own_damping;
             self.object.set_damping(damping);
         }
     }
 
-    /// β, by how much the strategy damps the copy [N·s/m].
+    /// Returns β [N·s/m], the damping of the copy by the strategy.
     #[must_use]
     pub const fn own_damping(&self) -> f64 {
         self.config.own_damping
     }
 
-    /// How the device touches the copy.
+    /// Returns the contact between device and copy.
     #[must_use]
     pub const fn contact(&self) -> Contact {
         self.config.contact
     }
 
-    /// Changes how the device touches the copy, from the next tick on.
+    /// Sets the contact between device and copy, from the next tick on.
     pub const fn set_contact(&mut self, contact: Contact) {
         self.config.contact = contact;
     }
 
-    /// The place of another peer among those that are held; `None` if it is not heard.
+    /// Returns the index of `sender` in [`Held`]; `None` for a sender that this peer does not hear.
     #[inline(always)]
     pub(crate) fn place_of(&self, sender: u32) -> Option<usize> {
         self.held.place_of(sender, self.config.place)
     }
 
-    /// What [`crate::Ages`] change: the peer's own state, what it holds, whether a sample has changed since the mean was computed, and the part that turns.
+    /// Returns the parts that [`crate::Ages`] change: own state, held samples, the flag of a stale mean, and the rotation.
     pub(crate) fn aged_parts(&mut self) -> (&State<A>, &mut Held<A>, &mut bool, Option<&mut Rotation>) {
         (self.object.state(), &mut self.held, &mut self.stale_mean, self.rotation.as_deref_mut())
     }
 
-    /// Brings up to date what some strategies ask for and most do not, and gives the coupling force if it was heard of.
+    /// Updates the lead, the state of a client and the torques for the strategies that need them. Returns FC \[N\] if this peer does not compute FC from
+    /// device and copy.
     fn heard(&mut self) -> Option<[f64; A]> {
+        // Moves the held samples to now, for a strategy that extrapolates.
         if self.asked.horizon {
             self.held.move_on(self.local_time);
         }
+        // A client has no copy of its own: the newest state of the server is its copy.
         if let Role::Client { server } = self.asked.role {
             self.object.set_state(*self.held.state(server).expect("the server is another peer"));
         }
+        // A grasp away from the centre of mass needs the attitude, so the rotation computes FC together with the torques.
         if let Some(rotation) = &mut self.rotation {
             let PeerConfig { contact, coupling, compute_delay, .. } = &self.config;
             return Some(rotation.compute(self.object.state(), &self.device.state(), *contact, coupling, *compute_delay));
@@ -506,6 +530,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     #[inline]
     fn coupling_force(&self, object: &State<A>) -> [f64; A] {
         let PeerConfig { contact, coupling, .. } = self.config;
+        // The force is zero on every axis, whatever the state of the device is.
         if contact == Contact::None {
             return [0.0; A];
         }

@@ -1,4 +1,4 @@
-//! Motion between ticks: one body on one axis, with its inputs held.
+//! Motion between ticks: a body along an axis, with held inputs.
 //!
 //! The body obeys m·a = f − b·v − k·x with the force f held over the step. Over one step h its state moves by a linear map
 //!
@@ -7,15 +7,15 @@
 //! Δv = e10·x + e11·v + g1·f        A = [0 1; −k/m −b/m],  B = [0; 1/m]
 //! ```
 //!
-//! The map is computed once per body. The augmented matrix needs no inverse of A, which is singular for a free body (k = 0), and taking the
-//! *increment* exp − I keeps full relative accuracy for small steps and an exact zero for what does not act: a free body's step does not depend on
-//! where it is. Euler's and Runge and Kutta's steps are linear maps too, so the three integrators cost the same to run and differ only in accuracy.
+//! The map is computed once per body. The augmented matrix needs no inverse of A, which is singular for a free body (k = 0). The *increment* exp − I keeps
+//! full relative accuracy for small steps, and an input without effect gets an exact zero: the step of a free body does not depend on its position. The steps
+//! of Euler and of Runge and Kutta are linear maps too, so the three integrators cost the same to run and differ only in accuracy.
 
 use core::time::Duration;
 
 use crate::{Motion, Number};
 
-/// How motion between ticks is computed.
+/// Method that computes the motion between ticks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Integrator {
     /// The matrix exponential: exact up to rounding.
@@ -33,7 +33,7 @@ pub enum Integrator {
     },
 }
 
-/// One body on one axis: m·a = f − b·v − k·x.
+/// A body along an axis: m·a = f − b·v − k·x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Plant {
     /// Mass m \[kg\], above zero.
@@ -65,12 +65,14 @@ impl Plant {
     #[must_use]
     pub fn step(&self, span: Duration, integrator: Integrator) -> StepMap {
         let h = span.as_secs_f64();
+        // Without a phase there is no map: NaN makes the loss visible in every later state.
         let increment = match integrator {
             Integrator::Exact if self.is_lost(h) => [[f64::NAN; 3]; 3],
             Integrator::Exact => exponential_increment(self.augmented(h)),
             Integrator::SemiImplicitEuler { steps } => repeated(self.semi_implicit_euler(h / f64::from(steps)), steps),
             Integrator::RungeKutta4 { steps } => repeated(taylor(self.augmented(h / f64::from(steps)), 4), steps),
         };
+        // The third row of the augmented matrix stays zero: the held force does not change.
         let [[e00, e01, g0], [e10, e11, g1], _] = increment;
         StepMap { state: [[e00, e01], [e10, e11]], force: [g0, g1] }
     }
@@ -83,7 +85,7 @@ impl Plant {
         1.0 + self.damping / self.mass * h + self.angle(h)
     }
 
-    /// h·√(k/m): the angle by which the body turns in a step, without its damping.
+    /// Returns h·√(k/m), the angle of the undamped oscillation in a step \[rad\].
     fn angle(&self, h: f64) -> f64 {
         h * libm::sqrt(self.stiffness / self.mass)
     }
@@ -95,26 +97,27 @@ impl Plant {
         decay < 2.0 * angle && angle * libm::exp(-0.5 * decay) > MOST_ANGLE
     }
 
-    /// [A B; 0 0]·h.
+    /// Returns \[A B; 0 0\]·h.
     fn augmented(&self, h: f64) -> Matrix {
         [[0.0, h, 0.0], [-self.stiffness / self.mass * h, -self.damping / self.mass * h, h / self.mass], [0.0; 3]]
     }
 
-    /// v⁺ = v + h·(f − b·v − k·x)/m, x⁺ = x + h·v⁺.
+    /// Returns the increment of v⁺ = v + h·(f − b·v − k·x)/m, x⁺ = x + h·v⁺.
     fn semi_implicit_euler(&self, h: f64) -> Matrix {
+        // The new velocity moves the position, so the position row is h times the velocity row, plus h·v.
         let velocity = self.augmented(h)[1];
         [[h * velocity[0], h + h * velocity[1], h * velocity[2]], velocity, [0.0; 3]]
     }
 }
 
 impl<C> StepMap<C> {
-    /// The map with these coefficients: increments by (x, v) row by row, then by the force.
+    /// Returns the map with these coefficients: increments by (x, v) row by row, then by the force.
     #[must_use]
     pub const fn new(state: [[C; 2]; 2], force: [C; 2]) -> Self {
         Self { state, force }
     }
 
-    /// Each coefficient replaced by what `coefficient` makes of it: increments by (x, v) row by row, then by the force.
+    /// Returns the map with `coefficient` applied to each coefficient: increments by (x, v) row by row, then by the force.
     #[must_use]
     #[inline(always)]
     pub fn map<D>(&self, mut coefficient: impl FnMut(&C) -> D) -> StepMap<D> {
@@ -124,7 +127,7 @@ impl<C> StepMap<C> {
 }
 
 impl<C: Copy> StepMap<C> {
-    /// The coefficients: increments by (x, v) row by row, then by the force.
+    /// Returns the coefficients: increments by (x, v) row by row, then by the force.
     #[must_use]
     #[inline(always)]
     pub const fn coefficients(&self) -> ([[C; 2]; 2], [C; 2]) {
@@ -133,7 +136,7 @@ impl<C: Copy> StepMap<C> {
 }
 
 impl<N: Number> StepMap<N> {
-    /// Moves a body by one step under the held force `f`.
+    /// Moves a body by one step under the held force `force`.
     #[inline(always)]
     pub fn advance(&self, body: &mut Motion<N>, force: N) {
         let Motion { position: x, velocity: v } = *body;
@@ -141,8 +144,8 @@ impl<N: Number> StepMap<N> {
         body.velocity = v + (self.state[1][0] * x + self.state[1][1] * v + self.force[1] * force);
     }
 
-    /// [`StepMap::advance`] for a free body, with the terms that are zero left out. The result is the same to the bit, unless the position is
-    /// infinite or NaN.
+    /// Like [`StepMap::advance`], for a free body: the terms that are zero are left out. The result is equal to the bit, unless the position is infinite or
+    /// NaN.
     #[inline(always)]
     pub fn advance_free(&self, body: &mut Motion<N>, force: N) {
         let Motion { position: x, velocity: v } = *body;
@@ -152,7 +155,7 @@ impl<N: Number> StepMap<N> {
 }
 
 impl StepMap {
-    /// Whether the increment does not depend on the position: a body that nothing ties to ground.
+    /// Returns whether the increment is independent of the position. The map then belongs to a body without a spring to ground.
     #[must_use]
     pub fn is_free(&self) -> bool {
         self.state[0][0] == 0.0 && self.state[1][0] == 0.0
@@ -169,8 +172,9 @@ fn sum(a: &Matrix, b: &Matrix) -> Matrix {
     core::array::from_fn(|i| core::array::from_fn(|j| a[i][j] + b[i][j]))
 }
 
-/// exp(X) − I by scaling and squaring: the increment of the halved step by its Taylor series, then E ← 2E + E² for every halving.
+/// Returns exp(X) − I by scaling and squaring: the increment of the halved step by its Taylor series, then E ← 2E + E² for every halving.
 fn exponential_increment(x: Matrix) -> Matrix {
+    // The largest sum of absolute values of a row bounds the matrix in the maximum norm.
     let norm = x.iter().map(|row| row.iter().map(|entry| entry.abs()).sum()).fold(0.0, f64::max);
     let mut halvings = 0;
     let mut scale = 1.0;
@@ -188,23 +192,24 @@ fn exponential_increment(x: Matrix) -> Matrix {
     increment
 }
 
-/// X + X²/2! + … + Xⁿ/n! by Horner's rule.
+/// Returns X + X²/2! + … + Xⁿ/n! by Horner's rule.
 fn taylor(x: Matrix, order: u32) -> Matrix {
     let mut nested = [[0.0; 3]; 3];
     for n in (1..=order).rev() {
         // nested ← X/n·(I + nested)
+        // Computed as X·nested + X: an added identity would cost the digits of a small X.
         let plus_identity = sum(&product(&x, &nested), &x);
         nested = plus_identity.map(|row| row.map(|entry| entry / f64::from(n)));
     }
     nested
 }
 
-/// The increment of two steps: (I + E)² − I.
+/// Returns the increment of two steps: (I + E)² − I.
 fn doubled(e: &Matrix) -> Matrix {
     sum(&sum(e, e), &product(e, e))
 }
 
-/// The increment of `count` equal steps, by repeated squaring.
+/// Returns the increment of `count` equal steps, by repeated squaring.
 fn repeated(step: Matrix, count: u32) -> Matrix {
     let mut total = [[0.0; 3]; 3];
     let mut power = step;
@@ -214,6 +219,7 @@ fn repeated(step: Matrix, count: u32) -> Matrix {
             // (I + total)·(I + power) − I
             total = sum(&sum(&total, &power), &product(&total, &power));
         }
+        // `power` is the increment of 1, 2, 4, … steps.
         power = doubled(&power);
         left /= 2;
     }
@@ -230,11 +236,12 @@ mod tests {
         assert!((actual - expected).abs() <= relative * expected.abs(), "{actual:e} is not within {relative:e} of {expected:e}");
     }
 
-    /// Closed form for a damped free body: Δv = −(1 − e^{−bh/m})·v + …, with `expm1` as the independent reference.
+    /// The closed form of a damped free body is Δv = −(1 − e^{−bh/m})·v + …, with `expm1` as the independent reference.
     #[test]
     fn a_damped_free_body_moves_as_the_closed_form_says() {
         for (mass, damping) in [(0.1, 5.0), (0.15, 1e-9), (1e-6, 5.0), (1e3, 5.0), (0.1, 500.0)] {
             let map = Plant { mass, damping, stiffness: 0.0 }.step(TICK, Integrator::Exact);
+            // `decay` and `reached` are velocity lost and distance travelled per unit of velocity.
             let h = 1e-3;
             let decay = -libm::expm1(-damping / mass * h);
             let reached = decay * mass / damping;
@@ -258,14 +265,15 @@ mod tests {
         close(body.velocity, 2.0 + 3.0 / 0.15 * 1e-3, 1e-15);
     }
 
-    /// The doubling of the exponential falls to rest at angles of 10¹⁹ rad, without a warning: there is no map where the phase is lost.
+    /// Without the rule of a lost phase, the doubling of the exponential falls to rest at angles of 10¹⁹ rad without a warning.
     #[test]
     fn an_oscillation_whose_phase_is_lost_has_no_map() {
         let map = |damping: f64, stiffness: f64| Plant { mass: 0.1, damping, stiffness }.step(TICK, Integrator::Exact);
         let is_lost = |map: StepMap| map.coefficients().0.as_flattened().iter().all(|coefficient| coefficient.is_nan());
+        // The stiffness at which a mass of 0.1 kg turns by the greatest angle in 1 ms.
         let most = (MOST_ANGLE / 1e-3).powi(2) * 0.1;
         assert!(!is_lost(map(0.0, 0.999 * most)) && is_lost(map(0.0, 1.001 * most)) && is_lost(map(0.0, 1e45)));
-        // e^(−50) of an oscillation does not matter, and beyond critical damping nothing oscillates.
+        // An oscillation that has decayed to e^(−50) does not matter, and beyond critical damping nothing oscillates.
         assert!(!is_lost(map(1e4, 1.001 * most)) && !is_lost(map(1e45, 1e45)));
         let rest = map(1e4, 1.001 * most).coefficients().0;
         close(rest[0][0], -1.0, 1e-15);
@@ -307,6 +315,7 @@ mod tests {
         let error = |integrator| (plant.step(TICK, integrator).state[1][0] - exact.state[1][0]).abs();
         let euler = |steps| error(Integrator::SemiImplicitEuler { steps });
         let runge_kutta = |steps| error(Integrator::RungeKutta4 { steps });
+        // The number of steps doubles from coarse to fine, so the logarithm is the order.
         let order = |coarse: f64, fine: f64| libm::log2(coarse / fine);
         assert!((order(euler(8), euler(16)) - 1.0).abs() < 0.05);
         assert!((order(runge_kutta(8), runge_kutta(16)) - 4.0).abs() < 0.1);

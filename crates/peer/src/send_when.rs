@@ -1,4 +1,4 @@
-//! Which samples are worth sending: dead bands around what was sent last.
+//! Dead bands: conditions under which a sample is worth sending.
 
 use core::time::Duration;
 
@@ -6,40 +6,43 @@ use cohaptic_units::Instant;
 
 use crate::State;
 
-/// When a peer sends at the instants at which it may. Each condition by itself is enough; a peer that has never sent sends.
+/// Conditions for sending at an instant at which the peer may send. One fulfilled condition is enough. A peer that has never sent always sends.
 ///
-/// The dead bands of haptic communication: a relative one of velocity (Hinterseer et al. 2008; the form is that of the TUM library) and an absolute one of
-/// position.
+/// The dead bands of haptic communication are a relative dead band of velocity (Hinterseer et al. 2008, in the form of the TUM library) and an absolute dead
+/// band of position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SendWhen {
-    /// Once the velocity differs from the one sent last by this part of its size, ‖v − v₀‖ ≥ part·(‖v₀‖ + 10⁻⁵ m/s); from 0, which is always, to below 1.
+    /// Relative change of velocity since the last sample, ‖v − v₀‖ ≥ part·(‖v₀‖ + 10⁻⁵ m/s); from 0, which is always fulfilled, to below 1.
     pub velocity: Option<f64>,
-    /// Once the position is that far \[m\] from where receivers hold the copy; above zero.
+    /// Distance \[m\] between the copy and its position as held by receivers; above zero.
     pub position: Option<f64>,
-    /// Once that much time has passed since the last sample, on the peer's own clock; above zero.
+    /// Time since the last sample on the peer's own clock; above zero.
     pub heartbeat: Option<Duration>,
 }
 
-/// What a peer has sent last.
+/// Last sample of a peer.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LastSent<const A: usize> {
-    /// When, on its own clock.
+    /// Send time on the peer's own clock.
     pub at: Instant,
-    /// The state of its copy.
+    /// State of the peer's copy in the sample.
     pub state: State<A>,
 }
 
-/// Below this speed a relative difference has no meaning [m/s].
+/// Speed \[m/s\] below which a relative difference has no meaning.
 const STANDSTILL: f64 = 1e-5;
 
 impl SendWhen {
-    /// Whether a copy in the state `own` is to be sent at `now` on the peer's own clock. Receivers extrapolate for up to `horizon` \[s\], if they do.
+    /// Returns whether a copy in the state `own` is to be sent at `now` on the peer's own clock. `horizon` \[s\] is the greatest age to which receivers
+    /// extrapolate; `None` if they hold the state.
     #[must_use]
     pub fn is_due<const A: usize>(&self, last: Option<&LastSent<A>>, now: Instant, own: &State<A>, horizon: Option<f64>) -> bool {
+        // Receivers know nothing of this peer before its first sample.
         let Some(last) = last else { return true };
         let age = now.saturating_duration_since(last.at).as_secs_f64();
         let lead = horizon.map_or(0.0, |horizon| age.min(horizon));
         let sent = &last.state;
+        // The receiver's view of this copy: the sent position, extrapolated as receivers do it.
         let moved = distance::<A>(core::array::from_fn(|axis| own.position[axis] - (sent.position[axis] + lead * sent.velocity[axis])));
         let changed = distance::<A>(core::array::from_fn(|axis| own.velocity[axis] - sent.velocity[axis]));
         self.velocity.is_some_and(|part| changed >= part * (distance(sent.velocity) + STANDSTILL))
@@ -48,7 +51,7 @@ impl SendWhen {
     }
 }
 
-/// The length of a vector.
+/// Returns the length of a vector.
 fn distance<const A: usize>(vector: [f64; A]) -> f64 {
     libm::sqrt(vector.iter().map(|component| component * component).sum())
 }
@@ -69,12 +72,14 @@ mod tests {
         let due = |when: &SendWhen, now: u64, own: State<2>, horizon: Option<f64>| when.is_due(Some(&last), ms(now), &own, horizon);
         assert!(nothing.is_due(None, ms(0), &at(0.0, 0.0), None));
         assert!(!due(&nothing, 10_000, at(9.0, 9.0), None));
+        // The change is a quarter of 1 m/s, faster or slower; the position has no effect on this band.
         let velocity = SendWhen { velocity: Some(0.25), ..nothing };
         assert!(due(&velocity, 101, at(0.0, 1.3), None) && due(&velocity, 101, at(0.0, 0.7), None) && !due(&velocity, 101, at(5.0, 1.2), None));
         assert!(due(&SendWhen { velocity: Some(0.0), ..nothing }, 101, last.state, None), "a band of nothing is left at once");
         let position = SendWhen { position: Some(0.5), ..nothing };
         assert!(due(&position, 101, at(0.5, 1.0), None) && !due(&position, 101, at(0.25, 9.0), None));
-        // Held for 400 ms at 1 m/s along y, up to the horizon: 0.4 m, or 0.6 m of 0.7 m.
+        // The copy stands still while receivers extrapolate at 1 m/s along y: the error is 0.4 m after 400 ms, and 0.6 m after 700 ms with a horizon of 0.6
+        // s.
         assert!(!due(&position, 500, at(0.0, 1.0), Some(1.0)) && due(&position, 800, at(0.0, 1.0), Some(0.6)));
         let heartbeat = SendWhen { heartbeat: Some(Duration::from_millis(8)), ..nothing };
         assert!(due(&heartbeat, 108, last.state, None) && !due(&heartbeat, 107, last.state, None));

@@ -1,4 +1,4 @@
-//! What a hand wants over time: a force or a motion, as a function of time.
+//! Signals of a hand: a force or a wanted motion as a function of time.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -7,26 +7,26 @@ use cohaptic_units::{Hertz, Instant, RadPerSec};
 
 /// A function of time with up to three components; components beyond the scene's axes are zero.
 ///
-/// The unit is that of its use: N for a force, m for a wanted motion.
+/// The unit depends on the use: N for a force, m for a wanted motion.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Signal {
-    /// The same at all times.
+    /// A constant value.
     Constant([f64; 3]),
     /// amplitude·sin(2π·frequency·t + phase).
     Sine {
         /// Amplitude of each component.
         amplitude: [f64; 3],
-        /// Frequency, the same for all.
+        /// Frequency of all components.
         frequency: Hertz,
-        /// Phase \[rad\], the same for all.
+        /// Phase \[rad\] of all components.
         phase: f64,
     },
-    /// Measured rows, linear in between.
+    /// Measured rows with linear interpolation.
     Table(Arc<Table>),
 }
 
 impl Signal {
-    /// The value at `t`.
+    /// Returns the value at `t`.
     #[must_use]
     pub fn value<const A: usize>(&self, t: Instant) -> [f64; A] {
         match self {
@@ -39,7 +39,7 @@ impl Signal {
         }
     }
 
-    /// The derivative with respect to time at `t` \[per s\]; for a table, the slope of the segment that begins at or before `t`.
+    /// Returns the derivative with respect to time at `t` \[per s\]; for a table, the slope of the segment that begins at or before `t`.
     #[must_use]
     pub fn slope<const A: usize>(&self, t: Instant) -> [f64; A] {
         match self {
@@ -53,56 +53,56 @@ impl Signal {
         }
     }
 
-    /// Whether the signal is the same at all times.
+    /// Returns whether the signal is a constant.
     #[must_use]
     pub const fn is_constant(&self) -> bool {
         matches!(self, Self::Constant(_))
     }
 }
 
-/// The first A of three components.
+/// Returns the first A of three components.
 fn take<const A: usize>(value: &[f64; 3]) -> [f64; A] {
     core::array::from_fn(|axis| value.get(axis).copied().unwrap_or(0.0))
 }
 
-/// Rows (t, value) in order of time. Linear between rows; before the first and after the last row, the value of that row.
+/// Rows (t, value) in order of time, with linear interpolation. Before the first row and after the last row, the value is constant.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Table {
     rows: Vec<(Instant, [f64; 3])>,
 }
 
-/// Why rows are no table.
+/// Reason for the refusal of rows.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum TableError {
-    /// There is no row.
+    /// The list of rows is empty.
     #[error("there is no row")]
     Empty,
-    /// A row is not later than the one before it. Rows count from zero.
+    /// A row is not later than its predecessor.
     #[error("row {row} at {at} is not later than the row before it, at {before}")]
     NotLater {
-        /// Which row.
+        /// Index of the row, from 0.
         row: usize,
-        /// Its time.
+        /// Time of the row.
         at: Instant,
-        /// The time of the row before it.
+        /// Time of its predecessor.
         before: Instant,
     },
-    /// A value is not finite.
+    /// A value is infinite or NaN.
     #[error("row {row} holds {value}, which is not a finite number")]
     NotFinite {
-        /// Which row.
+        /// Index of the row, from 0.
         row: usize,
-        /// The value.
+        /// The value that is not finite.
         value: f64,
     },
 }
 
 impl Table {
-    /// Checks the rows.
+    /// Checks the rows and returns the table.
     ///
     /// # Errors
     ///
-    /// [`TableError`] if there are no rows, they are not in strictly increasing order of time, or a value is not finite.
+    /// [`TableError`] for an empty list, for rows that are not in strictly increasing order of time, and for values that are not finite.
     pub fn new(rows: Vec<(Instant, [f64; 3])>) -> Result<Self, TableError> {
         if rows.is_empty() {
             return Err(TableError::Empty);
@@ -111,6 +111,7 @@ impl Table {
             if let Some(value) = values.iter().copied().find(|value| !value.is_finite()) {
                 return Err(TableError::NotFinite { row, value });
             }
+            // Equal times are refused too: the slope between two rows divides by their distance.
             if let Some(before) = row.checked_sub(1).map(|previous| rows[previous].0)
                 && *at <= before
             {
@@ -123,6 +124,7 @@ impl Table {
     fn value(&self, t: Instant) -> [f64; 3] {
         match self.segment(t) {
             Ok(((t0, v0), (t1, v1))) => {
+                // A segment lasts at least 1 ns, because rows are strictly increasing.
                 let share = (t - t0).as_secs_f64() / (t1 - t0).as_secs_f64();
                 core::array::from_fn(|axis| v0[axis] + share * (v1[axis] - v0[axis]))
             }
@@ -137,9 +139,10 @@ impl Table {
         }
     }
 
-    /// The rows around `t`, or the value that holds outside of them.
+    /// Returns the two rows around `t`, or the constant value outside of all rows.
     #[expect(clippy::type_complexity, reason = "two neighbouring rows, used twice, above")]
     fn segment(&self, t: Instant) -> Result<((Instant, [f64; 3]), (Instant, [f64; 3])), [f64; 3]> {
+        // `next` is the first row after `t`, so its predecessor is at or before `t`.
         let next = self.rows.partition_point(|(at, _)| *at <= t);
         match (next.checked_sub(1).map(|previous| self.rows[previous]), self.rows.get(next)) {
             (Some(previous), Some(next)) => Ok((previous, *next)),

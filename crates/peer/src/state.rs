@@ -10,20 +10,20 @@ pub struct State<const A: usize> {
 }
 
 impl<const A: usize> State<A> {
-    /// At rest at the origin.
+    /// Rest at the origin.
     pub const REST: Self = Self { position: [0.0; A], velocity: [0.0; A] };
 
-    /// Both times a number.
+    /// Returns position and velocity times `factor`.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         Self { position: self.position.map(|x| x * factor), velocity: self.velocity.map(|v| v * factor) }
     }
 
-    /// Whether every component is a finite number.
+    /// Returns whether every component is a finite number.
     #[must_use]
     #[inline]
     pub fn is_finite(&self) -> bool {
-        // Nothing times a finite number is nothing, times any other NaN: half of the instructions that asking each number takes.
+        // 0·x is 0 for a finite x and NaN for any other x, and a sum with a NaN is NaN. One check of the sum is then enough for all components.
         let mut nothing = 0.0;
         for axis in 0..A {
             nothing += 0.0 * self.position[axis] + 0.0 * self.velocity[axis];

@@ -1,12 +1,12 @@
 //! The tick of a peer along one axis: equations (7) to (10) of Rakhsha & Constantinescu (2015), in any [`Number`].
 //!
-//! With the desired motion (xd, vd) the mean of the samples held, equation (10) is the law of the paper,
-//! [`AveragePosition`](crate::coordination::AveragePosition); other laws have other desired motions or gains.
+//! If the desired motion (xd, vd) is the mean of the held samples, equation (10) is the law of the paper,
+//! [`AveragePosition`](crate::coordination::AveragePosition). Other laws have other desired motions or gains.
 
 use crate::coordination::{Law, Observation};
 use crate::{Gains, Motion, Number};
 
-/// FC \[N\] of a device that grasps its copy, where `apart` is the motion of the device relative to the copy: xH − xO and vH − vO.
+/// Returns FC \[N\] of a device that grasps its copy, where `apart` is the motion of the device relative to the copy: xH − xO and vH − vO.
 #[must_use]
 #[inline(always)]
 pub fn grasp<N: Number>(coupling: &Gains<N>, apart: Motion<N>) -> N {
@@ -14,7 +14,7 @@ pub fn grasp<N: Number>(coupling: &Gains<N>, apart: Motion<N>) -> N {
     coupling.force(apart)
 }
 
-/// FT \[N\] that draws a copy to a desired motion, where `apart` is the motion of the copy relative to it: xO − xd and vO − vd.
+/// Returns FT \[N\] towards a desired motion, where `apart` is the motion of the copy relative to the desired motion: xO − xd and vO − vd.
 #[must_use]
 #[inline(always)]
 pub fn coordinate<N: Number>(coordination: &Gains<N>, apart: Motion<N>) -> N {
@@ -22,7 +22,7 @@ pub fn coordinate<N: Number>(coordination: &Gains<N>, apart: Motion<N>) -> N {
     coordination.force(apart)
 }
 
-/// The force on a copy \[N\], apart from its damping and the walls.
+/// Returns the force on a copy \[N\] without its damping and without walls.
 #[must_use]
 #[inline(always)]
 pub fn on_object<N: Number>(coupling: N, coordination: N) -> N {
@@ -30,7 +30,7 @@ pub fn on_object<N: Number>(coupling: N, coordination: N) -> N {
     coupling - coordination
 }
 
-/// The force on a device \[N\], apart from its damping and the arm that holds it.
+/// Returns the force on a device \[N\] without its damping and without the arm that holds the device.
 #[must_use]
 #[inline(always)]
 pub fn on_device<N: Number>(hand: N, coupling: N) -> N {
@@ -38,7 +38,7 @@ pub fn on_device<N: Number>(hand: N, coupling: N) -> N {
     hand - coupling
 }
 
-/// FC and FC − FT, where `coupling` gives FC from the motion of the device relative to the copy.
+/// Returns FC and FC − FT \[N\], where `coupling` computes FC from the motion of the device relative to the copy.
 #[must_use]
 #[inline(always)]
 pub fn forces<N: Number>(

@@ -1,4 +1,5 @@
-//! The wire format of a sample: one datagram, little-endian. Version 1 has 48 bytes and 16 for each axis, and 56 more for an attitude; version 2 has 48 and 24.
+//! Wire format of a sample: one datagram, little-endian. Version 1 has 48 bytes, 16 more for each axis, and 56 more for an attitude. Version 2 has 48 bytes
+//! and 24 more for each axis.
 //!
 //! ```text
 //! offset  size  field
@@ -8,7 +9,7 @@
 //!      7     1  version 1: 1 with an attitude, 0 without; version 2: the kind of the extra number, 1 energy, 2 wave, 3 force
 //!      8     8  session: only peers of one session understand each other
 //!     16     4  sender: the place of the peer in the session
-//!     20     4  kinds 2 and 3: receiver, the place of the only peer that it is for; otherwise zero
+//!     20     4  kinds 2 and 3: place of the receiver in the session; otherwise zero
 //!     24     8  sequence number of the sample, from 0
 //!     32     8  send time \[ns\] on the sender's clock
 //!     40     8  zero
@@ -16,42 +17,42 @@
 //!     96    56  with an attitude: the unit quaternion w, x, y, z and the angular velocity about the three body axes [rad/s]
 //! ```
 //!
-//! Which sample is the newest follows from the sequence number alone. The send time is for laws that need the age of a sample, and for those who record or measure.
-//! Which version and kind a session speaks follows from its coordination strategy; samples of any other are refused.
+//! The sequence number alone decides which sample is the newest. The send time is for laws that need the age of a sample, and for records and measurements.
+//! The coordination strategy of a session decides version and kind; samples of other versions and kinds are refused.
 //!
-//! A datagram is taken only if every byte of it has a meaning: whatever decodes encodes to the same bytes again.
+//! Decoding accepts only datagrams in which every byte has a meaning: a decoded datagram encodes to the same bytes again.
 
 use cohaptic_units::Instant;
 
 use crate::State;
 use crate::rotation::Attitude;
 
-/// The first four bytes.
+/// First four bytes of a datagram.
 pub const MAGIC: [u8; 4] = *b"CHPT";
-/// The length of the largest datagram, with three axes and an attitude \[byte\].
+/// Length of the largest datagram, with three axes and an attitude \[byte\].
 pub const MAX_LEN: usize = SampleKind::Attitude.datagram_len(3);
 
 const HEADER_LEN: usize = 48;
 const ATTITUDE_LEN: usize = 56;
 
-/// What a sample carries on each axis beyond position and velocity.
+/// Data of a sample beyond position and velocity.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum SampleKind {
-    /// Nothing: version 1.
+    /// No more data: version 1.
     #[default]
     State,
-    /// The attitude of the body, the same for all receivers: version 1.
+    /// Attitude of the body, equal for all receivers: version 1.
     Attitude,
-    /// An energy \[J\] that only grows, the same for all receivers. One that has fallen begins a new life of the sender.
+    /// An energy per axis \[J\], equal for all receivers, that never falls. A lower energy marks a restart of the sender.
     Energy,
-    /// A wave [√W] for one receiver.
+    /// A wave per axis [√W] for one receiver.
     Wave,
-    /// A force \[N\] for one receiver.
+    /// A force per axis \[N\] for one receiver.
     Force,
 }
 
 impl SampleKind {
-    /// The version of the wire format that has samples of this kind.
+    /// Returns the version of the wire format for samples of this kind.
     #[must_use]
     pub const fn version(self) -> u16 {
         match self {
@@ -60,27 +61,29 @@ impl SampleKind {
         }
     }
 
-    /// Whether each receiver has a sample of its own.
+    /// Returns whether each receiver gets a sample of its own.
     #[must_use]
     pub const fn is_personal(self) -> bool {
         matches!(self, Self::Wave | Self::Force)
     }
 
-    /// The length of a datagram \[byte\].
+    /// Returns the length of a datagram with `axes` axes \[byte\].
     #[must_use]
     pub const fn datagram_len(self, axes: usize) -> usize {
         self.attitude_start(axes) + if matches!(self, Self::Attitude) { ATTITUDE_LEN } else { 0 }
     }
 
+    /// Returns the offset of the attitude in a datagram \[byte\].
     const fn attitude_start(self, axes: usize) -> usize {
         HEADER_LEN + self.axis_len() * axes
     }
 
+    /// Returns the length of the numbers of one axis \[byte\].
     const fn axis_len(self) -> usize {
         if self.version() == 1 { 16 } else { 24 }
     }
 
-    /// Byte 7.
+    /// Returns byte 7 of the header.
     const fn code(self) -> u8 {
         match self {
             Self::State => 0,
@@ -91,113 +94,113 @@ impl SampleKind {
     }
 }
 
-/// What a sample says beyond position and velocity.
+/// Data of a sample beyond position and velocity.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Extra<const A: usize> {
-    /// The place of the only peer that a sample of a personal kind is for; 0 for the other kinds.
+    /// Place of the receiver, for a personal kind; 0 for other kinds.
     pub receiver: u32,
-    /// The extra number on each axis; zeros in version 1.
+    /// Extra number on each axis; zeros in version 1.
     pub numbers: [f64; A],
-    /// The attitude of the copy, for [`SampleKind::Attitude`].
+    /// Attitude of the copy, for [`SampleKind::Attitude`].
     pub attitude: Attitude,
 }
 
 impl<const A: usize> Extra<A> {
-    /// Of a sample of kind [`SampleKind::State`].
+    /// Extra data of a sample of kind [`SampleKind::State`].
     pub const NONE: Self = Self { receiver: 0, numbers: [0.0; A], attitude: Attitude::REST };
 
-    /// Of a sample with that attitude.
+    /// Returns the extra data of a sample with that attitude.
     #[must_use]
     pub const fn turned(attitude: Attitude) -> Self {
         Self { attitude, ..Self::NONE }
     }
 }
 
-/// What a peer tells the others about its copy of the object.
+/// State of a peer's copy of the object, as sent to other peers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sample<const A: usize> {
-    /// The session.
+    /// Number of the session.
     pub session: u64,
-    /// The place of the sender in the session.
+    /// Place of the sender in the session.
     pub sender: u32,
-    /// Counts the sender's samples from 0.
+    /// Number of the sample, counted by the sender from 0.
     pub sequence: u64,
-    /// When it was sent, on the sender's clock.
+    /// Send time on the sender's clock.
     pub sent: Instant,
-    /// The sender's copy of the object.
+    /// State of the sender's copy of the object; of its device, if the sender is a client.
     pub state: State<A>,
 }
 
-/// Why a datagram is no sample.
+/// Reason why a datagram is no sample.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum DecodeError {
-    /// It is shorter than a header.
+    /// The datagram is shorter than a header.
     #[error("{len} bytes are too short for a sample")]
     TooShort {
-        /// Its length.
+        /// Length of the datagram \[byte\].
         len: usize,
     },
-    /// It does not begin with [`MAGIC`].
+    /// The datagram does not begin with [`MAGIC`].
     #[error("not a sample")]
     Magic,
-    /// It is a sample of another version.
+    /// The sample has another version.
     #[error("version {found} of the wire format; expected {expected}")]
     Version {
-        /// The version it has.
+        /// Version of the sample.
         found: u16,
-        /// The version of this session.
+        /// Version of this session.
         expected: u16,
     },
-    /// Its extra numbers are of another kind.
+    /// The extra numbers have another kind.
     #[error("extra numbers of kind {found}; expected {expected}")]
     Kind {
-        /// The kind it has.
+        /// Kind of the sample.
         found: u8,
-        /// The kind of this session.
+        /// Kind of this session.
         expected: u8,
     },
-    /// It has another number of axes.
+    /// The sample has another number of axes.
     #[error("a sample with {found} axes; expected {expected}")]
     Axes {
-        /// The number it has.
+        /// Number of axes in the sample.
         found: u8,
-        /// The number of this session.
+        /// Number of axes in this session.
         expected: usize,
     },
-    /// It has an attitude where none is expected, or none where one is.
+    /// An attitude is missing or unexpected.
     #[error("motion {found} in byte 7; expected {expected} (0 moves, 1 moves and turns)")]
     Motion {
-        /// What it has.
+        /// Byte 7 of the sample.
         found: u8,
-        /// That of this session.
+        /// Byte 7 in this session.
         expected: u8,
     },
-    /// Its length does not fit its number of axes.
+    /// The length of the datagram does not fit its number of axes.
     #[error("{found} bytes; expected {expected}")]
     Length {
-        /// The length it has.
+        /// Length of the datagram \[byte\].
         found: usize,
-        /// The length that fits.
+        /// Length that fits \[byte\].
         expected: usize,
     },
-    /// A byte that must be zero is not.
+    /// A reserved byte is not zero.
     #[error("a reserved byte is not zero")]
     Reserved,
-    /// A position, a velocity or an extra number is infinite or not a number.
+    /// A number is infinite or NaN.
     #[error("the {quantity} on axis {axis} is not finite")]
     NotFinite {
-        /// Which axis, from 0.
+        /// Axis from 0; for a quaternion the component, w first.
         axis: usize,
-        /// Position, velocity, extra number, quaternion or angular velocity.
+        /// Name of the quantity: position, velocity, extra number, quaternion or angular velocity.
         quantity: &'static str,
     },
-    /// The quaternion of its attitude does not have the norm 1.
+    /// The quaternion of the attitude does not have the norm 1.
     #[error("the quaternion of the attitude does not have the norm 1")]
     NotUnit,
 }
 
 impl<const A: usize> Sample<A> {
-    /// [`Sample::encode_as`] of version 1.
+    /// Like [`Sample::encode_as`], for [`SampleKind::State`].
     ///
     /// # Panics
     ///
@@ -207,13 +210,15 @@ impl<const A: usize> Sample<A> {
         self.encode_as(SampleKind::State, &Extra::NONE, axes, datagram)
     }
 
-    /// Writes the first `axes` axes and gives the length. A peer that simulates more axes than its scene has leaves out those that are always zero.
+    /// Writes the first `axes` axes and returns the length of the datagram \[byte\]. A peer that simulates more axes than its scene has leaves out the axes
+    /// that are always zero.
     ///
     /// # Panics
     ///
     /// If `axes` is more than A or than 3.
     #[inline]
     pub fn encode_as(&self, kind: SampleKind, extra: &Extra<A>, axes: usize, datagram: &mut [u8; MAX_LEN]) -> usize {
+        // Zeros first: reserved bytes must be zero.
         let mut header = [0; HEADER_LEN];
         header[0..4].copy_from_slice(&MAGIC);
         header[4..6].copy_from_slice(&kind.version().to_le_bytes());
@@ -227,6 +232,8 @@ impl<const A: usize> Sample<A> {
         datagram[..HEADER_LEN].copy_from_slice(&header);
         let (state, axis_len) = (&self.state, kind.axis_len());
         for axis in 0..axes {
+            // Version 1 has 16 bytes per axis, so `zip` drops the third number.
+            // NaN and infinities are not checked here: a receiver refuses them.
             let numbers = [state.position[axis], state.velocity[axis], extra.numbers[axis]];
             let start = HEADER_LEN + axis_len * axis;
             for (bytes, number) in datagram[start..start + axis_len].chunks_exact_mut(8).zip(numbers) {
@@ -242,21 +249,22 @@ impl<const A: usize> Sample<A> {
         kind.datagram_len(axes)
     }
 
-    /// [`Sample::decode_as`] of version 1.
+    /// Like [`Sample::decode_as`], for [`SampleKind::State`].
     ///
     /// # Errors
     ///
-    /// [`DecodeError`] for anything but a sample of version 1 with this number of axes and finite numbers. Never panics.
+    /// [`DecodeError`] for any datagram except a sample of [`SampleKind::State`] with `axes` axes and finite numbers. Never panics.
     #[inline]
     pub fn decode(datagram: &[u8], axes: usize) -> Result<Self, DecodeError> {
         Self::decode_as(datagram, SampleKind::State, axes).map(|(sample, _)| sample)
     }
 
-    /// Reads a sample of that kind and of `axes` axes, at most A; the other axes are zero.
+    /// Reads a sample of kind `kind` with `axes` axes, at most A. Further axes of the result are zero.
     ///
     /// # Errors
     ///
-    /// [`DecodeError`] for anything but a sample of this kind with this number of axes, finite numbers and, in an attitude, a quaternion of norm 1. Never panics.
+    /// [`DecodeError`] for any datagram except a sample of this kind with this number of axes, finite numbers and, in an attitude, a quaternion of norm 1.
+    /// Never panics.
     #[inline]
     pub fn decode_as(datagram: &[u8], kind: SampleKind, axes: usize) -> Result<(Self, Extra<A>), DecodeError> {
         let Some((header, body)) = datagram.split_first_chunk::<HEADER_LEN>() else {
@@ -268,6 +276,7 @@ impl<const A: usize> Sample<A> {
             let number = f64::from_bits(word(numbers, start));
             if number.is_finite() { Ok(number) } else { Err(DecodeError::NotFinite { axis, quantity }) }
         };
+        // The length is checked, so the body has whole axes; `take` keeps the attitude behind the last axis out.
         for (axis, numbers) in body.chunks_exact(kind.axis_len()).enumerate().take(A.min(axes)) {
             state.position[axis] = finite(numbers, 0, axis, "position")?;
             state.velocity[axis] = finite(numbers, 8, axis, "velocity")?;
@@ -287,8 +296,10 @@ impl<const A: usize> Sample<A> {
     }
 }
 
+/// Reads an attitude from its 56 bytes.
 fn decode_attitude(bytes: &[u8]) -> Result<Attitude, DecodeError> {
     let numbers: [f64; 7] = core::array::from_fn(|number| f64::from_bits(word(bytes, 8 * number)));
+    // Finite numbers before the norm: the norm of a NaN would hide which number is wrong.
     if let Some(place) = numbers.iter().position(|number| !number.is_finite()) {
         let (axis, quantity) = if place < 4 { (place, "quaternion") } else { (place - 4, "angular velocity") };
         return Err(DecodeError::NotFinite { axis, quantity });
@@ -298,8 +309,10 @@ fn decode_attitude(bytes: &[u8]) -> Result<Attitude, DecodeError> {
     if attitude.is_unit() { Ok(attitude) } else { Err(DecodeError::NotUnit) }
 }
 
+/// Checks the header against kind, number of axes and length. The order of the checks decides which error a datagram with several faults has.
 #[inline]
 fn check_header(header: &[u8; HEADER_LEN], len: usize, kind: SampleKind, axes: usize) -> Result<(), DecodeError> {
+    // Magic and version first: the meaning of all further bytes depends on both.
     if header[0..4] != MAGIC {
         return Err(DecodeError::Magic);
     }
@@ -323,6 +336,7 @@ fn check_header(header: &[u8; HEADER_LEN], len: usize, kind: SampleKind, axes: u
     Ok(())
 }
 
+/// Returns the little-endian number of 8 bytes at `start`.
 #[inline]
 fn word(bytes: &[u8], start: usize) -> u64 {
     let mut word = [0; 8];
@@ -330,6 +344,7 @@ fn word(bytes: &[u8], start: usize) -> u64 {
     u64::from_le_bytes(word)
 }
 
+/// Returns the little-endian number of 4 bytes at `start`.
 #[inline]
 fn half_word(bytes: &[u8], start: usize) -> u32 {
     let mut word = [0; 4];
@@ -374,6 +389,7 @@ mod tests {
             edit(&mut bytes);
             Sample::<1>::decode(&bytes[..len], 1).unwrap_err()
         };
+        // Each edit makes one fault in a valid datagram of 64 bytes.
         assert_eq!(decode(&|_| (), 47), DecodeError::TooShort { len: 47 });
         assert_eq!(decode(&|_| (), 63), DecodeError::Length { found: 63, expected: 64 });
         assert_eq!(decode(&|_| (), 65), DecodeError::Length { found: 65, expected: 64 });
@@ -381,6 +397,7 @@ mod tests {
         assert_eq!(decode(&|b| b[4] = 2, 64), DecodeError::Version { found: 2, expected: 1 });
         assert_eq!(decode(&|b| b[6] = 3, 64), DecodeError::Axes { found: 3, expected: 1 });
         assert_eq!(decode(&|b| b[45] = 1, 64), DecodeError::Reserved);
+        // Bytes 48 to 55 are the position, bytes 56 to 63 the velocity.
         let put = |at: usize, value: f64| move |b: &mut [u8; MAX_LEN]| b[at..at + 8].copy_from_slice(&value.to_le_bytes());
         assert_eq!(decode(&put(48, f64::NAN), 64), DecodeError::NotFinite { axis: 0, quantity: "position" });
         assert_eq!(decode(&put(56, f64::INFINITY), 64), DecodeError::NotFinite { axis: 0, quantity: "velocity" });
@@ -391,6 +408,7 @@ mod tests {
     fn a_peer_that_simulates_three_axes_speaks_of_one() {
         let state = State { position: [0.025, 0.0, 0.0], velocity: [-1.5, 0.0, 0.0] };
         let Sample { session, sender, sequence, sent, .. } = sample();
+        // The wide sample has zeros on the axes that the wire format leaves out.
         let wide = Sample::<3> { session, sender, sequence, sent, state };
         let mut bytes = [0; MAX_LEN];
         assert_eq!(wide.encode(1, &mut bytes), 64);

@@ -1,4 +1,4 @@
-//! Average-position coordination: each copy is pulled towards the mean of the others.
+//! Average-position coordination: each copy is pulled towards the mean of the other copies.
 //!
 //! Over an ideal network the difference modes of N copies have the stiffness N/(N−1)·KT (Rakhsha & Constantinescu 2015, equation 6): bounded in N.
 
@@ -9,7 +9,7 @@ use crate::{Gains, Number};
 /// The law of Rakhsha & Constantinescu (2015).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct AveragePosition<C = f64> {
-    /// KT and BT.
+    /// Gains KT [N/m] and BT [N·s/m].
     pub gains: Gains<C>,
 }
 

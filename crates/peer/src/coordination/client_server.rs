@@ -1,8 +1,8 @@
-//! A server in the middle: one peer alone has the object, the others are clients that send it the states of their devices.
+//! A central server: a single peer has the object. The remaining peers are clients, and send the states of their devices to the server.
 //!
-//! The server computes the coupling forces of all by equation (9) from the states held, with those of its clients in place of a coordination force. The
-//! copy of a client *is* the newest state heard from the server, and its device feels the force that the server returns, or one that it computes itself
-//! from its device and the state heard.
+//! The server computes the coupling forces of all peers by equation (9) from the held states. The coupling forces of the clients take the place of a
+//! coordination force. The copy of a client *is* the newest state heard from the server. The device of a client feels the force returned by the server, or a
+//! force computed by the client from its device and the heard state.
 
 use alloc::vec::Vec;
 
@@ -11,24 +11,25 @@ use super::{Command, Context, LawForm, LawParameter, LawValue, Role, Strategy, U
 use crate::wire::SampleKind;
 use crate::{Contact, Gains, Held, State};
 
-/// The words of `returns`, and what they mean.
+/// Words of the parameter `returns`, each with its meaning.
 const RETURNS: &[(&str, &str)] =
     &[("force", "the coupling force, computed by the server"), ("object", "the object, from which the client computes the coupling force")];
+/// Index of `force` in [`RETURNS`].
 const FORCE: usize = 0;
 
-/// The server, or one of its clients.
+/// The server or a client.
 #[derive(Clone, Debug)]
 pub enum ClientServer<const A: usize> {
-    /// The peer that has the object.
+    /// The peer with the object.
     Server {
-        /// Contact, KC and BC of each of the others.
+        /// Contact, KC and BC of each client, indexed by the order of peers without the server.
         couplings: Vec<(Contact, Gains)>,
     },
-    /// Any other.
+    /// A peer without a copy of its own.
     Client {
-        /// The place of the server among the others.
+        /// Index of the server in the order of peers without this client.
         server: usize,
-        /// The coupling force that was heard of \[N\]; `None` if the client computes it.
+        /// Newest coupling force returned by the server \[N\]; `None` if the client computes the force.
         returned: Option<[f64; A]>,
     },
 }
@@ -60,12 +61,13 @@ impl<const A: usize> ControllerKind<A> for ClientServer<A> {
             Self::Server { couplings: others.map(|(_, coupling)| *coupling).collect() }
         } else {
             let returned = (session.law.own.get(1) == LawValue::Word(FORCE)).then_some([0.0; A]);
+            // Peers after this client move down by one in the order without this client.
             Self::Client { server: if server < place { server } else { server - 1 }, returned }
         }
     }
 }
 
-/// FC of a client \[N\].
+/// Returns FC of a client \[N\].
 fn coupling_of<const A: usize>((contact, gains): &(Contact, Gains), device: &State<A>, object: &State<A>) -> [f64; A] {
     core::array::from_fn(|axis| contact.force_along(axis, gains, device.along(axis).relative_to(object.along(axis))))
 }
@@ -75,8 +77,10 @@ impl<const A: usize> Strategy<A> for ClientServer<A> {
         let mut force = [0.0; A];
         if let Self::Server { couplings } = self {
             for (other, coupling) in couplings.iter().enumerate() {
+                // Every client is heard by the server: `new` made one coupling for each held sample.
                 let device = context.held.state(other).expect("each of the others is held");
                 for (force, coupling) in force.iter_mut().zip(coupling_of(coupling, device, context.own)) {
+                    // A coordination force is subtracted from the forces on the copy, while couplings of clients push the object.
                     *force -= coupling;
                 }
             }
@@ -97,12 +101,14 @@ impl<const A: usize> Strategy<A> for ClientServer<A> {
 
     fn extra(&mut self, receiver: usize, own: &State<A>, held: &Held<A>) -> [f64; A] {
         match self {
+            // The force for the present object, not for the object of the last command: samples are sent before the command of a tick.
             Self::Server { couplings } => coupling_of(&couplings[receiver], held.state(receiver).expect("each of the others is held"), own),
             Self::Client { .. } => [0.0; A],
         }
     }
 
     fn accept(&mut self, other: usize, numbers: &[f64; A]) {
+        // Samples of other clients carry zeros.
         if let Self::Client { server, returned: Some(returned) } = self
             && other == *server
         {
@@ -123,6 +129,6 @@ impl<const A: usize> Strategy<A> for ClientServer<A> {
         }
     }
 
-    /// There is no coordination between copies.
+    /// No effect: copies without coordination have no gains.
     fn set_gains(&mut self, _gains: Gains) {}
 }

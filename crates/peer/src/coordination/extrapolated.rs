@@ -1,7 +1,7 @@
-//! Average-position coordination towards where the others are by now: samples are extrapolated with their velocities.
+//! Average-position coordination towards the present positions of other copies: samples are extrapolated with their velocities.
 //!
-//! The dead reckoning of distributed simulation (IEEE 1278.1, first order): x̂ⱼ = xⱼ + min(age, horizon)·vⱼ, and FT = KT·(x − mean x̂ⱼ) + BT·(v − mean vⱼ).
-//! Copies that move alike at one velocity then exert no force on each other, however old the samples are.
+//! The law is the dead reckoning of distributed simulation (IEEE 1278.1, first order): x̂ⱼ = xⱼ + min(age, horizon)·vⱼ, and FT = KT·(x − mean x̂ⱼ) + BT·(v −
+//! mean vⱼ). Copies that move at one velocity then exert no force on each other, at any age of the samples up to the horizon.
 
 use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
 use crate::tick::coordinate;
@@ -10,9 +10,9 @@ use crate::{Gains, Motion, Number};
 /// The average-position law with extrapolated samples.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Extrapolated<C = f64> {
-    /// KT and BT.
+    /// Gains KT [N/m] and BT [N·s/m].
     gains: Gains<C>,
-    /// Up to which age samples are extrapolated \[s\].
+    /// Greatest age to which samples are extrapolated \[s\]; 0 for average-position coordination.
     horizon: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Coordination laws, in any [`Number`].
+//! Coordination laws in any [`Number`], and the parameters of laws.
 
 use core::time::Duration;
 
@@ -6,144 +6,145 @@ use cohaptic_units::parse;
 
 use crate::{Gains, Motion, Number};
 
-/// What a law is told at a tick, along one axis.
+/// Input of a law at a tick, along one axis.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Observation<N = f64> {
-    /// The peer's own copy of the object.
+    /// Motion of the peer's own copy.
     pub own: Motion<N>,
-    /// The peer's own copy [`Law::lag`] ticks ago; before the first tick it was as at the first. The same as `own` for a law that does not look back.
+    /// Motion of the peer's own copy [`Law::lag`] ticks ago. Before the first tick, the motion of the first tick counts. Equal to `own` for a law without a
+    /// lag.
     pub past: Motion<N>,
-    /// The mean of the newest samples held from the other peers.
+    /// Mean of the newest samples held from other peers.
     pub mean: Motion<N>,
-    /// By how much those samples have moved on since they were sent, on average: the mean of min(age, [`Law::horizon`])·velocity \[m\]. Zero for a law that
-    /// has no horizon.
+    /// Mean displacement of these samples since they were sent \[m\]: the mean of min(age, [`Law::horizon`])·velocity. Zero for a law without a horizon.
     pub lead: N,
 }
 
-/// A coordination law: the force that holds the copies of the shared object together, as a function of what a peer knows. Each axis is by itself.
+/// A coordination law: the force between the copies of the shared object, as a function of the knowledge of a peer. Axes are independent.
 ///
-/// A law must be deterministic: the answer depends on the observation and the memory alone. It knows the other peers by their mean, so peers with equal
-/// parameters may be analysed as one class.
+/// A law must be deterministic: its result depends on the observation and the memory alone. A law sees only the mean of the samples, so an analysis can treat
+/// peers with equal parameters as one class.
 pub trait Law<N: Number> {
-    /// How many numbers the law remembers from tick to tick, along each axis.
+    /// Returns the number of values in the law's memory, along each axis.
     fn memory(&self) -> usize {
         0
     }
 
-    /// L, how many ticks old the own state is that the law takes as [`Observation::past`]; 0 for a law that does not look back. A law that does has no
-    /// [`Law::memory`] beside it.
+    /// Returns L, the age of the own state in [`Observation::past`] \[ticks\]; 0 for a law without a lag. A law with a lag has no [`Law::memory`].
     fn lag(&self) -> usize {
         0
     }
 
-    /// β [N·s/m]: by how much the law damps the peer's own copy. It is part of the body, bO + β, so it acts between ticks too, and [`Law::force`] leaves it out.
+    /// Returns β [N·s/m], the damping of the peer's own copy by the law. β is part of the body, bO + β, so it acts between ticks too, and [`Law::force`]
+    /// leaves it out.
     fn damping(&self) -> f64 {
         0.0
     }
 
-    /// Up to which age \[s\] samples are extrapolated; `None` for a law that takes them as they are.
+    /// Returns the greatest age to which samples are extrapolated \[s\]; `None` for a law without extrapolation.
     fn horizon(&self) -> Option<f64> {
         None
     }
 
-    /// The coordination force FT of a tick \[N\]; equation (8) subtracts it. `memory` has [`Law::memory`] numbers: those that the law left at the tick
-    /// before, zeros at the first.
+    /// Returns the coordination force FT of a tick \[N\], which equation (8) subtracts. `memory` has [`Law::memory`] values: the values at the end of the
+    /// tick before, or zeros at the first tick.
     fn force(&self, seen: &Observation<N>, memory: &mut [N]) -> N;
 
-    /// The desired motion of the copy (xd, vd), for the record.
+    /// Returns the desired motion of the copy (xd, vd), for the record.
     #[inline(always)]
     fn target(&self, seen: &Observation<N>) -> Motion<N> {
         seen.mean
     }
 }
 
-/// The coefficients of a law, in any type: of one peer, of eight lanes, of a linear form.
+/// Coefficients of a law in any type: `f64` for one peer, eight lanes for eight peers, or a linear form.
 pub trait Coefficients {
-    /// The type of a coefficient.
+    /// Type of a coefficient.
     type Coefficient;
-    /// The law with coefficients of another type.
+    /// The same law with coefficients of another type.
     type Of<D: Copy>;
 
-    /// The law with each coefficient replaced by what `coefficient` makes of it, always in one order.
+    /// Returns the law with `coefficient` applied to each coefficient, always in the same order.
     fn map<D: Copy>(&self, coefficient: impl FnMut(&Self::Coefficient) -> D) -> Self::Of<D>;
 }
 
-/// Something that is done with a law, whichever of the registry it is. The compiler makes code for each law, so that a loop within does not choose
-/// between laws at every turn.
+/// An operation on any law of the registry. The compiler generates code for each law, so a loop inside the operation does not select the law at every
+/// iteration.
 pub trait LawVisitor<C> {
-    /// What comes out.
+    /// Result of the operation.
     type Output;
 
-    /// Does it.
+    /// Applies the operation to a law.
     fn visit<L: Coefficients<Coefficient = C, Of<f64>: Law<f64>>>(self, law: &L) -> Self::Output;
 }
 
-/// What the registry knows of a law.
+/// Properties of a law in the registry.
 pub(super) trait LawKind {
-    /// How it pulls towards the others.
+    /// Pull of the law: towards the mean, or towards each copy.
     const PULL: Pull = Pull::Mean;
-    /// Which gains it uses.
+    /// Gains used by the law.
     const GAINS: UsedGains = UsedGains::Both;
-    /// The parameters that it alone has.
+    /// Parameters of this law alone.
     const PARAMETERS: &[LawParameter] = &[];
 
-    /// The law with these parameters.
+    /// Returns the law with these parameters.
     fn new(parameters: &LawParameters) -> Self;
 }
 
-/// What the coefficients of a law are computed from.
+/// Parameters from which the coefficients of a law are computed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LawParameters {
-    /// KT and BT.
+    /// Gains KT [N/m] and BT [N·s/m].
     pub gains: Gains,
-    /// How many peers there are.
+    /// Number of peers in the session.
     pub peers: usize,
-    /// The period of the peer's tick, Tc.
+    /// Period Tc of the peer's tick.
     pub tick: Duration,
-    /// How many ticks old a sample in use is at most, where the links bound it; for parameters that are [`LawValue::Automatic`].
+    /// Greatest age of a sample in use \[ticks\], for parameters that are [`LawValue::Automatic`]; `None` if the links do not bound the age.
     pub oldest: Option<u64>,
-    /// How many ticks old samples are in the middle of their use, where the links give all one such age; for parameters that are [`LawValue::Automatic`].
+    /// Age of samples in the middle of their use \[ticks\], for parameters that are [`LawValue::Automatic`]; `None` if the links do not give all samples the
+    /// same age.
     pub middle: Option<u64>,
-    /// The parameters that this law alone has.
+    /// Values of the parameters of this law alone.
     pub own: LawValues,
 }
 
-/// How a law pulls towards the others.
+/// Dependence of a law's pull on the number of peers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Pull {
-    /// Towards their mean: as strongly however many there are.
+    /// A pull towards the mean of the copies, independent of the number of peers.
     Mean,
-    /// Towards each of them: the more there are, the more strongly.
+    /// A pull towards each copy, which grows with the number of peers.
     Sum,
 }
 
-/// Which of the gains KT and BT a law uses.
+/// Gains used by a law.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum UsedGains {
-    /// Both.
+    /// KT and BT.
     Both,
     /// KT alone.
     Stiffness,
-    /// None of them.
+    /// Neither KT nor BT.
     Neither,
 }
 
-/// A parameter that one law alone has: a key of the table `[coordination.NAME]`.
+/// A parameter of one law alone: a key of the table `[coordination.NAME]`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LawParameter {
-    /// The key.
+    /// Key in the table.
     pub key: &'static str,
-    /// What values it has.
+    /// Form of the values.
     pub form: LawForm,
-    /// The value without the key, as TOML writes it.
+    /// Default value, in TOML syntax.
     pub default: &'static str,
-    /// What it means, without the last full stop.
+    /// Meaning of the parameter, without a final full stop.
     pub about: &'static str,
-    /// Whether the timeline of a scene may change it; a parameter that only says how a run begins, or what its samples mean, cannot change.
+    /// Whether the timeline of a scene may change the parameter. A parameter that defines the beginning of a run, or the meaning of samples, cannot change.
     pub can_change: bool,
 }
 
-/// What values a parameter of a law has.
+/// Form of the values of a law's parameter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LawForm {
     /// A duration.
@@ -158,14 +159,14 @@ pub enum LawForm {
     Impedance,
     /// An energy of at least zero \[J\].
     Energy,
-    /// One of these words, with what they mean.
+    /// A word of this list of words and meanings.
     Words(&'static [(&'static str, &'static str)]),
-    /// The name of a peer; the first peer without the key.
+    /// The name of a peer. Without the key, the first peer.
     Peer,
 }
 
 impl LawForm {
-    /// The unit of a number; empty where values are no numbers.
+    /// Returns the unit of a number; empty for values without a number or with units in the text.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -175,7 +176,7 @@ impl LawForm {
         }
     }
 
-    /// The form of values that are no `"auto"`.
+    /// Returns the form of the values except `"auto"`.
     #[must_use]
     pub const fn without_automatic(self) -> Self {
         match self {
@@ -185,7 +186,7 @@ impl LawForm {
         }
     }
 
-    /// The word at that place; empty where values are no words.
+    /// Returns the word with index `place`; empty beyond the last word, and for forms without words.
     #[must_use]
     pub const fn word(self, place: usize) -> &'static str {
         match self {
@@ -202,23 +203,23 @@ impl LawForm {
     }
 }
 
-/// The value of a parameter of a law.
+/// A value of a law's parameter.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum LawValue {
-    /// `"auto"`: as the links of the scene ask for.
+    /// `"auto"`: derived from the links of the scene.
     Automatic,
     /// A duration.
     Duration(Duration),
-    /// A number, in the unit of the [`LawForm`].
+    /// A number in the unit of the [`LawForm`].
     Number(f64),
-    /// The place of a word in its [`LawForm`].
+    /// The index of a word in the [`LawForm`].
     Word(usize),
-    /// The place of a peer in the scene.
+    /// The place of a peer in the scene, from 0.
     Place(usize),
 }
 
 impl LawValue {
-    /// The duration; `None` for any other value.
+    /// Returns the duration; `None` for any other value.
     #[must_use]
     pub const fn duration(self) -> Option<Duration> {
         match self {
@@ -227,7 +228,7 @@ impl LawValue {
         }
     }
 
-    /// The number; `None` for any other value.
+    /// Returns the number; `None` for any other value.
     #[must_use]
     pub const fn number(self) -> Option<f64> {
         match self {
@@ -237,26 +238,26 @@ impl LawValue {
     }
 }
 
-/// The values of a law's own parameters, in the order of [`Coordination::parameters`](super::Coordination::parameters).
+/// Values of a law's own parameters, in the order of [`Coordination::parameters`](super::Coordination::parameters).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LawValues([LawValue; Self::MOST]);
 
 impl Default for LawValues {
-    /// Durations of zero.
+    /// Returns durations of zero.
     fn default() -> Self {
         Self([LawValue::Duration(Duration::ZERO); Self::MOST])
     }
 }
 
 impl LawValues {
-    /// How many parameters of its own a law has at most.
+    /// Greatest number of own parameters of a law.
     pub const MOST: usize = 4;
 
-    /// Each at its default.
+    /// Returns the default of each parameter.
     ///
     /// # Panics
     ///
-    /// If a default has not the form of its parameter.
+    /// If a default does not have the form of its parameter.
     #[must_use]
     pub fn defaults(parameters: &[LawParameter]) -> Self {
         let mut values = Self::default();
@@ -274,57 +275,57 @@ impl LawValues {
         values
     }
 
-    /// Whether a value is `"auto"`.
+    /// Returns whether any value is `"auto"`.
     #[must_use]
     pub fn any_automatic(&self) -> bool {
         self.0.contains(&LawValue::Automatic)
     }
 
-    /// The value of the parameter at that place.
+    /// Returns the value of the parameter with index `place`.
     ///
     /// # Panics
     ///
-    /// From [`LawValues::MOST`] on.
+    /// If `place` is [`LawValues::MOST`] or greater.
     #[must_use]
     pub const fn get(&self, place: usize) -> LawValue {
         self.0[place]
     }
 
-    /// The duration at that place; zero for any other value.
+    /// Returns the duration with index `place`; zero for any other value.
     ///
     /// # Panics
     ///
-    /// From [`LawValues::MOST`] on.
+    /// If `place` is [`LawValues::MOST`] or greater.
     #[must_use]
     pub fn duration(&self, place: usize) -> Duration {
         self.get(place).duration().unwrap_or(Duration::ZERO)
     }
 
-    /// The number at that place; zero for any other value.
+    /// Returns the number with index `place`; zero for any other value.
     ///
     /// # Panics
     ///
-    /// From [`LawValues::MOST`] on.
+    /// If `place` is [`LawValues::MOST`] or greater.
     #[must_use]
     pub fn number(&self, place: usize) -> f64 {
         self.get(place).number().unwrap_or(0.0)
     }
 
-    /// The place of a peer at that place; the first peer for any other value.
+    /// Returns the place of a peer from the parameter with index `place`; the first peer for any other value.
     ///
     /// # Panics
     ///
-    /// From [`LawValues::MOST`] on.
+    /// If `place` is [`LawValues::MOST`] or greater.
     #[must_use]
     pub const fn place(&self, place: usize) -> usize {
         if let LawValue::Place(peer) = self.get(place) { peer } else { 0 }
     }
 
-    /// Replaces the value of the parameter at that place.
+    /// Replaces the value of the parameter with index `place`.
     ///
     /// # Panics
     ///
-    /// From [`LawValues::MOST`] on.
+    /// If `place` is [`LawValues::MOST`] or greater.
     pub const fn set(&mut self, place: usize, value: LawValue) {
         self.0[place] = value;
     }

@@ -1,4 +1,4 @@
-//! A law of the registry as the strategy of a peer.
+//! Strategy of a peer with a law of the registry.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -7,24 +7,24 @@ use super::past::Past;
 use super::{BuiltIn, Command, Context, Coordination, Law, LawParameters, LawValues, Observation, Strategy};
 use crate::{Gains, State};
 
-/// A law of the registry with what it remembers.
+/// A law of the registry, with its memory.
 #[derive(Clone, Debug)]
 pub struct LawStrategy<const A: usize> {
     coordination: Coordination,
     parameters: LawParameters,
     law: BuiltIn,
-    /// What the law remembers along each axis, one axis after another.
+    /// Memory of the law along each axis, one axis after another.
     memory: Vec<f64>,
-    /// The own states of the latest ticks, for a law that looks back: then that is all that it remembers.
+    /// Own states of the latest ticks, for a law with a lag. Such a law has no other memory.
     past: Option<Past<A>>,
 }
 
 impl<const A: usize> LawStrategy<A> {
-    /// The strategy of one peer, with nothing remembered.
+    /// Returns the strategy of one peer, with an empty memory.
     ///
     /// # Panics
     ///
-    /// If the strategy of the registry is not a law.
+    /// If `coordination` is not a law.
     #[must_use]
     pub fn new(coordination: Coordination, parameters: LawParameters) -> Self {
         let law = coordination.law(&parameters).expect("the strategy is a law");
@@ -40,8 +40,10 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
     #[inline]
     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
         let mut command = Command { force: [0.0; A], target: State::REST };
+        // `new` made the memory of equal parts, one for each axis.
         let remembered = self.memory.len() / A;
         let lead = context.held.lead();
+        // Without a lag the past is the present; with a lag, the exchange returns the oldest state and stores the present one.
         let past = self.past.as_mut().map_or(*context.own, |past| past.exchange(context.own));
         for (axis, lead) in lead.into_iter().enumerate() {
             let seen = Observation { own: context.own.along(axis), past: past.along(axis), mean: context.held.mean().along(axis), lead };
@@ -59,12 +61,14 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
 
     fn set_gains(&mut self, gains: Gains) {
         self.parameters.gains = gains;
+        // The coefficients are computed from gains and parameters together, so both setters make the whole law anew.
         self.law = self.coordination.law(&self.parameters).expect("it was a law when the strategy was made");
     }
 
     fn set_parameters(&mut self, own: &LawValues) {
         self.parameters.own = *own;
         self.set_gains(self.parameters.gains);
+        // A lag above zero before and after keeps the known states. A new lag starts without states.
         match (&mut self.past, Law::<f64>::lag(&self.law)) {
             (Some(past), lag @ 1..) => past.set_lag(lag),
             (past, lag) => *past = (lag > 0).then(|| Past::new(lag)),

@@ -1,17 +1,17 @@
-//! A spring towards the mean of the others, and a damper that ties each copy to ground.
+//! A spring towards the mean of the other copies, and a damper from each copy to ground.
 //!
-//! Local damping injection as in Lee & Huang (2010), without their set-points: FT = KT·(x − mean xⱼ), and the copy has the damping bO + β. Where no sample
-//! in use is older than m ticks, the springs inject at most the sum of KT·(m + 1)·d² over all ticks, with d the motion of a copy in a tick. A damper takes
-//! at least β·d²/Tc, so with β = KT·(m + 1)·Tc the network injects no energy. The damping is felt in free motion.
+//! This is local damping injection as in Lee & Huang (2010), without their set-points: FT = KT·(x − mean xⱼ), and the copy has the damping bO + β. If no
+//! sample in use is older than m ticks, the springs inject at most the sum of KT·(m + 1)·d² over all ticks, where d is the motion of a copy in a tick. A
+//! damper dissipates at least β·d²/Tc, so with β = KT·(m + 1)·Tc the network injects no energy. The user feels the damping in free motion.
 
 use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, LawValue, Observation, UsedGains};
 use crate::tick::coordinate;
 use crate::{Gains, Number};
 
-/// The law with damping of the own copy.
+/// The law with damping of the own copy towards ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalDamping<C = f64> {
-    /// KT, and no damping between copies.
+    /// Gain KT [N/m]; the damping between copies is zero.
     gains: Gains<C>,
     /// β [N·s/m].
     damping: f64,
@@ -43,7 +43,7 @@ impl LawKind for LocalDamping {
         let automatic = || match (parameters.own.get(1), parameters.oldest) {
             (LawValue::Duration(age), _) => stiffness * (age.as_secs_f64() + tick),
             (_, Some(oldest)) => stiffness * ((oldest + 1) as f64 * tick),
-            // Scenes in which the links bound no age are refused.
+            // Scenes with `auto` whose links do not bound the age are refused before this point.
             (_, None) => 0.0,
         };
         Self { gains: Gains { stiffness, damping: 0.0 }, damping: parameters.own.get(0).number().unwrap_or_else(automatic) }

@@ -1,8 +1,8 @@
-//! Average-position coordination of states of one age: the own state is taken as old as the samples of the others are.
+//! Average-position coordination of states of equal age: the own state is as old as the samples of the other copies.
 //!
 //! FT(k) = KT·(x(k − L) − mean xⱼ) + BT·(v(k − L) − mean vⱼ), with the initial state before the first tick, as in Cheong & Niculescu's synchronisation of
-//! delayed copies. Copies that move alike at one velocity then exert no force on each other if the samples in use are L ticks old. A copy feels what it did
-//! itself L ticks late.
+//! delayed copies. If the samples in use are L ticks old, copies that move at one velocity exert no force on each other. A copy feels its own motion L ticks
+//! late.
 
 use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, LawValue, Observation};
 use crate::tick::coordinate;
@@ -11,7 +11,7 @@ use crate::{Gains, Number};
 /// The average-position law with an own state of the past.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalLag<C = f64> {
-    /// KT and BT.
+    /// Gains KT [N/m] and BT [N·s/m].
     gains: Gains<C>,
     /// L, the age of the own state \[ticks\].
     lag: usize,
@@ -28,9 +28,10 @@ impl LawKind for LocalLag {
 
     fn new(parameters: &LawParameters) -> Self {
         let ticks = match (parameters.own.get(0), parameters.middle) {
+            // Rounded up to whole ticks, as the age of a sample that arrives between two ticks.
             (LawValue::Duration(lag), _) => lag.as_nanos().div_ceil(parameters.tick.as_nanos().max(1)),
             (_, Some(middle)) => middle.into(),
-            // Scenes whose links give no middle age are refused.
+            // Scenes with `auto` whose links give no middle age are refused before this point.
             (_, None) => 0,
         };
         Self { gains: parameters.gains, lag: usize::try_from(ticks).unwrap_or(usize::MAX) }

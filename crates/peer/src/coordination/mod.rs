@@ -1,8 +1,8 @@
-//! Coordination: the force that holds the copies of the shared object together.
+//! Coordination: the force between the copies of the shared object.
 //!
-//! A [`Law`] is one function of what a peer knows, in any [`Number`](crate::Number): runs, runs side by side and the linear response of the stability
-//! analysis come from it. To add one, write a file here and add its line to the [registry](Coordination). A [`Strategy`] is what a [`Peer`](crate::Peer)
-//! calls; every law is one, and so is a type that is simulated and not a law.
+//! A [`Law`] is one function of the knowledge of a peer, in any [`Number`](crate::Number). Runs, runs in parallel lanes and the linear response of the
+//! stability analysis use the same function. A new law is a file in this folder and a line in the [registry](Coordination). A [`Strategy`] is the interface
+//! called by a [`Peer`](crate::Peer). Every law is a strategy, and so is a controller, which is simulated but is not a law.
 
 mod average_position;
 mod client_server;

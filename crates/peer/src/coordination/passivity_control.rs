@@ -1,10 +1,10 @@
-//! Average-position coordination behind a passivity controller: time-domain passivity over networks, for any number of peers.
+//! Average-position coordination with a passivity controller: time-domain passivity over networks, for any number of peers.
 //!
-//! Ryu, Artigas & Preusche (2010) for two ports: each peer counts the energy that its coordination force takes from its copy, tells the others, and gives
-//! its copy no more than it has heard of. Each axis is by itself. With d the motion of the copy in a tick and F the force that equation (8) subtracts,
-//! F·d above zero adds to Ein, below zero to Eout, and A = E0 + mean Êin − Eout is what may be given, where Êin is the newest Ein heard from each of the
-//! others. Since d = d0 − c·F is known before F acts, F is held to −F·d ≤ A by F± = (d0 ± √(d0² + 4·c·A))/(2·c). In the publication F·v·h stands for F·d
-//! and is corrected afterwards, which gives energy away at every tick.
+//! The method is that of Ryu, Artigas & Preusche (2010) for two ports. Each peer counts the energy that its coordination force takes from its copy, sends
+//! this count to the other peers, and gives its copy no more energy than it has heard of. Axes are independent. Let d be the motion of the copy in a tick,
+//! and F the force that equation (8) subtracts. F·d above zero adds to Ein, F·d below zero adds to Eout, and A = E0 + mean Êin − Eout is the available
+//! energy, where Êin is the newest Ein heard from a peer. Since d = d0 − c·F is known before F acts, F is limited to −F·d ≤ A by F± = (d0 ± √(d0² +
+//! 4·c·A))/(2·c). The publication uses F·v·h instead of F·d and corrects it afterwards, which gives energy away at every tick.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -15,26 +15,26 @@ use crate::tick::coordinate;
 use crate::wire::SampleKind;
 use crate::{Gains, Held, State};
 
-/// The average-position law with its force limited to the energy at hand.
+/// The average-position law, with its force limited to the available energy.
 #[derive(Clone, Debug)]
 pub struct PassivityControl<const A: usize> {
-    /// KT and BT.
+    /// Gains KT [N/m] and BT [N·s/m].
     gains: Gains,
-    /// N − 1.
+    /// N − 1, the number of other peers.
     others: f64,
-    /// The reserve of each axis \[J\].
+    /// Reserve of each axis \[J\].
     reserve: f64,
-    /// E0 with the reserve \[J\].
+    /// E0 with the reserve \[J\], indexed by axis.
     initial: [f64; A],
-    /// Ein \[J\].
+    /// Ein \[J\], indexed by axis.
     taken: [f64; A],
-    /// Eout \[J\].
+    /// Eout \[J\], indexed by axis.
     given: [f64; A],
-    /// The sum of Êin over the others \[J\].
+    /// Sum of Êin over the other peers \[J\], indexed by axis.
     heard: [f64; A],
-    /// The newest energy of each of the others \[J\].
+    /// Newest energy heard from each other peer \[J\].
     newest: Vec<[f64; A]>,
-    /// Where the copy was and what force acted since the tick before.
+    /// Position of the copy at the tick before, and the force since then; `None` once this energy is counted.
     before: Option<([f64; A], [f64; A])>,
 }
 
@@ -55,6 +55,7 @@ impl<const A: usize> ControllerKind<A> for PassivityControl<A> {
         let own = &session.initial[session.place];
         let springs = |axis: usize| -> f64 {
             let squares = session.initial.iter().map(|other| own.position[axis] - other.position[axis]).map(|apart| apart * apart);
+            // A quarter: each of the two ends of a spring may give half of its energy ½·k·x².
             0.25 * gains.stiffness / others * squares.sum::<f64>()
         };
         Self {
@@ -72,8 +73,10 @@ impl<const A: usize> ControllerKind<A> for PassivityControl<A> {
 }
 
 impl<const A: usize> PassivityControl<A> {
-    /// Counts the energy of the tick just over, once.
+    /// Counts the energy of the tick just over. A second call in the same tick has no effect, because the sample and the command of a tick both need the
+    /// count.
     fn settle(&mut self, own: &State<A>) {
+        // `take` makes the second call of a tick find nothing.
         let Some((position, force)) = self.before.take() else { return };
         for axis in 0..A {
             let work = force[axis] * (own.position[axis] - position[axis]);
@@ -90,17 +93,20 @@ impl<const A: usize> Strategy<A> for PassivityControl<A> {
     #[inline]
     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
         let (own, mean) = (context.own, context.held.mean());
+        // The energy of the tick just over counts first: the available energy depends on it.
         self.settle(own);
         let limited = |axis: usize| {
             let wanted = coordinate(&self.gains, own.along(axis).relative_to(mean.along(axis)));
             let available = self.initial[axis] + self.heard[axis] / self.others - self.given[axis];
             let (free, compliance) = (context.ahead.free[axis], context.ahead.compliance);
-            // −F·d = (c·F − d0)·F: most forces stay below what may be given, and need no root.
+            // −F·d = (c·F − d0)·F. Most forces stay below the available energy, and need no root.
             if (compliance * wanted - free) * wanted <= available {
                 return wanted;
             }
+            // A can be negative by rounding, or after a reduced reserve. Both limits are then d0/(2·c), the force that takes the most energy from the copy.
             let root = libm::sqrt((free * free + 4.0 * compliance * available).max(0.0));
             let (least, most) = ((free - root) / (2.0 * compliance), (free + root) / (2.0 * compliance));
+            // Between the limits the force is unchanged; beyond, the nearer limit gives exactly the available energy.
             wanted.max(least).min(most)
         };
         let force = core::array::from_fn(limited);
@@ -116,7 +122,7 @@ impl<const A: usize> Strategy<A> for PassivityControl<A> {
         Self::KIND
     }
 
-    /// Ein with the tick just over.
+    /// Returns Ein with the tick just over.
     fn extra(&mut self, _receiver: usize, own: &State<A>, _held: &Held<A>) -> [f64; A] {
         self.settle(own);
         self.taken
@@ -129,7 +135,7 @@ impl<const A: usize> Strategy<A> for PassivityControl<A> {
     fn set_gains(&mut self, gains: Gains) {
         self.gains = gains;
     }
-    /// A reserve that has grown can be given from now on; one that has shrunk is missed.
+    /// Sets the reserve. Additional reserve is available from now on; a reduced reserve reduces the available energy, also below zero.
     fn set_parameters(&mut self, own: &LawValues) {
         let more = own.number(0) - core::mem::replace(&mut self.reserve, own.number(0));
         self.initial = self.initial.map(|initial| initial + more);

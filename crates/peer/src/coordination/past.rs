@@ -1,47 +1,51 @@
-//! The own states of the latest ticks, for laws that look back.
+//! Own states of the latest ticks, for laws with a lag.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::State;
 
-/// The states of a copy at the latest ticks, the oldest first, as numbers: its positions along each axis, then its velocities.
+/// States of a copy at the latest ticks, the oldest first, as numbers: the positions along all axes, then the velocities.
 ///
-/// Each state is written twice, one length of the window apart, so that the window is one slice wherever it begins, and a tick takes as long whatever the
-/// lag is.
+/// Each state is written twice, one window length apart. The window is therefore one slice, wherever it begins, and a tick takes the same time for any lag.
 #[derive(Clone, Debug)]
 pub(super) struct Past<const A: usize> {
+    /// Two copies of the window: 2·2·A·lag numbers.
     numbers: Vec<f64>,
+    /// Number of states in the window, at least 1.
     lag: usize,
-    /// The place of the oldest state.
+    /// Index of the oldest state in the first copy, below `lag`.
     oldest: usize,
-    /// Whether any state is known: before the first tick none is.
+    /// Whether a state is known; not before the first tick.
     is_known: bool,
 }
 
 impl<const A: usize> Past<A> {
-    /// Room for the states of that number of ticks, at least one.
+    /// Returns an empty window of `lag` ticks, at least one.
     pub(super) fn new(lag: usize) -> Self {
         Self { numbers: vec![0.0; 4 * A * lag], lag, oldest: 0, is_known: false }
     }
 
-    /// Room for the states of that number of ticks, at least one, from now on. The latest states stay; where more are asked for than are known, the copy was
-    /// before the oldest as at the oldest.
+    /// Changes the window to `lag` ticks, at least one. The latest states stay. If the new window is longer than the known states, the oldest known state
+    /// fills the rest.
     pub(super) fn set_lag(&mut self, lag: usize) {
         if lag == self.lag {
             return;
         }
+        // Before the first tick there is nothing to keep.
         let known = self.is_known.then(|| self.numbers().to_vec());
         *self = Self::new(lag);
         let Some(known) = known else { return };
         let (oldest, count) = (&known[..2 * A], known.len() / (2 * A));
+        // Either `missing` is empty, or all known states stay: together they fill the window exactly.
         let missing = oldest.repeat(lag.saturating_sub(count));
         self.set_numbers(&[&missing, &known[2 * A * count.saturating_sub(lag)..]].concat());
     }
 
-    /// Gives the oldest state, and remembers the present one. Before the first tick the copy was as at the first.
+    /// Returns the oldest state and stores the present state `now`. Before the first tick, the state of the first tick counts.
     pub(super) fn exchange(&mut self, now: &State<A>) -> State<A> {
         if !self.is_known {
+            // The state of the first tick stands for all earlier ticks.
             for place in 0..self.lag {
                 self.write(place, now);
             }
@@ -50,11 +54,12 @@ impl<const A: usize> Past<A> {
         let oldest = &self.numbers[2 * A * self.oldest..2 * A * (self.oldest + 1)];
         let before = State { position: core::array::from_fn(|axis| oldest[axis]), velocity: core::array::from_fn(|axis| oldest[A + axis]) };
         self.write(self.oldest, now);
+        // The window moves by one state, and wraps around after `lag` ticks.
         self.oldest = if self.oldest + 1 == self.lag { 0 } else { self.oldest + 1 };
         before
     }
 
-    /// All states, the oldest first.
+    /// Returns all states, the oldest first.
     pub(super) fn numbers(&self) -> &[f64] {
         &self.numbers[2 * A * self.oldest..2 * A * (self.oldest + self.lag)]
     }
@@ -63,7 +68,7 @@ impl<const A: usize> Past<A> {
     ///
     /// # Panics
     ///
-    /// If there are not as many numbers.
+    /// If `numbers` does not have the length of the window.
     pub(super) fn set_numbers(&mut self, numbers: &[f64]) {
         let (first, second) = self.numbers.split_at_mut(2 * A * self.lag);
         first.copy_from_slice(numbers);
@@ -71,6 +76,7 @@ impl<const A: usize> Past<A> {
         (self.oldest, self.is_known) = (0, true);
     }
 
+    /// Writes a state into both copies of the window.
     fn write(&mut self, place: usize, state: &State<A>) {
         for place in [place, place + self.lag] {
             let numbers = &mut self.numbers[2 * A * place..2 * A * (place + 1)];
@@ -107,7 +113,7 @@ mod tests {
         }
     }
 
-    /// A window that was longer or shorter before gives back what one of its length from the beginning does, as far as it has seen.
+    /// After a change of its length, a window returns the same states as a window of the new length, as far as it knows them.
     #[test]
     fn a_lag_that_changes_keeps_the_latest_states() {
         for (before, after) in [(3_u32, 7_u32), (7, 3), (4, 4), (1, 5), (5, 1)] {

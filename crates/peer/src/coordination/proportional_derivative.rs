@@ -1,17 +1,17 @@
-//! Conventional proportional-derivative coordination: each copy is pulled towards each of the others.
+//! Conventional proportional-derivative coordination: each copy is pulled towards each other copy.
 //!
-//! Over an ideal network the difference modes of N copies have the stiffness N·KT (Rakhsha & Constantinescu 2015, equation 3): it grows with N.
+//! Over an ideal network the difference modes of N copies have the stiffness N·KT (Rakhsha & Constantinescu 2015, equation 3), which grows with N.
 
 use super::{Coefficients, Law, LawKind, LawParameters, Observation, Pull};
 use crate::{Gains, Number};
 
 /// The conventional law.
 ///
-/// FT = Σⱼ [KT·(x − xⱼ) + BT·(v − vⱼ)] over the N−1 others. Every term is linear, so the sum is the pull of their mean with N−1 times the gains: two products
-/// made once in place of N−1 terms a tick.
+/// FT = Σⱼ [KT·(x − xⱼ) + BT·(v − vⱼ)] over the N−1 other peers. Every term is linear, so the sum equals a pull towards the mean with N−1 times the gains.
+/// These gains are computed once, in place of N−1 terms per tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ProportionalDerivative<C = f64> {
-    /// (N−1)·KT and (N−1)·BT.
+    /// Gains (N−1)·KT [N/m] and (N−1)·BT [N·s/m].
     summed: Gains<C>,
 }
 
@@ -20,6 +20,7 @@ impl LawKind for ProportionalDerivative {
 
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     fn new(parameters: &LawParameters) -> Self {
+        // A session of one peer has no other copies and no pull.
         Self { summed: parameters.gains.scaled(parameters.peers.saturating_sub(1) as f64) }
     }
 }

@@ -1,4 +1,4 @@
-//! The strategies that a scene can name.
+//! Registry of the strategies that a scene can name.
 
 use core::fmt;
 use core::time::Duration;
@@ -18,7 +18,7 @@ macro_rules! registry {
         laws { $($law:ident: $name:literal, $about:literal;)+ }
         controllers { $($controller:ident: $controller_name:literal, $controller_about:literal;)+ }
     ) => {
-        /// The strategies that a scene can name: the registry. The first ones are [laws](Law).
+        /// A strategy that a scene can name: the registry. [Laws](Law) come first.
         #[derive(Clone, Copy, PartialEq, Eq, Debug)]
         pub enum Coordination {
             $(#[doc = concat!("Each copy is drawn ", $about, ".")] $law,)+
@@ -26,10 +26,10 @@ macro_rules! registry {
         }
 
         impl Coordination {
-            /// Every strategy.
+            /// All strategies, the laws first.
             pub const ALL: &'static [Self] = &[$(Self::$law,)+ $(Self::$controller,)+];
 
-            /// The name in a scene file.
+            /// Returns the name in a scene file.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
@@ -38,13 +38,13 @@ macro_rules! registry {
                 }
             }
 
-            /// The strategy of this name in a scene file, or of a [short one](Self::short_name).
+            /// Returns the strategy with this name in a scene file, or with this [short name](Self::short_name).
             #[must_use]
             pub fn named(name: &str) -> Option<Self> {
                 Self::ALL.iter().find(|strategy| strategy.name() == name || strategy.short_name() == Some(name)).copied()
             }
 
-            /// The name of the two laws of Rakhsha & Constantinescu (2015) there, which a scene file takes too: `AP` and `PD`.
+            /// Returns the short name of the two laws of Rakhsha & Constantinescu (2015), which a scene file accepts too: `AP` and `PD`.
             #[must_use]
             pub const fn short_name(self) -> Option<&'static str> {
                 match self {
@@ -54,7 +54,7 @@ macro_rules! registry {
                 }
             }
 
-            /// Where it draws each copy, in words.
+            /// Returns the destination of the pull in words, to follow "each copy is drawn".
             #[must_use]
             pub const fn about(self) -> &'static str {
                 match self {
@@ -63,7 +63,7 @@ macro_rules! registry {
                 }
             }
 
-            /// How it pulls towards the others.
+            /// Returns the pull of the strategy: towards the mean, or towards each copy.
             #[must_use]
             pub const fn pull(self) -> Pull {
                 match self {
@@ -72,7 +72,7 @@ macro_rules! registry {
                 }
             }
 
-            /// Which gains it uses.
+            /// Returns the gains used by the strategy.
             #[must_use]
             pub const fn gains(self) -> UsedGains {
                 match self {
@@ -81,7 +81,7 @@ macro_rules! registry {
                 }
             }
 
-            /// The parameters that this law alone has.
+            /// Returns the parameters of this strategy alone.
             #[must_use]
             pub const fn parameters(self) -> &'static [LawParameter] {
                 match self {
@@ -90,7 +90,7 @@ macro_rules! registry {
                 }
             }
 
-            /// What samples carry beyond the state.
+            /// Returns the kind of data in samples beyond position and velocity.
             #[must_use]
             pub const fn kind(self) -> SampleKind {
                 match self {
@@ -99,7 +99,7 @@ macro_rules! registry {
                 }
             }
 
-            /// The law with these parameters; `None` of a strategy that is not a law.
+            /// Returns the law with these parameters; `None` for a strategy that is not a law.
             #[must_use]
             pub fn law(self, parameters: &LawParameters) -> Option<BuiltIn> {
                 match self {
@@ -108,7 +108,7 @@ macro_rules! registry {
                 }
             }
 
-            /// β [N·s/m]: by how much the strategy damps the peer's own copy, as part of the body.
+            /// Returns β [N·s/m], the damping of the peer's own copy by the strategy, as part of the body.
             #[must_use]
             pub fn damping(self, parameters: &LawParameters) -> f64 {
                 match self {
@@ -117,7 +117,7 @@ macro_rules! registry {
                 }
             }
 
-            /// The strategy of one peer out of `peers` whose tick has that period, with the law's own parameters at their defaults.
+            /// Returns the strategy of one peer in a session of `peers` peers with the period `tick`. The law's own parameters have their defaults.
             ///
             /// # Panics
             ///
@@ -127,7 +127,7 @@ macro_rules! registry {
                 LawStrategy::new(self, LawParameters { gains, peers, tick, oldest: None, middle: None, own: LawValues::defaults(self.parameters()) })
             }
 
-            /// The strategy of a peer of a session.
+            /// Returns the strategy of a peer in a session.
             #[must_use]
             pub fn in_session<const A: usize>(self, session: &SessionParameters<A>) -> BuiltInStrategy<A> {
                 match self {
@@ -255,7 +255,7 @@ macro_rules! registry {
         }
 
         impl<C: Copy> BuiltIn<C> {
-            /// The law with each coefficient replaced by what `coefficient` makes of it, always in one order.
+            /// Returns the law with `coefficient` applied to each coefficient, always in the same order.
             #[must_use]
             #[inline(always)]
             pub fn map<D: Copy>(&self, coefficient: impl FnMut(&C) -> D) -> BuiltIn<D> {
@@ -264,7 +264,7 @@ macro_rules! registry {
                 }
             }
 
-            /// Does something with the law by its own type.
+            /// Applies an operation to the law in its own type.
             #[inline(always)]
             pub fn visit<V: LawVisitor<C>>(&self, visitor: V) -> V::Output {
                 match self {
@@ -274,7 +274,7 @@ macro_rules! registry {
         }
 
         impl<N: Number> BuiltIn<N> {
-            /// [`Law::force`] and [`Law::target`]; the law is chosen once.
+            /// Returns [`Law::force`] and [`Law::target`] with one selection of the law.
             #[inline(always)]
             pub(super) fn command(&self, seen: &Observation<N>, memory: &mut [N]) -> (N, Motion<N>) {
                 match self {
@@ -343,32 +343,32 @@ registry! {
     }
 }
 
-/// The parameters that strategies alone have, of every strategy: a scene has them whatever its strategy is.
+/// Own parameters of every strategy. A scene has the values of all strategies, whatever its own strategy is.
 #[derive(Clone, Copy, PartialEq)]
 pub struct LawSettings([LawValues; Coordination::ALL.len()]);
 
 impl Default for LawSettings {
-    /// Every parameter at its default.
+    /// Returns every parameter at its default.
     fn default() -> Self {
         Self(core::array::from_fn(|law| LawValues::defaults(Coordination::ALL[law].parameters())))
     }
 }
 
 impl LawSettings {
-    /// Those of a law.
+    /// Returns the parameters of `law`.
     #[must_use]
     pub const fn of(&self, law: Coordination) -> &LawValues {
         &self.0[law as usize]
     }
 
-    /// Those of a law, to be changed.
+    /// Returns the parameters of `law`, for a change.
     pub const fn of_mut(&mut self, law: Coordination) -> &mut LawValues {
         &mut self.0[law as usize]
     }
 }
 
 impl fmt::Debug for LawSettings {
-    /// Strategies whose parameters are all at their defaults are not shown, so that the text of a scene stays when the registry grows.
+    /// Leaves out strategies with default parameters, so that the text of a scene does not change when the registry grows.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let usual = Self::default();
         let changed = Coordination::ALL.iter().filter(|law| self.of(**law) != usual.of(**law));

@@ -1,4 +1,4 @@
-//! What strategies that are not laws are made from, and how they hear of energies.
+//! Parameters of controllers, the strategies besides laws, and the sum of energies heard from other peers.
 
 use alloc::vec::Vec;
 
@@ -6,53 +6,54 @@ use super::{LawParameter, LawParameters, Pull, UsedGains};
 use crate::wire::SampleKind;
 use crate::{Contact, Gains, State};
 
-/// What a strategy is made from, where the parameters of a law are not enough.
+/// Parameters of a strategy for which the parameters of a law are not enough.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SessionParameters<const A: usize> {
-    /// The parameters that laws have.
+    /// Parameters of laws.
     pub law: LawParameters,
-    /// The place of the peer in the session.
+    /// Place of the peer in the session, from 0.
     pub place: usize,
-    /// M, how many of its ticks are between two of its samples.
+    /// M, the number of ticks from one sample to the next.
     pub samples_every: u64,
-    /// Where the copies of all peers begin.
+    /// Initial states of the copies of all peers, indexed by place.
     pub initial: Vec<State<A>>,
-    /// How the devices of all peers touch the object, with KC and BC.
+    /// Contact, KC and BC of the devices of all peers, indexed by place.
     pub couplings: Vec<(Contact, Gains)>,
 }
 
 impl<const A: usize> SessionParameters<A> {
-    /// N − 1.
+    /// Returns N − 1, the number of other peers.
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub(super) fn others(&self) -> f64 {
         (self.initial.len() - 1) as f64
     }
 }
 
-/// What the registry knows of a strategy that is not a law.
+/// Properties of a strategy in the registry that is not a law.
 pub(super) trait ControllerKind<const A: usize> {
-    /// How it pulls towards the others.
+    /// Pull of the strategy: towards the mean, or towards each copy.
     const PULL: Pull = Pull::Mean;
-    /// Which gains it uses.
+    /// Gains used by the strategy.
     const GAINS: UsedGains = UsedGains::Both;
-    /// What samples carry beyond the state.
+    /// Kind of data in samples beyond position and velocity.
     const KIND: SampleKind;
-    /// The parameters that it alone has.
+    /// Parameters of this strategy alone.
     const PARAMETERS: &[LawParameter];
 
-    /// β [N·s/m]: by how much the strategy damps the peer's own copy. It is part of the body, and the command leaves it out.
+    /// Returns β [N·s/m], the damping of the peer's own copy by the strategy. β is part of the body, and the command leaves it out.
     fn damping(_parameters: &LawParameters) -> f64 {
         0.0
     }
 
-    /// The strategy of a peer.
+    /// Returns the strategy of a peer.
     fn new(session: &SessionParameters<A>) -> Self;
 }
 
-/// Adds what an energy that only grows has grown by since it was heard last. One that has fallen begins a new life of its sender, from 0.
+/// Adds to `sum` the growth of an energy since the last call \[J\], and sets `newest` to `heard`. A lower energy marks a restart of the sender, whose count
+/// begins at 0 again.
 pub(super) fn hear_energy<const A: usize>(sum: &mut [f64; A], newest: &mut [f64; A], heard: &[f64; A]) {
     for axis in 0..A {
-        // An energy below zero was damaged on the way.
+        // A sender counts no energy below zero: such a number was damaged on the way.
         let heard = heard[axis].max(0.0);
         sum[axis] += if heard >= newest[axis] { heard - newest[axis] } else { heard };
         newest[axis] = heard;
@@ -66,6 +67,7 @@ mod tests {
     #[test]
     fn an_energy_that_falls_begins_a_new_life() {
         let (mut sum, mut newest) = ([0.0], [0.0]);
+        // Growth, a repetition, a restart at 0.25, growth, a damaged number below zero, and growth after the restart at 0.
         for (heard, expected) in [(0.5, 0.5), (2.0, 2.0), (2.0, 2.0), (0.25, 2.25), (1.25, 3.25), (-1.0, 3.25), (0.5, 3.75)] {
             hear_energy(&mut sum, &mut newest, &[heard]);
             assert_eq!(sum, [expected], "{heard}");

@@ -1,9 +1,11 @@
-//! Passive set-position modulation: a spring to a set-position that jumps to the mean of the others only as far as there is energy for the jump.
+//! Passive set-position modulation: a spring to a set-position, which jumps towards the mean of the other copies as far as the energy for the jump is
+//! available.
 //!
-//! Lee & Huang (2010), with a switch at each tick. Each axis is by itself. The copy has the damping bO + β, of whose work an energy tank E gets what the
-//! held force does not lose by being held, (β/h − KT/2)·d² a tick with d the motion of the copy in it. At a tick the spring KT to the set-position y
-//! becomes one to the mean of the others as far as S = E + KT/2·(x − y)² allows: y is the mean within r = √(2·S/KT) of x, and E is the rest. Above
-//! its ceiling the tank flows over into an energy e that samples carry, and that each of the others gets a share of.
+//! The method is that of Lee & Huang (2010), with a switch at each tick. Axes are independent. The copy has the damping bO + β. Of the work of the damper, an
+//! energy tank E gets the part that the held force does not lose by being held: (β/h − KT/2)·d² per tick, where d is the motion of the copy in the tick. At a
+//! tick the spring KT to the set-position y moves towards the mean of the other copies as far as S = E + KT/2·(x − y)² allows: the new y is the mean, limited
+//! to the distance r = √(2·S/KT) from x, and E is the rest of S. Above its ceiling the tank flows over into an energy e, which samples carry and which is
+//! shared among the other peers.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -13,32 +15,34 @@ use super::{Command, Context, LawForm, LawParameter, LawParameters, LawValues, S
 use crate::wire::SampleKind;
 use crate::{Gains, Held, State};
 
-/// The spring, its set-position and its energy tank.
+/// Spring, set-position and energy tank of a copy. Arrays are indexed by axis.
 #[derive(Clone, Debug)]
 pub struct SetPosition<const A: usize> {
-    /// KT.
+    /// Gain KT [N/m].
     stiffness: f64,
-    /// h \[s\].
+    /// Period h of the tick \[s\].
     period: f64,
-    /// β/h − KT/2 [N/m] in the tick just over and in the one that comes.
+    /// β/h − KT/2 [N/m] in the tick just over.
     gain: f64,
+    /// β/h − KT/2 [N/m] in the next tick.
     next_gain: f64,
-    /// N − 1.
+    /// N − 1, the number of other peers.
     others: f64,
-    /// The most that a tank holds \[J\].
+    /// Greatest energy in a tank \[J\].
     ceiling: f64,
-    /// y \[m\].
+    /// Set-position y \[m\].
     set: [f64; A],
-    /// E \[J\].
+    /// Energy E in the tank \[J\].
     tank: [f64; A],
-    /// e, what has flown over \[J\].
+    /// Sum e of the energy above the ceiling so far \[J\]; never falls.
     surplus: [f64; A],
-    /// The sum of ê over the others \[J\], and the part of its mean that the tank has got.
+    /// Sum of ê over the other peers \[J\].
     heard: [f64; A],
+    /// Part of the mean of ê that the tank has already got \[J\].
     got: [f64; A],
-    /// The newest energy of each of the others \[J\].
+    /// Newest energy heard from each other peer \[J\].
     newest: Vec<[f64; A]>,
-    /// Where the copy was at the tick before.
+    /// Position of the copy at the tick before \[m\]; `None` before the first tick.
     before: Option<[f64; A]>,
 }
 
@@ -77,6 +81,7 @@ impl<const A: usize> ControllerKind<A> for SetPosition<A> {
         let energy = |place: usize| session.law.own.number(place);
         let (stiffness, others) = (session.law.gains.stiffness, session.others());
         let mean = |axis: usize| {
+            // Before the first samples arrive, the set-position is the mean of the other initial positions.
             let rest = session.initial.iter().enumerate().filter(|(place, _)| *place != session.place);
             rest.map(|(_, other)| other.position[axis]).sum::<f64>() / others
         };
@@ -100,7 +105,7 @@ impl<const A: usize> ControllerKind<A> for SetPosition<A> {
     }
 }
 
-/// β/h − KT/2: what the tank gets for the square of a motion [N/m].
+/// Returns β/h − KT/2, the energy of the tank per square of a motion [N/m].
 fn gain(damping: f64, period: f64, stiffness: f64) -> f64 {
     damping / period - 0.5 * stiffness
 }
@@ -113,14 +118,16 @@ impl<const A: usize> Strategy<A> for SetPosition<A> {
         let mut command = Command { force: [0.0; A], target: *mean };
         for axis in 0..A {
             let x = own.position[axis];
+            // Income of the tank since the tick before: the damper's share, and the growth of the mean surplus.
             let moved = self.before.map_or(0.0, |before| x - before[axis]);
             let heard = self.heard[axis] / self.others;
             let stored = self.tank[axis] + (self.gain * (moved * moved) + (heard - self.got[axis]));
             self.got[axis] = heard;
+            // The whole energy of the spring is available for the new set-position.
             let apart = x - self.set[axis];
             let all = stored + half * (apart * apart);
             let wanted = x - mean.position[axis];
-            // Most of the time there is energy for the whole way, and no need of a root.
+            // Most of the time the energy is enough for the whole way, and no root is needed.
             let set = if half * (wanted * wanted) <= all {
                 mean.position[axis]
             } else {
@@ -129,6 +136,7 @@ impl<const A: usize> Strategy<A> for SetPosition<A> {
             };
             let apart = x - set;
             let left = all - half * (apart * apart);
+            // Energy above the ceiling leaves the tank, so that a long rest does not store energy for a jump.
             let over = (left - self.ceiling).max(0.0);
             self.surplus[axis] += over;
             self.tank[axis] = left - over;
@@ -136,6 +144,7 @@ impl<const A: usize> Strategy<A> for SetPosition<A> {
             command.force[axis] = self.stiffness * apart;
             command.target.position[axis] = set;
         }
+        // A new β acts in the body from this tick on, so it counts for the motion that the next tick measures.
         self.before = Some(own.position);
         self.gain = self.next_gain;
         command
@@ -153,9 +162,9 @@ impl<const A: usize> Strategy<A> for SetPosition<A> {
         hear_energy(&mut self.heard, &mut self.newest[other], numbers);
     }
 
-    /// Scenes in which the timeline changes gains are refused: a jump of the stiffness is a jump of the energy.
+    /// No effect. Scenes whose timeline changes gains are refused for this strategy, because a jump of the stiffness is a jump of the energy.
     fn set_gains(&mut self, _gains: Gains) {}
-    /// What the tank holds above a ceiling that has fallen goes to the others at the next tick.
+    /// Sets β and the ceiling. Energy above a lowered ceiling goes to the other peers at the next tick.
     fn set_parameters(&mut self, own: &LawValues) {
         self.next_gain = gain(own.number(0), self.period, self.stiffness);
         self.ceiling = own.number(2);

@@ -1,4 +1,4 @@
-//! What a peer asks of its coordination.
+//! Interface between a peer and its coordination.
 
 use alloc::boxed::Box;
 
@@ -8,62 +8,63 @@ use super::LawValues;
 use crate::wire::SampleKind;
 use crate::{Contact, Gains, Held, State};
 
-/// What a strategy sees at a tick.
+/// Input of a strategy at a tick.
 #[derive(Debug)]
 pub struct Context<'a, const A: usize> {
-    /// The instant of the tick.
+    /// Instant of the tick.
     pub now: Instant,
-    /// What the peer's own clock shows.
+    /// Time on the peer's own clock.
     pub local_time: Instant,
-    /// The peer's own copy of the object.
+    /// State of the peer's own copy of the object.
     pub own: &'a State<A>,
-    /// The newest samples from the others.
+    /// Newest samples of other peers.
     pub held: &'a Held<A>,
-    /// How the coordination force moves the copy over this tick; at rest for a strategy that does not [ask](Strategy::needs_prediction).
+    /// Motion of the copy over this tick as a function of the coordination force; [`Prediction::REST`] for a strategy that does not
+    /// [ask](Strategy::needs_prediction).
     pub ahead: Prediction<A>,
 }
 
-/// The motion of a copy over a tick as a function of the coordination force F: d = free − compliance·F.
+/// Motion of a copy over a tick as a function of the coordination force F: d = free − compliance·F.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Prediction<const A: usize> {
-    /// The motion without a coordination force, walls and coupling included \[m\].
+    /// Motion without a coordination force, with walls and coupling \[m\].
     pub free: [f64; A],
-    /// By how much a newton that acts over the tick moves the copy [m/N]; above zero.
+    /// Motion per force that acts over the tick [m/N]; above zero.
     pub compliance: f64,
 }
 
 impl<const A: usize> Prediction<A> {
-    /// Nothing moves.
+    /// A prediction without motion.
     pub const REST: Self = Self { free: [0.0; A], compliance: 0.0 };
 }
 
-/// Which part of the shared object a peer has.
+/// Part of the shared object that a peer simulates.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Role {
-    /// A copy of its own.
+    /// The peer has a copy of its own.
     #[default]
     Copy,
-    /// None: it sends the state of its device, and its copy is the newest state heard from a server.
+    /// The peer sends the state of its device, and has no copy of its own: the newest state heard from a server takes the place of the copy.
     Client {
-        /// The place of the server among the others, in order with this peer left out.
+        /// Index of the server in the order of peers without this peer.
         server: usize,
     },
 }
 
-/// What a strategy answers.
+/// Result of a strategy at a tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Command<const A: usize> {
-    /// The coordination force FT \[N\]; equation (8) subtracts it.
+    /// Coordination force FT \[N\], which equation (8) subtracts.
     pub force: [f64; A],
-    /// Where the strategy wants the copy to be, (xd, vd), for the record.
+    /// Desired motion of the copy (xd, vd), for the record.
     pub target: State<A>,
 }
 
 /// A coordination strategy of one peer.
 ///
-/// It must be deterministic: the answer depends on the calls made so far and on nothing else.
+/// A strategy must be deterministic: its result depends on the earlier calls alone.
 ///
-/// A peer with a strategy of its own, a tenth of a second of which is run:
+/// Example: a peer with a strategy of its own, run for a tenth of a second.
 ///
 /// ```
 /// use core::time::Duration;
@@ -125,67 +126,69 @@ pub struct Command<const A: usize> {
 /// println!("{} m at {}", peer.object().state().position[0], Instant::from_nanos(100_000_000));
 /// ```
 pub trait Strategy<const A: usize> {
-    /// The command at a tick. Called exactly once a tick, after the samples that have arrived were taken in.
+    /// Returns the command at a tick. Called exactly once per tick, after the arrived samples are taken in.
     fn command(&mut self, context: &Context<'_, A>) -> Command<A>;
 
-    /// Up to which age \[s\] samples move on in [`Held::lead`], for a strategy that asks for it; asked once, when the peer is made.
+    /// Returns the greatest age of extrapolation in [`Held::lead`] \[s\]; `None` for a strategy that does not use the lead. Asked once, in
+    /// [`Peer::new`](crate::Peer::new).
     fn horizon(&self) -> Option<f64> {
         None
     }
 
-    /// Whether the strategy asks for [`Context::ahead`]; asked once, when the peer is made.
+    /// Returns whether the strategy uses [`Context::ahead`]. Asked once, in [`Peer::new`](crate::Peer::new).
     fn needs_prediction(&self) -> bool {
         false
     }
 
-    /// Which part of the object the peer has; asked once, when the peer is made.
+    /// Returns the part of the object that the peer simulates. Asked once, in [`Peer::new`](crate::Peer::new).
     fn role(&self) -> Role {
         Role::Copy
     }
 
-    /// What samples carry beyond the state; asked once, when the peer is made. With [`SampleKind::State`], [`Strategy::extra`], [`Strategy::sent`] and
-    /// [`Strategy::accept`] are not called.
+    /// Returns the kind of data in samples beyond position and velocity. Asked once, in [`Peer::new`](crate::Peer::new). For [`SampleKind::State`], the
+    /// methods [`Strategy::extra`], [`Strategy::sent`] and [`Strategy::accept`] are not called.
     fn kind(&self) -> SampleKind {
         SampleKind::State
     }
 
-    /// The extra numbers of the sample that is sent now, before the command of the tick, to another peer; of a kind that is not personal, to all of them,
-    /// and `receiver` is 0. The others count in order, with this peer left out.
+    /// Returns the extra numbers of the present sample, before the command of the tick. `receiver` is the index of the receiver in the order of peers without
+    /// this peer, or 0 for a kind that is equal for all receivers.
     fn extra(&mut self, _receiver: usize, _own: &State<A>, _held: &Held<A>) -> [f64; A] {
         [0.0; A]
     }
 
-    /// The samples of this tick have been made for all receivers.
+    /// Tells the strategy that the samples of this tick are complete for all receivers.
     fn sent(&mut self, _own: &State<A>) {}
 
-    /// The extra numbers of a sample that is newer than all before it from another peer.
+    /// Takes in the extra numbers of a sample that is newer than all earlier samples of this sender. `_other` is the index of the sender in the order of
+    /// peers without this peer.
     fn accept(&mut self, _other: usize, _numbers: &[f64; A]) {}
 
-    /// The coupling force FC that was heard of \[N\], for a peer that does not compute it.
+    /// Returns the coupling force FC heard from another peer \[N\]; `None` if this peer computes FC.
     fn heard_coupling(&self) -> Option<[f64; A]> {
         None
     }
 
-    /// How the device of another peer touches the object from the next tick on; for a strategy that computes the coupling of others.
+    /// Sets the contact of another peer's device from the next tick on, for a strategy that computes couplings of other peers.
     fn set_contact(&mut self, _other: usize, _contact: Contact) {}
 
-    /// New gains, from the next tick on. A strategy without gains ignores them.
+    /// Sets the gains from the next tick on. A strategy without gains ignores the call.
     fn set_gains(&mut self, gains: Gains);
 
-    /// New values of the parameters that the strategy has of its own, from the next tick on: of those that [can change](super::LawParameter::can_change). β is part
-    /// of the body, and the peer changes it.
+    /// Sets the strategy's own parameters from the next tick on, as far as they [can change](super::LawParameter::can_change). β is part of the body, and the
+    /// peer changes it.
     fn set_parameters(&mut self, _own: &LawValues) {}
 
-    /// Everything the strategy remembers from tick to tick, as numbers; always as many. Empty for one that remembers nothing.
+    /// Returns the whole state of the strategy between ticks as numbers, always equally many. Empty for a strategy without a state.
     ///
-    /// The stability analysis puts a strategy into a state and looks where it goes. A strategy that remembers what it does not show here is refused there,
-    /// but for two things. Counts of ticks need not be shown: the state is put back where they stand as at the beginning of any frame. A strategy of a
-    /// [kind](Strategy::kind) that shows nothing is handed again what it accepted last.
+    /// The stability analysis sets the state of a strategy and observes its evolution. The analysis refuses a strategy with a hidden state, with two
+    /// exceptions. Counts of ticks may be hidden: the analysis sets the state where the counts stand as at the beginning of any frame. A strategy of a
+    /// [kind](Strategy::kind) beyond the state that returns no memory is given its last accepted numbers again.
     fn memory(&self) -> &[f64] {
         &[]
     }
 
-    /// Puts [`Strategy::memory`] back, or replaces it by as many other numbers.
+    /// Sets the state of the strategy: [`Strategy::memory`] of an earlier tick, or equally many other numbers.
     fn set_memory(&mut self, _memory: &[f64]) {}
 }
 

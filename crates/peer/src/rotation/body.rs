@@ -1,4 +1,7 @@
-//! The part of a peer that turns: its copy, and its device if that turns too.
+//! Rotation of a peer: the copy, and the device if the device rotates.
+//!
+//! In: attitudes of other peers, and the translation of copy and device. Out: torques, the attitude of the copy, and FC at the grasped point. This module
+//! does not know how attitudes travel.
 
 use alloc::boxed::Box;
 use core::array::from_fn;
@@ -15,42 +18,42 @@ use super::{Attitude, HeldAttitudes, RotationStep, Spin, Triple, aligning_torque
 use crate::coordination::BuiltIn;
 use crate::{Clock, Contact, Gains, Integrator, Signal, State};
 
-/// What the turning part of a peer is.
+/// Parameters of the rotation of a peer.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RotationConfig {
-    /// This copy: its share of the object's inertia, and its damping.
+    /// Share of this copy in the object's inertia, and its damping.
     pub copy: Spin,
-    /// Where the device grasps it, from the centre of mass in body axes \[m\].
+    /// Point of the copy that the device grasps, from the centre of mass in body axes \[m\].
     pub grasp: Triple,
-    /// KR [N·m/rad] and BR [N·m·s/rad] on the mean of the others, about the body's axes.
+    /// Gains KR [N·m/rad] and BR [N·m·s/rad] towards the mean of the other copies, about the body's axes.
     pub gains: Gains<Triple>,
-    /// The device, if it turns.
+    /// Rotation of the device; `None` for a device that does not rotate.
     pub device: Option<DeviceRotation>,
-    /// How motion between ticks is computed, and by how many steps a tick.
+    /// Method between ticks, with its steps per tick for translations.
     pub integrator: Integrator,
-    /// Steps a tick, at least 1.
+    /// Steps per tick for rotations, at least 1, in addition to the steps of the integrator.
     pub steps: u32,
 }
 
 /// A device with six degrees of freedom.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DeviceRotation {
-    /// Its inertia and damping, in handle axes.
+    /// Inertia and damping of the device, in handle axes.
     pub handle: Spin,
-    /// KCR [N·m/rad] and BCR [N·m·s/rad].
+    /// Gains KCR [N·m/rad] and BCR [N·m·s/rad] of the coupling.
     pub coupling: Gains,
-    /// The torque of the hand in world axes \[N·m\].
+    /// Torque of the hand in world axes \[N·m\].
     pub hand: Option<Signal>,
 }
 
-/// The torques of a tick.
+/// Torques of a tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Torques {
-    /// r×RᵀFC + τC, which device and coupling exert on the copy, in body axes \[N·m\].
+    /// Torque r×RᵀFC + τC of device and coupling on the copy, in body axes \[N·m\].
     pub coupling: Triple,
-    /// The held part of τT, which acts on the copy with the opposite sign, in body axes \[N·m\]: all but what the law's damping of the copy adds.
+    /// Held part of τT in body axes \[N·m\], without the damping of the copy by the law. Acts on the copy with the opposite sign.
     pub coordination: Triple,
-    /// The torque on the device but that of the hand, in handle axes \[N·m\].
+    /// Torque on the device in handle axes \[N·m\], without the torque of the hand.
     device: Triple,
 }
 
@@ -58,23 +61,24 @@ impl Torques {
     const NONE: Self = Self { coupling: [0.0; 3], coordination: [0.0; 3], device: [0.0; 3] };
 }
 
-/// The turning part of a peer.
+/// Rotation of a peer: attitudes of copy and device, held attitudes of other peers, and torques.
 #[derive(Clone, Debug)]
 pub struct Rotation {
     config: RotationConfig,
-    /// The law, if it is more than the sum of spring and damper.
+    /// Law with a memory or a lag; `None` if τT is the sum of spring and damper.
     law: Option<Box<TurnLaw>>,
     /// β about each axis [N·m·s/rad], part of the damping of the copy.
     own_damping: Triple,
     copy: Turning,
     device: Option<Turning>,
     held: HeldAttitudes,
+    /// Whether a held attitude has changed since the last computation of the means.
     stale: bool,
     computed: Torques,
     applied: Torques,
 }
 
-/// A body and its steps for the spans between ticks.
+/// A rotating body and its steps for the spans between ticks.
 #[derive(Clone, Debug)]
 struct Turning {
     attitude: Attitude,
@@ -98,13 +102,14 @@ impl Turning {
         } else if span == self.long.0 {
             &self.long.1
         } else {
+            // A span of another clock: the driver that passes it pays for a new step at each call.
             other = self.spin.step(span, config.integrator, config.steps);
             &other
         };
         step.advance(&mut self.attitude, torque);
     }
 
-    /// Another damping [N·m·s/rad], from the next step on.
+    /// Sets the damping [N·m·s/rad], from the next step on.
     fn set_damping(&mut self, damping: Triple, config: &RotationConfig) {
         self.spin.damping = damping;
         for (span, step) in [&mut self.short, &mut self.long] {
@@ -113,24 +118,25 @@ impl Turning {
     }
 }
 
-/// Three components of A of them; the others are zero.
+/// Returns the A components as three; missing components are zero.
 fn triple<const A: usize>(components: &[f64; A]) -> Triple {
     from_fn(|axis| components.get(axis).copied().unwrap_or(0.0))
 }
 
 impl Rotation {
-    /// The turning part of a peer that holds the initial attitudes of the others. Copy and device begin with `attitude`.
+    /// Returns the rotation of a peer that holds the initial attitudes `held` of other peers. Copy and device begin with `attitude`.
     #[must_use]
     pub fn new(config: RotationConfig, attitude: Attitude, held: HeldAttitudes, clock: &Clock) -> Self {
         let copy = Turning::new(attitude, config.copy, &config, clock);
         let device = config.device.as_ref().map(|device| Turning::new(attitude, device.handle, &config, clock));
+        // Without `with_law` the torque is the sum of spring and damper.
         let (law, own_damping) = (None, [0.0; 3]);
         Self { law, own_damping, copy, device, held, stale: false, computed: Torques::NONE, applied: Torques::NONE, config }
     }
 
-    /// With the law that makes τT from the torques of spring and damper; without one it is their sum. `law`: with gains of one, as [`RotationConfig::gains`] are in
-    /// these torques. `own_damping`: β about each axis [N·m·s/rad], by how much the law damps the copy; part of the damping in [`RotationConfig::copy`], and of τT on
-    /// the record.
+    /// Adds the law that makes τT from the torques of spring and damper; without a law τT is their sum. `law` has gains of 1, because
+    /// [`RotationConfig::gains`] are already in these torques. `own_damping` is β about each axis [N·m·s/rad], the damping of the copy by the law: part of
+    /// the damping in [`RotationConfig::copy`], and of τT in the record.
     #[must_use]
     pub fn with_law(mut self, law: &BuiltIn, own_damping: Triple) -> Self {
         self.law = TurnLaw::is_needed(law).then(|| Box::new(TurnLaw::new(*law)));
@@ -138,8 +144,9 @@ impl Rotation {
         self
     }
 
-    /// Other parameters of the law of [`Rotation::with_law`], from the next tick on. `damping`: of the copy, with β in it [N·m·s/rad].
+    /// Sets the parameters of the law of [`Rotation::with_law`], from the next tick on. `damping` is the damping of the copy, with β included [N·m·s/rad].
     pub fn set_law(&mut self, law: &BuiltIn, own_damping: Triple, damping: Triple) {
+        // A known law keeps its memory; a new law begins with an empty memory.
         match &mut self.law {
             Some(known) => known.set(*law),
             None => self.law = TurnLaw::is_needed(law).then(|| Box::new(TurnLaw::new(*law))),
@@ -149,99 +156,101 @@ impl Rotation {
         self.copy.set_damping(damping, &self.config);
     }
 
-    /// Whether all that turns is a finite number.
+    /// Returns whether the attitudes of copy and device are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.copy.attitude.is_finite() && self.device.as_ref().is_none_or(|device| device.attitude.is_finite())
     }
 
-    /// The attitude of the copy.
+    /// Returns the attitude of the copy.
     #[must_use]
     pub const fn copy(&self) -> &Attitude {
         &self.copy.attitude
     }
 
-    /// The attitude of the device, if it turns.
+    /// Returns the attitude of the device; `None` for a device that does not rotate.
     #[must_use]
     pub fn device(&self) -> Option<&Attitude> {
         self.device.as_ref().map(|device| &device.attitude)
     }
 
-    /// The torques computed at the latest tick, for the record.
+    /// Returns the torques computed at the latest tick, for the record.
     #[must_use]
     pub const fn computed(&self) -> &Torques {
         &self.computed
     }
 
-    /// The torques that act over the tick that begins now.
+    /// Returns the torques over the tick from now on.
     #[must_use]
     pub const fn applied(&self) -> &Torques {
         &self.applied
     }
 
-    /// τT of the latest tick, with what β adds, in body axes \[N·m\].
+    /// Returns τT of the latest tick with the share of β, in body axes \[N·m\].
     #[must_use]
     pub fn coordination_torque(&self) -> Triple {
         add(self.computed.coordination, by_component(self.own_damping, self.copy.attitude.rate))
     }
 
-    /// β about each axis [N·m·s/rad].
+    /// Returns β about each axis [N·m·s/rad].
     #[must_use]
     pub const fn own_damping(&self) -> Triple {
         self.own_damping
     }
 
-    /// The integral of the angular velocity of the copy in its axes over the step to the next tick \[rad\], between [`crate::Peer::compute`] and [`crate::Peer::advance`].
+    /// Returns the integral of the copy's angular velocity in body axes over the step to the next tick \[rad\]. Valid between [`crate::Peer::compute`] and
+    /// [`crate::Peer::advance`].
     #[must_use]
     pub fn travel(&self, span: Duration) -> Triple {
         let step = self.copy.spin.step(span, self.config.integrator, self.config.steps);
+        // On a copy of the attitude: a question about the step must not take the step.
         let mut body = self.copy.attitude;
         step.travel(&mut body, self.on_copy())
     }
 
-    /// The torque that is held on the copy over the tick that begins now, without its damping, in body axes \[N·m\].
+    /// Returns the torque held on the copy over the tick that begins now, without damping, in body axes \[N·m\].
     #[must_use]
     pub fn on_copy(&self) -> Triple {
         subtract(self.applied.coupling, self.applied.coordination)
     }
 
-    /// What the peer is.
+    /// Returns the parameters of the rotation.
     #[must_use]
     pub const fn config(&self) -> &RotationConfig {
         &self.config
     }
 
-    /// Changes KR and BR, from the next tick on.
+    /// Sets KR and BR, from the next tick on.
     pub const fn set_gains(&mut self, gains: Gains<Triple>) {
         self.config.gains = gains;
     }
 
-    /// Changes the torque of the hand \[N·m\], if the device turns.
+    /// Sets the torque of the hand \[N·m\]. No effect on a device that does not rotate.
     pub fn set_hand(&mut self, hand: Option<Signal>) {
         if let Some(device) = &mut self.config.device {
             device.hand = hand;
         }
     }
 
-    /// Puts the copy into that attitude.
+    /// Sets the attitude of the copy.
     pub const fn set_copy(&mut self, attitude: Attitude) {
         self.copy.attitude = attitude;
     }
 
-    /// Puts the device into that attitude, if it turns.
+    /// Sets the attitude of the device. No effect on a device that does not rotate.
     pub const fn set_device(&mut self, attitude: Attitude) {
         if let Some(device) = &mut self.device {
             device.attitude = attitude;
         }
     }
 
-    /// Holds an attitude of another peer.
+    /// Holds an attitude of the peer with index `other` in the order of peers without this peer.
     pub fn hold(&mut self, other: usize, attitude: &Attitude) {
         self.held.hold(other, attitude);
         self.stale = true;
     }
 
-    /// The own attitude as another peer would hold it.
+    /// Returns the own attitude in the form of a held attitude.
     pub(crate) fn own_held(&self) -> HeldAttitude {
         HeldAttitude::of(&self.copy.attitude)
     }
@@ -254,7 +263,7 @@ impl Rotation {
         self.held.replace(other, held);
     }
 
-    /// Computes the means of the held attitudes anew, around the own one if it is given.
+    /// Computes the means of the held attitudes, around the own attitude if `around` is given.
     pub(crate) fn refresh_held(&mut self, around: Option<&HeldAttitude>) {
         match around {
             Some(own) => self.held.refresh_around(own),
@@ -263,9 +272,9 @@ impl Rotation {
         self.stale = false;
     }
 
-    /// Computes the torques of this tick, and gives the coupling force.
+    /// Computes the torques of this tick, and returns the coupling force FC \[N\]. `late`: whether torques act one tick after their computation.
     ///
-    /// A frictionless finger turns nothing by itself, and a device that does not grasp the copy does not either: then τC is zero.
+    /// τC is zero unless the contact is a grasp: a frictionless finger exerts no torque of its own.
     pub(crate) fn compute<const A: usize>(
         &mut self,
         centre: &State<A>,
@@ -279,10 +288,12 @@ impl Rotation {
         }
         let RotationConfig { grasp, gains, .. } = &self.config;
         let (matrix, rate) = (self.copy.attitude.matrix(), self.copy.attitude.rate);
+        // The coupling acts at the grasped point, not at the centre of mass.
         let at = point_of(&matrix, rate, *grasp, centre);
         let force: [f64; A] = from_fn(|axis| contact.force_along(axis, coupling, device.along(axis).relative_to(at.along(axis))));
         let lever = lever(&matrix, *grasp, triple(&force));
         let (own, mean) = ((&matrix, rate), self.held.mean());
+        // A law with a memory or a lag must be called exactly once per tick.
         let coordination = match &mut self.law {
             Some(law) => law.torque(own, mean, gains),
             None => aligning_torque(own, mean, gains),
@@ -292,17 +303,20 @@ impl Rotation {
             let turned = handle.attitude.matrix();
             let torque = turning_torque((&matrix, rate), (&turned, handle.attitude.rate), coupling);
             torques.coupling = add(lever, torque);
+            // The device feels the opposite torque, in its own axes.
             torques.device = reaction(&matrix, &turned, torque);
         }
+        // As for forces: with a compute delay the torques of the tick before act now.
         self.applied = if late { core::mem::replace(&mut self.computed, torques) } else { torques };
         self.computed = torques;
         force
     }
 
-    /// Moves to the next tick under the torques that act over it, which are held in body axes.
+    /// Moves to the next tick under the applied torques, which are held in body axes.
     pub(crate) fn advance(&mut self, now: Instant, span: Duration) {
         self.copy.advance(span, self.on_copy(), &self.config);
         if let Some(device) = &mut self.device {
+            // The hand's torque is given in world axes and held in handle axes over the tick.
             let hand = self.config.device.as_ref().and_then(|device| device.hand.as_ref());
             let hand = hand.map_or([0.0; 3], |hand| in_body_axes(&device.attitude.matrix(), hand.value::<3>(now)));
             device.advance(span, add(hand, self.applied.device), &self.config);

@@ -1,19 +1,19 @@
-//! The newest attitude from each of the other peers, and the means of their matrices and angular velocities.
+//! Newest attitude of each sender, and means of their matrices and angular velocities.
 
 use alloc::vec::Vec;
 
 use super::{Attitude, Matrix3, Triple};
 
-/// What a peer knows of the attitudes of the others, in the order of the peers with the holder left out.
+/// Newest attitudes of the senders, in the order of peers without the holder.
 ///
-/// A matrix is made once, when the attitude is accepted; the means are kept until one changes.
+/// A matrix is computed once, at the arrival of the attitude. The means are stored until an attitude changes them.
 #[derive(Clone, Debug)]
 pub struct HeldAttitudes {
     held: Vec<HeldAttitude>,
     mean: HeldAttitude,
 }
 
-/// R, and the angular velocity in world axes [rad/s].
+/// Matrix R, and angular velocity in world axes [rad/s].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct HeldAttitude {
     pub(crate) matrix: Matrix3,
@@ -27,13 +27,13 @@ impl HeldAttitude {
         Self { matrix: attitude.matrix(), rate: attitude.world_rate() }
     }
 
-    /// The twelve numbers, each made of those of both.
+    /// Returns the twelve numbers `make(a, b)` for the numbers a of `self` and b of `other`.
     fn zip(&self, other: &Self, make: impl Fn(f64, f64) -> f64) -> Self {
         let triple = |a: &Triple, b: &Triple| core::array::from_fn(|i| make(a[i], b[i]));
         Self { matrix: core::array::from_fn(|row| triple(&self.matrix[row], &other.matrix[row])), rate: triple(&self.rate, &other.rate) }
     }
 
-    /// From this one to `to`, that part of the way; exactly this one at 0.
+    /// Returns the point from `self` to `to` at the fraction `part` of the way; exactly `self` at 0.
     pub(crate) fn mix(&self, to: &Self, part: f64) -> Self {
         self.zip(to, |from, to| from + part * (to - from))
     }
@@ -44,7 +44,7 @@ impl HeldAttitude {
 }
 
 impl HeldAttitudes {
-    /// Holds the initial attitude of each other peer.
+    /// Returns the initial attitudes of all other peers as held attitudes.
     #[must_use]
     pub fn new(initial: impl IntoIterator<Item = Attitude>) -> Self {
         let mut held = Self { held: initial.into_iter().map(|attitude| HeldAttitude::of(&attitude)).collect(), mean: HeldAttitude::ZERO };
@@ -52,11 +52,11 @@ impl HeldAttitudes {
         held
     }
 
-    /// Holds the attitude of that other peer. Call [`HeldAttitudes::refresh`] before the means are used again.
+    /// Holds the attitude of the other peer with index `place`. [`HeldAttitudes::refresh`] must be called before the next use of the means.
     ///
     /// # Panics
     ///
-    /// If there is no such peer.
+    /// If the index `place` is out of range.
     pub fn hold(&mut self, place: usize, attitude: &Attitude) {
         self.held[place] = HeldAttitude::of(attitude);
     }
@@ -69,13 +69,13 @@ impl HeldAttitudes {
         self.held[place] = held;
     }
 
-    /// M̄ and w̄ [rad/s], as of the last [`HeldAttitudes::refresh`]; zero if there is no other peer.
+    /// Returns M̄ and w̄ [rad/s], as of the last [`HeldAttitudes::refresh`]; zero without other peers.
     #[must_use]
     pub const fn mean(&self) -> (&Matrix3, Triple) {
         (&self.mean.matrix, self.mean.rate)
     }
 
-    /// Computes the means anew: four partial sums, added in pairs, as [`crate::Held::refresh`] does.
+    /// Computes the means by four partial sums, added in pairs, as [`crate::Held::refresh`] does.
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub fn refresh(&mut self) {
         if self.held.is_empty() {
@@ -96,10 +96,11 @@ impl HeldAttitudes {
         self.mean = a.plus(&b).plus(&c.plus(&d)).zip(&HeldAttitude::ZERO, |sum, _| sum / count);
     }
 
-    /// [`HeldAttitudes::refresh`] for means of the differences from the holder's own attitude, so that senders that are held exactly there exert no torque.
+    /// Like [`HeldAttitudes::refresh`], but sums differences from the holder's own attitude, so that senders held exactly at `own` exert no torque.
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub(crate) fn refresh_around(&mut self, own: &HeldAttitude) {
         let count = self.held.len() as f64;
+        // For a sender held exactly at `own` every difference is zero, without rounding.
         let differences = self.held.iter().map(|held| held.zip(own, |held, own| held - own));
         let sum = differences.fold(HeldAttitude::ZERO, |sum, difference| sum.plus(&difference));
         self.mean = own.zip(&sum, |own, sum| own + sum / count);
@@ -120,6 +121,7 @@ mod tests {
     fn the_mean_of_turns_to_and_fro_is_no_rotation() {
         let held = HeldAttitudes::new([turned([0.0, 0.0, 0.5]), turned([0.0, 0.0, -0.5])]);
         let (matrix, rate) = held.mean();
+        // The mean of rotations by ±0.5 rad has the cosine on its diagonal, and is shorter than a rotation.
         assert!((matrix[0][0] - libm::cos(0.5)).abs() < 1e-15 && matrix[1][0].abs() < 1e-17);
         assert_eq!(rate, [0.0; 3]);
     }

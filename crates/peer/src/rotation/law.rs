@@ -1,10 +1,11 @@
-//! A law of coordination on turns.
+//! Coordination laws on rotations.
 //!
-//! The torque towards the mean of the others has a part of the spring and one of the damper, about each axis of the body. A law takes them as it takes a
-//! difference of positions and one of velocities, with gains of one: so a torque is smoothed or made from an attitude of the past by the same function as a force.
+//! The torque towards the mean of the other copies has a part of the springs and a part of the dampers, about each axis of the body. A law with gains of 1
+//! takes these two parts in place of a difference of positions and a difference of velocities. The function that smooths a force, or makes it from a state of
+//! the past, then does the same with a torque.
 //!
-//! A law remembers torques in body axes and attitudes, and neither depends on the axes of the world. A torque made from the attitude of some ticks ago acts
-//! about the body's axes of now, as a torque that is held over a tick or applied a tick late does.
+//! A law remembers torques in body axes and attitudes, and both are independent of the axes of the world. A torque made from an earlier attitude acts about
+//! the present body axes, as do a torque held over a tick and a torque applied one tick late.
 
 use alloc::collections::VecDeque;
 use alloc::vec;
@@ -16,39 +17,40 @@ use super::{Matrix3, Triple};
 use crate::coordination::{BuiltIn, Law, Observation};
 use crate::{Gains, Motion};
 
-/// A law that remembers, with what it remembers.
+/// A law with a memory or a lag, and its state.
 #[derive(Clone, Debug)]
 pub(super) struct TurnLaw {
     law: BuiltIn,
-    /// What the law remembers about each axis, one axis after another.
+    /// Memory of the law about each axis, one axis after another.
     memory: Vec<f64>,
-    /// L, how many ticks it looks back.
+    /// L, the age of the own attitude that the law uses \[ticks\].
     lag: usize,
-    /// R and ω at the latest ticks, the oldest first; before the first tick the body was as at the first.
+    /// R and ω at the latest ticks, the oldest first. Before the first tick, the attitude of the first tick counts.
     past: VecDeque<(Matrix3, Triple)>,
 }
 
 impl TurnLaw {
-    /// A law of unit gains, with nothing remembered.
+    /// Returns a law with gains of 1 and an empty memory.
     pub(super) fn new(law: BuiltIn) -> Self {
         Self { memory: vec![0.0; 3 * Law::<f64>::memory(&law)], lag: Law::<f64>::lag(&law), past: VecDeque::new(), law }
     }
 
-    /// Whether a law is more than the sum of spring and damper.
+    /// Returns whether the law is more than the sum of spring and damper.
     pub(super) fn is_needed(law: &BuiltIn) -> bool {
         Law::<f64>::memory(law) > 0 || Law::<f64>::lag(law) > 0
     }
 
-    /// The same law with other parameters. The latest attitudes and torques stay.
+    /// Sets the parameters of the law. The latest attitudes and torques stay.
     pub(super) fn set(&mut self, law: BuiltIn) {
         self.memory.resize(3 * Law::<f64>::memory(&law), 0.0);
         (self.law, self.lag) = (law, Law::<f64>::lag(&law));
         self.forget();
     }
 
-    /// τT of a tick \[N·m\]. `own`: R and ω.
+    /// Returns τT of a tick \[N·m\]. `own`: R and ω. `mean`: M̄ and w̄.
     pub(super) fn torque(&mut self, own: (&Matrix3, Triple), mean: (&Matrix3, Triple), gains: &Gains<Triple>) -> Triple {
         self.past.push_back((*own.0, own.1));
+        // The oldest kept attitude is L ticks old, or younger while fewer ticks have passed.
         let (matrix, rate) = self.past.front().copied().unwrap_or((*own.0, own.1));
         self.forget();
         let parts = |own| {
@@ -56,8 +58,10 @@ impl TurnLaw {
             from_fn(|axis| Motion { position: spring[axis], velocity: damper[axis] })
         };
         let now: Triple<Motion> = parts(own);
+        // Without a lag the past equals the present, and one evaluation is enough.
         let past = if self.lag > 0 { parts((&matrix, rate)) } else { now };
         let remembered = self.memory.len() / 3;
+        // The parts are already differences, so the law sees a mean at rest at zero.
         let rest = Motion { position: 0.0, velocity: 0.0 };
         from_fn(|axis| {
             let seen = Observation { own: now[axis], past: past[axis], mean: rest, lead: 0.0 };
@@ -65,6 +69,7 @@ impl TurnLaw {
         })
     }
 
+    /// Drops attitudes that are older than the lag.
     fn forget(&mut self) {
         while self.past.len() > self.lag {
             self.past.pop_front();
@@ -92,7 +97,7 @@ mod tests {
         coordination.law(&LawParameters { gains, peers: 2, tick, oldest: None, middle: None, own }).unwrap()
     }
 
-    /// Attitudes of a body on its way, and means of others.
+    /// Returns the attitude of a moving body, and a mean of other bodies.
     fn seen(tick: u32) -> [(Matrix3, Triple); 2] {
         let turned = |angle: f64| {
             let mut attitude = Attitude { rate: [0.1 * angle, -1.0, angle], ..Attitude::REST };
@@ -130,7 +135,7 @@ mod tests {
             assert_eq!(at(&mut turn, tick), plain(tick.saturating_sub(3), tick), "{tick}");
         }
         turn.set(law(Coordination::LocalLag, Duration::from_millis(5)));
-        // Three ticks of before are known.
+        // Three ticks before the change are known.
         for tick in 20..30_u32 {
             assert_eq!(at(&mut turn, tick), plain((tick - 5).max(17), tick), "{tick}");
         }
@@ -138,7 +143,7 @@ mod tests {
         assert_eq!(at(&mut turn, 30), plain(29, 30));
     }
 
-    /// T(k) = a·T(k − 1) + (1 − a)·τ(k) with a = e^(−Tc/lag).
+    /// The smoothed torque is T(k) = a·T(k − 1) + (1 − a)·τ(k) with a = e^(−Tc/lag).
     #[test]
     fn a_torque_is_smoothed_in_body_axes() {
         let mut turn = TurnLaw::new(law(Coordination::SmoothedAveragePosition, Duration::from_millis(4)));

@@ -1,6 +1,6 @@
-//! Rigid bodies that turn: attitudes, how they move between ticks, and the torques that tie them to devices and to other copies.
+//! Rotating rigid bodies: attitudes, their motion between ticks, and the torques between copies and devices.
 //!
-//! Body axes are the principal axes of the body, so an inertia is three numbers. A scene without an inertia has none of this.
+//! Body axes are the principal axes of the body, so an inertia is three numbers. A scene without an inertia uses nothing of this module.
 
 mod algebra;
 mod alignment;

@@ -1,17 +1,17 @@
-//! The numbers in which a body turns.
+//! Numbers for rotations.
 
 use crate::Number;
 
-/// Below this square of an angle [rad²] both functions of [`Real::half_turn`] are series: seven terms leave less than 2⁻⁶⁴.
+/// Square of an angle [rad²] below which both functions of [`Real::half_turn`] are series. Seven terms leave an error below 2⁻⁶⁴.
 const SERIES_BELOW: f64 = 0.25;
 
-/// A number that can be divided by and turned by: a vector of numbers does it number by number.
+/// A number with a reciprocal and the functions of a half angle. A vector of numbers applies them element by element.
 pub trait Real: Number {
-    /// 1/x.
+    /// Returns 1/x.
     #[must_use]
     fn recip(self) -> Self;
 
-    /// cos(½a) and sin(½a)/a of an angle a that is given by its square.
+    /// Returns cos(½a) and sin(½a)/a, where `square` = a² is the square of an angle \[rad²\].
     #[must_use]
     fn half_turn(square: Self) -> (Self, Self);
 }
@@ -28,16 +28,16 @@ impl Real for f64 {
     }
 }
 
-/// By z = −a²/4: cos(½a) = Σ zᵏ/(2k)! and sin(½a)/a = ½·Σ zᵏ/(2k + 1)!.
+/// Returns the series with z = −a²/4: cos(½a) = Σ zᵏ/(2k)! and sin(½a)/a = ½·Σ zᵏ/(2k + 1)!.
 #[inline(always)]
 fn series(square: f64) -> (f64, f64) {
     let z = -0.25 * square;
     let nested = |factors: [f64; 6]| factors.into_iter().fold(1.0, |sum, factor| 1.0 + z * sum / factor);
-    // (2k − 1)·2k and 2k·(2k + 1), the last term first.
+    // Factors (2k − 1)·2k and 2k·(2k + 1), the last term first.
     (nested([132.0, 90.0, 56.0, 30.0, 12.0, 2.0]), 0.5 * nested([156.0, 110.0, 72.0, 42.0, 20.0, 6.0]))
 }
 
-/// [`Real::half_turn`] of many numbers, to the bit: without a branch where all angles are below half a radian.
+/// Returns [`Real::half_turn`] of each element, equal to the bit. If all angles are below half a radian, no element needs a branch.
 #[must_use]
 #[inline(always)]
 pub fn half_turns<const W: usize>(squares: &[f64; W]) -> ([f64; W], [f64; W]) {
@@ -47,6 +47,7 @@ pub fn half_turns<const W: usize>(squares: &[f64; W]) -> ([f64; W], [f64; W]) {
         (cosines[place], sines[place]) = series(squares[place]);
         all_below &= squares[place] < SERIES_BELOW;
     }
+    // One large angle sends all elements through the scalar function, which uses the same series below the limit.
     if !all_below {
         for place in 0..W {
             (cosines[place], sines[place]) = f64::half_turn(squares[place]);
@@ -55,6 +56,7 @@ pub fn half_turns<const W: usize>(squares: &[f64; W]) -> ([f64; W], [f64; W]) {
     (cosines, sines)
 }
 
+/// Returns the closed form, for angles above the limit of the series.
 #[inline(never)]
 fn closed(square: f64) -> (f64, f64) {
     let angle = libm::sqrt(square);
@@ -82,7 +84,7 @@ mod tests {
         for angle in [1e-9, 1e-3, 0.1, 0.3, 0.499] {
             let (square, half) = (angle * angle, 0.5 * angle);
             let (cosine, sine) = series(square);
-            // The angle is rounded twice by the square and the root.
+            // The square and the root round the angle twice.
             assert!((cosine - libm::cos(half)).abs() <= 4.0 * f64::EPSILON, "{angle}");
             assert!((sine * angle - libm::sin(half)).abs() <= 4.0 * f64::EPSILON * half, "{angle}");
         }

@@ -1,7 +1,7 @@
-//! How a body turns between ticks, under a torque that is held in body axes: J·ω̇ + ω×Jω = τ − b∘ω, Ṙ = R·\[ω\].
+//! Rotation between ticks, under a torque held in body axes: J·ω̇ + ω×Jω = τ − b∘ω, Ṙ = R·\[ω\].
 //!
-//! The damped motion without the gyroscopic term is exact; that term enters by a method of fourth order (Cox & Matthews 2002, ETDRK4), and the orientation turns
-//! by a rotation vector of fourth order (Magnus). So the linear part is the step map of one axis with mass J and damping b.
+//! The damped motion without the gyroscopic term is exact. The gyroscopic term enters by a method of fourth order (Cox & Matthews 2002, ETDRK4), and the
+//! orientation turns by a rotation vector of fourth order (Magnus). The linear part is the step map of one axis with mass J and damping b.
 
 use core::array::from_fn;
 use core::time::Duration;
@@ -10,19 +10,19 @@ use super::algebra::{add, by_component, cross, scale, subtract};
 use super::{Attitude, Real, Triple};
 use crate::{Integrator, Number};
 
-/// A body that turns.
+/// Inertia and damping of a rotating body.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Spin {
-    /// The principal moments of inertia J [kg·m²], each above zero.
+    /// Principal moments of inertia J [kg·m²], each above zero.
     pub inertia: Triple,
     /// Viscous damping b towards ground about each axis [N·m·s/rad].
     pub damping: Triple,
 }
 
-/// How the turn of a step is computed.
+/// Method that computes the rotation of a step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum RotationMethod {
-    /// Exact but for the gyroscopic term, which has order four.
+    /// Exact except for the gyroscopic term, which has order four.
     #[default]
     Exponential,
     /// Explicit Euler on quaternion and angular velocity. First order.
@@ -31,28 +31,29 @@ pub enum RotationMethod {
     RungeKutta4,
 }
 
-/// The step of one body over a span.
+/// Step of one body over a span.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RotationStep<C = f64> {
     method: RotationMethod,
-    /// How many steps the span is divided into.
+    /// Number of equal steps in the span.
     steps: u32,
-    /// The length of one of these steps \[s\].
+    /// Length of one of the equal steps \[s\].
     h: C,
-    /// (Jy − Jz)/Jx and so on: γ(ω) = gyration∘(ωy·ωz, ωz·ωx, ωx·ωy).
+    /// (Jy − Jz)/Jx and its cyclic permutations: γ(ω) = gyration∘(ωy·ωz, ωz·ωx, ωx·ωy).
     gyration: Triple<C>,
-    /// 1/J.
+    /// 1/J [1/(kg·m²)].
     mobility: Triple<C>,
-    /// b/J.
+    /// b/J [1/s].
     decay: Triple<C>,
-    /// e = φ0 and g = h·φ1, over the step and over half of it.
+    /// e = φ0 and g = h·φ1 over the step.
     whole: [Triple<C>; 2],
+    /// e and g over half of the step.
     half: [Triple<C>; 2],
-    /// A = h·(2φ2 − 4φ3), B = h·(4φ3 − φ2), C = h²·(2φ3 − 4φ4), D = h²·(4φ4 − φ3), and h²·φ2.
+    /// Weights A = h·(2φ2 − 4φ3), B = h·(4φ3 − φ2), C = h²·(2φ3 − 4φ4), D = h²·(4φ4 − φ3), and h²·φ2.
     weights: [Triple<C>; 5],
 }
 
-/// φn = Σ (−x)ᵏ/(k + n)! for n = 0 to 4 and x ≥ 0.
+/// Returns φn = Σ (−x)ᵏ/(k + n)! for n = 0 to 4 and x ≥ 0.
 fn phis(x: f64) -> [f64; 5] {
     const FACTORIALS: [f64; 4] = [1.0, 1.0, 2.0, 6.0];
     let mut phis = [0.0; 5];
@@ -63,6 +64,7 @@ fn phis(x: f64) -> [f64; 5] {
             *phi = sum / [1.0, 1.0, 2.0, 6.0, 24.0][n as usize];
         }
     } else {
+        // φ(n+1) = (1/n! − φn)/x loses no digits for x ≥ 2; for small x it cancels, hence the series above.
         phis[0] = libm::exp(-x);
         for n in 0..4 {
             phis[n + 1] = (1.0 / FACTORIALS[n] - phis[n]) / x;
@@ -72,7 +74,7 @@ fn phis(x: f64) -> [f64; 5] {
 }
 
 impl Spin {
-    /// The step over that span, with an integrator of translations and a number of steps of its own for turns.
+    /// Returns the step over `span`. `steps`, the number of steps for rotations, multiplies the steps of the integrator.
     #[must_use]
     pub fn step(&self, span: Duration, integrator: Integrator, steps: u32) -> RotationStep {
         let (method, within) = match integrator {
@@ -80,8 +82,10 @@ impl Spin {
             Integrator::SemiImplicitEuler { steps } => (RotationMethod::Euler, steps),
             Integrator::RungeKutta4 { steps } => (RotationMethod::RungeKutta4, steps),
         };
+        // Euler and Runge–Kutta divide each of the rotation's steps again, as they do for translations.
         let steps = steps.saturating_mul(within);
         let (h, j) = (span.as_secs_f64() / f64::from(steps), self.inertia);
+        // φ functions of the whole and of the half step, per axis, as ETDRK4 needs them.
         let decay: Triple = from_fn(|axis| self.damping[axis] / j[axis]);
         let over = |h: f64| decay.map(|decay| phis(h * decay));
         let (whole, half) = (over(h), over(0.5 * h));
@@ -107,14 +111,14 @@ impl Spin {
 }
 
 impl<C> RotationStep<C> {
-    /// How the turn is computed.
+    /// Returns the method that computes the rotation.
     #[must_use]
     #[inline(always)]
     pub const fn method(&self) -> RotationMethod {
         self.method
     }
 
-    /// How many steps the span is divided into.
+    /// Returns the number of equal steps in the span.
     #[must_use]
     #[inline(always)]
     pub const fn steps(&self) -> u32 {
@@ -123,7 +127,7 @@ impl<C> RotationStep<C> {
 }
 
 impl<C: Copy> RotationStep<C> {
-    /// Each coefficient replaced by what `coefficient` makes of it, always in one order.
+    /// Returns the step with `coefficient` applied to each coefficient, always in the same order.
     #[must_use]
     #[inline(always)]
     pub fn map<D: Copy>(&self, mut coefficient: impl FnMut(&C) -> D) -> RotationStep<D> {
@@ -144,13 +148,14 @@ impl<C: Copy> RotationStep<C> {
 }
 
 impl<N: Real> RotationStep<N> {
-    /// Turns a body over the span under a torque that is held in body axes [N·m].
+    /// Turns a body over the span under a torque held in body axes \[N·m\].
     #[inline(always)]
     pub fn advance(&self, body: &mut Attitude<N>, torque: Triple<N>) {
         self.travel(body, torque);
     }
 
-    /// [`RotationStep::advance`], which gives the integral of the angular velocity in body axes over the span too \[rad\]: times the torque it is the work of that.
+    /// Like [`RotationStep::advance`], and returns the integral of the angular velocity in body axes over the span \[rad\]. Its scalar product with the
+    /// torque is the work of the torque.
     #[inline(always)]
     pub fn travel(&self, body: &mut Attitude<N>, torque: Triple<N>) -> Triple<N> {
         let forced = self.forced(torque);
@@ -162,6 +167,7 @@ impl<N: Real> RotationStep<N> {
                     let (rate, sigma) = self.exponential(before, forced);
                     body.rate = rate;
                     body.turn(sigma);
+                    // σ without the Magnus term is the integral of the angular velocity.
                     subtract(sigma, self.magnus(before, rate))
                 }
                 RotationMethod::Euler => self.euler(body, forced),
@@ -172,33 +178,34 @@ impl<N: Real> RotationStep<N> {
         travel
     }
 
-    /// The angular acceleration by a torque, τ/J [rad/s²].
+    /// Returns the angular acceleration by a torque, τ/J [rad/s²].
     #[must_use]
     #[inline(always)]
     pub fn forced(&self, torque: Triple<N>) -> Triple<N> {
         by_component(torque, self.mobility)
     }
 
-    /// γ(ω): the angular acceleration by the gyroscopic term.
+    /// Returns γ(ω), the angular acceleration by the gyroscopic term [rad/s²].
     #[inline(always)]
     fn gyrate(&self, rate: Triple<N>) -> Triple<N> {
         by_component(self.gyration, [rate[1] * rate[2], rate[2] * rate[0], rate[0] * rate[1]])
     }
 
-    /// What a turn about an axis that moves has beyond the integral of the angular velocity: h²/12·ω×ω⁺.
+    /// Returns the Magnus term h²/12·ω×ω⁺ \[rad\]: the difference between the rotation vector about a moving axis and the integral of the angular velocity.
     #[inline(always)]
     fn magnus(&self, before: Triple<N>, after: Triple<N>) -> Triple<N> {
         scale(cross(before, after), self.h * self.h * N::of(1.0 / 12.0))
     }
 
-    /// One of the steps by [`RotationMethod::Exponential`]: the angular velocity after it, and the rotation vector σ of its turn, in body axes. `forced`: that of
-    /// [`RotationStep::forced`].
+    /// Returns the result of one equal step by [`RotationMethod::Exponential`]: the angular velocity after the step, and the rotation vector σ of the step,
+    /// in body axes. `forced` is the result of [`RotationStep::forced`].
     #[must_use]
     #[inline(always)]
     pub fn exponential(&self, rate: Triple<N>, forced: Triple<N>) -> (Triple<N>, Triple<N>) {
         let [e, g] = self.whole;
         let [e_half, g_half] = self.half;
         let [a, b, c, d, drift] = self.weights;
+        // Four stages of ETDRK4. `second` to `fourth` are differences from the first gyroscopic term, which `push` contains already.
         let first = self.gyrate(rate);
         let push = add(forced, first);
         let decayed = by_component(e_half, rate);
@@ -210,20 +217,23 @@ impl<N: Real> RotationStep<N> {
         let middle = add(second, third);
         let after = add(free, add(by_component(a, middle), by_component(b, fourth)));
         let magnus = self.magnus(rate, after);
+        // The integral of the angular velocity has the same stages with the weights C and D, one order of h higher.
         let free = add(by_component(g, rate), by_component(drift, push));
         let sigma = add(free, add(add(by_component(c, middle), by_component(d, fourth)), magnus));
         (after, sigma)
     }
 
-    /// ω̇ of the equation of motion.
+    /// Returns ω̇ of the equation of motion [rad/s²].
     #[inline(always)]
     fn acceleration(&self, rate: Triple<N>, forced: Triple<N>) -> Triple<N> {
         subtract(add(forced, self.gyrate(rate)), by_component(self.decay, rate))
     }
 
+    /// Makes one explicit Euler step, and returns the integral of the angular velocity \[rad\].
     #[inline(always)]
     fn euler(&self, body: &mut Attitude<N>, forced: Triple<N>) -> Triple<N> {
         let travel = scale(body.rate, self.h);
+        // Both slopes before either is applied: explicit Euler uses the state at the beginning of the step.
         let (turning, rising) = (spun(&body.orientation, body.rate), self.acceleration(body.rate, forced));
         body.orientation = moved(&body.orientation, &turning, self.h);
         body.rate = add(body.rate, scale(rising, self.h));
@@ -231,6 +241,7 @@ impl<N: Real> RotationStep<N> {
         travel
     }
 
+    /// Makes one Runge–Kutta step, and returns the integral of the angular velocity \[rad\].
     #[inline(always)]
     fn runge_kutta(&self, body: &mut Attitude<N>, forced: Triple<N>) -> Triple<N> {
         let Attitude { orientation: q, rate } = *body;
@@ -243,6 +254,7 @@ impl<N: Real> RotationStep<N> {
         let (q3, w3) = slope(&moved(&q, &q2, half), third);
         let fourth = add(rate, scale(w3, self.h));
         let (q4, w4) = slope(&moved(&q, &q3, self.h), fourth);
+        // Classical weights 1, 2, 2, 1 over six.
         let sixth = self.h * N::of(1.0 / 6.0);
         let two = N::of(2.0);
         body.orientation = from_fn(|i| q[i] + sixth * (q1[i] + two * (q2[i] + q3[i]) + q4[i]));
@@ -253,14 +265,14 @@ impl<N: Real> RotationStep<N> {
 }
 
 impl<N: Real> Attitude<N> {
-    /// Brings the quaternion's norm back to 1, to first order.
+    /// Restores the quaternion's norm of 1, to first order.
     #[inline(always)]
     fn renormalise(&mut self) {
         self.turn([N::of(0.0); 3]);
     }
 }
 
-/// q̇ = ½·q·(0, ω).
+/// Returns q̇ = ½·q·(0, ω).
 #[inline(always)]
 fn spun<N: Number>([w, x, y, z]: &[N; 4], rate: Triple<N>) -> [N; 4] {
     let (w, u, half) = (*w, [*x, *y, *z], N::of(0.5));
@@ -269,6 +281,7 @@ fn spun<N: Number>([w, x, y, z]: &[N; 4], rate: Triple<N>) -> [N; 4] {
     [-(half * along), half * (w * rate[0] + turned[0]), half * (w * rate[1] + turned[1]), half * (w * rate[2] + turned[2])]
 }
 
+/// Returns q + span·slope.
 #[inline(always)]
 fn moved<N: Number>(q: &[N; 4], slope: &[N; 4], span: N) -> [N; 4] {
     from_fn(|i| q[i] + span * slope[i])
@@ -292,7 +305,7 @@ mod tests {
         run(spin, start, torque, h, steps, Integrator::Exact)
     }
 
-    /// The closed form by elliptic functions, to twelve digits.
+    /// The reference is the closed form by elliptic functions, to twelve digits.
     #[test]
     fn a_free_top_turns_as_the_closed_form_says() {
         let spin = Spin { inertia: [3.0, 5.0, 9.0], damping: FREE };
@@ -300,12 +313,13 @@ mod tests {
         let q = [0.929_554_241_943, 0.268_068_584_514, 0.090_362_592_172, -0.236_437_618_026];
         let rate = [2.220_953_964_224, -0.678_695_174_521, -3.107_320_295_453];
         let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // q and −q are the same orientation, so the sign of w is fixed for the comparison.
         let sign = end.orientation[0].signum();
         assert!(apart(&end.orientation.map(|q| sign * q), &q) < 2e-12, "{:?}", end.orientation);
         assert!(apart(&end.rate, &rate) < 2e-12, "{:?}", end.rate);
     }
 
-    /// J₁ = J₂: R = Exp(t·Jω/J₁)·Exp(t(1 − J₃/J₁)·ω₃·e₃).
+    /// With J₁ = J₂ the solution is R = Exp(t·Jω/J₁)·Exp(t(1 − J₃/J₁)·ω₃·e₃).
     #[test]
     fn a_symmetric_top_precesses() {
         let (spin, rate) = (Spin { inertia: [2.0, 2.0, 0.5], damping: FREE }, [0.7, -0.3, 5.0]);
@@ -316,7 +330,7 @@ mod tests {
         assert!(end.angle_to(&expected.orientation) < 1e-10, "{}", end.angle_to(&expected.orientation));
     }
 
-    /// Angle errors 1.10e-7, 6.74e-9 and 4.18e-10 rad at 4, 2 and 1 ms, against steps of 31.25 µs.
+    /// The angle errors are 1.10e-7, 6.74e-9 and 4.18e-10 rad at 4, 2 and 1 ms, against steps of 31.25 µs.
     #[test]
     fn the_order_is_four() {
         let spin = Spin { inertia: [3e-5, 5e-5, 9e-5], damping: FREE };
@@ -325,6 +339,7 @@ mod tests {
             let steps = u32::try_from(1_000_000_000 / nanos).unwrap();
             run(spin, start, [2e-4, -3e-4, 4e-4], Duration::from_nanos(nanos), steps, integrator)
         };
+        // At a 32nd of the step a method of fourth order errs a million times less.
         let reference = at(31_250, Integrator::Exact);
         for (nanos, error) in [(4_000_000, 1.10e-7), (2_000_000, 6.74e-9), (1_000_000, 4.18e-10)] {
             let found = at(nanos, Integrator::Exact).angle_to(&reference.orientation);
@@ -336,7 +351,7 @@ mod tests {
         assert!((libm::log2(found[0] / found[1]) - 1.0).abs() < 0.1, "{found:?}");
     }
 
-    /// Without damping the kinetic energy changes by the work of the torque, of fourth order; exactly about one axis.
+    /// Without damping the kinetic energy changes by the work of the torque: with fourth order, and exactly for a rotation about one axis.
     #[test]
     fn the_work_of_a_torque_is_what_the_energy_changes_by() {
         let spin = Spin { inertia: [3e-5, 5e-5, 9e-5], damping: FREE };
@@ -354,16 +369,16 @@ mod tests {
         for integrator in [Integrator::Exact, Integrator::RungeKutta4 { steps: 1 }] {
             let found = [2000, 1000].map(|micros| missed([3.0, -4.0, 6.0], torque, micros, integrator));
             assert!(found[1] < 1e-9 && (libm::log2(found[0] / found[1]) - 4.0).abs() < 0.5, "{found:?}");
-            // Some hundred roundings.
+            // The sum of 200 steps has some hundred roundings.
             assert!(missed([0.0, 2.0, 0.0], [0.0, 1e-3, 0.0], 1000, integrator) < 1e-13);
         }
-        // Of first order: each step misses ½h²·J⁻¹τ·τ.
+        // Euler has first order: each step misses ½h²·J⁻¹τ·τ.
         let (euler, tau) = (missed([0.0; 3], [0.0, 1e-3, 0.0], 1000, Integrator::SemiImplicitEuler { steps: 1 }), 1e-3);
         let (rate, steps) = (0.2 * tau / 5e-5, 200.0);
         assert!((euler / (steps * 0.5e-6 * tau * tau / 5e-5 / (0.5 * 5e-5 * rate * rate)) - 1.0).abs() < 1e-9, "{euler}");
     }
 
-    /// About one axis there is no gyroscopic term, and the step is that of a damped mass, at any damping.
+    /// About one axis there is no gyroscopic term, and the step equals the step of a damped mass, at any damping.
     #[test]
     fn about_one_axis_it_is_the_map_of_a_translation() {
         for damping in [0.0, 1e-6, 1e-3, 0.1, 10.0] {

@@ -1,4 +1,4 @@
-//! A sender that falls silent, comes back or never comes: what it does to the force.
+//! Effect on the force of a sender that falls silent, returns, or never sends.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 const TICK: Duration = Duration::from_millis(1);
 const GAINS: Gains = Gains { stiffness: 2000.0, damping: 7.0 };
 
-/// A peer and the ages that it gives to others.
+/// A peer, and the ages of other peers as seen by this peer.
 struct Receiver {
     peer: Peer<1, RestingDevice<1>, LawStrategy<1>>,
     ages: Ages<1>,
@@ -43,7 +43,7 @@ impl Receiver {
     }
 }
 
-/// Peer 0 of so many, at rest at `own`; the others begin at the origin.
+/// Returns peer 0 of `peers` peers, at rest at `own`. All other peers begin at the origin.
 fn receiver(peers: usize, own: f64) -> Receiver {
     let config = PeerConfig {
         session: 1,
@@ -71,7 +71,7 @@ fn sample(sender: u32, sequence: u64, state: State<1>) -> Sample<1> {
     Sample { session: 1, sender, sequence, sent: Instant::ZERO, state }
 }
 
-/// With any number of peers: the mean of nothing but the own state is the own state, exactly.
+/// The mean of held states that all equal the own state is exactly the own state, for any number of peers.
 #[test]
 fn senders_without_weight_exert_no_force_at_all() {
     for peers in 2..12 {
@@ -88,14 +88,14 @@ fn senders_without_weight_exert_no_force_at_all() {
     }
 }
 
-/// The formula of the manual, by hand: w = 1/4, u = 1/2, N = 3. Powers of two, so every number is exact.
+/// The formula of the manual, computed by hand with w = 1/4, u = 1/2 and N = 3. All factors are powers of two, so every number is exact.
 #[test]
 fn what_is_held_is_the_mixture_of_three_states() {
     let mut peer = receiver(3, 1.0);
     peer.take_in(&sample(1, 0, at(4.0, 2.0)));
     peer.take_in(&sample(2, 0, at(-3.0, 0.0)));
     peer.set_age(0, Age { weight: 0.25, share: 1.0 });
-    // (1 + (4 − 1)/4, 2/4) and (−3, 0).
+    // Held states are (1 + (4 − 1)/4, 2/4) and (−3, 0).
     let target = peer.compute().target;
     assert_eq!((target.position, target.velocity), ([(1.75 - 3.0) / 2.0], [0.25]));
     peer.await_return(0, 5);
@@ -104,20 +104,20 @@ fn what_is_held_is_the_mixture_of_three_states() {
     peer.take_in(&sample(1, 5, at(16.0, 4.0)));
     assert!(peer.ages.take_return(0) && !peer.ages.take_return(0));
     peer.set_age(0, Age { weight: 0.25, share: 0.5 });
-    // Half way from (8, 2) to (16, 4) is (12, 3); a quarter of the way there from (1, 0) is (3.75, 0.75).
+    // Half of the way from (8, 2) to (16, 4) is (12, 3); a quarter of the way from (1, 0) to (12, 3) is (3.75, 0.75).
     let target = peer.compute().target;
     assert_eq!((target.position, target.velocity), ([(3.75 - 3.0) / 2.0], [0.375]));
 }
 
-/// What a sender does at one tick.
+/// Action of a sender at a tick.
 #[derive(Clone, Copy, Debug)]
 enum Event {
     Nothing,
-    /// It sends from there, as somebody who was there all the time.
+    /// The sender sends this position, as a sender does that was never silent.
     Sends(f64),
-    /// It comes back there.
+    /// The sender returns at this position.
     Returns(f64),
-    /// From here on its weight falls (or rises).
+    /// The weight of the sender begins to fall (`true`) or to rise (`false`).
     Falls(bool),
 }
 
@@ -133,7 +133,7 @@ fn event() -> impl Strategy<Value = Event> {
 proptest! {
     #![proptest_config(crate::cases(400))]
 
-    /// The bound of the manual, tick by tick, for one of N − 1 senders that comes, goes and turns up elsewhere as it likes: h/fade is `step`.
+    /// The bound of the manual at every tick, for one of N − 1 senders that leaves, returns and jumps at random. `step` is h/fade.
     #[test]
     fn no_coming_or_going_makes_the_force_jump(
         peers in 2..5_usize, own in -1.0..1.0, events in vec(event(), 1..60), step in prop_oneof![Just(0.004), 0.001..0.5],
@@ -173,7 +173,7 @@ proptest! {
             age.share = (age.share + step).min(1.0);
             peer.set_age(0, age);
             let now = peer.force();
-            // Every distance is at most what it is to the farther of the two states.
+            // Every distance is at most the distance to the farther of the two states.
             let bound = |newest: f64, before: f64, own: f64, moved: f64| {
                 step * ((newest - own).abs().max((before - own).abs()) + (newest - before).abs()) + moved.abs()
             };
@@ -185,7 +185,7 @@ proptest! {
         }
     }
 
-    /// A sender that was gone and is back whole is as if it had never had an age: to the bit.
+    /// After a silence and a full return, a sender counts as if it had never had an age, to the bit.
     #[test]
     fn whole_ages_change_no_bit(own in -1.0..1.0, states in vec((1..4_u32, -1.0..1.0), 1..30), aged in vec(0..3_usize, 1..4)) {
         let (Receiver { peer: mut plain, .. }, mut with_ages) = (receiver(4, own), receiver(4, own));

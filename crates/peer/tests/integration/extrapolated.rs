@@ -17,7 +17,7 @@ fn strategy(gains: Gains, horizon: Duration) -> LawStrategy<1> {
     LawStrategy::new(Coordination::Extrapolated, LawParameters { gains, peers: 2, tick: TICK, oldest: None, middle: None, own })
 }
 
-/// FT at the local time 1 s of samples with those ages \[ms\].
+/// Returns FT at the local time 1 s for samples with these ages \[ms\].
 fn force(gains: Gains, horizon: Duration, own: Body, others: &[(Body, u64)]) -> f64 {
     let state = |(x, v): Body| State { position: [x], velocity: [v] };
     let mut strategy = strategy(gains, horizon);
@@ -38,7 +38,7 @@ fn force(gains: Gains, horizon: Duration, own: Body, others: &[(Body, u64)]) -> 
 proptest! {
     #![proptest_config(cases(500))]
 
-    /// FT = mean of KT·(x − xⱼ − min(age, horizon)·vⱼ) + BT·(v − vⱼ).
+    /// The equation is FT = mean of KT·(x − xⱼ − min(age, horizon)·vⱼ) + BT·(v − vⱼ).
     #[test]
     fn it_is_the_mean_over_extrapolated_samples(
         gains in gains(), own in body(), others in vec((body(), 0..300_u64), 1..12), horizon in 0..200_u64,
@@ -46,11 +46,11 @@ proptest! {
         let moved: Vec<Body> = others.iter().map(|((x, v), age)| (x + (*age).min(horizon) as f64 * 1e-3 * v, *v)).collect();
         let mean = moved.iter().map(|other| pull(gains, own, *other)).sum::<f64>() / count(&moved);
         let force = force(gains, Duration::from_millis(horizon), own, &others);
-        // The ages and the leads are rounded too: twice as often.
+        // Ages and leads are rounded too, so there are twice as many roundings.
         prop_assert!((force - mean).abs() <= 2.0 * rounding(gains, own, &moved) / count(&moved) + 1e-13, "{force} is not {mean}");
     }
 
-    /// Copies that move at one velocity exert no force on each other, however old their samples are below the horizon.
+    /// Copies that move at one velocity exert no force on each other, at any age of the samples below the horizon.
     #[test]
     fn nobody_is_held_back_at_a_common_velocity(gains in gains(), x in -0.1..0.1, v in -1.0..1.0, ages in vec(0..200_u64, 1..12)) {
         let others: Vec<(Body, u64)> = ages.iter().map(|age| ((x - *age as f64 * 1e-3 * v, v), *age)).collect();
@@ -58,7 +58,7 @@ proptest! {
         prop_assert!(force.abs() <= 40.0 * f64::EPSILON * (gains.stiffness + gains.damping), "{force}");
     }
 
-    /// Of a copy under an acceleration of at most a, a sample is extrapolated to within ½·a·age²: here of one under a constant acceleration, exactly that.
+    /// The extrapolation of a copy under an acceleration of at most a errs by at most ½·a·age². A constant acceleration reaches this error exactly.
     #[test]
     fn the_error_of_a_sample_is_that_of_its_acceleration(x in -0.1..0.1, v in -1.0..1.0, a in -20.0..20.0_f64, age in 0..200_u64) {
         let t = age as f64 * 1e-3;
@@ -67,7 +67,7 @@ proptest! {
         prop_assert!((force - 0.5 * a * t * t).abs() < 1e-14, "{force}");
     }
 
-    /// Without a horizon it is the average-position law.
+    /// Without a horizon the law equals the average-position law.
     #[test]
     fn without_a_horizon_it_is_the_average_position_law(gains in gains(), own in body(), others in vec((body(), 0..300_u64), 1..12)) {
         let state = |(x, v): Body| State { position: [x], velocity: [v] };

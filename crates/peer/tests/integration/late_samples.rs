@@ -1,4 +1,4 @@
-//! Whatever the network does to the order of datagrams, a peer is left with the newest from each sender.
+//! A peer holds the newest sample of each sender, in whatever order the network delivers datagrams.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ type Receiver = Peer<1, RestingDevice<1>, LawStrategy<1>>;
 const SESSION: u64 = 7;
 const PLACE: u32 = 1;
 
-/// Peer 1 of three.
+/// Returns peer 1 of three peers.
 fn receiver() -> Receiver {
     let gains = Gains { stiffness: 1000.0, damping: 5.0 };
     let config = PeerConfig {
@@ -36,7 +36,7 @@ fn receiver() -> Receiver {
     Peer::new(config, RestingDevice { position: [0.0] }, object, Coordination::AveragePosition.strategy(gains, 3, Duration::from_millis(1)), held)
 }
 
-/// What sender `from` sends as its sample `sequence`, the first being number 1. Small integers: their means are exact.
+/// Returns the state in sample `sequence` of sender `from`, where the first sample has the number 1. The numbers are small integers, so means are exact.
 fn state(from: u32, sequence: u64) -> State<1> {
     let number = f64::from(from) * 1000.0 + f64::from(u32::try_from(sequence).unwrap());
     State { position: [number], velocity: [-number] }
@@ -63,7 +63,7 @@ proptest! {
             let expected = if sequence > *held { Reception::Newest } else { Reception::Stale };
             *held = sequence.max(*held);
             prop_assert_eq!(peer.handle_datagram(&datagram(SESSION, sender, sequence)), Ok(expected));
-            // With or without a tick between two arrivals.
+            // Some arrivals are in the same tick, others in different ticks.
             if tick {
                 let target = peer.compute(Instant::ZERO).target;
                 prop_assert_eq!(target.position[0], f64::midpoint(state(0, newest[0]).position[0], state(2, newest[2]).position[0]));

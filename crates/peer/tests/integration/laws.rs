@@ -1,4 +1,4 @@
-//! The coordination laws against their equations, written again sample by sample.
+//! Coordination laws against their equations, written again sample by sample.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ pub(crate) const TICK: Duration = Duration::from_millis(1);
 /// Position and velocity along one axis.
 pub(crate) type Body = (f64, f64);
 
-/// FT of a law for a copy and the samples held from the others.
+/// Returns FT of a law for a copy `own` and the held samples `others`.
 fn force(law: Coordination, gains: Gains, own: Body, others: &[Body]) -> f64 {
     let state = |(x, v): Body| State { position: [x], velocity: [v] };
     let mut strategy = law.strategy::<1>(gains, others.len() + 1, TICK);
@@ -28,12 +28,13 @@ fn force(law: Coordination, gains: Gains, own: Body, others: &[Body]) -> f64 {
     strategy.command(&Context { now: Instant::ZERO, local_time: Instant::ZERO, own: &own, held: &held, ahead: Prediction::REST }).force[0]
 }
 
-/// The pull of one sample: KT·(x − xⱼ) + BT·(v − vⱼ).
+/// Returns the pull of one sample: KT·(x − xⱼ) + BT·(v − vⱼ).
 pub(crate) fn pull(gains: Gains, own: Body, other: Body) -> f64 {
     gains.stiffness * (own.0 - other.0) + gains.damping * (own.1 - other.1)
 }
 
-/// What both ways of adding up n terms may be apart: each term is rounded at most three times and each sum at most n + 4 times, by 2⁻⁵³ of the sizes.
+/// Returns the greatest difference between two ways of adding n terms: each term is rounded at most three times, and each sum at most n + 4 times, by 2⁻⁵³ of
+/// the sizes.
 pub(crate) fn rounding(gains: Gains, own: Body, others: &[Body]) -> f64 {
     let size = |other: &Body| gains.stiffness * (own.0.abs() + other.0.abs()) + gains.damping * (own.1.abs() + other.1.abs());
     2.0 * (count(others) + 7.0) * f64::EPSILON / 2.0 * others.iter().map(size).sum::<f64>()
@@ -50,7 +51,7 @@ pub(crate) fn gains() -> impl Strategy<Value = Gains> {
 proptest! {
     #![proptest_config(cases(500))]
 
-    /// Rakhsha & Constantinescu 2015, eq. (2): the sum of the pulls of all others.
+    /// Rakhsha & Constantinescu 2015, eq. (2): the sum of the pulls of all other copies.
     #[test]
     fn proportional_derivative_is_the_sum_over_the_others(gains in gains(), own in body(), others in vec(body(), 1..12)) {
         let sum: f64 = others.iter().map(|other| pull(gains, own, *other)).sum();
@@ -58,7 +59,7 @@ proptest! {
         prop_assert!((force - sum).abs() <= rounding(gains, own, &others), "{force} is not {sum}");
     }
 
-    /// Rakhsha & Constantinescu 2015, eq. (4): the mean of the pulls of all others.
+    /// Rakhsha & Constantinescu 2015, eq. (4): the mean of the pulls of all other copies.
     #[test]
     fn average_position_is_the_mean_over_the_others(gains in gains(), own in body(), others in vec(body(), 1..12)) {
         let mean = others.iter().map(|other| pull(gains, own, *other)).sum::<f64>() / count(&others);
@@ -66,7 +67,7 @@ proptest! {
         prop_assert!((force - mean).abs() <= rounding(gains, own, &others) / count(&others), "{force} is not {mean}");
     }
 
-    /// New gains act as if the law had been made with them.
+    /// A law with changed gains acts as a law made with these gains.
     #[test]
     fn new_gains_make_the_law_anew(first in gains(), second in gains(), own in body(), other in body()) {
         for law in laws() {
@@ -84,13 +85,13 @@ fn parameters(gains: Gains) -> LawParameters {
     LawParameters { gains, peers: 2, tick: TICK, oldest: None, middle: None, own: LawValues::default() }
 }
 
-/// The strategies of the registry that are laws.
+/// Returns the strategies of the registry that are laws.
 fn laws() -> impl Iterator<Item = Coordination> {
     let gains = Gains { stiffness: 3.0, damping: 5.0 };
     Coordination::ALL.iter().copied().filter(move |coordination| coordination.law(&parameters(gains)).is_some())
 }
 
-/// The number of coefficients does not depend on what they are, so runs side by side can be told lane by lane.
+/// Order and number of coefficients are independent of their values, so parallel lanes can assign coefficients lane by lane.
 #[test]
 fn a_law_maps_its_coefficients_in_one_order() {
     let gains = Gains { stiffness: 3.0, damping: 5.0 };

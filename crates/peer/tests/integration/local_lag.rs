@@ -30,7 +30,7 @@ fn force(strategy: &mut LawStrategy<1>, own: Body, others: &[Body]) -> f64 {
 proptest! {
     #![proptest_config(cases(300))]
 
-    /// FT(k) = mean of KT·(x(k − L) − xⱼ) + BT·(v(k − L) − vⱼ), with the first state before the first tick.
+    /// The equation is FT(k) = mean of KT·(x(k − L) − xⱼ) + BT·(v(k − L) − vⱼ), with the first state before the first tick.
     #[test]
     fn it_is_the_mean_over_samples_of_a_past_state(
         gains in gains(), own in vec(body(), 1..40), others in vec(body(), 1..12), lag in 0..20_u32,
@@ -44,7 +44,7 @@ proptest! {
         }
     }
 
-    /// At a common velocity the force is KT·v times by how much the samples are older than the own state, on average: none where they are as old.
+    /// At a common velocity v the force is KT·v times the mean difference between the age of the samples and the age of the own state; zero for equal ages.
     #[test]
     fn at_a_common_velocity_it_is_as_the_ages_differ(gains in gains(), v in -1.0..1.0, lag in 0..20_u32, ages in vec(0..20_u32, 1..8), ticks in 20..40_u32) {
         let at = |tick: f64| (1e-3 * tick * v, v);
@@ -58,7 +58,7 @@ proptest! {
         prop_assert!((force - gains.stiffness * 1e-3 * v * older).abs() <= 64.0 * f64::EPSILON * (gains.stiffness + gains.damping), "{force}");
     }
 
-    /// The memory is the states of the latest ticks, the oldest first; it stays when gains change, and can be put back.
+    /// The memory contains the states of the latest ticks, the oldest first. A change of gains keeps the memory, and a saved memory can be restored.
     #[test]
     fn the_past_goes_on_under_new_gains(first in gains(), second in gains(), own in vec(body(), 30), other in body(), lag in 1..20_u32) {
         let (mut one, mut other_one) = (strategy(first, lag), strategy(second, lag));
@@ -74,7 +74,7 @@ proptest! {
     }
 }
 
-/// Part of a tick counts as a whole one, as with samples that arrive between two ticks.
+/// A part of a tick counts as a whole tick, as for samples that arrive between two ticks.
 #[test]
 fn a_lag_is_rounded_up_to_ticks() {
     let lag = |lag: LawValue, middle: Option<u64>| {

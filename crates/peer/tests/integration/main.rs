@@ -17,7 +17,7 @@ mod wire;
 
 use proptest::prelude::ProptestConfig;
 
-/// A property test of this number of cases that leaves no files behind.
+/// Returns the configuration of a property test with `cases` cases that leaves no files behind.
 fn cases(count: u32) -> ProptestConfig {
     ProptestConfig { cases: count, failure_persistence: None, ..ProptestConfig::default() }
 }

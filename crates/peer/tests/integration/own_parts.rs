@@ -1,4 +1,4 @@
-//! A device and a strategy of somebody else's, in a [`Peer`].
+//! A device and a strategy of another crate, in a [`Peer`].
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{Clock, Command, Contact, Context, CopyConfig, Device, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, State, Strategy};
 use cohaptic_units::Instant;
 
-/// A device whose position follows a script and which writes down what it is told.
+/// A device whose position follows a script, and which records the forces on it.
 #[derive(Debug, Default)]
 struct Scripted {
     tick: u32,
@@ -24,7 +24,7 @@ impl Device<1> for Scripted {
     }
 }
 
-/// Follows the first of the others only, with a gain that can be changed, and counts how often it is asked.
+/// A strategy that follows the first other peer only, with a gain that can be changed, and records the instants of its commands.
 #[derive(Debug)]
 struct FollowTheFirst {
     stiffness: f64,
@@ -57,7 +57,7 @@ fn peer<D: Device<1>, S: Strategy<1>>(device: D, strategy: S, compute_delay: boo
         enclosure: None,
     };
     let clock = Clock::regular(Duration::from_millis(1));
-    // So heavy that it stays where it is.
+    // A mass that moves too little to matter.
     let object = ObjectCopy::new(CopyConfig { mass: 1e300, damping: 0.0 }, State::REST, Integrator::Exact, &clock);
     Peer::new(config, device, object, strategy, Held::new([State::REST, State::REST]))
 }
@@ -99,7 +99,7 @@ fn a_strategy_is_asked_once_a_tick_and_sees_the_samples_one_by_one() {
     assert_eq!(peer.strategy_mut().asked, [at(0), at(1)]);
 }
 
-/// The traits can be used as objects: a driver may choose at run time.
+/// Both traits can be used as trait objects, so a driver may choose device and strategy at run time.
 #[test]
 fn devices_and_strategies_may_be_boxed() {
     let device: Box<dyn Device<1>> = Box::new(Scripted::default());

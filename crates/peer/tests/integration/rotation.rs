@@ -1,4 +1,4 @@
-//! How bodies turn where that is hard, against closed forms, and the torques that tie them against their potential.
+//! Difficult rotations against closed forms, and torques against their potential.
 
 use std::array::from_fn;
 use std::f64::consts::{PI, TAU};
@@ -12,7 +12,7 @@ use crate::cases;
 
 const FREE: Triple = [0.0; 3];
 const TICK: Duration = Duration::from_millis(1);
-/// Half a unit in the last place of 1: what one rounding errs by at most.
+/// Half a unit in the last place of 1, the greatest error of one rounding.
 const U: f64 = 0.5 * f64::EPSILON;
 
 pub(crate) fn turned(sigma: Triple) -> Attitude {
@@ -25,7 +25,7 @@ fn exact(spin: &Spin, span: Duration) -> RotationStep {
     spin.step(span, Integrator::Exact, 1)
 }
 
-/// Σ weightᵢ·aᵢ·bᵢ.
+/// Returns Σ weightᵢ·aᵢ·bᵢ.
 fn weighed(weights: &Triple, a: &Triple, b: &Triple) -> f64 {
     (0..3).map(|axis| weights[axis] * a[axis] * b[axis]).sum()
 }
@@ -34,7 +34,7 @@ fn plus(a: &Triple, factor: f64, b: &Triple) -> Triple {
     from_fn(|axis| a[axis] + factor * b[axis])
 }
 
-/// q·p.
+/// Returns q·p.
 fn product([a, b, c, d]: &[f64; 4], [w, x, y, z]: &[f64; 4]) -> [f64; 4] {
     [a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y, a * y + c * w + d * x - b * z, a * z + d * w + b * y - c * x]
 }
@@ -44,13 +44,13 @@ fn world_momentum(inertia: &Triple, body: &Attitude) -> Triple {
     from_fn(|row| (0..3).map(|axis| matrix[row][axis] * inertia[axis] * body.rate[axis]).sum())
 }
 
-/// γ(ω) of a free top.
+/// Returns γ(ω) of a free top.
 fn gyrate([a, b, c]: &Triple, [x, y, z]: &Triple) -> Triple {
     [(b - c) / a * y * z, (c - a) / b * z * x, (a - b) / c * x * y]
 }
 
-/// By how much one step of RK4, which the step is for a free top, changes Σ weight·ω² of a quadratic invariant: −h²·Σ mᵢⱼ·kᵢ·kⱼ with mᵢⱼ = bᵢaᵢⱼ + bⱼaⱼᵢ − bᵢbⱼ
-/// (Cooper 1987). By p = k2 − k1, q = k3 − k2 and r = k4 − k1 − 2p that sum is p·q/3 − q·q/9 + 2q·r/9 − r·r/36.
+/// Returns the change of the quadratic invariant Σ weight·ω² in one step of RK4, which the step equals for a free top: −h²·Σ mᵢⱼ·kᵢ·kⱼ with mᵢⱼ = bᵢaᵢⱼ +
+/// bⱼaⱼᵢ − bᵢbⱼ (Cooper 1987). With p = k2 − k1, q = k3 − k2 and r = k4 − k1 − 2p the sum is p·q/3 − q·q/9 + 2q·r/9 − r·r/36.
 fn defect(inertia: &Triple, weights: &Triple, rate: &Triple, h: f64) -> f64 {
     let k1 = gyrate(inertia, rate);
     let k2 = gyrate(inertia, &plus(rate, 0.5 * h, &k1));
@@ -62,14 +62,14 @@ fn defect(inertia: &Triple, weights: &Triple, rate: &Triple, h: f64) -> f64 {
     -h * h * (of(&p, &q) / 3.0 - of(&q, &q) / 9.0 + 2.0 / 9.0 * of(&q, &r) - of(&r, &r) / 36.0)
 }
 
-/// Near its unstable axis a top turns over every 2K/λ. After an hour energy and momentum are off by what the method loses and by roundings.
+/// Near its unstable axis a top flips every 2K/λ. After an hour the errors of energy and momentum equal the defect of the method, except for roundings.
 #[test]
 fn a_top_turns_over_for_an_hour() {
     let (inertia, start) = ([3e-5, 5e-5, 9e-5], Attitude { rate: [0.02, 12.0, 0.02], ..Attitude::REST });
     let squares = inertia.map(|j| j * j);
     let first = [inertia, squares].map(|weights| weighed(&weights, &start.rate, &start.rate));
     let momentum = world_momentum(&inertia, &start);
-    // L² − 2E·J1, L² − 2E·J2, λ and K: Landau & Lifshitz, Mechanics, § 37.
+    // Landau & Lifshitz, Mechanics, § 37: L² − 2E·J1, L² − 2E·J2, λ and K.
     let [below, between] = [0, 1].map(|axis| first[1] - first[0] * inertia[axis]);
     let pace = libm::sqrt((inertia[2] - inertia[1]) * below / (inertia[0] * inertia[1] * inertia[2]));
     let (mut a, mut b) = (1.0, libm::sqrt((inertia[2] - inertia[0]) * between / ((inertia[2] - inertia[1]) * below)));
@@ -81,7 +81,7 @@ fn a_top_turns_over_for_an_hour() {
     for millis in [1, 4] {
         let (span, steps) = (Duration::from_millis(millis), 3_600_000 / u32::try_from(millis).unwrap());
         let (h, step) = (span.as_secs_f64(), exact(&Spin { inertia, damping: FREE }, span));
-        // Some ten roundings a step.
+        // A step has some ten roundings.
         let rounding = 10.0 * U * f64::from(steps);
         let (mut body, mut lost, mut flips) = (start, [0.0; 2], Vec::new());
         for done in 0..steps {
@@ -97,23 +97,24 @@ fn a_top_turns_over_for_an_hour() {
             let found = weighed(weights, &body.rate, &body.rate) / first[place] - 1.0;
             assert!((found - lost[place]).abs() < rounding, "{millis} ms: {found:e} is not {:e}", lost[place]);
         }
-        // The terms of h⁵ that the turn leaves out are products of five rates, or of their derivatives, with coefficients below 1/240.
+        // The rotation of a step leaves out terms of h⁵: products of five rates, or of their derivatives, with coefficients below 1/240.
         let apart = plus(&world_momentum(&inertia, &body), -1.0, &momentum);
         let apart = libm::sqrt(weighed(&[1.0; 3], &apart, &apart) / first[1]);
         assert!(apart < f64::from(steps) * libm::pow(h * 13.0, 5.0) / 240.0 + rounding, "{millis} ms: {apart:e}");
         turned.push(apart);
-        // 2K is the logarithm of 16/(1 − m) and less than 10⁻⁴, so a period moves by 1/λ for each part by which L² − 2E·J2 does, and by its own part of λ.
+        // 2K is the logarithm of 16/(1 − m), except for 10⁻⁴. A period therefore moves by 1/λ per relative change of L² − 2E·J2, and by the relative change
+        // of λ.
         let moved = ((lost[1] - lost[0]).abs() + 2.0 * rounding) * first[1] / between / pace + lost[0].abs() * (period + 1.0 / pace);
         assert!((flips.len() as f64 - 3600.0 / period).abs() <= 1.0 + 3600.0 / period * moved / period, "{} flips", flips.len());
         for pair in flips.windows(2) {
             assert!((pair[1] - pair[0] - period).abs() < moved + 1e-6, "{millis} ms: {} s, not {period} s", pair[1] - pair[0]);
         }
     }
-    // To and fro are alike, so what errs by h⁴ averages out over a flip, and what adds up falls with h⁵.
+    // A flip and the flip back are alike, so errors of h⁴ average out over a flip, and the accumulated error falls with h⁵.
     assert!((turned[1] / turned[0] / 1024.0 - 1.0).abs() < 0.1, "{turned:?}");
 }
 
-/// A needle whose inertia about its axis is a billionth of that across: R = Exp(t·Jω/J2)·Exp(t(1 − J1/J2)·ω1·e1).
+/// The body is a needle whose inertia about its axis is a billionth of the inertia across: R = Exp(t·Jω/J2)·Exp(t(1 − J1/J2)·ω1·e1).
 #[test]
 fn inertias_nine_orders_apart_do_no_harm() {
     let rate = [20.0, 3.0, -1.0];
@@ -124,10 +125,10 @@ fn inertias_nine_orders_apart_do_no_harm() {
     }
     let mut expected = turned([1e-9 * rate[0], rate[1], rate[2]]);
     expected.turn([(1.0 - 1e-9) * rate[0], 0.0, 0.0]);
-    // Each step errs by (h·ω)⁵/120 of a turn, and by some ten roundings.
+    // Each step errs by (h·ω)⁵/120 of a rotation, and by some ten roundings.
     let bound = 1e4 * (libm::pow(1e-4 * 20.3, 5.0) / 120.0 + 10.0 * U);
     assert!(body.angle_to(&expected.orientation) < bound, "{:e}, bound {bound:e}", body.angle_to(&expected.orientation));
-    // 2³⁰ times the inertia, the damping and the torque: the same numbers to the bit.
+    // With 2³⁰ times the inertia, the damping and the torque, all numbers are equal to the bit.
     let run = |scale: f64| {
         let step = exact(&Spin { inertia: [3e-5, 5e-5, 7e-5].map(|j| j * scale), damping: [1e-4 * scale; 3] }, TICK);
         let mut body = Attitude { rate, ..Attitude::REST };
@@ -140,8 +141,8 @@ fn inertias_nine_orders_apart_do_no_harm() {
     assert_eq!(run(1.0), run(scale));
 }
 
-/// Half a radian a step, which is a number without rounding. Each step errs by one unit of sine and cosine and by six roundings of a product of quaternions, and
-/// an angle is twice that of the quaternion.
+/// Half a radian per step is a number without rounding. Each step errs by one unit of sine and cosine, and by six roundings of a product of quaternions. An
+/// angle has twice the error of its quaternion.
 #[test]
 fn a_million_radians_about_one_axis_are_counted() {
     let steps = 2_000_000;
@@ -159,15 +160,15 @@ fn a_million_radians_about_one_axis_are_counted() {
     }
 }
 
-/// 100 turns a second about the stiffest axis, six tenths of a radian a tick: the wobble goes round an ellipse of the ratio of the amplitudes a1 and a2, and
-/// RK4 at 0.8 rad a step lets it fall, not rise.
+/// The top turns 100 times per second about the stiffest axis, six tenths of a radian per tick. The wobble follows an ellipse with the ratio of the
+/// amplitudes a1 and a2, and RK4 at 0.8 rad per step lets the wobble fall, not rise.
 #[test]
 fn a_fast_top_stays_upright() {
     let inertia = [3e-5, 5e-5, 9e-5];
     let step = exact(&Spin { inertia, damping: FREE }, TICK);
     let mut body = Attitude { rate: [0.02, 0.02, 100.0 * TAU], ..Attitude::REST };
     let wobble = |body: &Attitude| {
-        // J1(J3 − J1)·ω1² + J2(J3 − J2)·ω2², which is constant.
+        // J1(J3 − J1)·ω1² + J2(J3 − J2)·ω2² is constant.
         libm::sqrt(inertia[0] * 6e-5 * body.rate[0] * body.rate[0] + inertia[1] * 4e-5 * body.rate[1] * body.rate[1])
     };
     let mut before = wobble(&body);
@@ -188,13 +189,13 @@ fn torque(own: &Attitude, others: &[Attitude], gains: &Gains<Triple>) -> Triple 
     aligning_torque((&own.matrix(), own.rate), HeldAttitudes::new(others.iter().copied()).mean(), gains)
 }
 
-/// About any axis sin θ is what it was, there are no signs to choose, and half a turn exerts nothing.
+/// The torque is the sine of the angle about any axis, independent of the signs of quaternions, and zero at half a turn.
 #[test]
 fn with_equal_gains_the_torque_is_a_sine_through_half_a_turn() {
     for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, -0.8], [2.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0]] {
         for angle in [0.0, 1e-9, 0.3, 1.5, 3.0, PI - 1e-9, PI, PI + 1e-9, 4.0, TAU] {
             let other = turned(axis.map(|component| component * angle));
-            // It acts on the copy with the opposite sign, towards the other.
+            // The torque acts on the copy with the opposite sign, towards the other copy.
             let acting = torque(&Attitude::REST, &[other], &stiff([0.5; 3])).map(|component| -component);
             let device = turning_torque((&Attitude::REST.matrix(), FREE), (&other.matrix(), FREE), &Gains { stiffness: 0.5, damping: 0.0 });
             for of in 0..3 {
@@ -206,7 +207,7 @@ fn with_equal_gains_the_torque_is_a_sine_through_half_a_turn() {
     }
 }
 
-/// A copy half a turn away stays there, or leaves as slowly as roundings let it: the angle grows by e^(t·√(KR/J)) from 10⁻¹⁵.
+/// A copy at half a turn stays at rest, or leaves as slowly as roundings allow: the angle grows by e^(t·√(KR/J)) from 10⁻¹⁵.
 #[test]
 fn half_a_turn_apart_nothing_jumps() {
     let (spin, far) = (Spin { inertia: [5e-5; 3], damping: FREE }, turned([0.0, PI, 0.0]));
@@ -228,7 +229,7 @@ fn attitude() -> impl Strategy<Value = Attitude> {
         })
 }
 
-/// Three numbers of which none is above the sum of the others: sums of pairs.
+/// Returns three numbers, each at most the sum of the two other numbers, made as sums of pairs.
 pub(crate) fn pairs(scale: f64) -> impl Strategy<Value = Triple> {
     [0.1..1.0, 0.1..1.0, 0.1..1.0].prop_map(move |[a, b, c]| [b + c, c + a, a + b].map(|sum| scale * sum))
 }
@@ -236,7 +237,7 @@ pub(crate) fn pairs(scale: f64) -> impl Strategy<Value = Triple> {
 proptest! {
     #![proptest_config(cases(200))]
 
-    /// The mean of tr P(I − RᵢᵀRⱼ) over the others, differentiated by turns of the copy about its axes.
+    /// The potential is the mean of tr P(I − RᵢᵀRⱼ) over the other copies, differentiated by rotations of the copy about its axes.
     #[test]
     fn the_torque_is_the_gradient_of_the_potential(own in attitude(), others in [attitude(), attitude(), attitude()], gains in pairs(1.0)) {
         let sum = 0.5 * (gains[0] + gains[1] + gains[2]);
@@ -256,12 +257,13 @@ proptest! {
                 potential(&own)
             };
             let slope = (at(1e-4) - at(-1e-4)) / 2e-4;
-            // A sixth of the third derivative, at most ΣKR ≤ 6 N·m, times 10⁻⁸; and ten roundings of a potential up to 12 N·m over 2·10⁻⁴.
+            // The central difference errs by a sixth of the third derivative, at most ΣKR ≤ 6 N·m, times 10⁻⁸. Rounding adds ten roundings of a potential up
+            // to 12 N·m, divided by 2·10⁻⁴.
             prop_assert!((found - slope).abs() < 1e-8 + 10.0 * 12.0 * U / 2e-4, "axis {axis}: {found} is not {slope}");
         }
     }
 
-    /// No direction of the world is special, neither is a sign of a quaternion, nor a name of a body axis.
+    /// No direction of the world is special, and neither is the sign of a quaternion or the name of a body axis.
     #[test]
     fn the_world_may_be_turned_and_the_axes_renamed(
         bodies in [attitude(), attitude()], by in attitude(), inertia in pairs(1e-4), gains in pairs(1e-2), loss in 0.0..1e-3,
@@ -279,7 +281,7 @@ proptest! {
         let plain = run(bodies, &spin, &gains);
         let elsewhere = run(bodies.map(|body| Attitude { orientation: product(&by.orientation, &body.orientation), ..body }), &spin, &gains);
         let negated = run(bodies.map(|body| Attitude { orientation: body.orientation.map(|q| -q), ..body }), &spin, &gains);
-        // y, z and x are the first, second and third axis: bodies turn by a third about (1, 1, 1) before.
+        // The axes y, z and x become the first, second and third axis: bodies turn by a third of a turn about (1, 1, 1) first.
         let renamed = |triple: Triple| [triple[1], triple[2], triple[0]];
         let third = [0.5; 4];
         let name = |body: Attitude| Attitude { orientation: product(&body.orientation, &third), rate: renamed(body.rate) };
@@ -298,7 +300,7 @@ proptest! {
         }
     }
 
-    /// Four steps in a tick are four steps of a quarter of it, but for the rounding of their length.
+    /// Four steps in a tick equal four steps of a quarter tick, except for the rounding of their length.
     #[test]
     fn steps_of_a_tick_are_shorter_steps(body in attitude(), inertia in pairs(1e-4), loss in 0.0..1e-3, torque in [-1e-3..1e-3, -1e-3..1e-3, -1e-3..1e-3]) {
         let spin = Spin { inertia, damping: [loss; 3] };

@@ -1,4 +1,4 @@
-//! The force that follows with a lag, against the closed form of a first-order lag.
+//! A force with a first-order lag, against the closed form.
 
 use std::time::Duration;
 
@@ -26,8 +26,8 @@ fn forces(strategy: &mut LawStrategy<1>, own: Body, other: Body, ticks: usize) -
 proptest! {
     #![proptest_config(cases(500))]
 
-    /// Under a constant pull F the force is F·(1 − e^(−k·Tc/lag)) at the k-th tick. Each tick rounds by some units in the last place of F, and 1 − a, whose
-    /// inverse the errors add up to at most, is at least 1/500 here.
+    /// Under a constant pull F the force is F·(1 − e^(−k·Tc/lag)) at the k-th tick. Each tick rounds by some units in the last place of F. The accumulated
+    /// error is at most 1/(1 − a) times as large, and 1 − a is at least 1/500 here.
     #[test]
     fn a_constant_pull_is_approached_exponentially(gains in gains(), own in body(), other in body(), lag in 0.2..500.0_f64) {
         let lag = Duration::from_secs_f64(lag * 1e-3);
@@ -39,7 +39,7 @@ proptest! {
         }
     }
 
-    /// Without a lag it is the average-position law.
+    /// Without a lag the law equals the average-position law.
     #[test]
     fn without_a_lag_it_is_the_average_position_law(gains in gains(), own in body(), other in body()) {
         let average = &mut Coordination::AveragePosition.strategy::<1>(gains, 2, TICK);
@@ -48,7 +48,7 @@ proptest! {
     }
 }
 
-/// What is remembered stays when gains change, and can be put back.
+/// A change of gains keeps the memory, and a saved memory can be restored.
 #[test]
 fn the_force_that_is_remembered_goes_on_under_new_gains() {
     let lag = Duration::from_millis(10);

@@ -1,5 +1,5 @@
-//! The step of a body against an independent computation: the same matrix exponential by its plain Taylor series, in double-double arithmetic (about 32
-//! digits), over steps so short that the series converges at once, doubled as often as needed.
+//! Step of a body against an independent computation: the same matrix exponential by its plain Taylor series, in double-double arithmetic (about 32 digits).
+//! The series runs over steps so short that it converges at once, and the result is doubled as often as needed.
 
 use std::time::Duration;
 
@@ -9,8 +9,8 @@ use proptest::prelude::*;
 proptest! {
     #![proptest_config(crate::cases(400))]
 
-    /// Masses, springs, dampers and steps over 12 decades each; what matters are the numbers without a unit z = b·h/m and w = k·h²/m, the damping and
-    /// the squared angle of a step.
+    /// Masses, springs, dampers and steps cover 12 decades each. Only two dimensionless numbers matter: the damping z = b·h/m and the squared angle w =
+    /// k·h²/m of a step.
     #[test]
     fn a_step_is_the_matrix_exponential(
         mass in -6.0..6.0, step in -6.0..0.0, z in prop_oneof![Just(None), (-9.0..2.0).prop_map(Some)], w in prop_oneof![Just(None), (-9.0..3.0).prop_map(Some)],
@@ -21,13 +21,13 @@ proptest! {
         let (z, w) = (z.map_or(0.0, power), w.map_or(0.0, power));
         let (b, k) = (z * m / h, w * m / (h * h));
         let ([[e00, e01], [e10, e11]], [g0, g1]) = Plant { mass: m, damping: b, stiffness: k }.step(span, Integrator::Exact).coefficients();
-        // Without units: lengths, velocities times h, accelerations times h².
+        // Made dimensionless: lengths, velocities times h, accelerations times h².
         let actual = [[e00, e01 / h, g0 * m / (h * h)], [e10 * h, e11, g1 * m / h]];
         let expected = reference(z, w);
         for (row, (actual, expected)) in actual.iter().zip(&expected).enumerate() {
             for (column, (actual, expected)) in actual.iter().zip(expected).enumerate() {
                 // Halving until the norm is below 1/2 and doubling again: up to 60 doublings round each entry once, and each of the last log2(z + √w)
-                // of them can double the error that is there. Entries that are small because z and w are keep their relative accuracy.
+                // doublings can double the present error. Entries that are small because z and w are small keep their relative accuracy.
                 let own = if column == 0 || (row, column) == (1, 1) { [[w, 1.0], [w, z + w]][row][column].min(1.0) } else { 1.0 };
                 let tolerance = 64.0 * f64::EPSILON * (1.0 + z + w.sqrt()) * own.max(expected.abs());
                 prop_assert!((actual - expected).abs() <= tolerance, "[{row}][{column}] at z = {z:e}, w = {w:e}: {actual:e}, expected {expected:e}");
@@ -39,8 +39,8 @@ proptest! {
 proptest! {
     #![proptest_config(crate::cases(200))]
 
-    /// One step of each method is what its textbook says, not merely something of its order: velocity first and the position with the new velocity;
-    /// four slopes, weighted 1, 2, 2, 1. In doubles of moderate size, so a few roundings of the terms.
+    /// One step of each method equals its textbook form, and not merely some form of its order: velocity first and the position with the new velocity; four
+    /// slopes, weighted 1, 2, 2, 1. Doubles of moderate size have only a few roundings of the terms.
     #[test]
     fn one_step_of_each_other_method_is_that_method(
         mass in 0.1..2.0, damping in 0.0..20.0, stiffness in 0.0..2000.0, x in -1.0..1.0, v in -1.0..1.0, f in -5.0..5.0,
@@ -68,7 +68,7 @@ proptest! {
     }
 }
 
-/// The upper rows of exp(X) − I for X = [0 1 0; −w −z 1; 0 0 0].
+/// Returns the upper rows of exp(X) − I for X = [0 1 0; −w −z 1; 0 0 0].
 fn reference(z: f64, w: f64) -> [[f64; 3]; 2] {
     let mut halvings = 0;
     let mut scale = 1.0;
@@ -78,7 +78,7 @@ fn reference(z: f64, w: f64) -> [[f64; 3]; 2] {
     }
     let entry = |value: f64| Double::from(value * scale);
     let x = [[entry(0.0), entry(1.0), entry(0.0)], [entry(-w), entry(-z), entry(1.0)], [Double::ZERO; 3]];
-    // 1/30! is 4e-33.
+    // The first term left out has the factor 1/30! = 4e-33.
     let mut term = x;
     let mut increment = x;
     for n in 2..=30 {
@@ -101,7 +101,7 @@ fn sum(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][j].plus(b[i][j])))
 }
 
-/// An unevaluated sum of two doubles, the second at most half a unit in the last place of the first (Dekker 1971; Knuth's exact sum).
+/// Unevaluated sum of two doubles, the second at most half a unit in the last place of the first (Dekker 1971; Knuth's exact sum).
 #[derive(Clone, Copy)]
 struct Double(f64, f64);
 

@@ -1,5 +1,5 @@
-//! Copies that hold attitudes of one another that are m ticks old at most gain no energy from turning if their damping is κ·(m + 1)·h; with half of it, with a
-//! torque by the logarithm, or with a mean that is made a rotation, they do.
+//! Energy of copies that hold attitudes of each other with an age of at most m ticks. With the damping κ·(m + 1)·h no energy is gained from rotation. With
+//! half of the damping, with a torque by the logarithm, or with a mean made a rotation, energy is gained.
 
 use std::array::from_fn;
 use std::f64::consts::PI;
@@ -15,15 +15,15 @@ use crate::rotation::{pairs, turned};
 
 const TICK: Duration = Duration::from_millis(1);
 
-/// The torque on a copy by the others' attitudes that it holds.
+/// Torque on a copy by the attitudes that the copy holds.
 type Law = fn(&Attitude, &[Attitude], &Triple) -> Triple;
-/// The potential of a pair.
+/// Potential of a pair of copies.
 type Potential = fn(&Attitude, &Attitude, &Triple) -> f64;
 
-/// Copies that tick together.
+/// Copies with simultaneous ticks.
 struct Copies {
     inertia: Vec<Triple>,
-    /// KR, tied to the mean of the others.
+    /// KR towards the mean of the other copies [N·m/rad].
     stiffness: Triple,
     damping: f64,
     law: Law,
@@ -31,7 +31,7 @@ struct Copies {
 }
 
 impl Copies {
-    /// κ·(m + 1)·h, where κ is the largest entry of KR: N − 1 pairs of KR/(N − 1).
+    /// Returns κ·(m + 1)·h, where κ is the largest entry of KR: N − 1 pairs of KR/(N − 1).
     fn bound(stiffness: &Triple, oldest: usize) -> f64 {
         stiffness.iter().fold(0.0, |most: f64, gain| most.max(*gain)) * (oldest + 1) as f64 * TICK.as_secs_f64()
     }
@@ -43,7 +43,7 @@ impl Copies {
         moving.sum::<f64>() + pairs.map(|(one, other)| (self.potential)(one, other, &self.stiffness)).sum::<f64>() / (bodies.len() - 1) as f64
     }
 
-    /// The largest energy over the first. `age` says how old the attitude is \[ticks\] that a copy holds of another one.
+    /// Returns the largest energy divided by the first energy. `age` returns the age of a held attitude \[ticks\].
     fn growth(&self, start: &[Attitude], ticks: usize, mut age: impl FnMut() -> usize) -> f64 {
         let steps: Vec<RotationStep> =
             self.inertia.iter().map(|inertia| Spin { inertia: *inertia, damping: [self.damping; 3] }.step(TICK, Integrator::Exact, 1)).collect();
@@ -65,19 +65,19 @@ impl Copies {
     }
 }
 
-/// The program's torque without BR.
+/// Returns the torque of the program without BR.
 fn chordal(own: &Attitude, held: &[Attitude], stiffness: &Triple) -> Triple {
     let gains = Gains { stiffness: *stiffness, damping: [0.0; 3] };
     aligning_torque((&own.matrix(), own.rate), HeldAttitudes::new(held.iter().copied()).mean(), &gains).map(|component| -component)
 }
 
-/// tr P(I − RᵢᵀRⱼ), P = diag(½ΣKR − KR).
+/// Returns tr P(I − RᵢᵀRⱼ) with P = diag(½ΣKR − KR).
 fn chord(one: &Attitude, other: &Attitude, stiffness: &Triple) -> f64 {
     let (one, other, half) = (one.matrix(), other.matrix(), 0.5 * stiffness.iter().sum::<f64>());
     (0..3).map(|axis| (half - stiffness[axis]) * (1.0 - (0..3).map(|row| one[row][axis] * other[row][axis]).sum::<f64>())).sum()
 }
 
-/// The rotation vector from one orientation to the other, shorter than half a turn.
+/// Returns the rotation vector from one orientation to the other, shorter than half a turn.
 fn logarithm(one: &Attitude, other: &Attitude) -> Triple {
     let ([a, b, c, d], [w, x, y, z]) = (one.orientation, other.orientation);
     let (cosine, u) = (a * w + b * x + c * y + d * z, [a * x - b * w - c * z + d * y, a * y - c * w - d * x + b * z, a * z - d * w - b * y + c * x]);
@@ -86,18 +86,18 @@ fn logarithm(one: &Attitude, other: &Attitude) -> Triple {
     u.map(|component| if sine == 0.0 { 0.0 } else { component * angle / sine })
 }
 
-/// A torque that grows with the angle up to half a turn, for equal KR.
+/// Returns a torque that grows with the angle up to half a turn, for equal entries of KR.
 fn by_logarithm(own: &Attitude, held: &[Attitude], stiffness: &Triple) -> Triple {
     let turns: Vec<Triple> = held.iter().map(|other| logarithm(own, other)).collect();
     from_fn(|axis| stiffness[axis] * turns.iter().map(|turn| turn[axis]).sum::<f64>() / held.len() as f64)
 }
 
-/// ½·KR·θ².
+/// Returns ½·KR·θ².
 fn square(one: &Attitude, other: &Attitude, stiffness: &Triple) -> f64 {
     0.5 * logarithm(one, other).iter().zip(stiffness).map(|(angle, gain)| gain * angle * angle).sum::<f64>()
 }
 
-/// Towards the rotation that is nearest to the mean of two matrices: its quaternion is along the sum of theirs.
+/// Returns the torque towards the rotation nearest to the mean of two matrices, whose quaternion is parallel to the sum of the two quaternions.
 fn projected(own: &Attitude, held: &[Attitude], stiffness: &Triple) -> Triple {
     let [one, other] = held else { unreachable!("three copies") };
     let sign = one.orientation.iter().zip(&other.orientation).map(|(a, b)| a * b).sum::<f64>().signum();
@@ -106,7 +106,7 @@ fn projected(own: &Attitude, held: &[Attitude], stiffness: &Triple) -> Triple {
     chordal(own, &[Attitude { orientation: sum.map(|q| q / norm), ..Attitude::REST }], stiffness)
 }
 
-/// Two copies of 5·10⁻⁵ kg·m² that hold attitudes 8 ticks old, `apart` about z; the first one turns.
+/// Returns the energy growth of two copies of 5·10⁻⁵ kg·m² that hold attitudes 8 ticks old, `apart` about z. The first copy rotates.
 fn two(law: Law, potential: Potential, (stiffness, share): (f64, f64), apart: f64, rate: Triple, ticks: usize) -> f64 {
     let damping = share * Copies::bound(&[stiffness; 3], 8);
     let copies = Copies { inertia: vec![[5e-5; 3]; 2], stiffness: [stiffness; 3], damping, law, potential };
@@ -139,7 +139,7 @@ fn a_mean_that_is_made_a_rotation_gains_energy_at_the_bound() {
     assert!((growth(projected) - 1.476).abs() < 1e-3, "{}", growth(projected));
 }
 
-/// An inertia, and an attitude.
+/// Returns an inertia and an attitude.
 fn copy() -> impl Strategy<Value = (Triple, Attitude)> {
     (pairs(5e-5), [-2.0..2.0, -2.0..2.0, -2.0..2.0], [-20.0..20.0, -20.0..20.0, -20.0..20.0])
         .prop_map(|(inertia, sigma, rate)| (inertia, Attitude { rate, ..turned(sigma) }))
@@ -148,7 +148,7 @@ fn copy() -> impl Strategy<Value = (Triple, Attitude)> {
 proptest! {
     #![proptest_config(cases(300))]
 
-    /// Ages up to m ticks, each drawn anew: what delay, jitter, loss and disorder make of samples.
+    /// Ages are drawn anew up to m ticks, as delay, jitter, loss and reordering would make them.
     #[test]
     fn turning_gains_no_energy(
         copies in vec(copy(), 2..6), gains in pairs(1.0), magnitude in -4.0..-2.0, still in any::<bool>(), oldest in 0_usize..12, seed in any::<u64>(),
@@ -159,10 +159,10 @@ proptest! {
             start.iter_mut().for_each(|body| body.rate = [0.0; 3]);
         }
         let copies = Copies { damping: Copies::bound(&stiffness, oldest), inertia, stiffness, law: chordal, potential: chord };
-        // The step is exact but for the gyroscopic term: no copy may reach more than 0.1 rad a tick with all energy there is.
+        // The step is exact except for the gyroscopic term: no copy may exceed 0.1 rad per tick with the whole energy.
         let lightest = copies.inertia.iter().flatten().fold(f64::INFINITY, |least: f64, j| least.min(*j));
         prop_assume!(libm::sqrt(2.0 * copies.energy(&start) / lightest) * TICK.as_secs_f64() <= 0.1);
-        // Knuth's generator: its upper bits.
+        // Knuth's generator, of which only the upper bits are used.
         let mut state = seed;
         let growth = copies.growth(&start, 300, || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -1,4 +1,4 @@
-//! The wire format against random bytes, random edits, and a second reading of the table in its module doc.
+//! Wire format against random bytes, random edits, and a second implementation of the table in its module documentation.
 
 use cohaptic_peer::State;
 use cohaptic_peer::rotation::Attitude;
@@ -22,7 +22,7 @@ proptest! {
         judge(&bytes, kind, axes)?;
     }
 
-    /// Denormals and −0 included.
+    /// Denormal numbers and −0 are included.
     #[test]
     fn every_finite_sample_reads_back_to_the_bit(sample in sample(), kind in kind(), extra in extra(), axes in 1..=3_usize) {
         let mut bytes = [0xAA; MAX_LEN];
@@ -45,7 +45,7 @@ proptest! {
         }
     }
 
-    /// The 56 bytes behind the axes: a unit quaternion and the angular velocity, to the bit; anything else is refused for what it is.
+    /// The 56 bytes after the axes are a unit quaternion and the angular velocity, to the bit. Any other content is refused with its own error.
     #[test]
     fn an_attitude_reads_back_to_the_bit(sample in sample(), turn in proptest::array::uniform3(-3.0..3.0_f64), rate in [finite(), finite(), finite()], edits in edits(), cut in 0..3_usize) {
         let mut attitude = Attitude { rate, ..Attitude::REST };
@@ -86,12 +86,12 @@ fn finite() -> proptest::num::f64::Any {
     POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO
 }
 
-/// Numbers in the place of some of the seven of an attitude.
+/// Returns replacements for some of the seven numbers of an attitude.
 fn edits() -> impl Strategy<Value = Vec<(usize, f64)>> {
     vec((0..7_usize, finite() | INFINITE | QUIET_NAN), 0..3)
 }
 
-/// Decodes and compares with what the table says of these bytes.
+/// Decodes, and compares with the result that the table demands for these bytes.
 fn judge(bytes: &[u8], kind: SampleKind, axes: usize) -> Result<(), TestCaseError> {
     let decoded = Sample::<3>::decode_as(bytes, kind, axes);
     match expected_error(bytes, kind, axes) {
@@ -106,7 +106,7 @@ fn judge(bytes: &[u8], kind: SampleKind, axes: usize) -> Result<(), TestCaseErro
     Ok(())
 }
 
-/// The version, byte 7 and the numbers on an axis of a kind, by the table.
+/// Returns the version, byte 7 and the quantities on an axis for a kind, by the table.
 fn row_of(kind: SampleKind) -> (u16, u8, &'static [&'static str]) {
     const EXTENDED: &[&str] = &["position", "velocity", "extra number"];
     match kind {
@@ -118,8 +118,7 @@ fn row_of(kind: SampleKind) -> (u16, u8, &'static [&'static str]) {
     }
 }
 
-/// The first fault, in the order in which a reader can know of it: too short to say, not ours, of another version, of other axes, of another kind, of another
-/// length, with a byte that has no meaning, with a number that is none.
+/// Returns the first fault, in the order of the checks: too short, magic, version, axes, kind, length, reserved bytes, numbers that are not finite.
 fn expected_error(bytes: &[u8], kind: SampleKind, axes: usize) -> Option<DecodeError> {
     let (expected_version, code, quantities) = row_of(kind);
     let expected_len = 48 + 8 * quantities.len() * axes;
@@ -148,7 +147,7 @@ fn expected_error(bytes: &[u8], kind: SampleKind, axes: usize) -> Option<DecodeE
     }
 }
 
-/// A valid datagram with up to three edits: a byte changed, a number put in, a byte cut off or added.
+/// Returns a valid datagram with up to three edits: a byte changed, a number replaced, bytes cut off, or a byte added.
 fn datagram_like() -> impl Strategy<Value = Vec<u8>> {
     #[derive(Clone, Debug)]
     enum Edit {
@@ -192,7 +191,7 @@ fn extra() -> impl Strategy<Value = Extra<3>> {
     (any::<u32>(), [finite(), finite(), finite()]).prop_map(|(receiver, numbers)| Extra { receiver, numbers, ..Extra::NONE })
 }
 
-/// Without what samples of a kind do not have.
+/// Returns `extra` without the data that samples of the kind do not have.
 fn of_kind(kind: SampleKind, extra: Extra<3>) -> Extra<3> {
     let numbers = if kind == SampleKind::State { [0.0; 3] } else { extra.numbers };
     Extra { receiver: if kind.is_personal() { extra.receiver } else { 0 }, numbers, ..Extra::NONE }
