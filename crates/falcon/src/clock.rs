@@ -1,4 +1,4 @@
-//! The wall clock. Nothing else in this crate reads it.
+//! Monotonic wall clock. No other file of this crate reads a clock of the machine.
 #![expect(clippy::disallowed_methods, reason = "a real device lives in real time; everything but this file takes time as an argument")]
 
 use std::thread;
@@ -6,7 +6,7 @@ use std::time;
 
 use cohaptic_units::Instant;
 
-/// The monotonic clock of the machine, zero when it was made.
+/// Monotonic clock of the machine, with zero at the call of `new`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WallClock {
     beginning: time::Instant,

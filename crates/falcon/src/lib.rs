@@ -1,4 +1,4 @@
-//! The Novint Falcon, a haptic device with three axes: how to talk to it, where its grip is, how to push without hurting anybody, and one that is not there.
+//! Driver, force limits, kinematics and simulator for the Novint Falcon, a haptic device with three axes.
 //!
 //! You need it if you drive a Novint Falcon from Rust, or test such a program without the device.
 //!
@@ -14,14 +14,14 @@
 //!         usb    simulator
 //! ```
 //!
-//! [`usb`] opens a real device, [`simulator`] makes one that speaks the same bytes; [`boot`] gets the user's firmware into either. [`driver::Driver`] exchanges
-//! packets and knows whether the device is homed and where its grip is; [`device::FalconDevice`] does so in a thread at 1 kHz and is a
+//! [`usb`] opens a real device, and [`simulator`] makes a simulated device with the same bytes. [`boot`] loads the user's firmware into either device.
+//! [`driver::Driver`] exchanges packets and tracks homing and the position of the grip. [`device::FalconDevice`] runs a driver in a thread at 1 kHz and is a
 //! [`Device`](cohaptic_peer::Device) of a peer.
 //!
-//! Safe by construction: only a [`safety::ForceGate`] makes motor counts. It lets nothing through before the device is homed and the user has switched forces
-//! on, nothing that is no number, nothing old, nothing too large or too sudden, and nothing after a stop.
+//! Only a [`safety::ForceGate`] makes motor counts. The gate gives zero force before the device is homed and the user has switched forces on, for numbers
+//! that are not finite, for old setpoints and old readings, and after a stop. The gate limits size and rate of change of all other forces.
 //!
-//! Nothing here was ever tried on hardware. All knowledge of the device comes from published drivers and captures; every unknown is a parameter.
+//! No part of this crate was tried on hardware. All knowledge of the device comes from published drivers and captures, and every unknown is a parameter.
 //!
 //! ```
 //! use std::time::Duration;

@@ -1,42 +1,43 @@
-//! What the driver needs of the way to a device, be it USB or simulated.
+//! Interface between the driver and the connection to a device, by USB or simulated.
 
 use core::time::Duration;
 
 use cohaptic_units::Instant;
 use thiserror::Error;
 
-/// Bytes to and from a device behind an FT232R, and a clock.
+/// Connection to a device with an FT232R, and a clock.
 pub trait Transport {
-    /// The time on the transport's own clock, which shows zero when it was made and never goes back.
+    /// Returns the time on the transport's own clock, which begins at zero and never goes back.
     fn now(&self) -> Instant;
 
-    /// Waits until then; not at all if that has passed.
+    /// Waits until the instant `until`; returns at once if it has passed.
     fn sleep_until(&mut self, until: Instant);
 
-    /// A control transfer to the chip: vendor request to the device, index 0, no data.
+    /// Makes a control transfer to the chip: vendor request to the device, index 0, no data.
     ///
     /// # Errors
     ///
-    /// [`TransportError`].
+    /// [`TransportError`] if the transfer fails.
     fn control(&mut self, request: Request, value: u16) -> Result<(), TransportError>;
 
-    /// Sends all of the bytes.
+    /// Sends all bytes.
     ///
     /// # Errors
     ///
-    /// [`TransportError`].
+    /// [`TransportError`] if the transfer fails.
     fn write(&mut self, bytes: &[u8]) -> Result<(), TransportError>;
 
-    /// Takes bytes that have come, without the chip's status bytes, as many as there is room for; the rest stays for the next call. Waits at
-    /// most `patience` for the first. May give 0 earlier, because the chip says now and then that it has nothing, but never without time passing.
+    /// Takes arrived bytes without the chip's status bytes, at most the length of `into`, and returns their number. Further bytes stay for the next call.
+    /// Waits at most `patience` for the first byte. May return 0 earlier, because the chip sometimes sends an empty packet, but never without passing of
+    /// time.
     ///
     /// # Errors
     ///
-    /// [`TransportError`].
+    /// [`TransportError`] if the transfer fails.
     fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError>;
 }
 
-/// Requests of the chip that are used here, by their numbers on the wire.
+/// Requests to the chip, with their numbers on the wire.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Request {
     /// Purges a buffer: see [`PURGE_RX`](crate::ftdi::PURGE_RX) and [`PURGE_TX`](crate::ftdi::PURGE_TX).
@@ -49,19 +50,19 @@ pub enum Request {
     BaudRate = 3,
     /// Sets bits, parity and stop bits.
     DataFormat = 4,
-    /// Sets after how many milliseconds the chip sends what it has.
+    /// Sets the latency timer: the time \[ms\] after which the chip sends a packet that is not full.
     LatencyTimer = 9,
 }
 
 impl Request {
-    /// Its number on the wire.
+    /// Returns the number on the wire.
     #[must_use]
     pub const fn number(self) -> u8 {
         self as u8
     }
 }
 
-/// The transfer that failed.
+/// Failed transfer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum Operation {
@@ -73,7 +74,7 @@ pub enum Operation {
     Read,
 }
 
-/// What a transfer failed of.
+/// Reason for the failure of a transfer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum Fault {
@@ -89,7 +90,7 @@ pub enum Fault {
     Other(u32),
 }
 
-/// A transfer that failed.
+/// Error of a transfer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum TransportError {

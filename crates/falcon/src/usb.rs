@@ -1,6 +1,7 @@
-//! The way to a real device, through `nusb`.
+//! Connection to a real device by `nusb`.
 //!
-//! Never tried on a Falcon: there was none. What it does is what the [driver](crate::driver) was tested with on the [simulator](crate::simulator).
+//! This module was never tried on a Falcon, because no Falcon was available. It implements the interface with which the [driver](crate::driver) was tested on
+//! the [simulator](crate::simulator).
 
 use core::fmt;
 use core::time::Duration;
@@ -14,23 +15,23 @@ use crate::clock::WallClock;
 use crate::ftdi::{ENDPOINT_IN, ENDPOINT_OUT, INTERFACE, PACKET, PAYLOAD, PRODUCT, VENDOR, strip_status};
 use crate::transport::{Fault, Operation, Request, Transport, TransportError};
 
-/// A control transfer that takes longer has failed.
+/// Time after which a control transfer has failed.
 const CONTROL_PATIENCE: Duration = Duration::from_millis(500);
-/// A bulk transfer out that takes longer has failed: sixteen bytes take a tenth of a millisecond.
+/// Time after which a bulk transfer to the device has failed. Sixteen bytes take a tenth of a millisecond.
 const WRITE_PATIENCE: Duration = Duration::from_millis(100);
-/// How long a transfer that was taken back may still be on the way.
+/// Time for which a cancelled transfer may still be in progress.
 const CANCEL_PATIENCE: Duration = Duration::from_secs(1);
 
-/// A Falcon that is plugged in.
+/// A connected Falcon.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Listed {
-    /// Its serial number, if the system tells.
+    /// Serial number, if the system reports one.
     pub serial: Option<String>,
-    /// What it calls itself: `FALCON HAPTIC`, by published drivers.
+    /// Product name: `FALCON HAPTIC`, by published drivers.
     pub product: Option<String>,
-    /// The bus it is on, as the system names it.
+    /// Name of the bus, as given by the system.
     pub bus: String,
-    /// Its address on the bus.
+    /// Address on the bus.
     pub address: u8,
 }
 
@@ -42,7 +43,7 @@ impl fmt::Display for Listed {
     }
 }
 
-/// The Falcons that are plugged in, in the order of the system. Nothing is opened.
+/// Returns the connected Falcons in the order of the system, without opening a device.
 ///
 /// # Errors
 ///
@@ -65,30 +66,31 @@ fn listed(info: &DeviceInfo) -> Listed {
     }
 }
 
-/// A device that was opened.
+/// An opened device.
 #[derive(Debug)]
 pub struct UsbTransport {
     clock: WallClock,
     interface: Interface,
     output: Endpoint<Bulk, Out>,
     input: Endpoint<Bulk, In>,
-    /// The buffer of writes while none is on the way.
+    /// Buffer for writes; `None` while a write is in progress.
     written: Option<Buffer>,
-    /// Payload that has come and was not taken.
+    /// Payload of the newest packet, of which bytes `taken..count` are not read yet.
     payload: [u8; PAYLOAD],
     taken: usize,
     count: usize,
 }
 
 impl UsbTransport {
-    /// Opens the Falcon with that serial number, or the only one there is, and claims its interface.
+    /// Opens the Falcon with the serial number `serial`, or the only connected Falcon, and claims its interface.
     ///
     /// # Errors
     ///
-    /// [`UsbError`] says which Falcons there are, and what to do if the system refuses.
+    /// [`UsbError`] with a list of the connected Falcons, or with advice if the system refuses access.
     pub fn open(serial: Option<&str>) -> Result<Self, UsbError> {
         let mut found = falcons()?;
         if let Some(serial) = serial {
+            // The list for the error message contains all Falcons, so it is made before the filter.
             let others = found.iter().map(listed).collect();
             found.retain(|info| info.serial_number() == Some(serial));
             if found.is_empty() {
@@ -107,21 +109,23 @@ impl UsbTransport {
         let interface = device.detach_and_claim_interface(INTERFACE).wait().map_err(|error| UsbError::system("claiming the interface", error))?;
         let output = interface.endpoint(ENDPOINT_OUT).map_err(|error| UsbError::system("opening the endpoint out", error))?;
         let mut input: Endpoint<Bulk, In> = interface.endpoint(ENDPOINT_IN).map_err(|error| UsbError::system("opening the endpoint in", error))?;
-        // One transfer is always asked for; the chip holds what comes meanwhile.
+        // One transfer from the device is always submitted. The chip buffers bytes that arrive between two transfers.
         input.submit(Buffer::new(PACKET));
         let written = Some(Buffer::new(PACKET));
         Ok(Self { clock: WallClock::new(), interface, output, input, written, payload: [0; PAYLOAD], taken: 0, count: 0 })
     }
 
-    /// Takes a packet in and asks for the next.
+    /// Takes in a packet, and submits the next transfer.
     fn take_in(&mut self, completion: Completion) -> Result<(), TransportError> {
         let Completion { mut buffer, actual_len, status } = completion;
         let outcome = status.map_err(|error| transport_error(Operation::Read, error));
         if outcome.is_ok() {
             let arrived = buffer.get(..actual_len.min(buffer.len())).unwrap_or(&[]);
+            // A bulk transfer has the length of one packet, so its payload fits.
             self.count = strip_status(arrived, &mut self.payload);
             self.taken = 0;
         }
+        // After a failed transfer the next one may succeed; only an unplugged device needs no new transfer.
         if outcome != Err(TransportError::Unplugged) {
             buffer.clear();
             buffer.set_requested_len(PACKET);
@@ -142,7 +146,7 @@ impl Transport for UsbTransport {
 
     fn control(&mut self, request: Request, value: u16) -> Result<(), TransportError> {
         if request == Request::Reset {
-            // What lies here would otherwise outlive the purge.
+            // Payload buffered here would otherwise survive the purge of the chip.
             (self.taken, self.count) = (0, 0);
         }
         let setup =
@@ -157,6 +161,7 @@ impl Transport for UsbTransport {
             buffer.extend_from_slice(piece);
             self.output.submit(buffer);
             let mut timed_out = false;
+            // A cancelled transfer still completes, and only its completion returns the buffer.
             let completion = self.output.wait_next_complete(WRITE_PATIENCE).or_else(|| {
                 timed_out = true;
                 self.output.cancel_all();
@@ -168,6 +173,7 @@ impl Transport for UsbTransport {
             };
             self.written = Some(buffer);
             status.map_err(|error| transport_error(Operation::Write, error))?;
+            // A cancelled transfer may have sent a part. The driver counts this as a fault and sends a new packet.
             if timed_out || actual_len != piece.len() {
                 return Err(failed(Fault::TimedOut));
             }
@@ -176,6 +182,7 @@ impl Transport for UsbTransport {
     }
 
     fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError> {
+        // Buffered payload is returned first; only an empty buffer waits for a packet.
         if self.taken == self.count {
             match self.input.wait_next_complete(patience) {
                 Some(completion) => self.take_in(completion)?,
@@ -202,7 +209,7 @@ fn transport_error(during: Operation, error: TransferError) -> TransportError {
     TransportError::Io { during, fault }
 }
 
-/// No device could be opened.
+/// Reason why no device could be opened.
 #[derive(Clone, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum UsbError {
@@ -255,6 +262,7 @@ mod tests {
     #[test]
     fn errors_name_what_there_is() {
         let one = Listed { serial: Some("AB12".to_owned()), product: None, bus: "001".to_owned(), address: 7 };
+        // The message lists the connected device, so that the user can copy its serial number.
         let text = UsbError::NoSuchSerial { serial: "XY".to_owned(), others: vec![one.clone()] }.to_string();
         assert!(text.contains("\"XY\"") && text.contains("bus 001 address 7: unknown, serial AB12"), "{text}");
         assert!(UsbError::Several(vec![one.clone(), one]).to_string().contains("serial number"));

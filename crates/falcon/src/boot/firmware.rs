@@ -1,4 +1,4 @@
-//! The firmware, as bytes of a file that the user has.
+//! Firmware image from a file of the user.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -6,23 +6,23 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-/// A firmware image. It is Novint's and no part of this program: the user gives the path of a file.
+/// A firmware image. The firmware is Novint's and no part of this program, so the user gives the path of a file.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Firmware {
     bytes: Vec<u8>,
 }
 
 impl Firmware {
-    /// No image is shorter \[bytes\]. Those that are known have 7,324 to 8,492.
+    /// Least length of an image \[bytes\]. Known images have 7,324 to 8,492 bytes.
     pub const SHORTEST: usize = 1024;
-    /// No image is longer \[bytes\].
+    /// Greatest length of an image \[bytes\].
     pub const LONGEST: usize = 65_536;
 
-    /// An image.
+    /// Returns an image of these bytes.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::Length`] if it cannot be one.
+    /// [`FirmwareError::Length`] for a length out of range.
     pub fn new(bytes: Vec<u8>) -> Result<Self, FirmwareError> {
         if !(Self::SHORTEST..=Self::LONGEST).contains(&bytes.len()) {
             return Err(FirmwareError::Length { least: bytes.len() });
@@ -30,27 +30,28 @@ impl Firmware {
         Ok(Self { bytes })
     }
 
-    /// Reads a file. No more of it is read than an image can have.
+    /// Reads a file, at most one byte more than the greatest length of an image.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError`] if it cannot be read or cannot be an image.
+    /// [`FirmwareError`] if the file cannot be read, or has a length out of range.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FirmwareError> {
         let path = path.as_ref();
         let failed = |error| FirmwareError::Read { path: path.to_owned(), error };
         let mut bytes = Vec::new();
+        // One byte beyond the greatest length tells a file that is too long, without reading all of it.
         File::open(path).map_err(failed)?.take(Self::LONGEST as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
         Self::new(bytes)
     }
 
-    /// Its bytes.
+    /// Returns the bytes of the image.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 }
 
-/// A file that is no firmware.
+/// Error of a file that is no firmware.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum FirmwareError {
@@ -58,7 +59,7 @@ pub enum FirmwareError {
     Read { path: PathBuf, error: io::Error },
     #[error("a firmware has 1024 to 65536 bytes, and this has {least}{}", if *least > Firmware::LONGEST { " or more" } else { "" })]
     Length {
-        /// How many bytes it has, or at least has.
+        /// Length of the file, or the number of bytes read of a longer file.
         least: usize,
     },
 }
@@ -73,6 +74,7 @@ mod tests {
             assert_eq!(Firmware::new(vec![7; length]).is_ok(), good, "{length}");
         }
         let file = tempfile::NamedTempFile::new().unwrap();
+        // A sparse file of a tebibyte: the read must stop after the greatest length of an image.
         file.as_file().set_len(1 << 40).unwrap();
         let error = Firmware::read(file.path()).unwrap_err().to_string();
         assert!(error.contains("65537 or more"), "{error}");

@@ -1,4 +1,4 @@
-//! The conversation with the boot loader.
+//! Conversation with the boot loader.
 
 use core::time::Duration;
 
@@ -10,53 +10,55 @@ use crate::ftdi::{self, PAYLOAD, STATUS};
 use crate::protocol::{Command, Framer, Leds, Report};
 use crate::transport::{Request, Transport, TransportError};
 
+/// Greeting to the boot loader.
 const HELLO: [u8; 3] = [0x0A, 0x43, 0x0D];
+/// Answer of the boot loader to the greeting.
 const HELLO_ANSWER: [u8; 4] = [0x0A, 0x44, 0x2C, 0x0D];
-/// Asks for the firmware to be taken, and is answered with itself.
+/// Request for the transfer of the firmware. The boot loader answers with the same byte.
 const READY: u8 = 0x41;
 
-/// How patient loading is.
+/// Numbers of attempts and waiting times of loading.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct BootOptions {
-    /// How often the whole sequence is tried. At least once.
+    /// Attempts of the whole sequence. At least one attempt is made, also for 0.
     pub attempts: u32,
-    /// How often the boot loader is greeted within an attempt.
+    /// Greetings per attempt. At least one greeting is sent, also for 0.
     pub greetings: u32,
-    /// How long an answer may take. The chip alone may hold bytes back for 16 ms.
+    /// Waiting time for an answer. The chip alone may delay bytes by 16 ms.
     pub patience: Duration,
-    /// How many packets are sent to find out whether firmware runs already.
+    /// Packets sent to find out whether firmware runs. At least one packet is sent, also for 0.
     pub probes: u32,
-    /// How long the answer to such a packet may take.
+    /// Waiting time for the answer to such a packet.
     pub probe_patience: Duration,
 }
 
 impl BootOptions {
-    /// Three attempts with 100 greetings each, answers within 100 ms; 20 probes, answered within 10 ms.
+    /// Three attempts with 100 greetings each and 100 ms for an answer; 20 probes with 10 ms for an answer.
     pub const DEFAULT: Self =
         Self { attempts: 3, greetings: 100, patience: Duration::from_millis(100), probes: 20, probe_patience: Duration::from_millis(10) };
 }
 
-/// How far loading has come.
+/// Progress of loading.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Progress {
-    /// An attempt begins; counted from 1.
+    /// An attempt begins. Attempts count from 1.
     Attempt(u32),
-    /// The boot loader is there, after this number of greetings.
+    /// The boot loader has answered after this number of greetings.
     Greeted(u32),
-    /// `done` bytes of `of` are over and came back right.
+    /// `done` of `of` bytes are transferred, and came back unchanged.
     Loaded {
-        /// Bytes that are over.
+        /// Transferred bytes.
         done: usize,
-        /// Bytes of the firmware.
+        /// Length of the firmware \[bytes\].
         of: usize,
     },
-    /// An attempt failed, for this reason; if more are left, the next begins.
+    /// An attempt failed. The next attempt begins, if one is left.
     Failed(BootError),
     /// The firmware runs.
     Running,
 }
 
-/// Why the firmware did not get into the device.
+/// Reason why the firmware was not loaded.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum BootError {
@@ -67,7 +69,7 @@ pub enum BootError {
     NoBootLoader { greetings: u32 },
     #[error("the boot loader did not get ready for the firmware: {}", match found { Some(byte) => format!("it answered {byte:#04x}, not 0x41"), None => "no answer".to_owned() })]
     NotReady {
-        /// What came instead; `None` is nothing.
+        /// Received byte; `None` if no byte came.
         found: Option<u8>,
     },
     #[error("byte {at} of the firmware is {sent:#04x} and came back as {found:#04x}: try again, with another cable or port if it stays so")]
@@ -78,17 +80,20 @@ pub enum BootError {
     NotRunning,
 }
 
-/// Whether firmware runs already: sets the chip up for it and sees whether packets are answered. The packets ask for no force, and for the device to stay homed
-/// if it is.
+/// Returns whether firmware runs: sets up the chip for running firmware, and sends packets until one is answered. The packets ask for zero force, and ask a
+/// homed device to stay homed.
 ///
 /// # Errors
 ///
-/// [`TransportError`].
+/// [`TransportError`] if a transfer fails.
 pub fn is_loaded<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions) -> Result<bool, TransportError> {
     ftdi::set_up_running(transport)?;
+    // A packet without the homing bit would make a homed device forget its position.
     let packet = Command { homing: true, leds: Leds::RED, ..Command::default() }.encode();
+    // One framer for all probes: a late answer to an earlier packet counts too.
     let mut framer = Framer::new();
     for _ in 0..options.probes.max(1) {
+        // Each probe is a complete packet: the firmware answers packets only.
         transport.write(&packet)?;
         let deadline = transport.now().saturating_add(options.probe_patience);
         let mut bytes = [0; PAYLOAD];
@@ -102,11 +107,11 @@ pub fn is_loaded<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions
     Ok(false)
 }
 
-/// Loads the firmware if none runs. Gives whether it had to.
+/// Loads the firmware if none runs. Returns whether it was loaded.
 ///
 /// # Errors
 ///
-/// [`BootError`].
+/// [`BootError`] if loading fails.
 pub fn ensure_loaded<T: Transport + ?Sized>(
     transport: &mut T,
     firmware: &Firmware,
@@ -120,11 +125,11 @@ pub fn ensure_loaded<T: Transport + ?Sized>(
     load(transport, firmware, options, progress).map(|()| true)
 }
 
-/// Wakes the boot loader and gives it the firmware, whatever ran before; leaves the chip set up for the running firmware.
+/// Wakes the boot loader and loads the firmware, whatever program ran before. The chip is then set up for the running firmware.
 ///
 /// # Errors
 ///
-/// [`BootError`] of the last attempt. An unplugged device is not tried again.
+/// [`BootError`] of the last attempt. An unplugged device ends the attempts.
 pub fn load<T: Transport + ?Sized>(
     transport: &mut T,
     firmware: &Firmware,
@@ -141,6 +146,7 @@ pub fn load<T: Transport + ?Sized>(
             }
             Err(error) => {
                 progress(Progress::Failed(error));
+                // Greetings wake the boot loader again in the next attempt, whatever state this one left behind.
                 if attempt >= options.attempts || error == BootError::Transport(TransportError::Unplugged) {
                     return Err(error);
                 }
@@ -150,6 +156,7 @@ pub fn load<T: Transport + ?Sized>(
     }
 }
 
+/// Makes one attempt of the whole sequence.
 fn load_once<T: Transport + ?Sized>(
     transport: &mut T,
     firmware: &Firmware,
@@ -158,17 +165,18 @@ fn load_once<T: Transport + ?Sized>(
 ) -> Result<(), BootError> {
     ftdi::set_up_handshake(transport)?;
     progress(Progress::Greeted(greet(transport, options)?));
+    // Speed and DTR change after the greeting: the boot loader takes firmware only then.
     ftdi::set_up_loading(transport)?;
     get_ready(transport, options)?;
     send(transport, firmware.bytes(), options, progress)?;
     if is_loaded(transport, options)? { Ok(()) } else { Err(BootError::NotRunning) }
 }
 
-/// Greets until the boot loader answers; gives how often.
+/// Greets until the boot loader answers, and returns the number of greetings.
 fn greet<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions) -> Result<u32, BootError> {
     for greeting in 1..=options.greetings.max(1) {
         transport.write(&HELLO)?;
-        // A zero byte may come first: some ways to the device show one more than others.
+        // A zero byte may precede the answer: some connections deliver one.
         let mut answer = [0; HELLO_ANSWER.len() + 1];
         let deadline = transport.now().saturating_add(options.patience);
         let mut count = 0;
@@ -177,16 +185,18 @@ fn greet<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions) -> Res
             if matches!(&answer[..count], [0, answer @ ..] | answer if *answer == HELLO_ANSWER) {
                 return Ok(greeting);
             }
+            // Five wrong bytes cannot become an answer by more bytes.
             if count == answer.len() {
                 break;
             }
         }
-        // The rest of a broken answer would spoil the next.
+        // The rest of a broken answer would be taken for a part of the next answer.
         transport.control(Request::Reset, ftdi::PURGE_RX)?;
     }
     Err(BootError::NoBootLoader { greetings: options.greetings.max(1) })
 }
 
+/// Sends the request for the transfer, and checks the answer.
 fn get_ready<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions) -> Result<(), BootError> {
     transport.write(&[READY])?;
     let mut answer = [0];
@@ -197,11 +207,13 @@ fn get_ready<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions) ->
     }
 }
 
-/// Block by block: the device sends every byte back, and the next block goes when the last one is back.
+/// Sends the firmware in blocks. The device returns every byte, and a block is sent after the whole preceding block has come back.
 fn send<T: Transport + ?Sized>(transport: &mut T, bytes: &[u8], options: &BootOptions, progress: &mut dyn FnMut(Progress)) -> Result<(), BootError> {
     let mut done = 0;
+    // A block fills one packet of the chip from the device, so its echo needs no second packet.
     for block in bytes.chunks(ftdi::PACKET - STATUS) {
         transport.write(block)?;
+        // The next block waits for the whole echo: the chip is set up without flow control.
         let mut echo = [0; PAYLOAD];
         let count = fill(transport, &mut echo[..block.len()], options.patience)?;
         if let Some(place) = (0..count).find(|place| echo[*place] != block[*place]) {
@@ -216,7 +228,7 @@ fn send<T: Transport + ?Sized>(transport: &mut T, bytes: &[u8], options: &BootOp
     Ok(())
 }
 
-/// Reads until there is no room left or the patience ends; gives how many bytes came.
+/// Reads until `into` is full or the patience ends, and returns the number of bytes.
 fn fill<T: Transport + ?Sized>(transport: &mut T, into: &mut [u8], patience: Duration) -> Result<usize, TransportError> {
     let deadline = transport.now().saturating_add(patience);
     let mut count = 0;
@@ -227,7 +239,7 @@ fn fill<T: Transport + ?Sized>(transport: &mut T, into: &mut [u8], patience: Dur
     Ok(count)
 }
 
-/// The time left until a deadline; `None` when it has passed.
+/// Returns the time left until a deadline; `None` after the deadline.
 fn rest<T: Transport + ?Sized>(transport: &T, deadline: Instant) -> Option<Duration> {
     deadline.checked_duration_since(transport.now()).filter(|rest| !rest.is_zero())
 }

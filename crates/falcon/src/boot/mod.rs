@@ -1,4 +1,4 @@
-//! Gets the firmware into a device that was just switched on, and finds out whether it is there already.
+//! Firmware of a device: the loading into a device that was just switched on, and the detection of running firmware.
 
 mod firmware;
 mod load;

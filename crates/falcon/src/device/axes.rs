@@ -1,4 +1,4 @@
-//! Which axes of the device are those of the peer.
+//! Assignment of the device's axes to the axes of a peer.
 
 use thiserror::Error;
 
@@ -16,24 +16,25 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Its place in a triple.
+    /// Returns the index in a triple.
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
     }
 }
 
-/// The axes of the device in the order of the peer's.
+/// Axes of the device, indexed by the peer's axes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Axes<const A: usize>([Axis; A]);
 
 impl<const A: usize> Axes<A> {
-    /// These axes, in this order.
+    /// Returns an assignment of these axes in this order.
     ///
     /// # Errors
     ///
-    /// [`AxesError`] if one is named twice, or none is.
+    /// [`AxesError`] for an axis that is named twice, or for no axis.
     pub fn new(axes: [Axis; A]) -> Result<Self, AxesError> {
+        // Each axis is compared with the axes before it, so the second of two equal axes is reported.
         let repeated = axes.iter().enumerate().find(|(place, axis)| axes[..*place].contains(axis));
         match repeated {
             Some((_, axis)) => Err(AxesError::Twice(*axis)),
@@ -42,13 +43,13 @@ impl<const A: usize> Axes<A> {
         }
     }
 
-    /// The components of a vector of the device that the peer sees.
+    /// Returns the components of a vector of the device along the peer's axes.
     #[must_use]
     pub fn of_device(&self, vector: Triple) -> [f64; A] {
         self.0.map(|axis| vector[axis.index()])
     }
 
-    /// A vector of the peer as one of the device; zero along axes that the peer does not use.
+    /// Returns a vector of the peer as a vector of the device, zero along the axes that the peer does not use.
     #[must_use]
     pub fn to_device(&self, vector: [f64; A]) -> Triple {
         let mut spread = [0.0; 3];
@@ -58,20 +59,20 @@ impl<const A: usize> Axes<A> {
         spread
     }
 
-    /// Which axes of the device the peer does not use.
+    /// Returns, indexed by the device's axes, whether the peer does not use the axis.
     #[must_use]
     pub fn unused(&self) -> [bool; 3] {
         [Axis::X, Axis::Y, Axis::Z].map(|axis| !self.0.contains(&axis))
     }
 }
 
-/// Axes that cannot be.
+/// Error of an assignment of axes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 pub enum AxesError {
-    /// One is named twice.
+    /// An axis is named twice.
     #[error("the axis {0:?} is named twice: each axis of the device can be one of the peer's")]
     Twice(Axis),
-    /// None is named.
+    /// No axis is named.
     #[error("no axis is named: a peer has one to three")]
     None,
 }

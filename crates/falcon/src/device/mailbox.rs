@@ -1,18 +1,18 @@
-//! A value that one thread leaves for others, without either waiting.
+//! Newest value of a writer thread for reader threads. No thread waits for another thread.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::sync::RwLock;
 
-/// How often one looks again while others are where it wants to be.
+/// Attempts at a place that another thread uses.
 const TRIES: u32 = 64;
 
-/// The newest value that one writer has left. Nobody waits: the writer writes where no reader looks, and a reader goes without if the newest value is being
-/// replaced each time that it looks.
+/// The newest value of one writer. No thread waits: the writer writes to a place that no reader uses, and a reader returns without a value if the newest
+/// value is being replaced at each of its attempts.
 #[derive(Debug)]
 pub(super) struct Mailbox<T> {
-    /// How many values were written, and, in the two lowest bits, where the newest one is.
+    /// Number of the newest value, counted from 1, above the two lowest bits, which contain the place of this value.
     newest: AtomicU64,
-    /// Values with their numbers, from 1.
+    /// Values with their numbers, counted from 1.
     places: [RwLock<Option<(T, u64)>>; 3],
 }
 
@@ -21,15 +21,18 @@ impl<T: Copy> Mailbox<T> {
         Self { newest: AtomicU64::new(0), places: [const { RwLock::new(None) }; 3] }
     }
 
-    /// Only one thread may write. A value is left out if readers keep looking at both older ones.
+    /// Leaves a value. Only one thread may write. A value is dropped if readers occupy both other places at all attempts.
     pub(super) fn write(&self, value: T) {
+        // Relaxed is enough: only this thread writes `newest`.
         let newest = self.newest.load(Ordering::Relaxed);
         let number = (newest >> 2) + 1;
         for _ in 0..TRIES {
+            // Two places do not hold the newest value; a reader can still occupy an older one.
             for (place, kept) in (0..).zip(&self.places).filter(|(place, _)| *place != newest & 3) {
                 if let Ok(mut kept) = kept.try_write() {
                     *kept = Some((value, number));
                     drop(kept);
+                    // Release orders the value before its place, for the acquire of a reader. The lock is free before a reader can learn the place.
                     return self.newest.store(number << 2 | place, Ordering::Release);
                 }
             }
@@ -37,13 +40,14 @@ impl<T: Copy> Mailbox<T> {
         }
     }
 
-    /// The newest value if it is newer than that of number `seen`, with its number; 0 is before the first.
+    /// Returns the newest value and its number if the number is greater than `seen`; 0 is before the first value.
     pub(super) fn read_newer(&self, seen: u64) -> Option<(T, u64)> {
         for _ in 0..TRIES {
             let newest = self.newest.load(Ordering::Acquire);
+            // Acquire makes the value visible that was written before its place was published.
             let place = (0..).zip(&self.places).find(|(place, _)| *place == newest & 3)?.1;
             if let Ok(kept) = place.try_read() {
-                // The writer may have come back to this place since, with a newer value.
+                // The writer may have reused this place since the load, for a newer value. The number tells the value's age in any case.
                 return kept.filter(|(_, number)| *number > seen);
             }
             core::hint::spin_loop();

@@ -1,7 +1,7 @@
 //! A Falcon as the device of a peer.
 //!
-//! [`FalconDevice`] has a thread that exchanges packets at 1 kHz; the peer and the thread hand each other numbers through memory that neither waits for.
-//! [`SteppedFalcon`] has none: the peer's own ticks drive it, which is what a simulated Falcon in virtual time needs.
+//! [`FalconDevice`] exchanges packets at 1 kHz in a thread of its own. Peer and thread pass values through memory without waiting for each other.
+//! [`SteppedFalcon`] has no thread and is driven by the peer's ticks, which a simulated Falcon in virtual time needs.
 
 mod axes;
 mod mailbox;

@@ -1,4 +1,4 @@
-//! One turn of the loop: what the peer wants, an exchange, and what the peer is told.
+//! One turn of the loop: the force of the peer, an exchange, and the state for the peer.
 
 use core::time::Duration;
 
@@ -12,19 +12,19 @@ use crate::kinematics::Triple;
 use crate::protocol::Buttons;
 use crate::transport::Transport;
 
-/// What keeps the grip in the middle along the axes that the peer does not use.
+/// Springs that hold the grip at the origin along the axes that the peer does not use.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hold {
-    /// \[N/m\]
+    /// Stiffness along each axis \[N/m\].
     pub stiffness: f64,
-    /// \[N·s/m\]
+    /// Damping along each axis \[N·s/m\].
     pub damping: f64,
-    /// The most it pushes \[N\], along each axis.
+    /// Greatest force along each axis \[N\].
     pub force: f64,
 }
 
 impl Hold {
-    /// 500 N/m, 2 N·s/m, at most 2 N.
+    /// Default values: 500 N/m, 2 N·s/m, at most 2 N.
     pub const DEFAULT: Self = Self { stiffness: 500.0, damping: 2.0, force: 2.0 };
 
     fn along(&self, position: f64, velocity: f64) -> f64 {
@@ -32,36 +32,37 @@ impl Hold {
     }
 }
 
-/// A Falcon as the device of a peer with A axes.
+/// Configuration of a Falcon as the device of a peer with A axes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DeviceConfig<const A: usize> {
-    /// Which axes of the device the peer uses.
+    /// Axes of the device that the peer uses.
     pub axes: Axes<A>,
-    /// How the device is driven.
+    /// Configuration of the driver.
     pub driver: DriverConfig,
-    /// From one exchange to the next. USB gives at best one in a millisecond.
+    /// Time from one exchange to the next, 250 us to 20 ms. USB allows at best one exchange per millisecond.
     pub period: Duration,
-    /// What holds the other axes; `None` leaves them free.
+    /// Springs along the unused axes; `None` leaves these axes free.
     pub hold: Option<Hold>,
 }
 
 impl<const A: usize> DeviceConfig<A> {
-    /// These axes, one exchange a millisecond, and defaults.
+    /// Returns a configuration with these axes, one exchange per millisecond, and default values.
     #[must_use]
     pub const fn new(axes: Axes<A>) -> Self {
         Self { axes, driver: DriverConfig::DEFAULT, period: Duration::from_millis(1), hold: Some(Hold::DEFAULT) }
     }
 
-    /// The same, if what this adds to the driver's configuration makes sense; the driver checks its own.
+    /// Returns the configuration if period and springs are within their ranges. The driver checks its own configuration.
     ///
     /// # Errors
     ///
-    /// [`DeviceConfigError`] names what does not.
+    /// [`DeviceConfigError`] with the number out of range.
     pub fn checked(self) -> Result<Self, DeviceConfigError> {
         if !(Duration::from_micros(250)..=Duration::from_millis(20)).contains(&self.period) {
             return Err(DeviceConfigError::Period(self.period));
         }
         if let Some(hold) = self.hold {
+            // `contains` is false for NaN.
             let sound = |number: f64, most: f64| (0.0..=most).contains(&number);
             if !(sound(hold.stiffness, 3000.0) && sound(hold.damping, 20.0) && sound(hold.force, 20.0)) {
                 return Err(DeviceConfigError::Hold(hold));
@@ -71,24 +72,25 @@ impl<const A: usize> DeviceConfig<A> {
     }
 }
 
-/// A configuration that makes no sense.
+/// Error of a configuration with a number out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 pub enum DeviceConfigError {
-    /// No rate at which a Falcon can be driven.
+    /// The period is out of range.
     #[error("the period of the loop is {0:?}, not within 250 us to 20 ms: 1 ms is what USB gives")]
     Period(Duration),
-    /// A spring that no Falcon can be.
+    /// A number of the springs is out of range.
     #[error("{0:?} is not within 3000 N/m, 20 N·s/m and 20 N, which is what the device is said to hold")]
     Hold(Hold),
 }
 
-/// The loop without what paces it.
+/// The loop, without its thread or ticks.
 #[derive(Debug)]
 pub(super) struct Turns<T: Transport, const A: usize> {
     pub(super) driver: Driver<T>,
     config: DeviceConfig<A>,
-    /// On the grip, in the axes of the device.
+    /// Newest force on the grip, in the axes of the device.
     wanted: Option<Setpoint>,
+    /// Begin of the next turn on the transport's clock.
     next: Instant,
     timing: LoopStatistics,
 }
@@ -100,17 +102,18 @@ impl<T: Transport, const A: usize> Turns<T, A> {
         Ok(Self { driver, config, wanted: None, next, timing: LoopStatistics::default() })
     }
 
-    /// The peer wants this force on the grip \[N\], in the axes of the device, from now on.
+    /// Sets the force of the peer on the grip \[N\], in the axes of the device.
     pub(super) fn want(&mut self, force: Triple) {
         self.wanted = Some(Setpoint { force, at: self.driver.now() });
     }
 
     pub(super) fn exchange(&mut self) -> Result<(), DriverError> {
+        // The springs follow the newest position, while the setpoint keeps the age of the peer's force.
         let setpoint = self.wanted.map(|wanted| Setpoint { force: self.held(wanted.force), ..wanted });
         self.driver.exchange(setpoint).map(|_| ())
     }
 
-    /// Waits for the next turn; a turn that took too long moves all that follow.
+    /// Waits for the next turn. A late turn shifts all following turns, so that the loop does not catch up with turns in quick succession.
     pub(super) fn pace(&mut self) {
         self.timing.turns += 1;
         self.next = self.next.saturating_add(self.config.period);
@@ -118,6 +121,7 @@ impl<T: Transport, const A: usize> Turns<T, A> {
         match now.checked_duration_since(self.next).filter(|late| !late.is_zero()) {
             Some(late) => {
                 self.timing.late += 1;
+                // The lateness of this turn, measured before the shift of the next turn.
                 self.timing.worst = self.timing.worst.max(late);
                 self.next = now;
             }
@@ -125,7 +129,7 @@ impl<T: Transport, const A: usize> Turns<T, A> {
         }
     }
 
-    /// The force with that of the springs along the axes that the peer does not use.
+    /// Returns the force with the springs along the axes that the peer does not use.
     fn held(&self, mut force: Triple) -> Triple {
         if let (Some(hold), Some(reading)) = (self.config.hold, self.driver.status().reading) {
             for (axis, unused) in self.config.axes.unused().into_iter().enumerate() {
@@ -144,53 +148,54 @@ impl<T: Transport, const A: usize> Turns<T, A> {
     }
 }
 
-/// How well the loop keeps its time.
+/// Timing of the loop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct LoopStatistics {
     /// Turns so far.
     pub turns: u64,
-    /// Turns that ended after the next should have begun.
+    /// Turns that ended after the begin of the next turn.
     pub late: u64,
-    /// The longest that one was late.
+    /// Greatest lateness of a turn.
     pub worst: Duration,
 }
 
 /// The device after its last exchange.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Snapshot {
-    /// When that was, on the transport's clock.
+    /// Time of the snapshot, on the transport's clock.
     pub at: Instant,
-    /// Where the device stands.
+    /// Phase of the device.
     pub phase: Phase,
-    /// Whether the device is homed and the user has switched forces on since.
+    /// Whether the device is homed, and the user has switched forces on since then.
     pub armed: bool,
-    /// Which encoders are homed.
+    /// Homed encoders.
     pub homed: [bool; 3],
-    /// The counts of the encoders.
+    /// Counts of the encoders.
     pub encoders: [i16; 3],
-    /// Which buttons are pressed.
+    /// Pressed buttons.
     pub buttons: Buttons,
-    /// Where the grip is, if that is known.
+    /// Position and velocity of the grip; `None` while unknown.
     pub reading: Option<Reading>,
-    /// The force that went out \[N\].
+    /// Force of the last packet \[N\].
     pub force: Triple,
-    /// What happened so far.
+    /// Counts of events since the start of the driver.
     pub statistics: Statistics,
-    /// How well the loop keeps its time.
+    /// Timing of the loop.
     pub timing: LoopStatistics,
 }
 
 impl Snapshot {
-    /// Whether a peer may begin: it is known where the grip is, and forces that are asked for go out.
+    /// Returns whether a peer may begin: the position of the grip is known, and forces are switched on.
     #[must_use]
     pub const fn is_ready(&self) -> bool {
         self.armed && self.reading.is_some()
     }
 }
 
-/// What the peer sees of a snapshot. A device that is not homed rests where it was last; a reading that is too old has no velocity.
+/// Returns the state of a snapshot for the peer. A device that is not homed rests at its last position, and a reading that is too old has no velocity.
 pub(super) fn state<const A: usize>(snapshot: &Snapshot, config: &DeviceConfig<A>, last: State<A>) -> State<A> {
     let Some(reading) = snapshot.reading else { return State { velocity: [0.0; A], ..last } };
+    // The position of an old reading is still the best estimate; its velocity is not.
     let fresh = snapshot.at.saturating_duration_since(reading.at) <= config.driver.limits.reading_age;
     let velocity = if fresh { config.axes.of_device(reading.velocity) } else { [0.0; A] };
     State { position: config.axes.of_device(reading.position), velocity }

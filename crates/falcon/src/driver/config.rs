@@ -1,4 +1,4 @@
-//! What a driver is told at the beginning.
+//! Configuration of a driver.
 
 use core::time::Duration;
 
@@ -7,29 +7,30 @@ use thiserror::Error;
 use crate::calibration::Calibration;
 use crate::safety::{Limits, LimitsError};
 
-/// How a device is driven.
+/// Configuration of a driver.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DriverConfig {
-    /// Gain of the motors and origin.
+    /// Gain of the motors, and origin of positions.
     pub calibration: Calibration,
-    /// Limits of force.
+    /// Limits of forces.
     pub limits: Limits,
-    /// How long an exchange waits for its report.
+    /// Time for which an exchange waits for its report.
     pub patience: Duration,
-    /// Silence after which the device is given up.
+    /// Silence of the device after which the driver fails.
     pub longest_silence: Duration,
-    /// Bandwidth of the velocity estimate \[Hz\].
+    /// Bandwidth of the velocity estimate \[Hz\], above 0 and at most 500.
     pub velocity_bandwidth: f64,
-    /// Reports in a row that must say that all encoders are homed until it is believed. One such report may be a bit that flipped on the wire.
+    /// Number of consecutive reports with all encoders homed after which the device counts as homed. A single such report can be a flipped bit.
     pub homing_confirmations: u32,
-    /// The fastest that an encoder can turn \[counts per ms\]; a faster one is taken for a byte that changed on the wire.
+    /// Greatest speed of an encoder \[counts per ms\]. A faster change counts as a byte changed on the wire.
     pub fastest_encoder: u16,
-    /// How far from the base the grip must be pulled \[m, frame of the device\] to switch forces on after homing; `None` switches them on at once.
+    /// Distance from the base \[m, frame of the device\] beyond which a pull of the grip switches forces on after homing. `None` switches forces on at once.
     pub arm_beyond: Option<f64>,
 }
 
 impl DriverConfig {
-    /// 3 ms for a report, 1 s of silence, 30 Hz, ten confirmations, 100 counts per ms (about 3 m/s), forces on beyond 170 mm, as existing programs have it.
+    /// Default values: 3 ms for a report, 1 s of silence, 30 Hz, ten confirmations, 100 counts per ms (about 3 m/s), forces on beyond 170 mm, as in existing
+    /// programs.
     pub const DEFAULT: Self = Self {
         calibration: Calibration::DEFAULT,
         limits: Limits::DEFAULT,
@@ -41,11 +42,11 @@ impl DriverConfig {
         arm_beyond: Some(0.170),
     };
 
-    /// The same, if it makes sense.
+    /// Returns the configuration if all numbers are within their ranges.
     ///
     /// # Errors
     ///
-    /// [`DriverConfigError`] names what does not.
+    /// [`DriverConfigError`] with the first number out of range.
     pub fn checked(self) -> Result<Self, DriverConfigError> {
         self.limits.checked()?;
         for (name, span, most) in [
@@ -56,6 +57,7 @@ impl DriverConfig {
                 return Err(DriverConfigError::Span { name, span, most });
             }
         }
+        // Written so that NaN is refused.
         if !(self.velocity_bandwidth > 0.0 && self.velocity_bandwidth <= 500.0) {
             return Err(DriverConfigError::Bandwidth(self.velocity_bandwidth));
         }
@@ -69,11 +71,11 @@ impl DriverConfig {
     }
 }
 
-/// A configuration that makes no sense.
+/// Error of a configuration with a number out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum DriverConfigError {
-    /// A limit of force.
+    /// A limit of forces is out of range.
     #[error(transparent)]
     Limits(#[from] LimitsError),
     #[error("the {name} is {span:?}, not within 0 to {most:?}")]

@@ -1,4 +1,4 @@
-//! Why a driver gives up.
+//! Error of a driver.
 
 use core::time::Duration;
 
@@ -7,11 +7,11 @@ use thiserror::Error;
 use super::DriverConfigError;
 use crate::transport::TransportError;
 
-/// The driver cannot go on.
+/// Reason why a driver cannot go on.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum DriverError {
-    /// A number of the configuration makes no sense.
+    /// A number of the configuration is out of range.
     #[error(transparent)]
     Config(#[from] DriverConfigError),
     /// The transport failed.

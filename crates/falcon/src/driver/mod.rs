@@ -1,4 +1,7 @@
-//! One exchange after the other: a packet out, a report in, and everything in between that keeps a hand safe.
+//! Driver of a device with running firmware. An exchange sends a packet and takes a report, and protects the user's hand.
+//!
+//! In: setpoints of force, and bytes of a transport. Out: packets with admitted forces, and the status of the device. The driver has no loop and no thread:
+//! the caller paces the exchanges.
 
 mod config;
 mod error;
@@ -22,25 +25,26 @@ use crate::protocol::{Command, Framer, Report};
 use crate::safety::{ForceGate, Moment, MotorCounts, Verdict};
 use crate::transport::{Transport, TransportError};
 
-/// How often zero force is sent when it stops.
+/// Packets of zero force at a stop.
 const FAREWELLS: u32 = 5;
-/// Time between two of them.
+/// Time between two packets of zero force.
 const BETWEEN_FAREWELLS: Duration = Duration::from_millis(2);
-/// Failed transfers in a row after which it gives up.
+/// Consecutive failed transfers after which the driver fails.
 const PATIENCE_WITH_FAULTS: u32 = 10;
-/// Implausible reports in a row after which they are believed, and homing is confirmed anew.
+/// Consecutive implausible reports after which the reports are believed, and homing is confirmed anew.
 const STUBBORN: u32 = 3;
-/// However long nothing was heard, an encoder may not have turned further than within this. A hand that did turn it further is believed at its third report.
+/// Longest time for which an encoder may have turned between two reports. After a longer silence, a hand that has turned an encoder further is believed at
+/// the third report.
 const LONGEST_LEAP: Duration = Duration::from_millis(3);
-/// Answers that may be on their way from packets before: what the chip's 256 bytes hold.
+/// Greatest number of answers to earlier packets that may still arrive: the capacity of the chip's 256 bytes.
 const MOST_OWED: usize = 16;
-/// Exchanges that wait for answers still owed, until those are taken for lost.
+/// Exchanges that wait for answers still owed, before the answers count as lost.
 const WAITS: u32 = 3;
 
-/// The driver of a device whose firmware runs: see [`crate::boot`].
+/// Driver of a device with running firmware: see [`crate::boot`].
 ///
-/// [`Driver::exchange`] is one turn of a loop that somebody else paces, at best once a millisecond: USB gives no more. It allocates nothing.
-/// Whatever is asked for, what goes to the motors comes from a [`ForceGate`]. When it is dropped it [stops](Driver::stop).
+/// [`Driver::exchange`] is one turn of a loop that the caller paces, at best once per millisecond, the limit of USB. An exchange allocates no memory. All
+/// motor counts come from a [`ForceGate`]. A drop [stops](Driver::stop) the driver.
 #[derive(Debug)]
 pub struct Driver<T: Transport> {
     transport: T,
@@ -50,27 +54,32 @@ pub struct Driver<T: Transport> {
     filter: VelocityFilter,
     statistics: Statistics,
     status: Status,
-    /// When the last report was believed.
+    /// Arrival of the last believed report.
     heard_at: Option<Instant>,
-    /// When it began, or was last heard: for silence.
+    /// Arrival of the last report, or the start of the driver, for the measurement of silence.
     alive_at: Instant,
-    /// In the frame of the device; of the last report that was homed.
+    /// Position of the grip in the frame of the device \[m\], from the last homed report.
     position: Option<Triple>,
+    /// Consecutive believed reports with all encoders homed.
     homed_in_row: u32,
+    /// Consecutive believed reports with an encoder that is not homed.
     unhomed_in_row: u32,
+    /// Whether the user has switched forces on since homing.
     armed: bool,
     implausible_in_row: u32,
     faults_in_row: u32,
+    /// Answers to earlier packets that are still to come.
     owed: usize,
+    /// Consecutive exchanges that had a report while answers were owed.
     waits: u32,
 }
 
 impl<T: Transport> Driver<T> {
-    /// Sets the serial chip up for the running firmware. No packet is sent yet.
+    /// Opens the driver, and sets up the serial chip for the running firmware. No packet is sent yet.
     ///
     /// # Errors
     ///
-    /// [`DriverError::Config`] if a number makes no sense, [`DriverError::Transport`] if the chip cannot be set up.
+    /// [`DriverError::Config`] for a number out of range, and [`DriverError::Transport`] if the chip cannot be set up.
     pub fn open(mut transport: T, config: DriverConfig) -> Result<Self, DriverError> {
         let config = config.checked()?;
         let gate = ForceGate::new(config.limits, config.calibration).map_err(DriverConfigError::from)?;
@@ -97,17 +106,18 @@ impl<T: Transport> Driver<T> {
         })
     }
 
-    /// Sends a packet with the force that somebody wants, as far as the gate lets it pass, and takes the report that answers it. `None` wants none.
+    /// Sends a packet with the force `wanted`, as far as the gate admits it, and takes the report that answers the packet. `None` asks for zero force.
     ///
-    /// A report that does not come within the patience of the configuration is counted; the reading stays, and ages.
+    /// If no report comes within the patience of the configuration, a timeout is counted, and the last reading stays and ages.
     ///
     /// # Errors
     ///
-    /// [`DriverError::Transport`] if the device is gone or transfers keep failing, [`DriverError::Silent`] if it has not answered for too long. Force is off
-    /// for good then.
+    /// [`DriverError::Transport`] if the device is unplugged or transfers keep failing, and [`DriverError::Silent`] if the device has been silent for too
+    /// long. After an error the force stays zero.
     pub fn exchange(&mut self, wanted: Option<Setpoint>) -> Result<&Status, DriverError> {
         let outcome = self.exchange_once(wanted);
         if outcome.is_err() {
+            // The gate stops before the caller sees the error, so no later exchange can give force.
             self.gate.stop();
             (self.status.phase, self.status.armed) = (Phase::Stopped, false);
             (self.status.force, self.status.motors) = ([0.0; 3], MotorCounts::ZERO);
@@ -127,6 +137,7 @@ impl<T: Transport> Driver<T> {
     }
 
     fn send(&mut self, wanted: Option<Setpoint>) -> Result<(), DriverError> {
+        // The gate decides with the knowledge before this exchange: the report of this packet is still to come.
         let moment = Moment {
             now: self.transport.now(),
             homed: self.is_homed(),
@@ -141,16 +152,19 @@ impl<T: Transport> Driver<T> {
         }
         (self.status.force, self.status.motors, self.status.verdict) = (admitted.force, admitted.motors, admitted.verdict);
         self.status.phase = self.phase();
+        // The homing bit is always set: a packet without it makes the device forget its homing.
         let command = Command { motors: admitted.motors, leds: self.status.phase.leds(), homing: true };
         let sent = self.transport.write(&command.encode());
         self.survive(sent)
     }
 
-    /// Takes reports until the one that answers the last packet is there, or its time is over.
+    /// Takes reports until the answer to the last packet has come, or the patience has passed.
     fn receive(&mut self) -> Result<(), DriverError> {
+        // The patience counts from the sent packet, not from the last byte: noise must not prolong an exchange.
         let deadline = self.transport.now().saturating_add(self.config.patience);
         let (mut reports, mut newest) = (0, None);
         let mut bytes = [0; PAYLOAD];
+        // Answers come in the order of packets, so the answer to this packet follows all owed answers.
         while reports <= self.owed {
             let Some(rest) = deadline.checked_duration_since(self.transport.now()).filter(|rest| !rest.is_zero()) else { break };
             let read = self.transport.read(&mut bytes, rest);
@@ -164,10 +178,12 @@ impl<T: Transport> Driver<T> {
             for byte in &bytes[..count] {
                 if let Some(report) = self.framer.push::<Report>(*byte) {
                     reports += 1;
+                    // Only the newest report counts; older ones describe an earlier state.
                     newest = Some((report, self.transport.now()));
                 }
             }
         }
+        // Counted also for an exchange without a report.
         self.statistics.garbage_bytes = self.framer.garbage();
         self.statistics.reports += reports as u64;
         match newest {
@@ -177,6 +193,7 @@ impl<T: Transport> Driver<T> {
                 self.take(report, at);
             }
             None => {
+                // The answer to this packet may still come, before the answers to later packets.
                 self.owed = (self.owed + 1).min(MOST_OWED);
                 self.statistics.timeouts += 1;
             }
@@ -186,7 +203,8 @@ impl<T: Transport> Driver<T> {
         Ok(())
     }
 
-    /// An answer that did not come in time makes all later ones late until it is read; one that is lost is not waited for for ever.
+    /// Counts the owed answers after `reports` reports. An answer that was late makes all later answers late until it is read; a lost answer must not be
+    /// awaited forever.
     fn settle(&mut self, reports: usize) {
         self.owed = (self.owed + 1).saturating_sub(reports);
         self.waits = if self.owed == 0 { 0 } else { self.waits + 1 };
@@ -195,15 +213,18 @@ impl<T: Transport> Driver<T> {
         }
     }
 
+    /// Takes in the newest report of an exchange.
     fn take(&mut self, report: Report, now: Instant) {
+        // An implausible report is no silence.
         self.alive_at = now;
         if self.is_implausible(&report, now) {
             self.statistics.implausible += 1;
             self.implausible_in_row += 1;
+            // A plausible report sets this count to zero, so only consecutive reports add up.
             if self.implausible_in_row < STUBBORN {
                 return;
             }
-            // Not a bit on the wire, then: the coordinates have jumped, and nothing that was known holds.
+            // The same jump in several reports is no flipped bit: the coordinates have changed, and earlier knowledge is void.
             self.homed_in_row = 0;
             self.filter.reset();
         }
@@ -219,14 +240,17 @@ impl<T: Transport> Driver<T> {
         }
     }
 
-    /// A homed device cannot have moved so far: a byte was changed on its way into another that can be there.
+    /// Returns whether a homed device cannot have moved so far since the last report, so that a byte must have changed on the wire into another valid byte.
     fn is_implausible(&self, report: &Report, now: Instant) -> bool {
         let Some(heard_at) = self.heard_at.filter(|_| self.homed_in_row > 0 && report.all_homed()) else { return false };
+        // A device that is not homed has counts without meaning, so its jumps are not checked.
         let passed = now.saturating_duration_since(heard_at).min(LONGEST_LEAP).as_micros();
+        // Rounded up, so that an encoder at exactly the greatest speed is plausible.
         let farthest = (u128::from(self.config.fastest_encoder) * passed).div_ceil(1000);
         report.encoders.iter().zip(self.status.encoders).any(|(new, old)| u128::from(new.abs_diff(old)) > farthest)
     }
 
+    /// Computes the position of the grip from a homed report, and switches forces on if the grip is far enough out.
     fn locate(&mut self, report: &Report, now: Instant) {
         let origin = self.config.calibration.origin();
         self.position = match forward_from(angles_of_counts(report.encoders), self.position.unwrap_or(origin)) {
@@ -236,10 +260,13 @@ impl<T: Transport> Driver<T> {
                 None
             }
         };
+        // Homed angles without a position are an error of the encoders: without a position there is no force.
         let Some(place) = self.position else { return self.status.reading = None };
         let position = core::array::from_fn(|axis| place[axis] - origin[axis]);
+        // The filter runs before homing is confirmed, so that the first reading has a settled velocity.
         let velocity = self.filter.update(now, position);
         if self.is_homed() {
+            // Once armed, the device stays armed until its homing is lost for good.
             self.armed |= self.config.arm_beyond.is_none_or(|z| place[2] >= z);
             self.status.reading = Some(Reading { at: now, position, velocity });
         } else {
@@ -247,7 +274,8 @@ impl<T: Transport> Driver<T> {
         }
     }
 
-    /// One report like that ends force; as many as it takes to believe the opposite end what was known.
+    /// Takes in a report that is not homed. One such report ends the force. As many reports as homing needs confirmations discard the position and the
+    /// arming.
     fn unhomed(&mut self) {
         if self.homed_in_row >= self.config.homing_confirmations {
             self.statistics.unhomed += 1;
@@ -280,7 +308,7 @@ impl<T: Transport> Driver<T> {
         }
     }
 
-    /// A transfer that fails now and then is counted; a device that is gone, or fails all the time, is an error.
+    /// Counts a failed transfer. Returns an error for an unplugged device, and for too many consecutive failures.
     fn survive(&mut self, outcome: Result<(), TransportError>) -> Result<(), DriverError> {
         let Err(error) = outcome else { return Ok(()) };
         self.statistics.faults += 1;
@@ -291,15 +319,17 @@ impl<T: Transport> Driver<T> {
         Ok(())
     }
 
-    /// Switches force off for good, and tells the device several times; then its lights are red. Further exchanges only look. What cannot be sent is not
-    /// tried again: a device that hears nothing gives no force either, after its own time-out.
+    /// Stops the force for good, and sends several packets of zero force with red lights. Later exchanges only read the device. Packets that cannot be sent
+    /// are not repeated: a device that hears no packets switches its motors off after its own time-out.
     pub fn stop(&mut self) {
+        // `exchange` may have stopped the gate without a packet, so the farewells decide whether the device knows.
         if self.gate.is_stopped() && self.status.phase == Phase::Stopped && self.statistics.farewells > 0 {
             return;
         }
         self.gate.stop();
         (self.status.phase, self.status.armed) = (Phase::Stopped, false);
         (self.status.force, self.status.motors) = ([0.0; 3], MotorCounts::ZERO);
+        // The homing bit stays set, so that the next driver finds the device homed.
         let packet = Command { motors: MotorCounts::ZERO, leds: Phase::Stopped.leds(), homing: true }.encode();
         for _ in 0..FAREWELLS {
             match self.transport.write(&packet) {
@@ -312,25 +342,25 @@ impl<T: Transport> Driver<T> {
         }
     }
 
-    /// The status of the device now.
+    /// Returns the status of the device after the last exchange.
     #[must_use]
     pub const fn status(&self) -> &Status {
         &self.status
     }
 
-    /// What happened so far.
+    /// Returns the counts of events since the start.
     #[must_use]
     pub const fn statistics(&self) -> &Statistics {
         &self.statistics
     }
 
-    /// The time on the transport's clock.
+    /// Returns the time on the transport's clock.
     #[must_use]
     pub fn now(&self) -> Instant {
         self.transport.now()
     }
 
-    /// Waits until then on the transport's clock.
+    /// Waits until `until` on the transport's clock.
     pub fn sleep_until(&mut self, until: Instant) {
         self.transport.sleep_until(until);
     }

@@ -1,40 +1,40 @@
-//! What happened, by name.
+//! Counts of events, by name.
 
 use crate::safety::{Verdict, ZeroCause};
 
-/// Counts since the driver began.
+/// Counts since the start of the driver.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Statistics {
-    /// Exchanges begun.
+    /// Started exchanges.
     pub exchanges: u64,
-    /// Whole reports.
+    /// Complete reports.
     pub reports: u64,
     /// Exchanges without a report in time.
     pub timeouts: u64,
-    /// Bytes that belonged to no report.
+    /// Bytes outside of any report.
     pub garbage_bytes: u64,
-    /// Transfers that failed.
+    /// Failed transfers.
     pub faults: u64,
-    /// Reports that a device in one piece could not have sent.
+    /// Reports of a movement that is too fast for any device.
     pub implausible: u64,
-    /// Homed reports of angles with which the grip is nowhere.
+    /// Homed reports of angles without a position of the grip.
     pub unlocated: u64,
-    /// How often a homed device said that it is not.
+    /// Losses of homing, as reported by the device.
     pub unhomed: u64,
-    /// Forces asked for that became zero, by cause in the order of [`ZeroCause::ALL`].
+    /// Forces that became zero, by cause in the order of [`ZeroCause::ALL`].
     pub zeroed: [u64; ZeroCause::ALL.len()],
-    /// Forces asked for that were too large.
+    /// Forces shortened to the largest force.
     pub limited: u64,
-    /// Forces asked for that changed too fast.
+    /// Forces with a change shortened to the fastest change.
     pub slewed: u64,
-    /// Forces asked for that a motor could not give.
+    /// Forces lowered to the limit of a motor.
     pub saturated: u64,
-    /// Packets of zero force that were sent on stopping.
+    /// Packets of zero force sent at a stop.
     pub farewells: u64,
 }
 
 impl Statistics {
-    /// How many forces became zero for this cause.
+    /// Returns the number of forces that became zero for this cause.
     #[must_use]
     pub const fn zeroed_by(&self, cause: ZeroCause) -> u64 {
         self.zeroed[cause.index()]

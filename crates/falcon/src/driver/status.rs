@@ -6,24 +6,24 @@ use crate::kinematics::Triple;
 use crate::protocol::{Buttons, Leds};
 use crate::safety::{MotorCounts, Verdict, ZeroCause};
 
-/// Where a device stands on its way to giving force.
+/// Progress of a device towards giving force.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Phase {
-    /// No report has come yet.
+    /// No report has arrived yet.
     #[default]
     Silent,
-    /// Not homed: pull the grip fully out, then push it fully in. Red.
+    /// The device is not homed: the user must pull the grip fully out, then push it fully in. Red.
     Homing,
-    /// Homed, and forces are off: pull the grip out to switch them on. Blue.
+    /// The device is homed, and forces are off: the user must pull the grip out to switch them on. Blue.
     Homed,
-    /// Homed, and forces asked for go out. Green.
+    /// The device is homed, and forces go out. Green.
     Active,
-    /// Stopped: no force any more. Red.
+    /// The driver is stopped, and gives no more force. Red.
     Stopped,
 }
 
 impl Phase {
-    /// In a word.
+    /// Returns the name in a word.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -35,7 +35,7 @@ impl Phase {
         }
     }
 
-    /// The lights that show it.
+    /// Returns the lights of the phase.
     #[must_use]
     pub const fn leds(self) -> Leds {
         match self {
@@ -46,51 +46,51 @@ impl Phase {
     }
 }
 
-/// A force that somebody wants, and when.
+/// A wanted force and its time.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Setpoint {
-    /// The force on the grip \[N\].
+    /// Force on the grip \[N\].
     pub force: Triple,
-    /// When it was asked for, on the transport's clock.
+    /// Time at which the force was asked for, on the transport's clock.
     pub at: Instant,
 }
 
-/// Where the grip was.
+/// Position and velocity of the grip at a report.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reading {
-    /// When the report came, on the transport's clock.
+    /// Arrival of the report, on the transport's clock.
     pub at: Instant,
-    /// Position \[m\] from the calibration's origin.
+    /// Position \[m\] relative to the calibration's origin.
     pub position: Triple,
     /// Velocity \[m/s\], estimated by a [`VelocityFilter`](super::VelocityFilter).
     pub velocity: Triple,
 }
 
-/// The status after an exchange.
+/// Status of a device after an exchange.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Status {
-    /// Where the device stands.
+    /// Phase of the device.
     pub phase: Phase,
-    /// Whether the device is homed and the user has switched forces on since: then forces asked for go out.
+    /// Whether the device is homed and the user has switched forces on since then, so that forces go out.
     pub armed: bool,
-    /// Which encoders the device says are homed; none before its first report.
+    /// Homed encoders, as reported by the device; all false before the first report.
     pub homed: [bool; 3],
-    /// The last counts of the encoders.
+    /// Counts of the encoders in the last report.
     pub encoders: [i16; 3],
-    /// Which buttons are pressed.
+    /// Pressed buttons.
     pub buttons: Buttons,
-    /// Where the grip is; `None` unless the device is homed beyond doubt.
+    /// Position and velocity of the grip; `None` unless homing is confirmed.
     pub reading: Option<Reading>,
-    /// The force that went out \[N\].
+    /// Force of the last packet \[N\].
     pub force: Triple,
-    /// Its motor counts.
+    /// Motor counts of the last packet.
     pub motors: MotorCounts,
-    /// What became of the force that was asked for.
+    /// Verdict of the gate on the wanted force.
     pub verdict: Verdict,
 }
 
 impl Status {
-    /// Before the first exchange: nothing is known, and nothing is homed.
+    /// Status before the first exchange, with nothing homed.
     pub(super) const UNKNOWN: Self = Self {
         phase: Phase::Silent,
         armed: false,

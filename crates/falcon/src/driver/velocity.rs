@@ -1,4 +1,4 @@
-//! Velocity from positions that come in steps.
+//! Estimate of velocity from quantised positions.
 
 use core::f64::consts::TAU;
 use core::time::Duration;
@@ -7,13 +7,13 @@ use cohaptic_units::Instant;
 
 use crate::kinematics::Triple;
 
-/// After a pause like this, velocity begins at zero again.
+/// Pause after which the velocity begins at zero again.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Differences of positions over the time between them, through a low-pass filter of first order.
+/// Low-pass filter of first order over differences of positions, divided by the time between them.
 ///
-/// Each update closes the part 1 − exp(−2π·f·Δt) of the gap to the newest difference, so the bandwidth f does not depend on the rate of the updates.
-/// The estimate lags by 1/(2π·f), 5 ms at 30 Hz; one count of an encoder, 0.03 mm, within one millisecond shows as 5 mm/s at 30 Hz instead of 30.
+/// Each update closes the part 1 − exp(−2π·f·Δt) of the gap to the newest difference, so the bandwidth f is independent of the rate of updates. The estimate
+/// lags by 1/(2π·f), 5 ms at 30 Hz. One count of an encoder, 0.03 mm, within one millisecond shows as 5 mm/s at 30 Hz instead of 30 mm/s.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct VelocityFilter {
     bandwidth: f64,
@@ -22,15 +22,16 @@ pub struct VelocityFilter {
 }
 
 impl VelocityFilter {
-    /// At rest. The bandwidth is in \[Hz\].
+    /// Returns a filter at rest with the bandwidth `bandwidth` \[Hz\].
     #[must_use]
     pub const fn new(bandwidth: f64) -> Self {
         Self { bandwidth, last: None, velocity: [0.0; 3] }
     }
 
-    /// Takes a position \[m\]; gives the velocity \[m/s\]. A position of the same instant or an earlier one changes nothing.
+    /// Takes a position \[m\] and returns the velocity \[m/s\]. A position of the same instant or of an earlier instant changes nothing.
     pub fn update(&mut self, at: Instant, position: Triple) -> Triple {
         let Some((before, old)) = self.last else {
+            // The first position has no difference.
             self.last = Some((at, position));
             return self.velocity;
         };
@@ -39,11 +40,13 @@ impl VelocityFilter {
             return self.velocity;
         }
         self.last = Some((at, position));
+        // The difference over a long pause would be a mean velocity of the past, not a present velocity.
         if passed > PAUSE {
             self.velocity = [0.0; 3];
             return self.velocity;
         }
         let seconds = passed.as_secs_f64();
+        // `expm1` keeps the digits of a short step.
         let part = -libm::expm1(-TAU * self.bandwidth * seconds);
         for axis in 0..3 {
             self.velocity[axis] += part * ((position[axis] - old[axis]) / seconds - self.velocity[axis]);
@@ -51,7 +54,7 @@ impl VelocityFilter {
         self.velocity
     }
 
-    /// Forgets everything: positions have jumped.
+    /// Resets the filter to rest, after a jump of positions.
     pub const fn reset(&mut self) {
         (self.last, self.velocity) = (None, [0.0; 3]);
     }
@@ -67,7 +70,7 @@ mod tests {
 
     #[test]
     fn the_answer_to_a_step_of_speed_does_not_depend_on_the_rate() {
-        // A time constant of 16 ms; after it, 1 − 1/e.
+        // The time constant is 16 ms, after which 1 − 1/e of the step is reached.
         for steps in [20_u32, 100, 1000] {
             let mut filter = VelocityFilter::new(1.0 / (TAU * 0.016));
             for step in 0..=steps {
@@ -82,7 +85,7 @@ mod tests {
     fn one_count_within_a_millisecond() {
         let mut filter = VelocityFilter::new(30.0);
         filter.update(at(0), [0.0; 3]);
-        // 0.03 m/s through 1 − exp(−2π·30·0.001) = 0.1718.
+        // The difference of 0.03 m/s passes 1 − exp(−2π·30·0.001) = 0.1718.
         assert!((filter.update(at(1000), [0.03e-3, 0.0, 0.0])[0] - 0.03 * 0.17183).abs() < 1e-5);
     }
 

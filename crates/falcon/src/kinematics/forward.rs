@@ -1,4 +1,4 @@
-//! From the angles of the arms to the position of the grip.
+//! Forward kinematics: from the angles of the arms to the position of the grip.
 
 use thiserror::Error;
 
@@ -6,48 +6,51 @@ use super::leg::Leg;
 use super::linear::{norm, solve};
 use super::{Triple, inverse};
 
-/// The last step of the search is shorter than this \[m\].
+/// Greatest length of the last step of the search \[m\].
 pub const TOLERANCE: f64 = 1e-12;
 
-/// Steps from a good start; Newton needs three to six.
+/// Greatest number of Newton steps from one start. From a good start three to six steps are enough.
 const STEPS: usize = 20;
-/// No step of the search is longer than this \[m\]: from far away the first would throw it behind the device.
+/// Greatest length of a step of the search \[m\]. From far away an unlimited first step would lead to a point behind the device.
 const LONGEST_STEP: f64 = 0.02;
-/// The angles \[rad\] at which the arms must stand when the grip is where the search ended. Tells the branches apart, and is no measure of precision.
+/// Greatest difference \[rad\] between the given angles and the inverse kinematics of the found position. The limit separates the branches of solutions, and
+/// is no measure of precision.
 const SAME_BRANCH: f64 = 1e-6;
-/// Pieces of the way from the angles of [`START`] to those asked for.
+/// Number of pieces of the way from the angles of [`START`] to the given angles.
 const PIECES: u32 = 24;
-/// Where the search begins when nothing better is known \[m\].
+/// Start of the search without a better position \[m\].
 const START: Triple = [0.0, 0.0, 0.11];
 
-/// No position was found. The angles are not those of a device in one piece, or they are at the edge of what it reaches.
+/// Error of angles without a position. The angles do not belong to an intact device, or lie at the edge of its workspace.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[error("no position of the grip has the arms at {angles:?} rad: are the encoders homed?")]
 pub struct ForwardError {
-    /// The angles asked for \[rad\].
+    /// The given angles \[rad\].
     pub angles: Triple,
 }
 
-/// The position \[m\] with the arms at `angles` \[rad\].
+/// Returns the position \[m\] of the grip with the arms at `angles` \[rad\].
 ///
 /// # Errors
 ///
-/// [`ForwardError`] if there is none.
+/// [`ForwardError`] if the angles have no position.
 pub fn forward(angles: Triple) -> Result<Triple, ForwardError> {
     forward_from(angles, START)
 }
 
-/// The same, beginning at a position close to it: the last one known. It makes the search shorter, and its result is the same within [`TOLERANCE`].
+/// Like [`forward`], but starts the search at `last`, the last known position \[m\]. A close start shortens the search, and the result is the same within
+/// [`TOLERANCE`].
 ///
-/// Newton's method on the three constraints. If it fails from there, it goes again from the middle, along the way of the angles.
+/// The search is Newton's method on the three constraints. If it fails from `last`, it starts again at the middle, and follows the angles in small pieces.
 ///
 /// # Errors
 ///
-/// [`ForwardError`] if there is none. Nothing is made up, and no older position is kept.
+/// [`ForwardError`] if the angles have no position. The function never returns an older position instead.
 pub fn forward_from(angles: Triple, last: Triple) -> Result<Triple, ForwardError> {
     newton(angles, last).or_else(|| along_the_way(angles)).ok_or(ForwardError { angles })
 }
 
+/// Solves the three constraints by Newton's method; `None` without convergence or on a wrong branch.
 fn newton(angles: Triple, start: Triple) -> Option<Triple> {
     let mut position = start;
     for _ in 0..STEPS {
@@ -58,13 +61,16 @@ fn newton(angles: Triple, start: Triple) -> Option<Triple> {
         }
         let mut step = solve(&slopes, values);
         let length = norm(step);
+        // A singular matrix gives a step that is not finite.
         if !length.is_finite() {
             return None;
         }
         if length > LONGEST_STEP {
+            // Shortened, the step keeps its direction.
             step = step.map(|part| part * (LONGEST_STEP / length));
         }
         position = core::array::from_fn(|axis| position[axis] - step[axis]);
+        // The convergence is checked before the branch, because the branch has a meaning only at a solution.
         if length < TOLERANCE {
             return is_branch(position, angles).then_some(position);
         }
@@ -72,12 +78,14 @@ fn newton(angles: Triple, start: Triple) -> Option<Triple> {
     None
 }
 
-/// The constraints have other solutions: behind the device, or with a knee inside.
+/// Returns whether a solution is the branch of the device: other solutions lie behind the device or have a knee inside.
 fn is_branch(position: Triple, angles: Triple) -> bool {
     inverse(position).is_some_and(|there| there.iter().zip(angles).all(|(there, angle)| (there - angle).abs() < SAME_BRANCH))
 }
 
+/// Solves from the middle in small pieces of the angles, each from the position of the piece before.
 fn along_the_way(angles: Triple) -> Option<Triple> {
+    // Each piece starts close to its solution, where Newton's method converges on the same branch.
     let from = inverse(START)?;
     let mut position = START;
     for piece in 1..=PIECES {
@@ -108,7 +116,7 @@ mod tests {
             let found = inverse(position).unwrap();
             for arm in 0..3 {
                 assert!((found[arm] - angles[arm]).abs() < 0.51e-12, "{} and {}", found[arm], angles[arm]);
-                // Nine digits are printed; the angle has twelve, and a radian is 1573 counts.
+                // Nine digits are printed. The angle has twelve digits, and a radian is 1573 counts.
                 assert!((count_of_angle(found[arm]) - counts[arm]).abs() < 0.51e-9 + 1e-11, "{} and {}", count_of_angle(found[arm]), counts[arm]);
             }
             assert!(distance(forward(found).unwrap(), position) < 1e-12);
@@ -122,7 +130,7 @@ mod tests {
                 assert!((count_of_angle(angle) - count).abs() < 0.0501, "{z}: {}", count_of_angle(angle));
             }
         }
-        // Encoders at zero.
+        // All encoders at zero.
         assert!(distance(forward([angle_of_count(0.0); 3]).unwrap(), [0.0, 0.0, 0.134_602]) < 0.51e-6);
     }
 
@@ -141,7 +149,7 @@ mod tests {
                 }
             }
         }
-        // The workspace is about 1.3 dm³, a cell 0.064 cm³.
+        // The workspace is about 1.3 dm³, and a cell of the grid 0.064 cm³.
         assert!(places > 10_000, "{places}");
     }
 

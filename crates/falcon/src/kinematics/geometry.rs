@@ -1,38 +1,38 @@
-//! Lengths, angles and counts of the device.
+//! Lengths, angles and encoder counts of the device.
 
 use core::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// Length of an arm, from the motor's drum to the knee \[m\].
 pub(super) const ARM: f64 = 0.060;
-/// Length of the shin, the parallelogram \[m\].
+/// Length of the shin, a parallelogram \[m\].
 pub(super) const SHIN: f64 = 0.1025;
-/// Half the width of the grip's plate, to the end of the shin \[m\].
+/// Half the width of the grip's plate, from the middle to the end of the shin \[m\].
 pub(super) const C: f64 = 0.01443;
-/// The pieces at both ends of the shin, together \[m\]: d + e.
+/// Sum d + e of the end pieces of the shin \[m\].
 pub(super) const ENDS: f64 = 0.01125 + 0.01125;
-/// The shin's end is off the plane of the arm by this \[m\].
+/// Offset of the shin's end from the plane of the arm \[m\].
 pub(super) const F: f64 = -0.025;
-/// The axis of an arm is off the middle by this, along and across the leg \[m\].
+/// Offset r of an arm's axis from the middle, along the leg \[m\].
 pub(super) const R: f64 = 0.0400;
-/// See [`R`].
+/// Offset s of an arm's axis from the middle, across the leg \[m\].
 pub(super) const S: f64 = -0.02309;
 
-/// Where the legs top, right and left stand around the middle \[degrees\], clockwise from the front.
+/// Azimuths of the legs top, right and left around the middle \[degrees\], clockwise from the front.
 pub const AZIMUTHS: [f64; 3] = [105.0, -15.0, -135.0];
-/// What the index of an encoder stands at \[degrees\].
+/// Angle of an arm at the index of its encoder \[degrees\].
 pub const HOME_ANGLE: f64 = 35.0;
-/// Counts of one turn of an arm: 320 slots, four counts each, drums of 110 mm and 14.25 mm.
+/// Encoder counts per turn of an arm: 320 slots with four counts each, and drums of 110 mm and 14.25 mm.
 pub const COUNTS_PER_TURN: f64 = 320.0 * 4.0 * 110.0 / 14.25;
-/// How far an arm turns with each count \[degrees\]: 0.036434659…
+/// Angle of an arm per count \[degrees\]: 0.036434659…
 pub const DEGREES_PER_COUNT: f64 = 360.0 / COUNTS_PER_TURN;
 
-/// The angle of an arm \[rad\] at a count. The count may have a fraction.
+/// Returns the angle of an arm \[rad\] at a count, which may have a fraction.
 #[must_use]
 pub fn angle_of_count(count: f64) -> f64 {
     (count * DEGREES_PER_COUNT + HOME_ANGLE) * (PI / 180.0)
 }
 
-/// The count, with its fraction, at an angle of the arm \[rad\].
+/// Returns the count, with its fraction, at an angle of the arm \[rad\].
 #[must_use]
 pub fn count_of_angle(angle: f64) -> f64 {
     (angle * (180.0 / PI) - HOME_ANGLE) / DEGREES_PER_COUNT
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn drums_and_slots_give_the_published_step() {
-        // Published as 9880.70 counts and 0.036434659 degrees.
+        // The published values are 9880.70 counts and 0.036434659 degrees.
         assert!((COUNTS_PER_TURN - 9880.70).abs() < 0.005);
         assert!((DEGREES_PER_COUNT - 0.036_434_659).abs() < 0.51e-9);
     }

@@ -1,19 +1,20 @@
-//! How angles change with position, and torques with force.
+//! Jacobian of a device: from a change of position to a change of angles, and from a force to torques.
 
 use super::linear::{dot, solve, transposed};
 use super::{Triple, leg::Leg};
 
-/// dθ = J·dp at one position: a row for each arm \[rad/m\].
+/// Jacobian dθ = J·dp at one position, with a row for each arm \[rad/m\].
 ///
-/// The column of z is sin θ2·sin θ3/D. Existing drivers have sin² θ2 there, which makes forces along z up to 37 % too strong and gives them sideways
-/// parts away from the middle (libnifalcon, issue 66).
+/// The column of z is sin θ2·sin θ3/D. Existing drivers use sin² θ2 instead, which makes forces along z up to 37 % too strong, and adds sideways parts away
+/// from the middle (libnifalcon, issue 66).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Jacobian {
     rows: [Triple; 3],
 }
 
 impl Jacobian {
-    /// At a position \[m\]; `None` where the grip cannot be, or where an arm has no say: at the edge of what it reaches.
+    /// Returns the Jacobian at a position \[m\]. `None` where the grip cannot be, and at the edge of the workspace, where an arm has no influence on the
+    /// grip.
     #[must_use]
     pub fn at(position: Triple) -> Option<Self> {
         let mut rows = [[0.0; 3]; 3];
@@ -21,29 +22,31 @@ impl Jacobian {
             let leg = Leg::at(place, position);
             *row = leg.row(leg.arm_angle()?);
         }
+        // At the edge of the workspace a division by zero gives an infinite entry.
         rows.iter().flatten().all(|entry| entry.is_finite()).then_some(Self { rows })
     }
 
-    /// Its rows, one for each arm \[rad/m\].
+    /// Returns the rows, one for each arm \[rad/m\].
     #[must_use]
     pub const fn rows(&self) -> &[Triple; 3] {
         &self.rows
     }
 
-    /// The torques of the arms \[N·m\] that make a force \[N\]: τ = J⁻ᵀ·F. `None` if there are none, or the force is not finite.
+    /// Returns the torques of the arms \[N·m\] that make a force \[N\]: τ = J⁻ᵀ·F. `None` for a singular Jacobian, and for a force that is not finite.
     #[must_use]
     pub fn torques(&self, force: Triple) -> Option<Triple> {
         let torques = solve(&transposed(&self.rows), force);
+        // A singular Jacobian shows as torques that are not finite.
         torques.iter().all(|torque| torque.is_finite()).then_some(torques)
     }
 
-    /// The force \[N\] that torques of the arms \[N·m\] make: F = Jᵀ·τ.
+    /// Returns the force \[N\] of the torques of the arms \[N·m\]: F = Jᵀ·τ.
     #[must_use]
     pub fn force(&self, torques: Triple) -> Triple {
         transposed(&self.rows).map(|column| dot(column, torques))
     }
 
-    /// How fast the arms turn \[rad/s\] when the grip moves \[m/s\].
+    /// Returns the angular velocities of the arms \[rad/s\] at a velocity of the grip \[m/s\].
     #[must_use]
     pub fn turning(&self, velocity: Triple) -> Triple {
         self.rows.map(|row| dot(row, velocity))
@@ -76,7 +79,7 @@ mod tests {
             for (force, wanted) in [([1.0, 0.0, 0.0], sideways), ([0.0, 0.0, 1.0], out)] {
                 let torques = jacobian.torques(force).unwrap();
                 for (found, wanted) in torques.into_iter().zip(wanted) {
-                    // Half of the last digit printed.
+                    // The tolerance is half of the last printed digit.
                     assert!((found - wanted).abs() < 0.51e-12, "{position:?} {force:?}: {found} and {wanted}");
                 }
                 for (found, wanted) in jacobian.force(torques).into_iter().zip(force) {
@@ -88,12 +91,12 @@ mod tests {
 
     #[test]
     fn the_squared_sine_of_existing_drivers_is_not_here() {
-        // On the axis all rows have the same entry for z, and dividing it by sin θ2 once too little makes the force too strong by 1/sin θ2.
-        // The published sizes of the error: 1.37 at z = 0.09, 1.29 at 0.125, 1.13 at 0.16.
+        // On the axis all rows have the same entry for z. One missing division by sin θ2 makes the force too strong by 1/sin θ2. The published sizes of the
+        // error are 1.37 at z = 0.09, 1.29 at 0.125, and 1.13 at 0.16.
         for (z, gain) in [(0.09, 1.37), (0.11, 1.34), (0.125, 1.29), (0.14, 1.22), (0.16, 1.13)] {
             let position = [0.0, 0.0, z];
             let theta1 = inverse(position).unwrap()[0];
-            // u + c on the axis is −r + c, and L from the constraint.
+            // On the axis u + c is −r + c, and L follows from the constraint.
             let (along, out) = (-0.04 + 0.01443 - 0.06 * libm::cos(theta1), z - 0.06 * libm::sin(theta1));
             let sin_theta2 = out / libm::hypot(along, out);
             assert!((1.0 / sin_theta2 - gain).abs() < 0.006, "at {z}: {}", 1.0 / sin_theta2);

@@ -1,11 +1,11 @@
-//! Three equations with three unknowns.
+//! Linear equations with three unknowns.
 
 use super::Triple;
 
-/// Solves `matrix · x = right`. The numbers are not finite if the matrix is singular.
+/// Solves `matrix · x = right`. The result is not finite for a singular matrix.
 pub(super) fn solve(matrix: &[Triple; 3], right: Triple) -> Triple {
     let [a, b, c] = *matrix;
-    // Cramer: the columns of the inverse are cross products of rows, over the determinant.
+    // Cramer's rule: the columns of the inverse are cross products of rows, divided by the determinant.
     let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
     let determinant = dot(a, bc);
     core::array::from_fn(|axis| (bc[axis] * right[0] + ca[axis] * right[1] + ab[axis] * right[2]) / determinant)

@@ -1,15 +1,15 @@
-//! Where the grip may be used.
+//! Usable workspace of the grip.
 
 use core::f64::consts::PI;
 
 use super::{Jacobian, Triple, inverse};
 
-/// The angles between which an arm is used \[rad\]: −25° to 90°.
+/// Least and greatest usable angle of an arm \[rad\]: −25° and 90°.
 pub const ANGLE_LIMITS: [f64; 2] = [-25.0 * PI / 180.0, PI / 2.0];
 
-/// Whether the grip can be at a position \[m\] with every arm within [`ANGLE_LIMITS`] and able to push.
+/// Returns whether the grip can be at a position \[m\] with every arm within [`ANGLE_LIMITS`] and able to push.
 ///
-/// Around the axis that is a radius of 92 mm at z = 0.10 m, 80 mm at 0.125, 61 mm at 0.15 and 33 mm at 0.17.
+/// Around the axis the usable radius is 92 mm at z = 0.10 m, 80 mm at 0.125, 61 mm at 0.15 and 33 mm at 0.17.
 #[must_use]
 pub fn is_usable(position: Triple) -> bool {
     let [lowest, highest] = ANGLE_LIMITS;
@@ -20,7 +20,7 @@ pub fn is_usable(position: Triple) -> bool {
 mod tests {
     use super::*;
 
-    /// The radius up to which every direction is usable, in whole millimetres.
+    /// Returns the radius up to which every direction is usable, in whole millimetres.
     fn radius(z: f64) -> u32 {
         let round = |millimetres: u32| {
             (0..360).all(|degree| {
@@ -28,6 +28,7 @@ mod tests {
                 is_usable([radius * libm::cos(angle), radius * libm::sin(angle), z])
             })
         };
+        // The first radius that fails ends the count, even if a larger radius were usable again.
         (0..150).take_while(|millimetres| round(*millimetres)).last().unwrap_or(0)
     }
 

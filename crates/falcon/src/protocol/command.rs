@@ -1,30 +1,30 @@
-//! What the host tells the device: motors, lights, and whether to stay homed.
+//! Packets from the host to the device: motors, lights, and the homing bit.
 
 use thiserror::Error;
 
 use super::{PACKET, nibbles};
 use crate::safety::MotorCounts;
 
-/// The lights of the logo, in the order of the control bits as existing drivers send them (0x2 green, 0x4 blue, 0x8 red). The order of the colours is
-/// not confirmed on hardware.
+/// Lights of the logo, in the order of the control bits as sent by existing drivers (0x2 green, 0x4 blue, 0x8 red). The order of the colours is not confirmed
+/// on hardware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Leds {
-    /// Red: not homed, by habit.
+    /// Red. By convention, the device is not homed.
     pub red: bool,
-    /// Green: forces are on, by habit.
+    /// Green. By convention, forces are on.
     pub green: bool,
-    /// Blue: homed, forces are off, by habit.
+    /// Blue. By convention, the device is homed and forces are off.
     pub blue: bool,
 }
 
 impl Leds {
-    /// All dark.
+    /// All lights off.
     pub const OFF: Self = Self { red: false, green: false, blue: false };
-    /// Red alone.
+    /// The red light alone.
     pub const RED: Self = Self { red: true, ..Self::OFF };
-    /// Green alone.
+    /// The green light alone.
     pub const GREEN: Self = Self { green: true, ..Self::OFF };
-    /// Blue alone.
+    /// The blue light alone.
     pub const BLUE: Self = Self { blue: true, ..Self::OFF };
 
     const fn bits(self) -> u8 {
@@ -36,35 +36,36 @@ impl Leds {
     }
 }
 
+/// Control bit of [`Command::homing`].
 const HOMING: u8 = 0x1;
 
-/// A packet to the device. Its motors are [`MotorCounts`], which only the [force gate](crate::safety::ForceGate) hands out.
+/// A packet to the device. Its motor counts are [`MotorCounts`], which only the [force gate](crate::safety::ForceGate) makes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Command {
-    /// What the motors are told.
+    /// Counts of the motors.
     pub motors: MotorCounts,
-    /// The lights.
+    /// Lights of the logo.
     pub leds: Leds,
-    /// Must be set in every packet: a device that is told otherwise forgets that it was homed.
+    /// Homing bit. Must be set in every packet: a packet without it makes the device forget its homing.
     pub homing: bool,
 }
 
 impl Command {
-    /// Its 16 bytes.
+    /// Returns the 16 bytes of the packet.
     #[must_use]
     pub fn encode(&self) -> [u8; PACKET] {
         CommandParts { motors: self.motors.get(), leds: self.leds, homing: self.homing }.encode()
     }
 }
 
-/// What a device reads from a packet: numbers that nobody vouches for. A simulator needs it.
+/// Contents of a packet as read by a device, with motor counts from any source. Used by the simulator.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct CommandParts {
     /// Counts of the motors top, right, left.
     pub motors: [i16; 3],
-    /// The lights.
+    /// Lights of the logo.
     pub leds: Leds,
-    /// Whether the device is to stay homed.
+    /// Homing bit.
     pub homing: bool,
 }
 
@@ -73,11 +74,11 @@ impl CommandParts {
         nibbles::packet(self.motors, self.leds.bits() | if self.homing { HOMING } else { 0 })
     }
 
-    /// Reads a packet. The byte before the last carries nothing and is not looked at.
+    /// Reads a packet. The byte before the last carries no data and is ignored.
     ///
     /// # Errors
     ///
-    /// [`DecodeCommandError`] at the first byte that cannot be there.
+    /// [`DecodeCommandError`] with the first byte that is not allowed at its place.
     pub fn decode(packet: &[u8; PACKET]) -> Result<Self, DecodeCommandError> {
         let wrong = |at: usize| DecodeCommandError { at, found: packet[at] };
         let (motors, control) = nibbles::contents(packet, nibbles::is_letter).map_err(wrong)?;
@@ -85,13 +86,13 @@ impl CommandParts {
     }
 }
 
-/// A byte that cannot stand where it stands in a command.
+/// Error of a byte that is not allowed at its place in a command.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[error("byte {at} of the command is {found:#04x}, which cannot be there")]
 pub struct DecodeCommandError {
-    /// Its place in the packet, from 0.
+    /// Index of the byte in the packet, from 0.
     pub at: usize,
-    /// The byte.
+    /// Value of the byte.
     pub found: u8,
 }
 
@@ -100,7 +101,7 @@ mod tests {
     use super::nibbles::BASE;
     use super::*;
 
-    /// Captured from Novint's own library, as listed in libnifalcon's util/translate_packet.py.
+    /// Packets captured from Novint's own library, as listed in libnifalcon's util/translate_packet.py.
     const CAPTURED: [([u8; PACKET], [i16; 3]); 4] = [
         (*b"<PLPPIIAABGPPEA>", [-65, 136, -159]),
         (*b"<JFNPBOJAKLIPEA>", [-679, 2529, -1862]),

@@ -1,14 +1,14 @@
-//! Finds packets in a stream of bytes that may have lost, gained or changed some.
+//! Search for packets in a stream of bytes with lost, added and changed bytes.
 
 use super::report::is_status;
 use super::{CommandParts, END, PACKET, Report, START, nibbles};
 
 /// A kind of packet that a [`Framer`] looks for.
 pub trait Frame: Sized {
-    /// Whether this byte can be the status or control byte, the thirteenth after the start.
+    /// Returns whether the byte can be the status or control byte at index 13.
     fn is_thirteenth(byte: u8) -> bool;
 
-    /// Reads a packet of which every byte can be where it is.
+    /// Reads a packet in which every byte is allowed at its place.
     fn read(packet: &[u8; PACKET]) -> Option<Self>;
 }
 
@@ -32,12 +32,12 @@ impl Frame for CommandParts {
     }
 }
 
-/// Bytes in, packets out. It holds at most the beginning of one packet, in a fixed buffer, and never allocates.
+/// Finds packets in a stream of bytes. The framer holds at most the beginning of one packet in a fixed buffer, and never allocates.
 ///
-/// Every byte is checked when it comes. At the first that cannot be where it would be, the start of the supposed packet is thrown away and the search
-/// goes on at the next `<` among the bytes held. No byte of a packet but its first can be `<`, apart from the one of unknown meaning before the last,
-/// which `>` follows and no packet can begin with; so a whole packet is always found, whatever came before it. There is no checksum: a
-/// byte changed into another that can be there is not noticed here.
+/// Every byte is checked at its arrival. At the first byte that is not allowed at its place, the start of the supposed packet is discarded, and the search
+/// continues at the next `<` among the held bytes. Within a packet, only the first byte can be `<`, except for the byte of unknown meaning at index 14, which
+/// is followed by `>` and so cannot begin a packet. A complete packet is therefore always found, whatever bytes precede it. The protocol has no checksum: a
+/// byte changed into another allowed byte is not detected here.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Framer {
     held: [u8; PACKET],
@@ -46,13 +46,13 @@ pub struct Framer {
 }
 
 impl Framer {
-    /// Nothing held.
+    /// Returns a framer without held bytes.
     #[must_use]
     pub const fn new() -> Self {
         Self { held: [0; PACKET], count: 0, garbage: 0 }
     }
 
-    /// Takes a byte; gives the packet that it completes.
+    /// Takes a byte, and returns the packet that the byte completes.
     pub fn push<F: Frame>(&mut self, byte: u8) -> Option<F> {
         self.held[self.count] = byte;
         self.count += 1;
@@ -67,27 +67,28 @@ impl Framer {
         F::read(&self.held)
     }
 
-    /// Bytes thrown away since the beginning: those that belonged to no whole packet.
+    /// Returns the number of discarded bytes, which belonged to no complete packet.
     #[must_use]
     pub const fn garbage(&self) -> u64 {
         self.garbage
     }
 
-    /// Bytes held, of a packet that is not whole yet.
+    /// Returns the number of held bytes of an incomplete packet.
     #[must_use]
     pub const fn held(&self) -> usize {
         self.count
     }
 
-    /// Throws the held bytes away, as garbage: after a purge nothing will complete it.
+    /// Discards the held bytes as garbage: after a purge no later byte completes them.
     pub fn reset(&mut self) {
         self.garbage += self.count as u64;
         self.count = 0;
     }
 
-    /// Throws bytes away from the front until the rest can be the beginning of a packet.
+    /// Discards bytes from the front until the rest can be the beginning of a packet.
     fn realign<F: Frame>(&mut self) {
         loop {
+            // The byte at index 0 did not begin a packet, so the search starts at index 1.
             let next = (1..self.count).find(|at| self.held[*at] == START).unwrap_or(self.count);
             self.held.copy_within(next..self.count, 0);
             self.count -= next;
@@ -105,6 +106,7 @@ impl Default for Framer {
     }
 }
 
+/// Returns whether a byte is allowed at the index `at` of a packet.
 fn fits<F: Frame>(at: usize, byte: u8) -> bool {
     match at {
         0 => byte == START,
@@ -134,7 +136,7 @@ mod tests {
         })
     }
 
-    /// Garbage that looks like packets more often than chance has it.
+    /// Returns garbage that resembles packets more often than random bytes do.
     fn garbage() -> impl Strategy<Value = Vec<u8>> {
         vec(prop_oneof![Just(START), Just(END), b'A'..=b'P', any::<u8>()], 0..80)
     }
@@ -154,6 +156,7 @@ mod tests {
     fn the_unknown_byte_may_be_anything() {
         for byte in 0..=u8::MAX {
             let mut packet = Report::default().encode();
+            // Also `<` and `>`: the framer must not take this byte for a border of a packet.
             packet[14] = byte;
             let mut framer = Framer::new();
             assert_eq!(all(&mut framer, &[packet, packet].concat()), [Report::default(); 2], "{byte:#x}");
@@ -169,7 +172,7 @@ mod tests {
             let before = all(&mut framer, &garbage).len();
             let found = all(&mut framer, &report.encode());
             prop_assert_eq!(found, [report]);
-            // Every byte is part of a packet, held or counted.
+            // Every byte is part of a packet, held or counted as garbage.
             prop_assert_eq!(framer.held(), 0);
             prop_assert_eq!(framer.garbage() + (before * PACKET) as u64, garbage.len() as u64);
         }

@@ -1,8 +1,8 @@
-//! The packets of the running firmware: 16 bytes out cause 16 bytes in.
+//! Packets of the running firmware. A packet of 16 bytes to the device causes a report of 16 bytes.
 //!
-//! A packet is `<`, 14 bytes of payload, `>`. Numbers are sixteen bits in two's complement, four bytes each, least significant nibble first, and each
-//! nibble travels as its value plus [`nibbles::BASE`]. So no byte of a number can be `<` or `>`, and a stream that lost its place can find it again:
-//! see [`Framer`].
+//! A packet is `<`, 14 bytes of payload, and `>`. A number has sixteen bits in two's complement and four bytes, the least significant nibble first; each
+//! nibble is sent as its value plus [`nibbles::BASE`]. No byte of a number can therefore be `<` or `>`, and a receiver that has lost its place in the stream
+//! can find it again: see [`Framer`].
 
 mod command;
 mod framer;
@@ -13,9 +13,9 @@ pub use command::{Command, CommandParts, DecodeCommandError, Leds};
 pub use framer::{Frame, Framer};
 pub use report::{Buttons, DecodeReportError, Report};
 
-/// The length of a packet, both ways \[bytes\].
+/// Length of a packet in either direction \[bytes\].
 pub const PACKET: usize = 16;
-/// The first byte of a packet.
+/// First byte of a packet.
 pub const START: u8 = b'<';
-/// The last byte of a packet.
+/// Last byte of a packet.
 pub const END: u8 = b'>';

@@ -2,17 +2,17 @@
 
 use super::{END, PACKET, START};
 
-/// The offset of a nibble: 0 travels as `A`, 15 as `P`.
+/// Offset of a nibble: 0 is sent as `A`, 15 as `P`.
 pub const BASE: u8 = b'A';
 
-/// Four letters for a number, least significant nibble first.
+/// Returns the four letters of a number, the least significant nibble first.
 #[must_use]
 pub const fn encode(value: i16) -> [u8; 4] {
     let [low, high] = value.to_le_bytes();
     [BASE + (low & 0xF), BASE + (low >> 4), BASE + (high & 0xF), BASE + (high >> 4)]
 }
 
-/// The number of four letters; `None` if one of them is not within `A` to `P`.
+/// Returns the number of four letters; `None` for a letter outside of `A` to `P`.
 #[must_use]
 pub const fn decode(letters: [u8; 4]) -> Option<i16> {
     let [a, b, c, d] = letters;
@@ -22,13 +22,13 @@ pub const fn decode(letters: [u8; 4]) -> Option<i16> {
     Some(i16::from_le_bytes([(a - BASE) | ((b - BASE) << 4), (c - BASE) | ((d - BASE) << 4)]))
 }
 
-/// Whether a byte stands for a nibble.
+/// Returns whether a byte stands for a nibble.
 #[must_use]
 pub const fn is_letter(byte: u8) -> bool {
     byte >= BASE && byte <= BASE + 0xF
 }
 
-/// A packet: three numbers at the places 1 to 12, and an addend of the base at place 13.
+/// Returns a packet with three numbers at the indexes 1 to 12, and `thirteenth` plus the base at index 13.
 pub(super) fn packet(values: [i16; 3], thirteenth: u8) -> [u8; PACKET] {
     let mut packet = [BASE; PACKET];
     packet[0] = START;
@@ -40,8 +40,8 @@ pub(super) fn packet(values: [i16; 3], thirteenth: u8) -> [u8; PACKET] {
     packet
 }
 
-/// The numbers of a packet and the addend of the base at place 13, or the place of the first byte that cannot be there. The byte before the last is not
-/// looked at.
+/// Returns the three numbers of a packet and the value at index 13 without the base, or the index of the first byte that is not allowed at its place. The
+/// byte at index 14 is ignored.
 pub(super) fn contents(packet: &[u8; PACKET], is_thirteenth: impl Fn(u8) -> bool) -> Result<([i16; 3], u8), usize> {
     let is_wrong = |at: usize| match at {
         0 => packet[at] != START,
@@ -55,6 +55,7 @@ pub(super) fn contents(packet: &[u8; PACKET], is_thirteenth: impl Fn(u8) -> bool
     }
     let mut values = [0; 3];
     for (place, value) in packet[1..13].chunks_exact(4).zip(&mut values) {
+        // The letters are checked above, so the default is never used.
         *value = decode([place[0], place[1], place[2], place[3]]).unwrap_or_default();
     }
     Ok((values, packet[13] - BASE))
@@ -73,7 +74,7 @@ mod tests {
 
     #[test]
     fn the_published_example() {
-        // JFKP is 0xFA59.
+        // The letters JFKP are 0xFA59.
         assert_eq!(decode(*b"JFKP"), Some(-1447));
         assert_eq!(encode(-1447), *b"JFKP");
         assert_eq!(encode(0), *b"AAAA");

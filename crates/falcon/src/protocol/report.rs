@@ -1,45 +1,45 @@
-//! What the device answers: encoders, homed bits, buttons.
+//! Packets from the device to the host: encoders, homed bits, buttons.
 
 use thiserror::Error;
 
 use super::PACKET;
 use super::nibbles::{self, BASE};
 
-/// The buttons of the standard grip, seen from the front.
+/// Buttons of the standard grip, as seen from the front.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Buttons(u8);
 
 impl Buttons {
-    /// None is pressed.
+    /// No button.
     pub const NONE: Self = Self(0);
-    /// Far right: plus.
+    /// The far right button: plus.
     pub const PLUS: Self = Self(0x1);
-    /// Forward: lightning.
+    /// The front button: lightning.
     pub const FORWARD: Self = Self(0x2);
-    /// Centre: the logo.
+    /// The centre button: the logo.
     pub const CENTRE: Self = Self(0x4);
-    /// Far left: minus.
+    /// The far left button: minus.
     pub const MINUS: Self = Self(0x8);
 
-    /// The buttons of the low four bits; higher ones are not looked at.
+    /// Returns the buttons of the low four bits. Higher bits are ignored.
     #[must_use]
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits & 0xF)
     }
 
-    /// A bit for each button that is pressed.
+    /// Returns a bit for each pressed button.
     #[must_use]
     pub const fn bits(self) -> u8 {
         self.0
     }
 
-    /// Whether all buttons of `other` are pressed.
+    /// Returns whether all buttons of `other` are pressed.
     #[must_use]
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// These and those.
+    /// Returns the union of both sets of buttons.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -49,33 +49,34 @@ impl Buttons {
 /// A packet from the device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Report {
-    /// Counts of the encoders top, right, left. Without meaning until the encoder is homed.
+    /// Counts of the encoders top, right, left. A count has no meaning until its encoder is homed.
     pub encoders: [i16; 3],
-    /// Which encoders have passed their index since power-on.
+    /// Whether the encoder has passed its index since power-on, for each encoder.
     pub homed: [bool; 3],
-    /// Which buttons are pressed.
+    /// Pressed buttons.
     pub buttons: Buttons,
 }
 
 impl Report {
-    /// Whether all encoders are homed.
+    /// Returns whether all encoders are homed.
     #[must_use]
     pub const fn all_homed(&self) -> bool {
         self.homed[0] && self.homed[1] && self.homed[2]
     }
 
-    /// Its 16 bytes, as the device would send them. The byte of which nobody knows the meaning is that of zero.
+    /// Returns the 16 bytes as sent by a device. The byte of unknown meaning is a nibble of zero.
     #[must_use]
     pub fn encode(&self) -> [u8; PACKET] {
+        // The first encoder has the lowest homed bit.
         let homed = self.homed.iter().rev().fold(0, |bits, homed| bits << 1 | u8::from(*homed));
         nibbles::packet(self.encoders, self.buttons.bits() | homed << 4)
     }
 
-    /// Reads a packet. The byte before the last is not looked at: its meaning is unknown.
+    /// Reads a packet. The byte before the last is ignored, because its meaning is unknown.
     ///
     /// # Errors
     ///
-    /// [`DecodeReportError`] at the first byte that cannot be there.
+    /// [`DecodeReportError`] with the first byte that is not allowed at its place.
     pub fn decode(packet: &[u8; PACKET]) -> Result<Self, DecodeReportError> {
         let wrong = |at: usize| DecodeReportError { at, found: packet[at] };
         let (encoders, status) = nibbles::contents(packet, is_status).map_err(wrong)?;
@@ -83,18 +84,18 @@ impl Report {
     }
 }
 
-/// Whether a byte can be the status: four buttons and three homed bits, so up to 0x41 + 0x7F.
+/// Returns whether a byte can be the status byte: four buttons and three homed bits, so at most 0x41 + 0x7F.
 pub(super) const fn is_status(byte: u8) -> bool {
     byte >= BASE && byte <= BASE + 0x7F
 }
 
-/// A byte that cannot stand where it stands in a report.
+/// Error of a byte that is not allowed at its place in a report.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[error("byte {at} of the report is {found:#04x}, which cannot be there")]
 pub struct DecodeReportError {
-    /// Its place in the packet, from 0.
+    /// Index of the byte in the packet, from 0.
     pub at: usize,
-    /// The byte.
+    /// Value of the byte.
     pub found: u8,
 }
 

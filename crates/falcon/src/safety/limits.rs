@@ -1,27 +1,27 @@
-//! What a force must keep to.
+//! Limits of forces.
 
 use core::time::Duration;
 
 use thiserror::Error;
 
-/// Limits that every force keeps to.
+/// Limits of every force.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Limits {
-    /// The largest force \[N\], by its length.
+    /// Greatest length of a force \[N\].
     pub force: f64,
-    /// The fastest change of force \[N/s\], by its length, when it goes on. Going off is at once.
+    /// Fastest change of an admitted force \[N/s\], by the length of the change. A force that the gate zeroes drops at once.
     pub slew: f64,
-    /// A force asked for longer ago than this is no force.
+    /// Age of a setpoint above which the force is zero.
     pub setpoint_age: Duration,
-    /// If the newest report of the device is older than this there is no force.
+    /// Age of the newest report above which the force is zero.
     pub reading_age: Duration,
-    /// If the loop pauses longer than this, its next force is zero.
+    /// Pause of the loop above which the next force is zero.
     pub gap: Duration,
 }
 
 impl Limits {
-    /// 4 N, which is half of what the device is said to give; 1000 N/s; no force 50 ms after it was last asked for, 10 ms after the last report,
-    /// and after a pause of 20 ms.
+    /// Default values: 4 N, which is half of the force that the device is said to give; 1000 N/s; zero force 50 ms after the last setpoint, 10 ms after the
+    /// last report, and after a pause of 20 ms.
     pub const DEFAULT: Self = Self {
         force: 4.0,
         slew: 1000.0,
@@ -30,11 +30,11 @@ impl Limits {
         gap: Duration::from_millis(20),
     };
 
-    /// The same, if they make sense.
+    /// Returns the limits if all numbers are within their ranges.
     ///
     /// # Errors
     ///
-    /// [`LimitsError`] names the first that does not.
+    /// [`LimitsError`] with the first limit out of range.
     pub fn checked(self) -> Result<Self, LimitsError> {
         if !(0.0..=20.0).contains(&self.force) {
             return Err(LimitsError::Force(self.force));
@@ -51,7 +51,7 @@ impl Limits {
     }
 }
 
-/// A limit that makes no sense.
+/// Error of a limit out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum LimitsError {

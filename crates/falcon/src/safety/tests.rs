@@ -14,7 +14,7 @@ fn at(milliseconds: u64) -> Instant {
     Instant::ZERO + Duration::from_millis(milliseconds)
 }
 
-/// A moment at which everything is well.
+/// Returns a moment at which every check passes.
 fn well(now: Instant) -> Moment {
     Moment { now, homed: true, armed: true, reading_at: Some(now), setpoint_at: Some(now), position: Some(CENTRE) }
 }
@@ -27,7 +27,7 @@ fn length(v: Triple) -> f64 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 
-/// The cause, and that nothing went out.
+/// Returns the cause, and asserts that no force went out.
 fn cause(admitted: Admitted) -> ZeroCause {
     assert_eq!((admitted.force, admitted.motors), ([0.0; 3], MotorCounts::ZERO));
     match admitted.verdict {
@@ -47,7 +47,7 @@ fn force_comes_up_as_fast_as_it_may_and_no_faster() {
 
 #[test]
 fn counts_are_those_of_the_design_page() {
-    // 0.024180165286 N·m for 1 N along z at z = 0.110, and 10000 counts per N·m, with the sign turned: −241.8.
+    // The force of 1 N along z at z = 0.110 has 0.024180165286 N·m. With 10000 counts per N·m and the opposite sign, this is −241.8 counts.
     let mut gate = gate(Limits { slew: 1e6, ..Limits::DEFAULT });
     let place = |now| Moment { position: Some([0.0, 0.0, 0.110]), ..well(now) };
     gate.admit([0.0; 3], &place(at(0)));
@@ -66,7 +66,7 @@ fn a_motor_at_its_end_lowers_the_others_alike() {
     assert_eq!(large.iter().map(|count| count.abs()).max(), Some(MOTOR_LIMIT));
     let scale = f64::from(large[1]) / f64::from(small[1]);
     for (small, large) in small.into_iter().zip(large) {
-        // Half a count of rounding, scaled.
+        // The tolerance is the rounding of half a count, scaled.
         assert!((f64::from(small) * scale - f64::from(large)).abs() < scale.abs() + 1.0);
     }
 }
@@ -96,7 +96,7 @@ fn each_reason_alone_makes_zero_at_once() {
     for (moment, expected) in moments {
         let mut gate = up();
         assert_eq!(cause(gate.admit(strong, &moment)), expected);
-        // It comes back from zero.
+        // After zero, the force grows from zero.
         let again = gate.admit(strong, &well(moment.now));
         assert_eq!(again.force, [0.0; 3]);
     }
@@ -146,7 +146,7 @@ fn moments() -> impl Strategy<Value = (Triple, Moment, u64, bool)> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is asked for, in whatever order: an independent statement of every promise.
+    /// Every promise of the gate, stated independently, for any sequence of forces.
     #[test]
     fn promises_hold(steps in vec(moments(), 1..60), force in 0.0..20.0, slew in 1.0..1e5) {
         let limits = Limits { force, slew, ..Limits::DEFAULT };
@@ -159,7 +159,7 @@ proptest! {
             }
             now += Duration::from_nanos(step);
             moment.now = now;
-            // Ages were drawn; turn them into instants.
+            // The generator draws ages; the gate takes instants.
             let ages = [moment.reading_at, moment.setpoint_at].map(|age| age.map(|age| age.as_nanos()));
             let instants = ages.map(|age| age.map(|age| Instant::from_nanos(now.as_nanos() - age)));
             [moment.reading_at, moment.setpoint_at] = instants;

@@ -1,4 +1,4 @@
-//! The FT232R: bytes take their time on the wire, and go to the host in packets, when one is full or the latency timer ends.
+//! Simulated FT232R chip: bytes take their time on the wire, and go to the host in packets, when a packet is full or the latency timer ends.
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -7,22 +7,24 @@ use cohaptic_units::Instant;
 
 use crate::ftdi::{BAUD_RUNNING, PACKET, PAYLOAD, STATUS, byte_time};
 
-/// What a chip without complaints puts before every payload.
+/// Status bytes of a chip without errors, at the beginning of every packet.
 const STATUS_BYTES: [u8; STATUS] = [0x01, 0x60];
-/// Room that is never outgrown in ordinary use, so that nothing is allocated on the way.
+/// Initial capacity of the queues \[bytes\], enough for ordinary use, so that no allocation happens later.
 const ROOM: usize = 4096;
 
 #[derive(Clone, Debug)]
 pub(super) struct Chip {
     divisor: u16,
     latency: Duration,
-    /// When each byte will have reached the device.
+    /// Bytes on the way to the device, each with the time of its arrival.
     to_device: VecDeque<(Instant, u8)>,
-    /// When each byte will have reached the chip.
+    /// Bytes on the way to the host, each with the time of its arrival at the chip.
     to_host: VecDeque<(Instant, u8)>,
+    /// Arrival of the last byte sent to the device.
     last_to_device: Instant,
+    /// Arrival of the last byte sent to the host.
     last_to_host: Instant,
-    /// When the timer was last restarted: at every packet.
+    /// Time of the last restart of the latency timer, which every packet restarts.
     timer: Instant,
 }
 
@@ -52,6 +54,7 @@ impl Chip {
     }
 
     pub(super) fn send_to_device(&mut self, now: Instant, byte: u8) {
+        // The wire carries one byte at a time, so a byte starts after the byte before it.
         self.last_to_device = self.last_to_device.max(now) + byte_time(self.divisor);
         self.to_device.push_back((self.last_to_device, byte));
     }
@@ -71,13 +74,16 @@ impl Chip {
 
     pub(super) fn next_packet(&self) -> Instant {
         let timer = self.timer.saturating_add(self.latency);
+        // The packet is full with the last byte of its payload; an earlier end of the timer sends it as it is.
         self.to_host.get(PAYLOAD - 1).map_or(timer, |(full, _)| timer.min(*full))
     }
 
-    /// Fills a packet with what has come, at most `most` bytes if a fragment is wanted.
+    /// Fills a packet with the arrived bytes, at most `most` bytes for a fragment, and returns the length of the packet with its status bytes.
     pub(super) fn take_packet(&mut self, now: Instant, into: &mut [u8; PACKET], most: Option<usize>) -> usize {
+        // Every packet restarts the latency timer, also an empty one.
         self.timer = now;
         into[..STATUS].copy_from_slice(&STATUS_BYTES);
+        // Status bytes are part of every packet, also of a fragment.
         let room = most.unwrap_or(PAYLOAD).min(PAYLOAD);
         let mut length = STATUS;
         while length < STATUS + room
@@ -92,6 +98,7 @@ impl Chip {
     }
 
     pub(super) fn purge_to_host(&mut self, now: Instant) {
+        // Bytes that are still on the wire have not reached the chip's buffer.
         self.to_host.retain(|(at, _)| *at > now);
     }
 
@@ -120,7 +127,7 @@ mod tests {
         let mut packet = [0; PACKET];
         assert_eq!(chip.take_packet(micros(1000), &mut packet, None), 18);
         assert_eq!(packet[..18], [1, 0x60, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
-        // Nothing more: an empty packet at the next end of the timer.
+        // Without further bytes, an empty packet follows at the next end of the timer.
         assert_eq!(chip.next_packet(), micros(2000));
         assert_eq!(chip.take_packet(micros(2000), &mut packet, None), 2);
     }

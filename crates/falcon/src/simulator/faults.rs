@@ -1,28 +1,28 @@
-//! How a simulated device fails, and the random numbers for it.
+//! Faults of a simulated device, and their random numbers.
 
-/// Faults, each with its probability. All of them are drawn from the seed, so a run can be repeated.
+/// Faults, each with its probability. Random numbers come from the seed, so a run can be repeated.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
-    /// A byte to the host gets lost.
+    /// Loss of a byte to the host.
     pub drop_to_host: f64,
-    /// A bit of a byte to the host is flipped.
+    /// A flipped bit in a byte to the host.
     pub garble_to_host: f64,
-    /// A byte that nobody sent comes before a byte to the host.
+    /// An additional random byte before a byte to the host.
     pub insert_to_host: f64,
-    /// A byte to the device gets lost.
+    /// Loss of a byte to the device.
     pub drop_to_device: f64,
-    /// A bit of a byte to the device is flipped.
+    /// A flipped bit in a byte to the device.
     pub garble_to_device: f64,
-    /// A packet to the host holds 0 to 15 of the bytes that are due; the others come with the next.
+    /// A packet to the host that contains only 0 to 15 of the due bytes. The further bytes come with the next packet.
     pub fragment: f64,
-    /// The device hears, and answers nothing.
+    /// Whether the device receives packets and sends no answers.
     pub mute: bool,
-    /// The boot loader sends this byte of the firmware back wrong, counted from 0, in the first attempt.
+    /// Index of the firmware byte, from 0, that the boot loader returns wrong in the first attempt.
     pub wrong_echo: Option<usize>,
 }
 
 impl Faults {
-    /// None.
+    /// No faults.
     pub const NONE: Self = Self {
         drop_to_host: 0.0,
         garble_to_host: 0.0,
@@ -35,7 +35,7 @@ impl Faults {
     };
 }
 
-/// Random numbers: `SplitMix64` (Steele, Lea & Flood 2014).
+/// Random number generator `SplitMix64` (Steele, Lea & Flood 2014).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dice(u64);
 
@@ -56,18 +56,19 @@ impl Dice {
         self.word().to_le_bytes()[7]
     }
 
-    /// An event of that probability. What cannot happen draws nothing.
+    /// Returns whether an event of that probability happens. An impossible event draws no number, so that unused faults do not change a run.
     pub(super) fn happens(&mut self, probability: f64) -> bool {
         #[expect(clippy::cast_precision_loss, reason = "53 bits, exactly")]
         let uniform = |word: u64| (word >> 11) as f64 / (1_u64 << 53) as f64;
         probability > 0.0 && uniform(self.word()) < probability
     }
 
-    /// What becomes of a byte on its way.
+    /// Returns a byte after its transmission; `None` for a lost byte.
     pub(super) fn pass(&mut self, byte: u8, drop: f64, garble: f64) -> Option<u8> {
         if self.happens(drop) {
             return None;
         }
+        // One flipped bit: the framer can detect some, but not all, of the results.
         Some(if self.happens(garble) { byte ^ (1 << (self.byte() % 8)) } else { byte })
     }
 }

@@ -1,4 +1,4 @@
-//! A Falcon that is not there: it speaks the same bytes, moves as a mass in somebody's hand, and fails as asked.
+//! Simulated Falcon: the bytes of the real device, a mass in a hand, and faults on demand.
 //!
 //! ```text
 //!   host ── bytes ──► chip ──► boot loader / firmware ──► motors ──► mass, friction, end stops ◄── hand
@@ -6,8 +6,8 @@
 //!                                              └── encoders, index, buttons ◄───┘
 //! ```
 //!
-//! [`Simulator`] knows no clock: time is an argument. [`SimulatedTransport`] gives it one, virtual or that of the machine, and is what a driver is given.
-//! Each unknown of the device is a number of [`SimulatorConfig`].
+//! [`Simulator`] has no clock: time is an argument. [`SimulatedTransport`] adds a virtual clock or the machine's clock, and connects a driver. Each unknown
+//! property of the device is a parameter of [`SimulatorConfig`].
 
 mod chip;
 mod config;
@@ -39,7 +39,7 @@ use faults::Dice;
 use mechanics::Mechanics;
 use program::Program;
 
-/// The device, its chip and the hand that holds it.
+/// A device, its chip and the hand on its grip.
 pub struct Simulator {
     config: SimulatorConfig,
     now: Instant,
@@ -55,7 +55,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// A device that was just switched on, in somebody's hand.
+    /// Returns a device that was just switched on, in the hand `hand`.
     #[must_use]
     pub fn new(config: SimulatorConfig, hand: impl Hand + 'static) -> Self {
         let mut dice = Dice::new(config.seed);
@@ -76,10 +76,10 @@ impl Simulator {
         }
     }
 
-    /// Lets time pass until `to`; nothing happens if that has passed.
+    /// Advances the simulation to the time `to`. No effect if `to` has passed.
     pub fn advance(&mut self, to: Instant) {
         while let Some((at, byte)) = self.chip.next_for_device(to) {
-            // The grip need not be moved to where it is at a byte that nothing follows from.
+            // Only a byte with an answer needs the grip at its own time; all other bytes leave the mechanics for later.
             if self.program.may_answer(byte) {
                 self.move_until(at);
             }
@@ -91,20 +91,23 @@ impl Simulator {
         self.now = self.now.max(to);
     }
 
+    /// Moves the grip and the encoders to the time `to`.
     fn move_until(&mut self, to: Instant) {
         let homing = self.program.homing();
         while let Some(step) = self.mechanics.next_step(to) {
+            // Torques are computed at each step, because the torque time-out may end within the span.
             let torques = if self.plugged { self.program.torques(self.mechanics.at(), &self.config) } else { [0.0; 3] };
             self.mechanics.step(step, torques, self.hand.as_mut());
             self.encoders.turn(self.mechanics.counts(), homing);
         }
     }
 
-    /// A byte reaches the device.
+    /// Delivers a byte to the device, and the answer of the device to the chip.
     fn hear(&mut self, at: Instant, byte: u8) {
         let Some(byte) = self.dice.pass(byte, self.faults.drop_to_device, self.faults.garble_to_device) else { return };
         let was_homing = self.program.homing();
         let answer = self.program.hear(at, byte, self.chip.divisor(), self.dtr, &self.config, &self.faults, &self.encoders);
+        // The firmware forgets the homing at the packet that clears the homing bit.
         if was_homing && !self.program.homing() {
             self.encoders.forget();
         }
@@ -113,16 +116,18 @@ impl Simulator {
         }
         for byte in answer.bytes() {
             if self.dice.happens(self.faults.insert_to_host) {
+                // An inserted byte precedes the real one, and both are sent.
                 let strange = self.dice.byte();
                 self.chip.send_to_host(at, strange);
             }
             if let Some(byte) = self.dice.pass(*byte, self.faults.drop_to_host, self.faults.garble_to_host) {
+                // The answer leaves at the arrival of the last byte of the packet.
                 self.chip.send_to_host(at, byte);
             }
         }
     }
 
-    /// A control transfer at the present time.
+    /// Makes a control transfer at the present time.
     pub fn control(&mut self, request: Request, value: u16) {
         match request {
             Request::Reset => match value {
@@ -133,13 +138,14 @@ impl Simulator {
             Request::ModemControl => match value {
                 DTR_LOW => self.dtr = false,
                 DTR_HIGH => {
+                    // A rising edge of DTR at the speed of the greeting wakes the boot loader.
                     if !self.dtr && self.chip.divisor() == BAUD_HANDSHAKE {
                         self.program.wake();
                         self.encoders.forget();
                     }
                     self.dtr = true;
                 }
-                // RTS, which nothing is connected to.
+                // RTS is not connected in the device.
                 _ => {}
             },
             Request::BaudRate => {
@@ -153,26 +159,28 @@ impl Simulator {
         }
     }
 
-    /// Bytes from the host at the present time.
+    /// Sends bytes from the host at the present time.
     pub fn write(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.chip.send_to_device(self.now, *byte);
         }
     }
 
-    /// When the chip hands the next packet to the host, if nothing more comes from the device until then. At its latency timer that is a packet without payload.
+    /// Returns the time of the next packet to the host, if no more bytes come from the device until then. At the end of the latency timer the packet may have
+    /// no payload.
     #[must_use]
     pub fn next_packet(&self) -> Instant {
         self.chip.next_packet().max(self.now)
     }
 
-    /// When the device will hear the next byte; what it answers may let the chip hand a packet over sooner.
+    /// Returns the time at which the device receives the next byte; `None` without bytes on the way. The answer of the device may lead to an earlier packet.
     #[must_use]
     pub fn next_heard(&self) -> Option<Instant> {
         self.chip.next_heard()
     }
 
-    /// The packet that is due at the present time as it is on USB: two status bytes, then payload. Gives its length; 0 if none is due.
+    /// Writes the packet that is due at the present time into `into`, as on USB: two status bytes, then payload. Returns its length \[bytes\], or 0 if no
+    /// packet is due.
     pub fn read_packet(&mut self, into: &mut [u8; crate::ftdi::PACKET]) -> usize {
         if self.next_packet() > self.now {
             return 0;
@@ -181,12 +189,12 @@ impl Simulator {
         self.chip.take_packet(self.now, into, fragment)
     }
 
-    /// Pulls the plug: nothing comes any more, and the motors are off.
+    /// Unplugs the device: no more packets, and no torque of the motors.
     pub const fn unplug(&mut self) {
         self.plugged = false;
     }
 
-    /// Puts the plug back and switches the device on: boot loader, encoders unhomed. The grip stays where it is.
+    /// Plugs the device in and switches it on: boot loader, encoders not homed. The grip stays at its position.
     pub fn power_cycle(&mut self) {
         self.plugged = true;
         self.dtr = false;
@@ -195,80 +203,80 @@ impl Simulator {
         self.encoders = Encoders::new(self.config.index, self.mechanics.counts(), &mut self.dice);
     }
 
-    /// Presses these buttons and lets go of the others.
+    /// Presses exactly these buttons.
     pub const fn press(&mut self, buttons: Buttons) {
         self.program.press(buttons);
     }
 
-    /// Fails in these ways from now on.
+    /// Sets the faults from now on.
     pub const fn set_faults(&mut self, faults: Faults) {
         self.faults = faults;
     }
 
-    /// Gives the grip into another hand.
+    /// Replaces the hand on the grip.
     pub fn set_hand(&mut self, hand: impl Hand + 'static) {
         self.hand = Box::new(hand);
     }
 
-    /// Shifts the counts of one encoder, top, right or left, of which the device notices nothing.
+    /// Shifts the counts of one encoder, 0 top, 1 right or 2 left, unnoticed by the device.
     pub fn slip(&mut self, encoder: usize, counts: i16) {
         self.encoders.slip(encoder, counts);
     }
 
-    /// Loses the homing of one encoder, top, right or left, and says so.
+    /// Ends the homing of one encoder, 0 top, 1 right or 2 left, which the device then reports.
     pub const fn lose_homing(&mut self, encoder: usize) {
         self.encoders.lose(encoder);
     }
 
-    /// The present time.
+    /// Returns the present time.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
     }
 
-    /// Whether it is plugged in.
+    /// Returns whether the device is plugged in.
     #[must_use]
     pub const fn is_plugged(&self) -> bool {
         self.plugged
     }
 
-    /// Where the grip truly is, in the frame of the device \[m\].
+    /// Returns the true position of the grip, in the frame of the device \[m\].
     #[must_use]
     pub const fn position(&self) -> Triple {
         self.mechanics.position()
     }
 
-    /// How fast it truly moves \[m/s\].
+    /// Returns the true velocity of the grip \[m/s\].
     #[must_use]
     pub const fn velocity(&self) -> Triple {
         self.mechanics.velocity()
     }
 
-    /// The force \[N\] of the motors on the grip now.
+    /// Returns the present force of the motors on the grip \[N\].
     #[must_use]
     pub fn motor_force(&self) -> Triple {
         if self.plugged { self.mechanics.force_of(self.program.peek_torques(self.now, &self.config)) } else { [0.0; 3] }
     }
 
-    /// Which encoders are homed.
+    /// Returns which encoders are homed: top, right, left.
     #[must_use]
     pub const fn homed(&self) -> [bool; 3] {
         self.encoders.homed()
     }
 
-    /// The lights.
+    /// Returns the lights of the last packet.
     #[must_use]
     pub const fn leds(&self) -> Leds {
         self.program.leds()
     }
 
-    /// What its processor is at.
+    /// Returns the activity of the processor.
     #[must_use]
     pub const fn activity(&self) -> Activity {
         self.program.activity()
     }
 
-    /// What it has seen of the host so far.
+    /// Returns the observations of the device on its host so far.
     #[must_use]
     pub const fn observed(&self) -> &Observed {
         self.program.observed()

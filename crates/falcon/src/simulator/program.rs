@@ -1,4 +1,4 @@
-//! What runs in the device: first a boot loader, then the firmware.
+//! Simulated programs of the device: boot loader and firmware.
 
 use cohaptic_units::Instant;
 
@@ -10,41 +10,41 @@ use crate::ftdi::{BAUD_HANDSHAKE, BAUD_LOADING, BAUD_RUNNING};
 use crate::kinematics::Triple;
 use crate::protocol::{Buttons, CommandParts, END, Framer, Leds, PACKET, Report};
 
-/// What the processor is at.
+/// Activity of the processor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Activity {
-    /// Switched on; nobody has woken the boot loader.
+    /// The device is switched on, and the boot loader is not awake.
     Asleep,
-    /// The boot loader waits for its greeting.
+    /// The boot loader waits for a greeting.
     Listening,
-    /// It was greeted and waits for the request.
+    /// The boot loader was greeted, and waits for the request of a transfer.
     Greeted,
-    /// It takes firmware in.
+    /// The boot loader receives firmware.
     Loading,
     /// The firmware runs.
     Running,
 }
 
-/// What the device has seen of its host.
+/// Observations of the device on its host.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Observed {
-    /// Whole packets.
+    /// Complete packets.
     pub commands: u64,
-    /// Bytes that belonged to none.
+    /// Bytes outside of any packet.
     pub garbage: u64,
-    /// Bytes at a speed that the device was not at, or at a time at which it took none.
+    /// Bytes at a wrong speed, or at a time at which the device accepts none.
     pub misheard: u64,
-    /// The largest motor count, either way.
+    /// Largest motor count, in either direction.
     pub largest_count: u16,
-    /// The largest motor count while not all encoders were homed. A driver must keep it at zero.
+    /// Largest motor count while an encoder was not homed. A correct driver keeps this count at zero.
     pub largest_count_unhomed: u16,
-    /// Packets that asked more of a motor than it can give.
+    /// Packets with a motor count above the limit of a motor.
     pub saturated: u64,
-    /// How often the motors went off because no packet came.
+    /// Times at which the motors went off because no packet came.
     pub torque_timeouts: u64,
 }
 
-/// The answer to a byte: up to a packet.
+/// Answer to a byte, at most a packet long.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Answer {
     bytes: [u8; PACKET],
@@ -68,14 +68,20 @@ impl Answer {
 #[derive(Clone, Debug)]
 pub(super) struct Program {
     activity: Activity,
-    /// The last three bytes heard by the boot loader.
+    /// Last three bytes heard by the boot loader.
     heard: [u8; 3],
+    /// Greetings heard, also the ignored ones.
     greetings: u32,
+    /// Firmware received so far.
     loaded: Vec<u8>,
+    /// Whether the wrong echo of [`Faults`] has been sent.
     echoes_spoiled: bool,
     framer: Framer,
+    /// Last complete packet.
     command: CommandParts,
+    /// Arrival of the last complete packet.
     commanded: Option<Instant>,
+    /// Whether the torque time-out since the last packet is counted.
     timed_out: bool,
     buttons: Buttons,
     observed: Observed,
@@ -98,12 +104,12 @@ impl Program {
         }
     }
 
-    /// Whether something may follow from that byte: the firmware answers the last byte of a packet alone.
+    /// Returns whether the byte may have an effect beyond its reception. The firmware answers only the last byte of a packet.
     pub(super) fn may_answer(&self, byte: u8) -> bool {
         self.activity != Activity::Running || byte == END
     }
 
-    /// A pulse of DTR at 9600 baud: the boot loader begins anew, whatever ran.
+    /// Restarts the boot loader after a pulse of DTR at 9600 baud, whatever program ran.
     pub(super) fn wake(&mut self) {
         self.activity = Activity::Listening;
         self.heard = [0; 3];
@@ -112,11 +118,12 @@ impl Program {
         self.commanded = None;
     }
 
-    /// The host goes to the speed of the running firmware: what was loaded begins to run, if it is whole.
+    /// Starts the loaded firmware, if it is complete, when the host changes to the speed of the running firmware.
     pub(super) fn start(&mut self, config: &SimulatorConfig) {
         if self.activity != Activity::Loading {
             return;
         }
+        // Without a given image, every plausible length counts as complete firmware.
         let whole = config.image.as_ref().map_or(self.loaded.len() >= Firmware::SHORTEST, |image| *image == self.loaded);
         if whole {
             self.activity = Activity::Running;
@@ -124,6 +131,7 @@ impl Program {
         }
     }
 
+    /// Receives a byte and returns the answer.
     #[expect(clippy::too_many_arguments, reason = "one call, by the device that owns all of it")]
     pub(super) fn hear(
         &mut self,
@@ -138,7 +146,7 @@ impl Program {
         let understood = match self.activity {
             Activity::Asleep => false,
             Activity::Listening => divisor == BAUD_HANDSHAKE && dtr,
-            // It may be greeted again while the host has not gone on.
+            // The host may greet again until it has changed the speed.
             Activity::Greeted => divisor == BAUD_HANDSHAKE || divisor == BAUD_LOADING && !dtr,
             Activity::Loading => divisor == BAUD_LOADING && !dtr,
             Activity::Running => divisor == BAUD_RUNNING,
@@ -162,11 +170,13 @@ impl Program {
         }
     }
 
+    /// Receives a byte of a greeting.
     fn greet(&mut self, byte: u8, config: &SimulatorConfig) -> Answer {
         self.heard = [self.heard[1], self.heard[2], byte];
         if self.heard != [0x0A, 0x43, 0x0D] {
             return Answer::NONE;
         }
+        // Ignored greetings count too, so that `deaf_greetings` is a number of greetings.
         self.greetings += 1;
         if self.greetings <= config.deaf_greetings {
             return Answer::NONE;
@@ -176,6 +186,7 @@ impl Program {
         Answer::of(if config.leading_zero { &answer } else { &answer[1..] })
     }
 
+    /// Receives a byte of firmware, and returns its echo.
     fn load(&mut self, byte: u8, faults: &Faults) -> Answer {
         let place = self.loaded.len();
         if place >= Firmware::LONGEST {
@@ -183,11 +194,13 @@ impl Program {
             return Answer::NONE;
         }
         self.loaded.push(byte);
+        // Only once, so that a second attempt can succeed.
         let spoil = faults.wrong_echo == Some(place) && !self.echoes_spoiled;
         self.echoes_spoiled |= spoil;
         Answer::of(&[if spoil { byte ^ 0x20 } else { byte }])
     }
 
+    /// Receives a byte of a packet, and returns a report for a complete packet.
     fn run(&mut self, at: Instant, byte: u8, encoders: &Encoders) -> Answer {
         let command: Option<CommandParts> = self.framer.push(byte);
         self.observed.garbage = self.framer.garbage();
@@ -199,15 +212,17 @@ impl Program {
             self.observed.largest_count_unhomed = self.observed.largest_count_unhomed.max(largest);
         }
         self.observed.saturated += u64::from(largest > MOTOR_LIMIT.unsigned_abs());
+        // `saturated` has counted the excess; the motors give what they can.
         command.motors = command.motors.map(|count| count.clamp(-MOTOR_LIMIT, MOTOR_LIMIT));
         self.command = command;
         self.commanded = Some(at);
         self.timed_out = false;
+        // The report already shows the effect of the homing bit in the packet that it answers.
         let homed = if command.homing { encoders.homed() } else { [false; 3] };
         Answer::of(&Report { encoders: encoders.read(), homed, buttons: self.buttons }.encode())
     }
 
-    /// The torques \[N·m\] at a time; notes when they go off because no packet came.
+    /// Returns the torques \[N·m\] at `now`, and counts a switch-off of the motors by the time-out.
     pub(super) fn torques(&mut self, now: Instant, config: &SimulatorConfig) -> Triple {
         if self.is_silent(now, config) && !self.timed_out && self.command.motors != [0; 3] {
             self.timed_out = true;
@@ -216,6 +231,7 @@ impl Program {
         self.peek_torques(now, config)
     }
 
+    /// Returns the torques \[N·m\] at `now`, without counting.
     pub(super) fn peek_torques(&self, now: Instant, config: &SimulatorConfig) -> Triple {
         if self.activity != Activity::Running || self.is_silent(now, config) {
             return [0.0; 3];
@@ -223,10 +239,12 @@ impl Program {
         self.command.motors.map(|count| -f64::from(count) / config.counts_per_newton_metre)
     }
 
+    /// Returns whether the last packet is older than the torque time-out.
     fn is_silent(&self, now: Instant, config: &SimulatorConfig) -> bool {
         self.commanded.is_none_or(|at| now.saturating_duration_since(at) > config.torque_timeout)
     }
 
+    /// Returns whether the firmware runs and the last packet had the homing bit.
     pub(super) fn homing(&self) -> bool {
         self.activity == Activity::Running && self.command.homing
     }

@@ -1,4 +1,4 @@
-//! A simulated device as a transport, in virtual time or in that of the machine.
+//! Transport to a simulated device, in virtual time or in the time of the machine.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -10,15 +10,15 @@ use crate::clock::WallClock;
 use crate::ftdi::{PACKET, PAYLOAD, strip_status};
 use crate::transport::{Request, Transport, TransportError};
 
-/// How long any call takes in virtual time. A driver that never sleeps still gets on.
+/// Time of a call in virtual time, so that a driver that never sleeps makes progress.
 const CALL: Duration = Duration::from_micros(20);
 
-/// A simulated device that a driver works on and somebody else looks at.
+/// A simulated device shared between a driver and an observer.
 #[derive(Clone, Debug)]
 pub struct SharedSimulator(Arc<Mutex<Simulator>>);
 
 impl SharedSimulator {
-    /// Looks at the device, or does something to it, between two transfers.
+    /// Calls `work` with the device, between two transfers.
     pub fn with<R>(&self, work: impl FnOnce(&mut Simulator) -> R) -> R {
         work(&mut self.lock())
     }
@@ -28,33 +28,36 @@ impl SharedSimulator {
     }
 }
 
-/// The way to a simulated device.
+/// Transport to a simulated device.
 #[derive(Clone, Debug)]
 pub struct SimulatedTransport {
     shared: SharedSimulator,
     clock: Clock,
+    /// Payload of the newest packet, of which bytes `taken..count` are not read yet.
     payload: [u8; PAYLOAD],
     taken: usize,
     count: usize,
 }
 
+/// Clock of the transport.
 #[derive(Clone, Debug)]
 enum Clock {
-    /// Passes when the driver sleeps, waits or calls.
+    /// A virtual clock, which advances when the driver sleeps, waits or calls.
     Virtual(Instant),
-    /// Passes by itself.
+    /// The clock of the machine.
     Wall(WallClock),
 }
 
 impl SimulatedTransport {
-    /// In virtual time, which passes only while the driver waits: the same run gives the same bytes, as fast as the machine can.
+    /// Returns a transport in virtual time, which advances only by calls and waits of the driver. Equal runs give equal bytes, as fast as the machine
+    /// computes.
     #[must_use]
     pub fn in_virtual_time(simulator: Simulator) -> Self {
         let now = simulator.now();
         Self::new(simulator, Clock::Virtual(now))
     }
 
-    /// In the time of the machine, from now on.
+    /// Returns a transport in the time of the machine, from now on.
     #[must_use]
     pub fn in_real_time(simulator: Simulator) -> Self {
         Self::new(simulator, Clock::Wall(WallClock::new()))
@@ -64,13 +67,13 @@ impl SimulatedTransport {
         Self { shared: SharedSimulator(Arc::new(Mutex::new(simulator))), clock, payload: [0; PAYLOAD], taken: 0, count: 0 }
     }
 
-    /// The device, to look at it or to do something to it.
+    /// Returns the shared device, for observation or manipulation.
     #[must_use]
     pub fn simulator(&self) -> SharedSimulator {
         self.shared.clone()
     }
 
-    /// The device at the present time, if it is plugged in. The call itself takes time.
+    /// Returns the device at the present time, or an error if it is unplugged. The call takes virtual time.
     fn device(&mut self) -> Result<MutexGuard<'_, Simulator>, TransportError> {
         if let Clock::Virtual(now) = &mut self.clock {
             *now = now.saturating_add(CALL);
@@ -99,6 +102,7 @@ impl Transport for SimulatedTransport {
 
     fn control(&mut self, request: Request, value: u16) -> Result<(), TransportError> {
         if request == Request::Reset {
+            // Payload buffered here would otherwise survive the purge of the chip.
             (self.taken, self.count) = (0, 0);
         }
         self.device()?.control(request, value);
@@ -116,7 +120,9 @@ impl Transport for SimulatedTransport {
             let mut packet = [0; PACKET];
             let mut device = self.device()?;
             let length = device.read_packet(&mut packet);
+            // Either the next packet is due, or an answer of the device may make an earlier packet.
             let next = device.next_heard().map_or_else(|| device.next_packet(), |heard| heard.min(device.next_packet()));
+            // The lock is released before the sleep: an observer may use the device meanwhile.
             drop(device);
             if length > 0 {
                 self.count = strip_status(&packet[..length], &mut self.payload);
@@ -126,6 +132,7 @@ impl Transport for SimulatedTransport {
             if self.now() >= deadline {
                 return Ok(0);
             }
+            // In virtual time this advances the clock to the next event, so the loop makes progress.
             self.sleep_until(next.min(deadline));
         }
         let rest = &self.payload[self.taken..self.count];

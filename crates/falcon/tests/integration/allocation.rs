@@ -1,4 +1,4 @@
-//! The loop allocates nothing.
+//! Exchanges allocate no memory.
 
 use cohaptic_falcon::driver::DriverConfig;
 use cohaptic_falcon::simulator::Faults;
@@ -8,7 +8,7 @@ use crate::common::{Bench, running, seconds};
 #[test]
 fn ten_thousand_exchanges_allocate_nothing() {
     let mut bench = Bench::active(running(), [0.02, 0.01, 0.01], 1.0, DriverConfig::DEFAULT);
-    // Garbage, fragments and lost packets as well: the way of an error must not allocate either.
+    // With garbage, fragments and lost packets, because the paths of errors must not allocate either.
     bench.simulator.with(|device| {
         device.set_faults(Faults { garble_to_host: 0.002, drop_to_host: 0.002, insert_to_host: 0.002, fragment: 0.05, ..Faults::NONE });
     });
@@ -18,8 +18,8 @@ fn ten_thousand_exchanges_allocate_nothing() {
         exchanged = bench.driver.statistics().exchanges;
     });
     assert!(exchanged > 9000, "{exchanged}");
-    // The simulator works within the same calls, and does not allocate either.
+    // The simulator runs within the same calls, and does not allocate either.
     assert_eq!(counted.count_total, 0, "{counted:?}");
-    // The counter counts.
+    // Check of the counter itself.
     assert!(allocation_counter::measure(|| drop(core::hint::black_box(vec![1_u8; 10]))).count_total > 0);
 }

@@ -7,7 +7,7 @@ use cohaptic_falcon::boot::{BootError, BootOptions, Firmware, Progress, ensure_l
 use cohaptic_falcon::simulator::{Activity, Faults, SimulatedTransport, Simulator, SimulatorConfig, StillHand, Waypoints};
 use cohaptic_falcon::transport::{Transport, TransportError};
 
-/// As long as the image that everybody uses, and none of it.
+/// Returns an image as long as the usual firmware, with other contents.
 fn image() -> Vec<u8> {
     (0..8492_u32).map(|place| (place.wrapping_mul(2_654_435_761) >> 24).to_le_bytes()[0]).collect()
 }
@@ -40,10 +40,10 @@ fn a_file_gets_into_the_device_and_runs() {
     assert_eq!(seen[seen.len() - 2..], [Progress::Loaded { done: 8492, of: 8492 }, Progress::Running]);
     assert_eq!(seen.iter().filter(|progress| matches!(progress, Progress::Loaded { .. })).count(), 137);
     assert_eq!(transport.simulator().with(|device| device.activity()), Activity::Running);
-    // 137 blocks, each 62 · 70 us there and at least as long until its last byte is back, at most 16 ms more for the timer.
+    // A transfer has 137 blocks. A block takes 62 · 70 us to the device, at least as long until its last byte is back, and at most 16 ms more for the timer.
     let taken = transport.now() - begin;
     assert!((Duration::from_millis(595)..Duration::from_millis(3500)).contains(&taken), "{taken:?}");
-    // Once it runs it stays.
+    // Running firmware is not loaded again.
     let again = ensure_loaded(&mut transport, &firmware, &BootOptions::DEFAULT, &mut |progress| assert_eq!(progress, Progress::Running));
     assert_eq!(again, Ok(false));
 }
@@ -63,7 +63,7 @@ fn a_deaf_boot_loader_and_a_leading_zero_are_no_obstacle() {
 fn fragments_are_put_together() {
     let faults = Faults { fragment: 0.5, ..Faults::NONE };
     let mut transport = transport(SimulatorConfig { faults, ..switched_on() });
-    // Half of the packets hold 7 of 62 bytes: an echo may take a second.
+    // Half of the packets hold 7 of 62 bytes on average, so an echo may take a second.
     let options = BootOptions { patience: Duration::from_secs(2), ..BootOptions::DEFAULT };
     load(&mut transport, &Firmware::new(image()).unwrap(), &options, &mut |_| {}).unwrap();
 }
@@ -141,7 +141,7 @@ fn a_broken_answer_does_not_spoil_the_next() {
             }
         })
         .unwrap();
-        // Four bytes stay whole with 0.7⁴ = 0.24; sixty greetings fail with less than 1e-7.
+        // Four bytes arrive unchanged with the probability 0.7⁴ = 0.24, so sixty greetings fail with less than 1e-7.
         assert!(greetings <= 60, "seed {seed}: {greetings}");
     }
 }

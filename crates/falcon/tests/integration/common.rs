@@ -1,4 +1,4 @@
-//! A simulated device with a driver on it, in virtual time.
+//! A simulated device with a driver, in virtual time.
 
 use core::time::Duration;
 
@@ -13,12 +13,12 @@ pub(crate) fn seconds(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
 }
 
-/// A device whose firmware runs.
+/// Returns a device with running firmware.
 pub(crate) fn running() -> SimulatorConfig {
     SimulatorConfig { running: true, seed: 7, ..SimulatorConfig::default() }
 }
 
-/// A driver on a device, and a way to look behind the scenes.
+/// A driver on a device, with access to the simulation.
 pub(crate) struct Bench {
     pub(crate) driver: Driver<SimulatedTransport>,
     pub(crate) simulator: SharedSimulator,
@@ -34,7 +34,7 @@ impl Bench {
         Self { driver, simulator, next }
     }
 
-    /// Homed and armed by a hand that goes on with this sway.
+    /// Returns a bench that a hand has homed and armed, and then moves with this sway.
     pub(crate) fn active(simulator: SimulatorConfig, sway: Triple, frequency: f64, config: DriverConfig) -> Self {
         let mut bench = Self::new(simulator, Waypoints::homing(Duration::ZERO).swaying(sway, frequency), config);
         bench.run(seconds(4.5), |_, _| None).unwrap();
@@ -42,7 +42,7 @@ impl Bench {
         bench
     }
 
-    /// One exchange a millisecond, with a force that may depend on what is known.
+    /// Makes one exchange per millisecond, with a force that may depend on time and status.
     pub(crate) fn run(&mut self, span: Duration, mut force: impl FnMut(Instant, &Status) -> Option<Triple>) -> Result<(), DriverError> {
         let end = self.driver.now() + span;
         while self.driver.now() < end {
@@ -55,7 +55,7 @@ impl Bench {
         Ok(())
     }
 
-    /// The largest motor count the device has seen before it was homed.
+    /// Returns the largest motor count that the device has received before homing.
     pub(crate) fn unhomed_count(&self) -> u16 {
         self.simulator.with(|device| device.observed().largest_count_unhomed)
     }
@@ -66,7 +66,7 @@ pub(crate) fn distance(a: Triple, b: Triple) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// Position in the frame of the device of what a driver with the default origin gives.
+/// Returns the position in the frame of the device for a position of a driver with the default origin.
 pub(crate) fn in_device(position: Triple) -> Triple {
     [position[0], position[1], position[2] + 0.125]
 }

@@ -1,4 +1,4 @@
-//! The device of a peer.
+//! A Falcon as the device of a peer.
 
 use core::time::Duration;
 
@@ -42,7 +42,7 @@ fn the_grip_feels_the_coupling_force_with_the_opposite_sign() {
     simulator.with(|device| {
         let [x, y, z] = device.motor_force();
         assert!((y + 1.5).abs() < 0.01, "{y}");
-        // The others are held in the middle, where the hand is as well.
+        // The two unused axes are held in the middle, where the hand is too.
         assert!(x.abs() < 0.7 && z.abs() < 0.7, "{x} {z}");
     });
 }
@@ -54,7 +54,7 @@ fn axes_that_nobody_uses_are_held_in_the_middle() {
     ticks(&mut falcon, 1500, |_| [0.0]);
     simulator.with(|device| {
         let [_, y, z] = device.position();
-        // 0.8 N on 500 N/m are 1.6 mm; dry friction of 0.2 N may hold 0.4 mm of that either way.
+        // A force of 0.8 N on 500 N/m gives 1.6 mm. Dry friction of 0.2 N may hold 0.4 mm of the way in either direction.
         assert!(((y - 0.0016).abs() < 0.0005) && ((z - 0.125 + 0.0016).abs() < 0.0005), "{y} {z}");
         device.set_hand(|_, _, _| [0.8, 0.0, 0.0]);
     });
@@ -66,7 +66,7 @@ fn axes_that_nobody_uses_are_held_in_the_middle() {
 fn two_falcons_meet_at_an_object() {
     let (mut left, left_device) = stepped([Axis::X, Axis::Z]);
     let (mut right, right_device) = stepped([Axis::X, Axis::Z]);
-    // Hands 20 mm apart, a spring of 200 N/m between the grips.
+    // The hands are 20 mm apart, with a spring of 200 N/m between the grips.
     left_device.with(|device| device.set_hand(|_, place: [f64; 3], speed: [f64; 3]| hand([-0.01, 0.0, 0.125], place, speed)));
     right_device.with(|device| device.set_hand(|_, place: [f64; 3], speed: [f64; 3]| hand([0.01, 0.0, 0.125], place, speed)));
     for tick in 0..1500_u64 {
@@ -76,7 +76,7 @@ fn two_falcons_meet_at_an_object() {
         left.advance(now, MILLISECOND, force);
         right.advance(now, MILLISECOND, force.map(|part| -part));
     }
-    // Two springs of 100 N/m at the hands and 200 N/m between: ±10 mm become ±2 mm, give or take 0.2 N of friction on 500 N/m.
+    // With two springs of 100 N/m at the hands and 200 N/m between the grips, ±10 mm become ±2 mm, except for 0.2 N of friction on 500 N/m.
     let (a, b) = (left.state().position[0], right.state().position[0]);
     assert!((a + 0.002).abs() < 0.0006 && (b - 0.002).abs() < 0.0006, "{a} {b}");
 }
@@ -106,13 +106,13 @@ fn what_ends_the_driver_is_said_and_the_peer_goes_on() {
     assert_eq!(falcon.wait(seconds(0.1)).unwrap_err(), DriverError::Transport(TransportError::Unplugged));
 }
 
-/// In real time; only what a slow machine cannot change is asserted.
+/// Tests in real time, which assert only what a slow machine cannot change.
 mod threaded {
     use super::*;
 
-    /// Homed and active without waiting for a hand.
+    /// Returns a device that becomes homed and active without a user.
     fn quick() -> (FalconDevice<1>, cohaptic_falcon::simulator::SharedSimulator) {
-        // It sways across the index for ever: however late the thread begins, it will be homed.
+        // The hand sways across the index forever, so the device becomes homed however late the thread begins.
         let hand = Waypoints::new([(Duration::ZERO, [0.0, 0.0, 0.110])]).swaying([0.0, 0.0, 0.010], 2.0);
         let transport = SimulatedTransport::in_real_time(Simulator::new(running(), hand));
         let simulator = transport.simulator();
@@ -121,7 +121,7 @@ mod threaded {
         (falcon, simulator)
     }
 
-    /// Lets others run until something is so.
+    /// Waits until a condition holds.
     fn until(mut is_so: impl FnMut() -> bool) {
         while !is_so() {
             std::thread::park_timeout(MILLISECOND);
@@ -132,13 +132,13 @@ mod threaded {
     fn a_thread_drives_the_device_and_stops_it() {
         let (mut falcon, simulator) = quick();
         until(|| falcon.snapshot().is_some_and(|snapshot| snapshot.is_ready()));
-        // The latch: the thread goes on, the answer stays.
+        // The state is latched: the thread goes on, and the state stays the same until the next `advance`.
         falcon.advance(Instant::ZERO, MILLISECOND, [0.0]);
         let state = falcon.state();
         let turns = falcon.snapshot().unwrap().timing.turns;
         until(|| falcon.snapshot().is_some_and(|snapshot| snapshot.timing.turns > turns + 20));
         assert_eq!(falcon.state(), state);
-        // Force goes out while it is renewed.
+        // Force goes out while the peer renews it.
         until(|| {
             falcon.advance(Instant::ZERO, MILLISECOND, [-1.0]);
             falcon.snapshot().is_some_and(|snapshot| snapshot.force[2] > 0.9)
@@ -148,7 +148,7 @@ mod threaded {
         let last = falcon.snapshot().unwrap();
         assert_eq!((last.phase, last.force, last.statistics.farewells), (Phase::Stopped, [0.0; 3], 5));
         assert_eq!(simulator.with(|device| device.observed().largest_count_unhomed), 0);
-        // A peer that goes on does no harm.
+        // Calls of a peer after the stop have no effect.
         falcon.advance(Instant::ZERO, MILLISECOND, [-1.0]);
         assert!(falcon.state().is_finite());
     }

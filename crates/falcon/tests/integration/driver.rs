@@ -45,7 +45,7 @@ fn nothing_is_homed_while_nobody_moves_it() {
 
 #[test]
 fn position_is_true_to_the_size_of_a_count() {
-    // A slow circle: what the encoders round away is all there is, apart from a fraction of a millisecond of age at 20 mm/s.
+    // On a slow circle the only errors are the rounding of the encoders and a fraction of a millisecond of age at 20 mm/s.
     let mut bench = Bench::active(running(), [0.02, 0.015, -0.01], 0.2, DriverConfig::DEFAULT);
     let (mut worst, mut total, mut count) = (0.0_f64, 0.0, 0.0);
     let simulator = bench.simulator.clone();
@@ -59,7 +59,8 @@ fn position_is_true_to_the_size_of_a_count() {
             None
         })
         .unwrap();
-    // Half a count on three arms is at most √3/2 counts, of at most 0.057 mm each; the report is at most two milliseconds old, at at most 0.034 m/s.
+    // The rounding of half a count on three arms is at most √3/2 counts of at most 0.057 mm each. The report is at most two milliseconds old, at a speed of
+    // at most 0.034 m/s.
     let bound = 0.87 * 0.057e-3 + 0.002 * TAU * 0.2 * distance([0.02, 0.015, -0.01], [0.0; 3]);
     assert!(worst < bound, "{worst} m, and {bound} m are allowed");
     assert!(total / count < 0.06e-3, "{} m on average", total / count);
@@ -79,7 +80,8 @@ fn velocity_follows_a_sway_with_the_lag_that_is_stated() {
             None
         })
         .unwrap();
-    // 5.3 ms of the filter, 2 ms of age and half a millisecond of the difference at the largest acceleration, and a count of 0.05 mm on three arms through the filter.
+    // The bound adds 5.3 ms of the filter, 2 ms of age and half a millisecond of the difference at the largest acceleration, and a count of 0.05 mm on three
+    // arms through the filter.
     let acceleration = amplitude * (TAU * frequency) * (TAU * frequency);
     let bound = 0.0078 * acceleration * 1.1 + 3.0_f64.sqrt() * 0.05 * 0.1718;
     assert!(worst < bound, "{worst} m/s, and {bound} m/s are allowed");
@@ -99,7 +101,7 @@ fn buttons_arrive() {
 fn a_spring_of_1000_newtons_per_metre_holds_the_grip() {
     let config = DriverConfig { limits: Limits { force: 8.0, ..Limits::DEFAULT }, ..DriverConfig::DEFAULT };
     let mut bench = Bench::active(running(), [0.0; 3], 0.0, config);
-    // The hand lets go 5 mm from the middle and the spring takes over.
+    // The hand lets go of the grip, and the spring takes over.
     bench.simulator.with(|device| device.set_hand(StillHand));
     let spring = |position: [f64; 3]| position.map(|part| -1000.0 * part);
     bench.run(seconds(0.5), |_, status| Some(spring(status.reading.unwrap().position))).unwrap();
@@ -112,7 +114,7 @@ fn a_spring_of_1000_newtons_per_metre_holds_the_grip() {
             Some(spring(status.reading.unwrap().position))
         })
         .unwrap();
-    // At most twice the static deflection of 3 mm.
+    // The overshoot is at most twice the static deflection of 3 mm.
     assert!(farthest > 0.001 && farthest < 0.006, "{farthest}");
     bench.simulator.with(|device| device.set_hand(StillHand));
     bench.run(seconds(1.5), |_, status| Some(spring(status.reading.unwrap().position))).unwrap();
@@ -124,7 +126,7 @@ fn a_spring_of_1000_newtons_per_metre_holds_the_grip() {
         })
         .unwrap();
     assert_eq!(bench.driver.status().phase, Phase::Active);
-    // Dry friction of 0.2 N holds it within 0.2 mm, beside the rounding of the encoders and what its last swing leaves.
+    // Dry friction of 0.2 N holds the grip within 0.2 mm. The rest is the rounding of the encoders and the last oscillation.
     assert!(rest < 0.0006, "{rest}");
 }
 
@@ -135,7 +137,7 @@ fn force_is_what_was_asked_for_where_the_calibration_is_true() {
         for force in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.7, 0.7, -0.7]] {
             bench.run(seconds(0.3), |_, _| Some(force)).unwrap();
             let felt = bench.simulator.with(|device| device.motor_force());
-            // Half a count of three motors: 0.5/10000 N·m each, at about 40 rad/m at most; and the grip moves within a millisecond.
+            // Half a count of three motors is 0.5/10000 N·m each, at about 40 rad/m at most. The grip also moves within a millisecond.
             assert!(distance(felt, force.map(|part| part * scale)) < 0.01 * scale, "{felt:?} for {force:?} and {gain}");
         }
     }

@@ -1,4 +1,4 @@
-//! What goes wrong on the way, and what becomes of it.
+//! Faults of the connection, and their effects.
 
 use cohaptic_falcon::driver::{DriverConfig, DriverError, Phase};
 use cohaptic_falcon::protocol::{Buttons, Leds};
@@ -12,7 +12,7 @@ fn active() -> Bench {
     Bench::active(running(), [0.01, 0.0, 0.01], 0.5, DriverConfig::DEFAULT)
 }
 
-/// A weak spring, so that there is force to lose.
+/// Runs a weak spring, so that a fault can end a force.
 fn spring(bench: &mut Bench, span: f64) -> Result<(), DriverError> {
     bench.run(seconds(span), |_, status| Some(status.reading.map_or([0.0; 3], |reading| reading.position.map(|part| -100.0 * part))))
 }
@@ -47,7 +47,7 @@ fn garbage_is_counted_and_passed_by() {
             .run(seconds(3.0), |_, status| {
                 ticks += 1;
                 if let Some(reading) = status.reading {
-                    // A bit that flips in a number may move an encoder by up to 300 counts, and be believed: that is 15 mm.
+                    // A flipped bit in a number may move an encoder by up to 300 counts and be believed, which is 15 mm.
                     let error = distance(in_device(reading.position), simulator.with(|device| device.position()));
                     assert!(error < 0.02, "{error}");
                     far += u32::from(error > 0.001);
@@ -56,10 +56,10 @@ fn garbage_is_counted_and_passed_by() {
             })
             .unwrap();
         let statistics = *bench.driver.statistics();
-        // One packet in twelve is hurt on one way or the other.
+        // One packet in twelve is damaged in one direction or the other.
         assert!(statistics.garbage_bytes > 100 && statistics.timeouts > 20, "{statistics:?}");
         assert!(statistics.reports > 1000, "{statistics:?}");
-        // Wrong and believed: rare.
+        // Wrong positions that are believed are rare.
         assert!(far * 20 < ticks, "{far} of {ticks}");
         bench.simulator.with(|device| device.set_faults(Faults::NONE));
         spring(&mut bench, 0.2).unwrap();
@@ -80,7 +80,7 @@ fn a_lost_byte_does_not_lose_the_place() {
         let before = *bench.driver.statistics();
         bench.run(10 * MILLISECOND, |_, _| None).unwrap();
         let after = *bench.driver.statistics();
-        // Aligned again, and no answer late any more: one report for each exchange.
+        // The stream is aligned again and no answer is late: one report for each exchange.
         assert_eq!((after.garbage_bytes, after.timeouts), (before.garbage_bytes, before.timeouts));
         assert_eq!(after.reports - before.reports, after.exchanges - before.exchanges);
     }
@@ -95,7 +95,7 @@ fn an_answer_that_came_late_makes_no_other_late() {
         bench.run(20 * MILLISECOND, |_, _| None).unwrap();
         bench.simulator.with(|device| device.set_faults(Faults::NONE));
         bench.run(10 * MILLISECOND, |_, _| None).unwrap();
-        // What the device is like when a packet reaches it is in the report of that very exchange.
+        // The state of the device at the arrival of a packet is in the report of the same exchange.
         let buttons = Buttons::from_bits(round);
         bench.simulator.with(|device| device.press(buttons));
         assert_eq!(bench.driver.exchange(None).unwrap().buttons, buttons, "round {round}");
@@ -113,7 +113,7 @@ fn unplugging_is_noticed_at_once_and_for_good() {
     assert_eq!(spring(&mut bench, 0.1), Err(DriverError::Transport(TransportError::Unplugged)));
     assert_eq!((bench.driver.status().phase, bench.driver.status().force), (Phase::Stopped, [0.0; 3]));
     assert_eq!(bench.simulator.with(|device| device.motor_force()), [0.0; 3]);
-    // Plugged in again, it is another device: nothing goes to its motors.
+    // After a power cycle the stopped driver sends nothing to the motors.
     bench.simulator.with(Simulator::power_cycle);
     let _ = spring(&mut bench, 0.1);
     assert_eq!(bench.driver.status().force, [0.0; 3]);
@@ -131,7 +131,7 @@ fn a_device_that_falls_silent_gets_no_force_and_is_given_up() {
     assert!(bench.driver.now() - begin < seconds(1.1));
     assert!(bench.driver.statistics().zeroed_by(ZeroCause::StaleReading) > 100);
     assert_eq!(bench.simulator.with(|device| device.motor_force()), [0.0; 3]);
-    // It answers again, homed as it was: what was given up stays so.
+    // The device answers again and is still homed, but a failed driver stays stopped.
     bench.simulator.with(|device| device.set_faults(Faults::NONE));
     spring(&mut bench, 0.2).unwrap();
     assert_eq!(bench.driver.status().homed, [true; 3]);
@@ -144,7 +144,7 @@ fn losing_one_encoder_ends_force_until_it_is_homed_and_armed_again() {
         let mut bench = active();
         bench.run(seconds(0.2), |_, _| Some([0.0, 0.0, 1.0])).unwrap();
         bench.simulator.with(|device| device.lose_homing(encoder));
-        // The packet that is on its way was made before the device said so; the next knows.
+        // The packet on its way was made before the device reported the loss; the next packet follows the report.
         bench.run(3 * MILLISECOND, |_, _| Some([0.0, 0.0, 1.0])).unwrap();
         bench
             .run(seconds(0.2), |_, status| {
@@ -154,7 +154,7 @@ fn losing_one_encoder_ends_force_until_it_is_homed_and_armed_again() {
             .unwrap();
         assert_eq!(bench.simulator.with(|device| device.leds()), Leds::RED);
         assert_eq!(bench.driver.statistics().unhomed, 1);
-        // Through the index again, without going out: homed, not armed.
+        // The grip passes the index again without going out, so the device is homed and not armed.
         let now = bench.driver.now().as_nanos();
         let path = [(1, 0.125), (500, 0.085), (1000, 0.125)].map(|(ms, z)| (core::time::Duration::from_nanos(now + ms * 1_000_000), [0.0, 0.0, z]));
         bench.simulator.with(|device| device.set_hand(cohaptic_falcon::simulator::Waypoints::new(path)));
@@ -180,18 +180,18 @@ fn a_leap_is_not_believed_at_once_and_ends_force_when_it_is() {
     bench
         .run(seconds(0.1), |_, status| {
             seen.push((status.reading.map(|reading| reading.position), status.force));
-            // The leap is no motion: the hand moves at some centimetres a second.
+            // The jump of the counts must not appear as a velocity: the hand moves at some centimetres per second.
             assert!(status.reading.is_none_or(|reading| distance(reading.velocity, [0.0; 3]) < 0.2), "{status:?}");
             Some(pull)
         })
         .unwrap();
     assert_eq!(bench.driver.statistics().implausible, 3);
-    // While it is not believed the old place stands; then there is none, and no force, until ten reports agree.
+    // While the jump is not believed, the old position stays. Then there is no position and no force, until ten reports agree.
     let leap = seen.iter().position(|(position, _)| position.is_none()).unwrap();
     assert!(leap >= 3 && seen[..leap].iter().all(|(position, _)| distance(position.unwrap(), place) < 0.002));
     let back = leap + seen[leap..].iter().position(|(position, _)| position.is_some()).unwrap();
     assert_eq!(back - leap, 9);
-    // The force of an exchange is made before its report comes.
+    // The force of an exchange is computed before its report arrives.
     assert!(seen[leap + 1..back].iter().all(|(_, force)| *force == [0.0; 3]));
     assert!(seen[back..].iter().all(|(position, _)| distance(position.unwrap(), place) > 0.01));
     assert_eq!(seen.last().unwrap().1, pull);

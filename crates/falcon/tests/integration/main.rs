@@ -1,4 +1,4 @@
-//! The driver against the simulated device: what it does, what it survives, and what it never does.
+//! The driver against the simulated device: functions, faults, and promises of safety.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail that way")]
 #![allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "exact values are compared, and samples are counted")]
 

@@ -1,4 +1,4 @@
-//! The defects of existing drivers, each shown to be absent here.
+//! Defects of existing drivers, each shown to be absent in this driver.
 
 use cohaptic_falcon::driver::{Driver, DriverConfig, Phase};
 use cohaptic_falcon::kinematics::{Jacobian, angle_of_count, forward_from, inverse};
@@ -7,13 +7,13 @@ use cohaptic_falcon::simulator::{SimulatedTransport, Simulator, StillHand};
 
 use crate::common::{Bench, distance, running, seconds};
 
-/// libnifalcon, issue 66: force along z 13 to 37 % too strong, and 16 % of it sideways at 30 mm off the axis.
+/// libnifalcon, issue 66: force along z is 13 to 37 % too strong, and 16 % of the force is sideways at 30 mm off the axis.
 #[test]
 fn a_force_along_z_is_along_z_and_as_strong_as_asked() {
     for z in [0.09, 0.11, 0.125, 0.14, 0.16] {
         for x in [0.0, 0.03] {
             let place = [x, 0.0, z];
-            // The force that torques make, by work: F·dp = τ·dθ for three small motions, with angles from inverse kinematics alone.
+            // The force of the torques follows from work: F·dp = τ·dθ for three small motions, with angles from inverse kinematics alone.
             let torques = Jacobian::at(place).unwrap().torques([0.0, 0.0, 1.0]).unwrap();
             let step = 1e-6;
             let force = [0, 1, 2].map(|axis| {
@@ -28,7 +28,7 @@ fn a_force_along_z_is_along_z_and_as_strong_as_asked() {
     }
 }
 
-/// libnifalcon: a tolerance of 0.01 rad and, on failure, silently the old position: 0.24 mm off at 25 mm and 1 Hz.
+/// libnifalcon has a tolerance of 0.01 rad and, on failure, silently returns the old position: an error of 0.24 mm at 25 mm and 1 Hz.
 #[test]
 fn a_moving_grip_is_followed_to_the_picometre() {
     let mut last = [0.0, 0.0, 0.125];
@@ -42,7 +42,7 @@ fn a_moving_grip_is_followed_to_the_picometre() {
     assert!(forward_from([angle_of_count(4000.0), angle_of_count(-4000.0), 0.0], last).is_err());
 }
 
-/// libnifalcon: torques are not clamped; beyond sixteen bits the sign flips, and NaN reaches the motors.
+/// libnifalcon does not clamp torques: beyond sixteen bits the sign flips, and NaN reaches the motors.
 #[test]
 fn no_force_however_large_turns_its_sign() {
     let mut bench = Bench::active(running(), [0.0; 3], 0.0, DriverConfig::DEFAULT);
@@ -54,14 +54,14 @@ fn no_force_however_large_turns_its_sign() {
     }
 }
 
-/// libnifalcon: whether it is homed is not initialised, and may be true before the first packet.
+/// libnifalcon does not initialise the homed flag, which may be true before the first packet.
 #[test]
 fn nothing_is_homed_before_the_first_report() {
     let driver = Driver::open(SimulatedTransport::in_virtual_time(Simulator::new(running(), StillHand)), DriverConfig::DEFAULT).unwrap();
     assert_eq!((driver.status().phase, driver.status().homed, driver.status().reading), (Phase::Silent, [false; 3], None));
 }
 
-/// libnifalcon: after a malformed packet it goes on 16 bytes later, and a stream out of step stays so.
+/// libnifalcon continues 16 bytes after a malformed packet, and a stream out of step stays out of step.
 #[test]
 fn a_stream_out_of_step_is_in_step_with_the_next_packet() {
     for lost in 1..16 {

@@ -1,4 +1,4 @@
-//! What never happens.
+//! Promises of safety.
 
 use cohaptic_falcon::calibration::MOTOR_LIMIT;
 use cohaptic_falcon::driver::{DriverConfig, Phase, Setpoint};
@@ -47,11 +47,11 @@ fn a_force_that_nobody_renews_goes_to_zero() {
         assert!(lasted < seconds(0.06), "still there after {lasted:?}");
     }
     assert!(lasted > seconds(0.05));
-    // And none at all is none at once.
+    // No setpoint means zero force at once.
     bench.run(20 * MILLISECOND, |_, _| Some([0.0, 1.0, 0.0])).unwrap();
     bench.run(MILLISECOND, |_, _| None).unwrap();
     assert_eq!(counts(&bench), [0; 3]);
-    // One from the future is not fresh.
+    // A setpoint of the future is not fresh.
     bench.driver.exchange(Some(Setpoint { force: [1.0; 3], at: Instant::MAX })).unwrap();
     assert_eq!(counts(&bench), [0; 3]);
 }
@@ -65,7 +65,7 @@ fn a_loop_that_stands_still_begins_again_from_zero() {
     let at = bench.driver.now();
     bench.driver.exchange(Some(Setpoint { force: [0.0, 1.0, 0.0], at })).unwrap();
     assert_eq!(counts(&bench), [0; 3]);
-    // The device switched its motors off by itself meanwhile.
+    // Meanwhile the device has switched its motors off by itself.
     assert_eq!(bench.simulator.with(|device| device.observed().torque_timeouts), 1);
     bench.run(20 * MILLISECOND, |_, _| Some([0.0, 1.0, 0.0])).unwrap();
     assert!(counts(&bench) != [0; 3]);
@@ -80,10 +80,10 @@ fn the_largest_force_and_its_fastest_change_are_kept() {
         .run(seconds(1.0), |now, status| {
             let span = (now - last.0).as_secs_f64();
             assert!(distance(status.force, [0.0; 3]) <= 2.0 + 1e-12);
-            // The force went out at some time within the last exchange and this: twice its span is beyond doubt.
+            // The force went out at some time within the last exchange and the present one, so twice the span bounds the change.
             assert!(distance(status.force, last.1) <= 100.0 * 2.0 * span + 1e-9);
             last = (now, status.force);
-            // Back and forth, far beyond what is allowed.
+            // The wanted force alternates, far beyond the limits.
             let sign = if now.as_nanos() / 100_000_000 % 2 == 0 { 1.0 } else { -1.0 };
             Some([sign * 50.0, 0.0, 20.0])
         })
@@ -141,7 +141,7 @@ fn without_arming_forces_come_with_homing() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whoever asks for whatever force on a line as bad as can be: no motor moves before the device is homed.
+    /// No motor moves before homing, for any wanted force and on a very bad connection.
     #[test]
     fn no_force_before_homing(
         seed in any::<u64>(),

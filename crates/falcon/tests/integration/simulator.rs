@@ -1,4 +1,4 @@
-//! The simulated device on its own, byte by byte.
+//! The simulated device alone, byte by byte.
 
 use core::time::Duration;
 
@@ -15,7 +15,7 @@ fn set_up(device: &mut Simulator) {
     device.control(Request::BaudRate, ftdi::BAUD_RUNNING);
 }
 
-/// A packet with these motors, written by hand.
+/// Returns a packet with these motor counts, without the encoder of the driver.
 fn packet(motors: [i16; 3], control: u8) -> [u8; 16] {
     let mut packet = *b"<AAAAAAAAAAAAAA>";
     for (place, count) in packet[1..13].chunks_exact_mut(4).zip(motors) {
@@ -25,7 +25,7 @@ fn packet(motors: [i16; 3], control: u8) -> [u8; 16] {
     packet
 }
 
-/// Writes a packet and lets time pass until something other than an empty packet is due; gives it with its status bytes.
+/// Writes a packet, advances until a packet with payload is due, and returns this packet with its status bytes.
 fn ask(device: &mut Simulator, packet: [u8; 16]) -> Vec<u8> {
     device.write(&packet);
     loop {
@@ -50,9 +50,9 @@ fn sixteen_bytes_out_cause_sixteen_in_behind_two_of_status() {
     let begin = device.now();
     let answer = ask(&mut device, packet([0; 3], 0));
     assert_eq!((answer.len(), &answer[..2]), (18, &[0x01, 0x60][..]));
-    // 107 us there, 107 us back, and the timer of 1 ms.
+    // 107 us to the device, 107 us back, and the timer of 1 ms.
     assert!(device.now() - begin >= Duration::from_micros(213) && device.now() - begin <= Duration::from_millis(3));
-    // Nothing more is due: at the next end of the timer, a packet of status alone.
+    // No more bytes are due, so the next end of the timer gives a packet with status bytes alone.
     let next = device.next_packet();
     device.advance(next);
     assert_eq!(device.read_packet(&mut [0; PACKET]), 2);
@@ -63,16 +63,16 @@ fn encoders_mean_nothing_until_they_are_homed_and_everything_then() {
     let mut device = Simulator::new(running(), Waypoints::homing(Duration::ZERO));
     set_up(&mut device);
     let before = report(&ask(&mut device, packet([0; 3], 1)));
-    // At 0.100 m every encoder would stand at −740.8.
+    // At 0.100 m a homed encoder would stand at −740.8.
     assert!(before.encoders.iter().all(|count| count.abs_diff(-741) >= 99) && before.homed == [false; 3], "{before:?}");
     for _ in 0..4200 {
         device.advance(device.now() + Duration::from_millis(1));
         ask(&mut device, packet([0; 3], 1));
     }
     let after = report(&ask(&mut device, packet([0; 3], 1)));
-    // In the middle, at 0.125 m: −200.1, as near as dry friction lets the hand bring it: 0.2 N on 600 N/m, and 25 counts are a millimetre.
+    // In the middle, at 0.125 m, the count is −200.1, as near as dry friction lets the hand bring the grip: 0.2 N on 600 N/m, and 25 counts are a millimetre.
     assert!(after.all_homed() && after.encoders.iter().all(|count| count.abs_diff(-200) <= 12), "{after:?}");
-    // One packet without the homing bit and all is forgotten.
+    // One packet without the homing bit ends the homing.
     assert_eq!(report(&ask(&mut device, packet([0; 3], 0))).homed, [false; 3]);
     let forgotten = report(&ask(&mut device, packet([0; 3], 1)));
     assert!(!forgotten.all_homed() && forgotten.encoders.iter().all(|count| count.abs_diff(-200) >= 80), "{forgotten:?}");
@@ -84,7 +84,7 @@ fn motors_hold_a_torque_for_its_time_and_saturate() {
     set_up(&mut device);
     ask(&mut device, packet([i16::MAX; 3], 1));
     let force = device.motor_force();
-    // 0.4095 N·m at each arm, backwards; in the frame of the device that is straight in.
+    // A torque of 0.4095 N·m at each arm, backwards, is a force straight into the device.
     assert!(force[2] < -5.0 && force[0].abs() < 1e-9 && force[1].abs() < 1e-9, "{force:?}");
     assert_eq!(device.observed().saturated, 1);
     device.advance(device.now() + Duration::from_millis(20));
