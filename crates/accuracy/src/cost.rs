@@ -1,10 +1,10 @@
-//! What work costs.
+//! Measurement of costs, as processor time.
 
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// The processor time of this thread that one round of work takes: the median of `rounds`, since a machine that others use too is slow now and then.
+/// Returns the processor time of this thread for one round of work: the median of `rounds` rounds, because a machine with other users is slow at times.
 pub(crate) fn median_time<T>(rounds: usize, mut work: impl FnMut() -> T) -> Duration {
     let times = (0..rounds.max(1)).map(|_| {
         let start = processor_time();
@@ -14,40 +14,42 @@ pub(crate) fn median_time<T>(rounds: usize, mut work: impl FnMut() -> T) -> Dura
     median(times.collect())
 }
 
-/// The processor time that this thread has used.
+/// Returns the processor time used by this thread so far.
 pub(crate) fn processor_time() -> Duration {
     clock_gettime(ClockId::ThreadCPUTime).try_into().expect("processor time is not negative")
 }
 
-/// The median of some times, at least one.
+/// Returns the median of some times, at least one.
 pub(crate) fn median(mut times: Vec<Duration>) -> Duration {
     times.sort();
     times[times.len() / 2]
 }
 
-/// A span in nanoseconds.
+/// Returns a span in nanoseconds.
 pub(crate) fn nanos(span: Duration) -> f64 {
     span.as_secs_f64() * 1e9
 }
 
-/// How long and how often something is measured.
+/// Number and length of the rounds of a measurement.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rounds {
-    /// How many; the median counts.
+    /// Number of rounds, whose median is the result.
     pub(crate) count: usize,
-    /// A round repeats the work until it takes about so long: far more than reading a clock.
+    /// Approximate length of a round, far longer than a reading of the clock. A round repeats the work to fill this length.
     pub(crate) span: Duration,
 }
 
-/// Something whose cost is measured.
+/// Work whose cost is measured.
 pub(crate) type Work<'a> = Box<dyn FnMut() + 'a>;
 
 impl Rounds {
-    /// The processor time that each work takes once: the median of rounds in which all take turns.
+    /// Returns the processor time of one run of each work: the median of rounds in which all works take turns, so that a slow moment of the machine affects
+    /// all of them.
     pub(crate) fn medians(self, works: &mut [Work<'_>]) -> Vec<Duration> {
         let repetitions: Vec<u32> = works.iter_mut().map(|work| self.repetitions(work)).collect();
         let mut times = vec![Vec::new(); works.len()];
         for _ in 0..self.count.max(1) {
+            // Each round runs every work once, so the rounds of all works cover the same moments of the machine.
             for ((work, times), repetitions) in works.iter_mut().zip(&mut times).zip(&repetitions) {
                 let start = processor_time();
                 (0..*repetitions).for_each(|_| work());
@@ -57,7 +59,7 @@ impl Rounds {
         times.into_iter().map(median).collect()
     }
 
-    /// How often it fits into the span, at least once. The first time is not counted: it fills caches.
+    /// Returns how many runs of the work fit into the span, at least one. The first run is not timed, because it fills caches.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 1 and a million")]
     fn repetitions(self, work: &mut Work<'_>) -> u32 {
         work();

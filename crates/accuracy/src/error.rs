@@ -1,13 +1,13 @@
-//! Why there are no rows.
+//! Error of a measurement.
 
 use cohaptic_scene::SceneError;
 use cohaptic_stability::{AnalysisError, BoundaryError, FamilyError};
 use cohaptic_wan::{NetworkError, TimeWentBack};
 
-/// Why a measurement came to no end.
+/// Reason why a measurement ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum AccuracyError {
-    /// The watcher asked for it.
+    /// The watcher asked for the end.
     #[error("stopped")]
     Stopped,
     /// A scene of this crate is refused.
@@ -25,10 +25,10 @@ pub enum AccuracyError {
     /// A network of this crate refuses a packet.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// A network of this crate was asked for the past.
+    /// A network of this crate was asked for an instant of the past.
     #[error(transparent)]
     Time(#[from] TimeWentBack),
-    /// The system refuses to wait.
+    /// The system refused to wait.
     #[error("waiting for a packet's time: {0}")]
     Wait(#[from] std::io::Error),
 }

@@ -1,8 +1,8 @@
-//! Rows that belong together: what stands in one table, and what lies in one plot.
+//! Groups of rows. A group is a table and a plot.
 
 use crate::{Row, Subject};
 
-/// The rows of one plot: the same work, the same kind of error, the same kind of cost.
+/// Rows of one plot: the same work, the same kind of error, the same kind of cost.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Group<'a> {
     pub(crate) subject: Subject,
@@ -12,11 +12,12 @@ pub(crate) struct Group<'a> {
     pub(crate) rows: Vec<&'a Row>,
 }
 
-/// All groups, in the order in which their first rows came.
+/// Returns all groups, in the order of their first rows.
 pub(crate) fn groups(rows: &[Row]) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     for row in rows {
         let Row { subject, case, error_unit, cost_unit, .. } = row;
+        // There are few groups, so a linear search is enough and keeps the order of the rows.
         let found = groups
             .iter_mut()
             .find(|group| group.subject == *subject && group.case == *case && group.error_unit == *error_unit && group.cost_unit == *cost_unit);
@@ -29,7 +30,7 @@ pub(crate) fn groups(rows: &[Row]) -> Vec<Group<'_>> {
 }
 
 impl<'a> Group<'a> {
-    /// The methods, in the order in which they came.
+    /// Returns the methods, in the order of their first rows.
     pub(crate) fn methods(&self) -> Vec<&'a str> {
         let mut methods: Vec<&str> = Vec::new();
         for row in &self.rows {
@@ -40,7 +41,7 @@ impl<'a> Group<'a> {
         methods
     }
 
-    /// The references, in the order in which they came: nearly always one.
+    /// Returns the references, in the order of their first rows; nearly always a single reference.
     pub(crate) fn references(&self) -> Vec<&'static str> {
         let mut references = Vec::new();
         for row in &self.rows {
@@ -51,7 +52,7 @@ impl<'a> Group<'a> {
         references
     }
 
-    /// Words that name it.
+    /// Returns the title of the group.
     pub(crate) fn title(&self) -> String {
         format!("{}, {}: {} against {}", self.subject.name(), self.case, self.error_unit, self.cost_unit)
     }

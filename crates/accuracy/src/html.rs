@@ -7,16 +7,16 @@ use crate::groups::{Group, groups};
 use crate::numbers::short;
 use crate::{Row, Subject, plots};
 
-/// What stands at the head of the page besides the rows: where and when they were measured is not known here.
+/// Facts about a measurement for the head of the page, which the rows do not contain.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct About {
-    /// A line for people, such as the machine and the command; empty if there is none.
+    /// A line for readers, such as the machine and the command; empty without such a line.
     pub line: String,
-    /// Whether the measurement was ended before it was done.
+    /// Whether the measurement ended early.
     pub partial: bool,
 }
 
-/// The page, with plots of this size.
+/// Returns the page, with plots of this size.
 #[must_use]
 pub fn html(rows: &[Row], about: &About, size: Size) -> String {
     let first = "What each method costs and how wrong it is, on the same work. Costs are processor time unless their unit says otherwise, and differ from run to run; \
@@ -29,6 +29,7 @@ pub fn html(rows: &[Row], about: &About, size: Size) -> String {
         page = page.with(Html::warning("The measurement was interrupted: these rows were measured until then."));
     }
     let groups = groups(rows);
+    // Only subjects with rows get a section and a link.
     let present: Vec<Subject> = Subject::ALL.into_iter().filter(|subject| groups.iter().any(|group| group.subject == *subject)).collect();
     page = page.with(Html::list(present.iter().map(|subject| Html::link(subject.name(), subject.name()))));
     for subject in present {
@@ -39,11 +40,13 @@ pub fn html(rows: &[Row], about: &About, size: Size) -> String {
     page.html()
 }
 
+/// Returns the plots and the table of a group.
 fn figure(group: &Group<'_>, size: Size) -> Html {
     let mut content = Html::heading(3, group.title());
     for reference in group.references() {
         content = content.and(Html::paragraph(format!("Against: {reference}")));
     }
+    // The same plots as in the files, made from this group alone.
     let own: Vec<Row> = group.rows.iter().map(|row| (*row).clone()).collect();
     for plot in plots(&own, size) {
         content = content.and(Html::picture(&plot.svg)).and(Html::caption(plot.caption));

@@ -1,14 +1,15 @@
-//! Speed against error: what every method of the program costs, and how wrong it is, on the same work.
+//! Speed against error: the cost and the error of every method of the program, on the same work.
 //!
-//! You need it if you choose between the methods of this project by their cost and their error. It needs Linux.
+//! You need it if you choose between the methods of this project by their cost and their error. The crate needs Linux.
 //!
-//! [`measure`] gives [`Row`]s, one for each method at each setting. A cost is measured (processor time of the measuring thread, unless its unit says
-//! otherwise) and differs from run to run; an error is computed against a reference that is named in the row, and is the same every time unless the row
-//! says that it was measured too.
+//! [`measure`] returns [`Row`]s, one for each method at each setting. A cost is measured as processor time of the measuring thread, unless its unit says
+//! otherwise, and differs from run to run. An error is computed against a reference named in the row, and is the same in every run, unless the row says that
+//! the error was measured too.
 //!
-//! [`text`], [`csv`], [`plots`] and [`html`] show rows, and look at nothing but them. The program `cohaptic-accuracy` of this package measures, prints and writes them.
+//! [`text`], [`csv`], [`plots`] and [`html`] present rows, and use nothing but the rows. The program `cohaptic-accuracy` of this package measures, prints and
+//! writes rows.
 //!
-//! It does not say which method is best: that depends on the error that one can live with, and this is what the rows are for.
+//! The crate does not rank the methods: a ranking depends on the acceptable error, and the rows show cost and error for the reader's own choice.
 //! ```
 //! use cohaptic_accuracy::{Options, Subject, Unwatched, measure, text};
 //!
@@ -47,10 +48,10 @@ pub use subject::Subject;
 pub use text::text;
 pub use watch::{Unwatched, Watch};
 
-/// How closely everything is looked at.
+/// Amount of work of a measurement.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Options {
-    /// Fewer settings and less work a row: under a minute for everything, instead of under ten.
+    /// Fewer settings and less work per row: under one minute for all subjects, instead of under ten minutes.
     pub quick: bool,
 }
 
@@ -60,11 +61,12 @@ impl Options {
     }
 }
 
-/// Measures those subjects, in the order of [`Subject::ALL`].
+/// Measures the subjects `subjects`, in the order of [`Subject::ALL`].
 ///
 /// # Errors
 ///
-/// [`AccuracyError::Stopped`] if `watch` asks for it; another one if a scene of this crate cannot be read or run, which would be a fault of this crate.
+/// [`AccuracyError::Stopped`] if `watch` asks for the end. Any other error means that a scene of this crate cannot be read or run, which is a fault of this
+/// crate, or that the system refuses to wait.
 pub fn measure(subjects: &[Subject], options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
     let mut rows = Vec::new();
     for subject in Subject::ALL.into_iter().filter(|subject| subjects.contains(subject)) {

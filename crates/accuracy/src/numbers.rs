@@ -1,11 +1,12 @@
-//! Numbers as people read them: three digits.
+//! Numbers with three digits, for readers.
 
-/// A number with three digits; a dash if there is none.
+/// Returns a number with three digits; a dash for `None`.
 #[must_use]
 pub fn short(value: Option<f64>) -> String {
     match value {
         None => "–".to_owned(),
         Some(0.0) => "0".to_owned(),
+        // Below 0.01 fixed notation would have fewer than three digits; above 10⁵ it would be hard to read.
         Some(value) if !(0.01..1e5).contains(&value.abs()) => format!("{value:.2e}"),
         Some(value) => {
             let magnitude = value.abs();
@@ -32,6 +33,7 @@ mod tests {
         for (value, text) in [
             (None, "–"),
             (Some(0.0), "0"),
+            // Numbers outside of 0.01 to 10⁵ have an exponent.
             (Some(1.234e-17), "1.23e-17"),
             (Some(0.012_34), "0.012"),
             (Some(1.234), "1.23"),

@@ -1,54 +1,56 @@
-//! One method at one setting.
+//! Result of a method at a setting.
 
 use crate::{AccuracyError, Subject, Watch};
 
-/// What one method cost at one setting, and how wrong it was.
+/// Cost and error of a method at a setting.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Row {
-    /// What the method is for.
+    /// Subject of the method.
     pub subject: Subject,
-    /// The work that all methods of a group did: rows with the same subject, case and error unit lie in one plot.
+    /// Name of the work, the same for all methods of a group. Rows with the same subject, case, error unit and cost unit are one plot.
     pub case: String,
-    /// The method, without its setting: the rows of one method are one line of a plot.
+    /// Name of the method, without the setting. Rows of a method are a line of a plot.
     pub method: String,
-    /// The setting: a number of sub-steps, of runs, and so on; empty if the method has none.
+    /// Setting, such as a number of sub-steps or of runs; empty for a method without settings.
     pub setting: String,
-    /// What it cost, in [`Row::cost_unit`]; `None` if that cannot be told, and then the row has a reason.
+    /// Cost in [`Row::cost_unit`]; `None` for an unknown cost, explained by the note.
     pub cost: Option<f64>,
-    /// The unit of the cost, with what it is for one of: "ns a draw".
+    /// Unit of the cost, with the work that is counted: "ns a draw".
     pub cost_unit: &'static str,
-    /// How wrong it was, in [`Row::error_unit`]; not negative. `None` if there is no such number: a method that diverged, or does not answer this.
+    /// Error in [`Row::error_unit`], not negative; `None` without such a number, as for a method that diverged or does not answer the question.
     pub error: Option<f64>,
-    /// What the error is of, and its unit: "position \[m\]".
+    /// Quantity of the error and its unit: "position \[m\]".
     pub error_unit: &'static str,
-    /// What the error is against: a formula, a computation with more digits, an exact law.
+    /// Reference of the error: a formula, a computation with more digits, or an exact law.
     pub reference: &'static str,
-    /// What a reader should know of this row; empty if nothing.
+    /// Remark for readers; may be empty.
     pub note: String,
 }
 
 impl Row {
-    /// A row that has no error yet.
+    /// Returns a row without an error.
     pub(crate) fn of(subject: Subject, case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str)) -> Self {
         let (case, method) = (case.to_owned(), method.to_owned());
         Self { subject, case, method, setting, cost: Some(cost), cost_unit, error: None, error_unit: "", reference: "", note: String::new() }
     }
 }
 
-/// The rows so far, and the watcher.
+/// Rows of a running measurement, and the watcher.
 pub(crate) struct RowSink<'a> {
     pub(crate) rows: Vec<Row>,
     pub(crate) watch: &'a dyn Watch,
 }
 
 impl RowSink<'_> {
-    /// A row is done.
+    /// Adds a row and shows it to the watcher. An error ends the measurement if the watcher asks for the end.
     pub(crate) fn push(&mut self, row: Row) -> Result<(), AccuracyError> {
+        // The watcher sees the row before the measurement can end.
         self.watch.row(&row);
         self.rows.push(row);
         self.check()
     }
 
+    /// Returns [`AccuracyError::Stopped`] if the watcher asks for the end.
     pub(crate) fn check(&self) -> Result<(), AccuracyError> {
         if self.watch.stops() { Err(AccuracyError::Stopped) } else { Ok(()) }
     }

@@ -2,28 +2,28 @@
 
 use crate::{AccuracyError, Options, Row, Watch, analysis, motion, network, real_time, rotation, time};
 
-/// What a group of methods is for.
+/// Task of a group of methods.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Subject {
-    /// Moving masses from tick to tick.
+    /// Motion of masses from tick to tick.
     Motion,
-    /// Turning bodies from tick to tick.
+    /// Rotation of bodies from tick to tick.
     Rotation,
-    /// When things happen: events in nanoseconds, or steps.
+    /// Representation of time: events in nanoseconds, or steps.
     Time,
-    /// Random delays and losses.
+    /// Random delays and losses on links.
     Network,
-    /// Whether a scene is stable.
+    /// Stability of a scene.
     Analysis,
-    /// Leaving on time by the wall clock.
+    /// Release of packets by the wall clock.
     RealTime,
 }
 
 impl Subject {
-    /// Every subject, in the order in which they are measured and shown.
+    /// All subjects, in the order of measurement and presentation.
     pub const ALL: [Self; 6] = [Self::Motion, Self::Rotation, Self::Time, Self::Network, Self::Analysis, Self::RealTime];
 
-    /// The name, as on the command line.
+    /// Returns the name, as on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -36,6 +36,7 @@ impl Subject {
         }
     }
 
+    /// Measures the rows of the subject.
     pub(crate) fn rows(self, options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
         match self {
             Self::Motion => motion::rows(options, watch),

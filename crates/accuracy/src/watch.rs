@@ -2,16 +2,16 @@
 
 use crate::Row;
 
-/// Sees each row as it is measured, and may end the work.
+/// Observer of a measurement, who sees each row as it is measured and may end the work.
 pub trait Watch {
-    /// A row is done.
+    /// Takes a finished row.
     fn row(&self, row: &Row);
 
-    /// Whether the work is to be given up.
+    /// Returns whether the measurement is to end early.
     fn stops(&self) -> bool;
 }
 
-/// Nobody watches.
+/// A watcher that ignores the rows and never ends the work.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Unwatched;
 

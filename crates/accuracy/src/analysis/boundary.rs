@@ -1,4 +1,4 @@
-//! The stiffness at which a scene turns unstable, found by halving an interval with each method's verdicts.
+//! Stiffness at which a scene becomes unstable, found by bisection with the verdicts of each method.
 
 use std::time::Duration;
 
@@ -16,18 +16,21 @@ use crate::cost::processor_time;
 use crate::row::RowSink;
 use crate::{AccuracyError, Row};
 
+/// Name of the work.
 const CASE: &str = "boundary of KT, three peers at 24 ms";
 
-/// The interval that is halved \[N/m\]: stable at its lower end, unstable at its upper one.
+/// Interval of the bisection \[N/m\]: stable at the lower end, unstable at the upper end.
 const RANGE: [f64; 2] = [1000.0, 2600.0];
 
 /// Halvings of an interval of 1600 N/m down to the rounding of the result.
 const ALL: u32 = 52;
-/// Halvings down to half a µN/m: finer than the longest simulation here tells.
+/// Halvings down to half a µN/m, finer than the longest simulation of this module can resolve.
 const SIMULATED: u32 = 31;
 
+/// Measures the rows of the boundary.
 pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let (edge, text) = on_the_edge();
+    // The reference file gives the stiffness at which the radius is 1 with 50 digits.
     let exact = edge.scene.coordination.gains.stiffness;
     let key = KeyRange::parse("coordination.stiffness=1000..2600").expect("a range");
     let family = Family::new(&text, "on-the-edge.toml".as_ref(), &[], vec![key.clone()])?;
@@ -45,6 +48,7 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
         let found = halve(ALL, |stiffness| Ok(analyse(&with(stiffness), method)?.radius.value > 1.0))?;
         push(method.word(), String::new(), found, "each from the scene on")?;
     }
+    // One scratch for all verdicts: the preparation is the advantage of a family.
     let mut scratch = FamilyScratch::default();
     let found = halve(ALL, |stiffness| Ok(family.radius(&[stiffness], &mut scratch)?.radius > 1.0))?;
     push("family", String::new(), found, "reduced, with what the scenes share prepared once, radii without bounds")?;
@@ -66,14 +70,17 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
     Ok(())
 }
 
-/// A boundary and what it took.
+/// A boundary and its cost.
 struct Found {
+    /// Stiffness at the boundary \[N/m\].
     value: f64,
+    /// Processor time of the search \[ms\].
     millis: f64,
+    /// Number of verdicts in the search.
     verdicts: usize,
 }
 
-/// Halves the interval so often.
+/// Halves the interval `times` times.
 fn halve(times: u32, mut is_unstable: impl FnMut(f64) -> Result<bool, AccuracyError>) -> Result<Found, AccuracyError> {
     let start = processor_time();
     let [mut low, mut high] = RANGE;
@@ -81,6 +88,7 @@ fn halve(times: u32, mut is_unstable: impl FnMut(f64) -> Result<bool, AccuracyEr
     for _ in 0..times {
         let middle = 0.5 * (low + high);
         verdicts += 1;
+        // The boundary stays in the interval: unstable at `high`, stable at `low`.
         if is_unstable(middle)? {
             high = middle;
         } else {
@@ -90,7 +98,8 @@ fn halve(times: u32, mut is_unstable: impl FnMut(f64) -> Result<bool, AccuracyEr
     Ok(Found { value: 0.5 * (low + high), millis: millis(start), verdicts })
 }
 
-/// The library's own search. It takes all threads that there are, so its cost is the processor time of the whole process, which does nothing else.
+/// Finds the boundary by the library's own search. The search uses all threads of the machine, so its cost is the processor time of the whole process, which
+/// has no other work meanwhile.
 fn searched(family: &Family, key: &KeyRange) -> Result<Found, AccuracyError> {
     let start = process_time();
     let boundary = Boundary::find(family, BoundaryOptions::of(key), &[], |_| (), || false)?;
@@ -99,17 +108,19 @@ fn searched(family: &Family, key: &KeyRange) -> Result<Found, AccuracyError> {
     Ok(Found { value, millis, verdicts: boundary.samples })
 }
 
-/// The processor time that all threads of this process have used.
+/// Returns the processor time used by all threads of this process so far.
 fn process_time() -> Duration {
     clock_gettime(ClockId::ProcessCPUTime).try_into().expect("processor time is not negative")
 }
 
+/// Returns whether the simulated scene grows, as `cohaptic check` judges without analysis.
 fn grows(mut scene: Scene, seconds: u64) -> bool {
+    // A longer run distinguishes slower growth from slower decay.
     scene.duration = Duration::from_secs(seconds);
     match stability(&scene, Model::Least, || true) {
         Stability::Stable => false,
         Stability::Undecided { ratio } => ratio > 1.0,
-        // Nothing interrupts; and what else there may be is no sign of stability.
+        // No call interrupts the check, and any other outcome is no sign of stability.
         Stability::Unstable | Stability::Interrupted => true,
     }
 }

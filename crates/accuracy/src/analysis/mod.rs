@@ -1,5 +1,5 @@
-//! Whether a scene is stable: what a verdict costs by each method, and how far it is from numbers of fifty digits; and by runs that are left to chance,
-//! how much a number of them tells.
+//! Stability of a scene: cost of a verdict by each method, and its error against numbers of fifty digits. For random scenes: the information in a number of
+//! runs.
 
 mod boundary;
 mod every_pattern;
@@ -12,33 +12,33 @@ pub mod references;
 use crate::row::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
-/// How much work there is in the rows.
+/// Amount of work in the rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Effort {
-    /// In how many rounds the cost of a verdict is measured.
+    /// Rounds in which the cost of a verdict is measured.
     pub rounds: usize,
-    /// Over how many frames a disturbance is simulated.
+    /// Numbers of frames over which a disturbance is simulated.
     pub growth_frames: &'static [u32],
-    /// How many seconds are simulated for the verdicts of a boundary.
+    /// Lengths of the simulations for the verdicts of a boundary \[s\].
     pub boundary_seconds: &'static [u64],
-    /// How many runs there are of a scene that is left to chance.
+    /// Numbers of runs of a random scene.
     pub runs: &'static [u32],
 }
 
 impl Effort {
-    /// Seconds.
+    /// Effort of some seconds.
     pub const QUICK: Self = Self { rounds: 5, growth_frames: &[50, 200, 800], boundary_seconds: &[1, 4, 16], runs: &[100, 1000, 10_000] };
 
-    /// About a minute.
+    /// Effort of about a minute.
     pub const FULL: Self =
         Self { rounds: 15, growth_frames: &[50, 200, 800, 3200], boundary_seconds: &[1, 4, 16, 64, 256], runs: &[100, 1000, 10_000, 100_000] };
 }
 
-/// The rows of this subject.
+/// Measures the rows of this subject.
 ///
 /// # Errors
 ///
-/// As [`crate::measure`].
+/// The errors of [`crate::measure`].
 pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
     let mut done = RowSink { rows: Vec::new(), watch };
     radius::measure(effort, &mut done)?;
@@ -48,7 +48,7 @@ pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError
     Ok(done.rows)
 }
 
-/// A row of this subject that has no error yet.
+/// Returns a row of this subject without an error.
 fn row(case: &str, method: &str, setting: String, cost: (f64, &'static str), reference: &'static str) -> Row {
     Row { reference, ..Row::of(Subject::Analysis, case, method, setting, cost) }
 }

@@ -1,4 +1,4 @@
-//! The probability of an event, from runs: how far it is from the exact one, and how wide the interval is that a number of runs leaves.
+//! Probability of an event from runs: its error against the exact probability, and the width of its confidence interval.
 
 use super::every_pattern::{LIMIT, exact, happens, scene};
 use super::{Effort, row};
@@ -9,15 +9,17 @@ use crate::{AccuracyError, Row};
 const COST: &str = "s a verdict";
 const REFERENCE: &str = "every pattern of losses, weighed";
 
-/// 97.5 % of a normal law lie below this number of deviations.
+/// Number of standard deviations below which 97.5 % of a normal law lie.
 const Z: f64 = 1.959_963_984_540_054;
 
+/// Measures the rows of the probability.
 pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let mut scene = scene()?;
     let case = format!("probability of more than {:.1} mm apart", 1e3 * LIMIT);
     let start = processor_time();
     let exact = exact(&scene, || done.check())?;
     let seconds = (processor_time() - start).as_secs_f64();
+    // The probability of all patterns together is known to be 1, so its error shows the rounding of the weights.
     let weighed = row(&case, "every pattern", format!("{} runs", exact.patterns), (seconds, COST), "certainty: all patterns together");
     let note = format!("{:.6}; the error is that of the weights, which sum to one; each further sample doubles the cost", exact.probability);
     done.push(Row { error: Some((exact.all - 1.0).abs()), error_unit: "probability [1]", note, ..weighed })?;
@@ -25,6 +27,7 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
         let start = processor_time();
         let mut count = 0_u32;
         for run in 0..*runs {
+            // The run number is the seed, so that a longer series repeats the runs of a shorter one.
             scene.seed = u64::from(run);
             count += u32::from(happens(&scene));
             if run.is_multiple_of(256) {
@@ -39,6 +42,7 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
             format!("{share:.5}; the interval of 95 % from {:.5} to {:.5} {covered} the exact {:.6}", interval.low, interval.high, exact.probability);
         let row = row(&case, "monte carlo", format!("{runs} runs"), (seconds, COST), REFERENCE);
         done.push(Row { error: Some((share - exact.probability).abs()), error_unit: "probability [1]", note: note.clone(), ..row.clone() })?;
+        // A second row shows the width, which is the error that a user without the exact number can state.
         let half = 0.5 * (interval.high - interval.low);
         done.push(Row {
             error: Some(half),
@@ -51,7 +55,7 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
     Ok(())
 }
 
-/// Where a probability lies.
+/// Confidence interval of a probability.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Interval {
     low: f64,
@@ -59,7 +63,7 @@ struct Interval {
 }
 
 impl Interval {
-    /// Wilson's (1927), which does not leave \[0, 1\] and has width where nothing happened.
+    /// Returns Wilson's (1927) interval for `count` events in `runs` runs. The interval lies within \[0, 1\], and has a width even for `count` = 0.
     fn wilson(count: u32, runs: u32) -> Self {
         let (n, share) = (f64::from(runs), f64::from(count) / f64::from(runs));
         let scale = 1.0 / (1.0 + Z * Z / n);
@@ -68,6 +72,7 @@ impl Interval {
         Self { low: middle - half, high: middle + half }
     }
 
+    /// Returns whether the probability lies in the interval.
     fn covers(self, probability: f64) -> bool {
         (self.low..=self.high).contains(&probability)
     }
@@ -77,7 +82,7 @@ impl Interval {
 mod tests {
     use super::*;
 
-    /// Both ends solve |p̂ − p| = z·√(p·(1 − p)/n), from which Wilson derived them.
+    /// Both ends solve |p̂ − p| = z·√(p·(1 − p)/n), from which Wilson derived the interval.
     #[test]
     fn the_ends_are_where_the_share_is_just_credible() {
         for (count, runs) in [(1, 10), (5, 10), (37, 1000)] {
@@ -89,7 +94,7 @@ mod tests {
         }
     }
 
-    /// z²/(n + z²) for nothing in n.
+    /// The upper end for no event in n runs is z²/(n + z²).
     #[test]
     fn nothing_seen_is_not_nothing_possible() {
         let Interval { low, high } = Interval::wilson(0, 100);

@@ -1,14 +1,14 @@
-//! Ways of one body from tick to tick, with its force held.
+//! Methods of motion for a body from tick to tick under a held force.
 
 use cohaptic_peer::{Motion, Number, Plant, StepMap};
 
-/// A way of one body on one axis over one tick.
+/// A method of motion for a body along an axis over a tick.
 pub(crate) trait Advance<T> {
-    /// Moves a body by one tick under the held force.
+    /// Moves a body by one tick under the held force \[N\].
     fn advance(&self, body: &mut Motion<T>, force: T);
 }
 
-/// The program's own map, with the short form for what nothing ties to ground: what its peers do at every tick, whichever integrator made the map.
+/// The program's own map, in its short form for a body without a spring to ground, as peers of the program use it at every tick, for any integrator.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Program {
     map: StepMap,
@@ -32,7 +32,7 @@ impl Advance<f64> for Program {
     }
 }
 
-/// A body and the length of a sub-step, as loops that step have them.
+/// Coefficients of a body and the length of a sub-step \[s\], as a loop over sub-steps uses them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stepped {
     inverse_mass: f64,
@@ -43,7 +43,7 @@ pub(crate) struct Stepped {
 }
 
 impl Stepped {
-    /// A number of sub-steps in a tick of a length \[s\].
+    /// Returns the coefficients for `steps` sub-steps in a tick of the length `tick` \[s\].
     pub(crate) fn new(plant: &Plant, tick: f64, steps: u32) -> Self {
         Self { inverse_mass: 1.0 / plant.mass, damping: plant.damping, stiffness: plant.stiffness, h: tick / f64::from(steps), steps }
     }
@@ -54,7 +54,7 @@ impl Stepped {
     }
 }
 
-/// Semi-implicit Euler, step by step: velocity first, then position with the new velocity.
+/// Semi-implicit Euler by a loop over sub-steps: velocity first, then position with the new velocity.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Euler(pub(crate) Stepped);
 
@@ -68,7 +68,7 @@ impl Advance<f64> for Euler {
     }
 }
 
-/// The classical Runge–Kutta method, step by step.
+/// The classical Runge–Kutta method by a loop over sub-steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RungeKutta(pub(crate) Stepped);
 
@@ -79,6 +79,7 @@ impl Advance<f64> for RungeKutta {
         let half = 0.5 * h;
         for _ in 0..self.0.steps {
             let Motion { position: x, velocity: v } = *body;
+            // Slopes at the begin, twice in the middle, and at the end of the sub-step. The slope of a position is a velocity.
             let a1 = self.0.acceleration(x, v, force);
             let v2 = v + half * a1;
             let a2 = self.0.acceleration(x + half * v, v2, force);
@@ -92,7 +93,7 @@ impl Advance<f64> for RungeKutta {
     }
 }
 
-/// A map in any numbers, with all its terms.
+/// A map in any number type, with all its terms.
 impl<T: Number> Advance<T> for StepMap<T> {
     fn advance(&self, body: &mut Motion<T>, force: T) {
         Self::advance(self, body, force);

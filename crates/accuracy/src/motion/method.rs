@@ -1,4 +1,4 @@
-//! The ways from tick to tick that are compared.
+//! Methods of motion that are compared.
 
 use std::time::Duration;
 
@@ -9,23 +9,23 @@ use super::scenes::TICK;
 use super::world::{Pair, World, run};
 use crate::Options;
 
-/// A way from tick to tick.
+/// A method of motion from tick to tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Method {
-    /// The program's matrix exponential, as one map.
+    /// The program's matrix exponential, as one map per tick.
     Exact,
-    /// Semi-implicit Euler, with the steps of a tick.
+    /// Semi-implicit Euler, with this number of steps per tick.
     Euler(u32),
-    /// Runge and Kutta's, with the steps of a tick.
+    /// The Runge–Kutta method, with this number of steps per tick.
     RungeKutta(u32),
-    /// The steps of semi-implicit Euler multiplied out beforehand into one map: the program's `integrator = "semi-implicit-euler"`.
+    /// The steps of semi-implicit Euler, multiplied into one map in advance: the program's `integrator = "semi-implicit-euler"`.
     EulerMap(u32),
-    /// The steps of Runge and Kutta multiplied out beforehand: the program's `integrator = "rk4"`.
+    /// The steps of Runge–Kutta, multiplied into one map in advance: the program's `integrator = "rk4"`.
     RungeKuttaMap(u32),
 }
 
 impl Method {
-    /// All that are looked at.
+    /// Returns all compared methods.
     pub(crate) fn all(options: Options) -> Vec<Self> {
         let steps: &[u32] = if options.quick { &[1, 4, 16, 64] } else { &[1, 2, 4, 8, 16, 32, 64] };
         let ways: [fn(u32) -> Self; 4] = [Self::Euler, Self::RungeKutta, Self::EulerMap, Self::RungeKuttaMap];
@@ -42,7 +42,7 @@ impl Method {
         }
     }
 
-    /// How many steps a tick has.
+    /// Returns the number of steps per tick in words.
     pub(crate) fn setting(self) -> String {
         match self {
             Self::Exact => String::new(),
@@ -53,7 +53,7 @@ impl Method {
         }
     }
 
-    /// Which of the program's maps does the same in one multiplication, but for rounding.
+    /// Returns the integrator of the program whose map does the same in one multiplication, except for rounding.
     pub(crate) const fn integrator(self) -> Integrator {
         match self {
             Self::Exact => Integrator::Exact,
@@ -62,15 +62,16 @@ impl Method {
         }
     }
 
-    /// The maps of one tick, as the program makes them.
+    /// Returns the program's maps of a tick.
     pub(crate) fn maps(self, pair: &Pair) -> [StepMap; 4] {
         pair.plants.map(|plant| plant.step(Duration::from_millis(1), self.integrator()))
     }
 
-    /// Runs the loop this way.
+    /// Runs the loop with this method.
     pub(crate) fn run(self, pair: &Pair, show: impl FnMut(usize, &[Motion; 4])) -> World<f64> {
         let stepped = |steps| pair.plants.map(|plant| Stepped::new(&plant, TICK, steps));
         match self {
+            // Maps of all integrators cost the same per tick; only loops over sub-steps cost more with more steps.
             Self::Exact | Self::EulerMap(_) | Self::RungeKuttaMap(_) => run(pair, &self.maps(pair).map(Program::new), show),
             Self::Euler(steps) => run(pair, &stepped(steps).map(Euler), show),
             Self::RungeKutta(steps) => run(pair, &stepped(steps).map(RungeKutta), show),

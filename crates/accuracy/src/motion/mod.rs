@@ -1,7 +1,7 @@
-//! Motion between ticks: the exact propagator compared with integrators that step.
+//! Motion between ticks: the exact propagator compared with integrators that use sub-steps.
 //!
-//! All methods do the same: two peers compute their forces at ticks of 1 ms and hold them. They differ in how a body with a held force gets to the next
-//! tick. The reference is the same loop with at least 100 bits and the exact exponential.
+//! All methods do the same work: two peers compute their forces at ticks of 1 ms and hold them. The methods differ in the motion of a body under a held
+//! force. The reference is the same loop with at least 100 bits and the exact exponential.
 
 mod advance;
 mod boundary;
@@ -34,11 +34,11 @@ const STIFFNESS: &str = "critical stiffness [N/m]";
 const LOOP: &str = "the same loop with 100 bits and the exact exponential";
 const ROOT: &str = "root of the characteristic equation with 100 bits and the exact exponential";
 
-/// The rows of this subject.
+/// Measures the rows of this subject.
 ///
 /// # Errors
 ///
-/// As [`crate::measure`].
+/// The errors of [`crate::measure`].
 pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
     let mut sink = RowSink { rows: Vec::new(), watch };
     for motion in &SCENES {
@@ -52,19 +52,24 @@ pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyErr
     Ok(sink.rows)
 }
 
-/// A scene, and its reference.
+/// A scene and its reference.
 pub(crate) struct Work {
     pub(crate) pair: Pair,
-    /// The bodies after every tick.
+    /// Bodies of the reference after every tick.
     pub(crate) reference: Vec<[Motion<Quad>; 4]>,
+    /// Critical stiffness of the reference \[N/m\]; `None` for a scene without a boundary.
     pub(crate) critical: Option<Quad>,
+    /// Rounds in which costs are measured.
     rounds: usize,
 }
 
 impl Work {
+    /// Computes the reference of a scene.
     pub(crate) fn prepare(motion: &MotionScene, options: Options) -> Result<Self, AccuracyError> {
+        // The full run lasts four seconds of simulated time, many time constants of each scene.
         let (ticks, rounds) = if options.quick { (1000, 7) } else { (4000, 31) };
         let pair = Pair::of(motion, &motion.scene()?, ticks);
+        // One exact map per body, computed from the exact values of the parameters.
         let maps: [StepMap<Quad>; 4] = pair.plants.map(|plant| exponential::exact_map(&plant, TICK_NANOS));
         let mut reference = Vec::with_capacity(ticks);
         run(&pair, &maps, |_, bodies| reference.push(*bodies));
@@ -72,7 +77,7 @@ impl Work {
         Ok(Self { pair, reference, critical, rounds })
     }
 
-    /// What a method costs and how wrong it is.
+    /// Returns cost and errors of a method.
     fn rows(&self, motion: &MotionScene, method: Method) -> Vec<Row> {
         let work = || method.run(&self.pair, |_, _| {});
         let cost = nanos(median_time(self.rounds, work)) / f64_of(self.pair.hands.len());
@@ -95,9 +100,10 @@ impl Work {
         rows
     }
 
-    /// The largest error of a position \[m\], and of the energy \[J\], at any tick; `None` if there is none that is finite.
+    /// Returns the largest error of a position \[m\] and of the energy \[J\] over all ticks; `None` for an error that is not finite.
     pub(crate) fn errors(&self, method: Method) -> (Option<f64>, Option<f64>) {
         let (mut position, mut stored) = (0.0, 0.0);
+        // Differences are taken with 100 bits: the errors of the exact propagator are a few units in the last place.
         method.run(&self.pair, |tick, bodies| {
             let exactly = bodies.map(|body| Motion { position: Quad::of(body.position), velocity: Quad::of(body.velocity) });
             let right = &self.reference[tick];
@@ -106,11 +112,12 @@ impl Work {
             }
             stored = worse(stored, absolute(energy(&self.pair, &exactly) - energy(&self.pair, right)).rounded());
         });
+        // A diverged run has no error to plot, and its row says so.
         let finite = |error: f64| error.is_finite().then_some(error);
         (finite(position), finite(stored))
     }
 
-    /// The boundary as `cohaptic stability boundary` finds it: another matrix, made by other code, without the digits.
+    /// Measures the boundary as `cohaptic stability boundary` finds it: another matrix, made by other code, in doubles.
     fn second_witness(&self, motion: &MotionScene) -> Result<Option<Row>, AccuracyError> {
         let (Some((along, low, high)), Some(right)) = (motion.boundary, self.critical) else { return Ok(None) };
         let start = crate::cost::processor_time();
@@ -127,16 +134,17 @@ impl Work {
     }
 }
 
-/// The first crossing that the program finds \[N/m\].
+/// Returns the first crossing that the program finds \[N/m\].
 pub(crate) fn program_boundary(motion: &MotionScene, (key, low, high): (&str, f64, f64)) -> Result<Option<f64>, AccuracyError> {
     let range = KeyRange { key: key.to_owned(), low, high, unit: String::new() };
+    // The second witness is asked for as many digits as its radius can resolve.
     let options = BoundaryOptions { tolerance: 1e-9, ..BoundaryOptions::of(&range) };
     let family = motion.family(range)?;
     let boundary = Boundary::find(&family, options, &[], |_| (), || false)?;
     Ok(boundary.crossings.first().map(|crossing| crossing.value))
 }
 
-/// The larger one; a NaN is worse than any.
+/// Returns the larger error; a NaN counts as infinite.
 fn worse(before: f64, now: f64) -> f64 {
     if now.is_nan() { f64::INFINITY } else { before.max(now) }
 }

@@ -1,12 +1,12 @@
-//! Numbers that the loop can be run in: those of the program, and those with twice the digits that it is set against.
+//! Number types of the loop: doubles as in the program, and numbers of twice the digits for the reference.
 
 use std::ops::{Div, Mul, Sub};
 
 use qd::Quad;
 
-/// A number of the loop that is compared, divided and rounded.
+/// A number of the loop with comparison, division and rounding.
 pub(crate) trait Number: cohaptic_peer::Number + PartialOrd + Div<Output = Self> {
-    /// The nearest number of the program.
+    /// Returns the nearest double.
     fn rounded(self) -> f64;
 }
 
@@ -17,14 +17,14 @@ impl Number for f64 {
     }
 }
 
-/// The unevaluated sum of two numbers of the program: at least 100 bits.
+/// The unevaluated sum of two doubles, with at least 100 bits.
 impl Number for Quad {
     fn rounded(self) -> f64 {
         self.0
     }
 }
 
-/// The absolute value.
+/// Returns the absolute value.
 pub(crate) fn absolute<T: Number>(value: T) -> T {
     if value < T::of(0.0) { -value } else { value }
 }
@@ -67,6 +67,7 @@ impl<T: Number> Div for Complex<T> {
 
     fn div(self, other: Self) -> Self {
         let divisor = other.norm_squared();
+        // Multiplication by the conjugate makes the divisor real.
         let Self { re, im } = self * Self { re: other.re, im: -other.im };
         Self { re: re / divisor, im: im / divisor }
     }

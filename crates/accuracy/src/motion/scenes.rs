@@ -1,4 +1,4 @@
-//! The four scenes: two peers each, on one axis, with ticks of 1 ms in lockstep.
+//! The four scenes, each with two peers on one axis and ticks of 1 ms in lockstep.
 
 use std::path::Path;
 
@@ -9,15 +9,15 @@ use crate::AccuracyError;
 
 /// The tick of all scenes \[ns\].
 pub(crate) const TICK_NANOS: f64 = 1e6;
-/// The tick of all scenes \[s\], as the program has it.
+/// The tick of all scenes \[s\], as a double of the program.
 pub(crate) const TICK: f64 = 1e-3;
 
-/// Which gain is raised until the loop is unstable.
+/// Gain that is raised until the loop is unstable.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Along {
-    /// KC.
+    /// KC, the stiffness of the coupling.
     Coupling,
-    /// KT.
+    /// KT, the stiffness of the coordination.
     Coordination,
 }
 
@@ -30,7 +30,7 @@ impl Along {
     }
 }
 
-/// Two peers, one on the right and one on the left, that hold one object; each scene says what differs from this one.
+/// Two peers with a shared object. Each scene is a difference from this text.
 const PAIR: &str = r#"
 [scene]
 duration = "4s"
@@ -52,27 +52,27 @@ name = "right"
 delay = "4ms"
 "#;
 
-/// One of the scenes, and facts of it that the loop need not read from the text.
+/// A scene, with facts that the loop does not read from the text.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotionScene {
     pub(crate) name: &'static str,
-    /// The difference from [`PAIR`], as texts `KEY=VALUE`.
+    /// Differences from [`PAIR`], as texts `KEY=VALUE`.
     overrides: &'static [&'static str],
-    /// How many ticks there are between two samples.
+    /// Number of ticks between two samples.
     pub(crate) update: usize,
-    /// How many ticks a sample takes.
+    /// Delay of a sample \[ticks\].
     pub(crate) delay: usize,
-    /// Along which gain the boundary of stability is looked for, and within which range \[N/m\]: stable at its beginning. `None` where there is no loop,
-    /// or none that is linear.
+    /// Gain and range \[N/m\] of the search for the boundary of stability, stable at the begin. `None` for a scene without a loop, or with a nonlinear loop.
     pub(crate) boundary: Option<(Along, f64, f64)>,
 }
 
 impl MotionScene {
+    /// Returns the parsed scene.
     pub(crate) fn scene(&self) -> Result<Scene, AccuracyError> {
         Ok(Scene::parse(PAIR, Path::new(FILE), &self.overrides())?)
     }
 
-    /// The scene with a key left open.
+    /// Returns the scene with one key left open.
     pub(crate) fn family(&self, range: KeyRange) -> Result<Family, FamilyError> {
         Family::new(PAIR, Path::new(FILE), &self.overrides(), vec![range])
     }
@@ -84,7 +84,7 @@ impl MotionScene {
 
 const FILE: &str = "motion.toml";
 
-/// A device that touches nothing, pushed by a constant force: it nears its last velocity in some time constants of 20 ms.
+/// A device without contact under a constant force, which approaches its final velocity in some time constants of 20 ms.
 pub(crate) const FREE: MotionScene = MotionScene {
     name: "free device",
     overrides: &["coordination.stiffness=1000.0", "peer.contact=none", "peers.left.hand.force=1.0", "link.delay=8ms"],
@@ -93,7 +93,7 @@ pub(crate) const FREE: MotionScene = MotionScene {
     boundary: None,
 };
 
-/// Two peers hold the object, one of them with an arm that stays where it is, the other pushing with 1 N.
+/// Two peers that hold the object: the left peer with an arm at rest, the right peer with a push of 1 N.
 pub(crate) const COUPLED: MotionScene = MotionScene {
     name: "coupled peers",
     overrides: &["object.damping=1.0", "peers.left.hand.arm={ mass = 0.3, damping = 10.0, stiffness = 100.0 }", "peers.right.hand.force=1.0"],
@@ -102,7 +102,7 @@ pub(crate) const COUPLED: MotionScene = MotionScene {
     boundary: Some((Along::Coordination, 100.0, 20_000.0)),
 };
 
-/// These two, a sample every tick and light copies, with a coupling so stiff that a little more is unstable.
+/// Like [`COUPLED`], with a sample every tick, light copies, and a coupling so stiff that slightly more is unstable.
 pub(crate) const STIFF: MotionScene = MotionScene {
     name: "stiff coupling",
     overrides: &[
@@ -118,7 +118,7 @@ pub(crate) const STIFF: MotionScene = MotionScene {
     boundary: Some((Along::Coupling, 100.0, 1_000_000.0)),
 };
 
-/// Each can push the object towards the other and cannot pull it, and both swing to and fro: contact is made and lost again and again.
+/// Two peers with one-sided contacts, which push the object towards the partner, and with oscillating hands. Contact is made and lost repeatedly.
 pub(crate) const PUSH: MotionScene = MotionScene {
     name: "one-sided contact",
     overrides: &[

@@ -1,4 +1,4 @@
-//! The methods against their orders, the reference against closed forms and other programs, the loop against the simulator.
+//! Methods against their orders, the reference against closed forms and other programs, and the loop against the simulator.
 
 use std::convert::Infallible;
 use std::time::Duration;
@@ -20,7 +20,7 @@ fn position_error(work: &Work, method: Method) -> f64 {
     work.errors(method).0.unwrap()
 }
 
-/// Halving the step divides the error by 2 to the order, of the position and of the energy, in every scene in which the error is far above rounding.
+/// Halving the step divides the error by 2 to the order, for position and energy, in every scene whose error is far above rounding.
 #[test]
 fn eulers_error_falls_with_the_step_and_runge_and_kuttas_with_its_fourth_power() {
     for motion in [FREE, COUPLED, PUSH] {
@@ -43,7 +43,7 @@ fn eulers_error_falls_with_the_step_and_runge_and_kuttas_with_its_fourth_power()
     }
 }
 
-/// The same for the boundary that is predicted.
+/// The predicted boundary converges with the same order.
 #[test]
 fn the_boundary_converges_with_the_order_too() {
     for motion in [COUPLED, STIFF] {
@@ -56,13 +56,13 @@ fn the_boundary_converges_with_the_order_too() {
         let order = |way: fn(u32) -> Method, coarse: u32| (error(way(coarse)) / error(way(2 * coarse))).log2();
         assert!((order(Method::EulerMap, 64) - 1.0).abs() < 0.1, "{}", motion.name);
         assert!((order(Method::RungeKuttaMap, 2) - 4.0).abs() < 0.1, "{}", motion.name);
-        // 1000 times nearer than Runge and Kutta's in one step, and within some roundings of a number of that size, times what the loop makes of one.
+        // The exact propagator is 1000 times nearer than Runge–Kutta in one step, and within some roundings of a number of that size, amplified by the loop.
         assert!(error(Method::Exact) < 1e-3 * error(Method::RungeKutta(1)));
         assert!(error(Method::Exact) < 1e-13 * right.rounded());
     }
 }
 
-/// A spring that is moved with the new velocity is stable up to K·h²·(1/mH + 1/mO) = 4, far beyond what holds for one that is sampled and held.
+/// A spring moved with the new velocity is stable up to K·h²·(1/mH + 1/mO) = 4, far beyond the limit of a sampled and held spring.
 #[test]
 fn one_step_of_euler_calls_stable_what_is_not() {
     let work = work(&STIFF);
@@ -70,7 +70,8 @@ fn one_step_of_euler_calls_stable_what_is_not() {
     assert!(found.rounded() > 10.0 * work.critical.unwrap().rounded(), "{found:?}");
 }
 
-/// A damped free mass under a constant force: v = f/b·(1 − e^{−bt/m}), x = f/b·(t − m/b·(1 − e^{−bt/m})), with the exponential of another author.
+/// The closed form of a damped free mass under a constant force is v = f/b·(1 − e^{−bt/m}), x = f/b·(t − m/b·(1 − e^{−bt/m})), with the exponential of the
+/// `qd` crate.
 #[test]
 fn the_reference_is_the_closed_form_of_a_free_device() {
     let work = work(&FREE);
@@ -79,16 +80,17 @@ fn the_reference_is_the_closed_form_of_a_free_device() {
         let t = Quad::of(f64_of(tick + 1)) / Quad::of(1000.0);
         let reached = Quad::ONE - (-(b * t / m)).exp();
         let x = (t - m / b * reached) / b;
-        // A thousand additions of numbers below 0.2, each rounded at 2⁻¹⁰⁴ or better.
+        // A thousand additions of numbers below 0.2 are each rounded at 2⁻¹⁰⁴ or better.
         assert!(absolute(bodies[0].position - x).rounded() < 1000.0 * 0.2 * 5e-32, "tick {tick}");
         assert!(absolute(bodies[0].velocity - reached / b).rounded() < 1000.0 * 0.2 * 5e-32, "tick {tick}");
     }
 }
 
-/// A number of more digits than one has.
+/// A number with twice the digits of a double, as an unevaluated sum.
 type Sum = (f64, f64);
 
-/// After 500 ticks, by a program of its own: mpmath 1.3.0 with 60 digits, its matrix exponential, the loop written anew. Each number as a sum of two.
+/// The expected values after 500 ticks come from an independent program: mpmath 1.3.0 with 60 digits, its matrix exponential, and the loop written anew. Each
+/// number is a sum of two doubles.
 #[test]
 fn the_reference_is_that_of_another_program() {
     let expected: [(MotionScene, [[Sum; 2]; 4]); 2] = [
@@ -114,14 +116,14 @@ fn the_reference_is_that_of_another_program() {
     for (motion, bodies) in expected {
         let found = work(&motion).reference[499];
         for (found, [x, v]) in found.iter().zip(bodies) {
-            // 500 ticks of some ten roundings of numbers below 0.02, 2⁻¹⁰⁴ each, and what a coupling of 15 kN/m makes of them over a tick.
+            // The tolerance covers 500 ticks of some ten roundings of numbers below 0.02, by 2⁻¹⁰⁴ each, amplified over a tick by a coupling of 15 kN/m.
             assert!(absolute(found.position - Quad(x.0, x.1)).rounded() < 1e-28, "{}: {found:?}", motion.name);
             assert!(absolute(found.velocity - Quad(v.0, v.1)).rounded() < 1e-27, "{}: {found:?}", motion.name);
         }
     }
 }
 
-/// The halving of long steps: one of 100 ms against a hundred of 1 ms.
+/// The halving of long steps is exact: one step of 100 ms against a hundred steps of 1 ms.
 #[test]
 fn a_long_exact_step_is_as_good_as_many_short_ones() {
     let plant = Plant { mass: 0.1, damping: 5.0, stiffness: 300.0 };
@@ -136,9 +138,9 @@ fn a_long_exact_step_is_as_good_as_many_short_ones() {
     assert!(absolute(apart.position).rounded() < 1e-28 && absolute(apart.velocity).rounded() < 1e-27);
 }
 
-/// Rounding alone. With u = 2⁻⁵³, each tick rounds x once, by at most u·|x|; an increment has a relative error of at most 11·u (8 of a coefficient, 3 of
-/// its use), which sums up to 11·u·|x|. The error of v shrinks by e^{−0.05} a tick and grows by u·|v| + 11·u·2·g₁·f ≤ 0.42·u, so it stays below
-/// 8.7·u m/s, and adds at most 8.7·u·t to x.
+/// The bound is that of rounding alone. With u = 2⁻⁵³, each tick rounds x once, by at most u·|x|. An increment has a relative error of at most 11·u (8 of a
+/// coefficient, 3 of its use), which sums to 11·u·|x|. The error of v shrinks by e^{−0.05} per tick and grows by u·|v| + 11·u·2·g₁·f ≤ 0.42·u, so it stays
+/// below 8.7·u m/s and adds at most 8.7·u·t to x.
 #[test]
 fn the_exact_propagator_errs_by_no_more_than_roundings_explain() {
     let work = Work::prepare(&FREE, Options { quick: false }).unwrap();
@@ -151,7 +153,7 @@ fn the_exact_propagator_errs_by_no_more_than_roundings_explain() {
     }
 }
 
-/// Steps multiplied out beforehand do the same as steps one by one, but for roundings.
+/// Steps multiplied into one map give the same result as single steps, except for roundings.
 #[test]
 fn one_map_is_many_steps() {
     for motion in SCENES {
@@ -159,14 +161,14 @@ fn one_map_is_many_steps() {
         for (stepped, mapped) in [(Method::Euler(4), Method::EulerMap(4)), (Method::RungeKutta(4), Method::RungeKuttaMap(4))] {
             let (stepped, mapped) = (stepped.run(&work.pair, |_, _| {}), mapped.run(&work.pair, |_, _| {}));
             for (one, other) in stepped.bodies.iter().zip(&mapped.bodies) {
-                // 1000 ticks of four steps of some ten roundings of numbers below 0.3.
+                // The tolerance covers 1000 ticks of four steps with some ten roundings of numbers below 0.3.
                 assert!((one.position - other.position).abs() < 4e4 * 0.3 * f64::EPSILON, "{}", motion.name);
             }
         }
     }
 }
 
-/// Compares every number that a simulation shows with the loop of this crate.
+/// Observer that compares every number of a simulation with the loop of this crate.
 struct Compare {
     bodies: Vec<[Motion; 4]>,
     compared: usize,
@@ -222,14 +224,14 @@ fn the_scenes_are_as_hard_as_they_say() {
     assert!(changes >= 8, "contact was made or lost {changes} times");
 }
 
-/// The boundary here and that of `cohaptic stability boundary` come from two matrices by different code.
+/// The boundary of this module and the boundary of `cohaptic stability boundary` come from two matrices by different code.
 #[test]
 fn the_boundary_is_that_of_the_stability_analysis() {
     for motion in [COUPLED, STIFF] {
         let (along, low, high) = motion.boundary.unwrap();
         let found = program_boundary(&motion, (along.key(), low, high)).unwrap().unwrap();
         let right = work(&motion).critical.unwrap().rounded();
-        // The analysis stops where its radius is within about 1e-11 of 1; the radius moves by 1e-6 or more a newton per metre.
+        // The analysis stops where its radius is within about 1e-11 of 1. The radius changes by 1e-6 or more per N/m.
         assert!((found - right).abs() < 1e-5, "{}: {found} {right}", motion.name);
     }
 }

@@ -1,4 +1,5 @@
-//! The loop that all methods share: what two peers do at a tick, in any numbers. Forces are computed at ticks and held, as docs/model.md says.
+//! The loop shared by all methods: the actions of two peers at a tick, in any number type. Forces are computed at ticks and held, as described in
+//! docs/model.md.
 
 use cohaptic_peer::coordination::{AveragePosition, Observation};
 use cohaptic_peer::tick::{forces, grasp, on_device};
@@ -10,34 +11,36 @@ use super::advance::Advance;
 use super::number::Number;
 use super::scenes::{Along, MotionScene, TICK_NANOS};
 
-/// How a device touches its copy, on one axis.
+/// Contact between a device and its copy, on one axis.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Touch {
     Nothing,
     Grasp,
-    /// It pushes and cannot pull: 1 towards larger positions, −1 towards smaller ones.
+    /// A contact that pushes and cannot pull: 1 towards larger positions, −1 towards smaller positions.
     Push(f64),
 }
 
-/// What the two peers are.
+/// Parameters of the two peers.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Pair {
     pub(crate) coupling: Gains,
     pub(crate) coordination: Gains,
     pub(crate) touch: [Touch; 2],
-    /// Devices with their arms, then copies.
+    /// Plants of the two devices with their arms, then of the two copies.
     pub(crate) plants: [Plant; 4],
-    /// The force of each hand at each tick \[N\].
+    /// Force of each hand at each tick \[N\].
     pub(crate) hands: Vec<[f64; 2]>,
+    /// Number of ticks between two samples.
     pub(crate) update: usize,
+    /// Delay of a sample \[ticks\].
     pub(crate) delay: usize,
 }
 
 impl Pair {
-    /// The pair of a scene, for a number of ticks.
+    /// Returns the pair of a scene, for `ticks` ticks.
     pub(crate) fn of(motion: &MotionScene, scene: &Scene, ticks: usize) -> Self {
         let copy = scene.copy_config(0).plant();
-        // Arms of these scenes want to stay where they are, which is no held force.
+        // Arms of these scenes are at rest at the wanted position, and exert no held force.
         let force = |peer: usize, at: Instant| match &scene.peers[peer].hand {
             Some(Hand::Force(signal)) => Signal::value::<1>(signal, at)[0],
             Some(Hand::Arm { .. }) | None => 0.0,
@@ -58,7 +61,7 @@ impl Pair {
         }
     }
 
-    /// The same without hands, and with another gain in place of one: what the stability of the loop depends on.
+    /// Returns the loop without hands, with the gain `along` replaced: the stability of the loop depends on no hand.
     pub(crate) fn with<T: Number>(&self, along: Along, stiffness: T) -> Loop<T> {
         let mut gains = self.gains();
         match along {
@@ -68,19 +71,20 @@ impl Pair {
         gains
     }
 
-    /// What the loop of forces is made of.
+    /// Returns the parameters of the loop of forces.
     pub(crate) fn gains<T: Number>(&self) -> Loop<T> {
         let exactly = |gains: Gains| gains.map(|gain| T::of(*gain));
         Loop { coupling: exactly(self.coupling), coordination: exactly(self.coordination), touch: self.touch, update: self.update, delay: self.delay }
     }
 }
 
+/// Returns the instant of a tick.
 fn instant(tick: usize) -> Instant {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number of nanoseconds")]
     Instant::from_nanos(tick as u64 * TICK_NANOS as u64)
 }
 
-/// What the forces of a tick depend on besides the motion.
+/// Parameters of the forces of a tick, besides the motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Loop<T> {
     pub(crate) coupling: Gains<T>,
@@ -90,48 +94,52 @@ pub(crate) struct Loop<T> {
     pub(crate) delay: usize,
 }
 
-/// The two peers and the samples on the way between them.
+/// State of the two peers and of the samples on the way.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct World<T> {
-    /// Two devices, then two copies.
+    /// Motions of the two devices, then of the two copies.
     pub(crate) bodies: [Motion<T>; 4],
-    /// What each peer holds of the other.
+    /// Newest sample held by each peer from its partner.
     pub(crate) held: [Motion<T>; 2],
-    /// The copies as they were at the latest sendings: sample s in place s modulo the length.
+    /// Motions of the copies at the latest samplings: sample s at the index s modulo the length.
     pub(crate) sent: Vec<[Motion<T>; 2]>,
 }
 
 impl<T: Number> World<T> {
-    /// At rest at the origin.
+    /// Returns the state of rest at the origin.
     pub(crate) fn rest(gains: &Loop<T>) -> Self {
         let rest = Motion { position: T::of(0.0), velocity: T::of(0.0) };
         Self { bodies: [rest; 4], held: [rest; 2], sent: vec![[rest; 2]; gains.delay / gains.update + 1] }
     }
 
-    /// What happens at tick `tick`, until the next one.
+    /// Makes the tick `tick`: sampling, arrival, forces, and motion to the next tick.
     #[inline(always)]
     pub(crate) fn tick(&mut self, gains: &Loop<T>, movers: &[impl Advance<T>; 4], tick: usize, hands: [T; 2]) {
         let places = self.sent.len();
         if tick.is_multiple_of(gains.update) {
             self.sent[tick / gains.update % places] = [self.bodies[2], self.bodies[3]];
         }
+        // A sample taken at this tick arrives at this tick for a delay of 0, so sampling comes first.
         if let Some(sending) = tick.checked_sub(gains.delay)
             && sending.is_multiple_of(gains.update)
         {
             let [left, right] = self.sent[sending / gains.update % places];
             self.held = [right, left];
         }
+        // The law of the program, in the number type of this loop.
         let law = AveragePosition { gains: gains.coordination };
         for peer in 0..2 {
             let seen = Observation { own: self.bodies[2 + peer], past: self.bodies[2 + peer], mean: self.held[peer], lead: T::of(0.0) };
             let touch = |apart: Motion<T>| coupling_force(gains.touch[peer], &gains.coupling, apart);
             let (coupling, on_object) = forces(self.bodies[peer], touch, &seen, &law, &mut []);
             movers[peer].advance(&mut self.bodies[peer], on_device(hands[peer], coupling));
+            // Both motions use the forces of the begin of the tick, because `forces` has computed them before.
             movers[2 + peer].advance(&mut self.bodies[2 + peer], on_object);
         }
     }
 }
 
+/// Returns FC \[N\] of a contact, like [`Contact::force_along`] in any number type.
 #[inline(always)]
 fn coupling_force<T: Number>(touch: Touch, coupling: &Gains<T>, apart: Motion<T>) -> T {
     let nothing = T::of(0.0);
@@ -145,12 +153,13 @@ fn coupling_force<T: Number>(touch: Touch, coupling: &Gains<T>, apart: Motion<T>
                 return nothing;
             }
             let force = grasp(coupling, inwards);
+            // The damper alone could pull; a contact only pushes.
             if force > nothing { sign * force } else { nothing }
         }
     }
 }
 
-/// Runs from rest and shows the bodies after every tick.
+/// Runs from rest, and shows the bodies after every tick.
 #[inline(always)]
 pub(crate) fn run<T: Number>(pair: &Pair, movers: &[impl Advance<T>; 4], mut show: impl FnMut(usize, &[Motion<T>; 4])) -> World<T> {
     let gains = pair.gains();
@@ -162,14 +171,15 @@ pub(crate) fn run<T: Number>(pair: &Pair, movers: &[impl Advance<T>; 4], mut sho
     world
 }
 
-/// The mechanical energy \[J\]: the motion of devices, arms and copies; the springs of arms, of couplings that touch, and of the coordination as it would
-/// be without delay, ½·KT·(xO1 − xO2)².
+/// Returns the mechanical energy \[J\]: the motion of devices, arms and copies; the springs of arms and of couplings in contact; and the spring of the
+/// coordination without delay, ½·KT·(xO1 − xO2)².
 pub(crate) fn energy<T: Number>(pair: &Pair, bodies: &[Motion<T>; 4]) -> T {
     let mut twice = T::of(0.0);
     for (plant, body) in pair.plants.iter().zip(bodies) {
         twice = twice + T::of(plant.mass) * body.velocity * body.velocity + T::of(plant.stiffness) * body.position * body.position;
     }
     for peer in 0..2 {
+        // A one-sided contact stores energy only while the device presses into the object.
         let depth = bodies[peer].position - bodies[2 + peer].position;
         let touches = match pair.touch[peer] {
             Touch::Nothing => false,

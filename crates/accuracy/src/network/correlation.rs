@@ -1,4 +1,4 @@
-//! Jitter that hangs together from packet to packet: what was asked for, and what comes out.
+//! Correlated jitter: requested and delivered correlation.
 
 use std::time::Duration;
 
@@ -10,13 +10,17 @@ use super::{Effort, RowSink, real, row};
 use crate::cost::{nanos, processor_time};
 use crate::{AccuracyError, Row};
 
+/// Requested autocorrelation at lag one.
 const ASKED: f64 = 0.75;
+/// Mean delay.
 const MEAN: Duration = Duration::from_millis(24);
+/// Standard deviation of the delay.
 const SD: Duration = Duration::from_millis(2);
 
-/// The figures are the average of links with these seeds.
+/// Seeds of the links whose figures are averaged.
 const SEEDS: [u64; 4] = [1, 2, 3, 4];
 
+/// Measures the rows of correlated jitter.
 pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     for (name, distribution, words) in [
         ("normal", Distribution::Normal, Some("delay 24ms 2ms 75% distribution normal")),
@@ -35,12 +39,14 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
     Ok(())
 }
 
+/// Returns the link of the program with correlated jitter.
 fn ours(distribution: Distribution) -> LinkModel {
     let jitter = Jitter { correlation: Correlation::PerPacket(ASKED), ..Jitter::new(SD, distribution) };
     let delay = Delay::with_jitter(MEAN, jitter).expect("a law with this correlation");
     LinkConfig { delay, ..LinkConfig::default() }.into()
 }
 
+/// Measures the rows of one model.
 fn of_model(case: &str, method: &str, model: &LinkModel, what: &str, effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let packets = effort.correlated_packets / SEEDS.len();
     let (mut at_lag_one, mut variance) = (0.0, 0.0);
@@ -54,7 +60,7 @@ fn of_model(case: &str, method: &str, model: &LinkModel, what: &str, effort: Eff
     let n = real(packets * SEEDS.len());
     let cost = (nanos(processor_time() - start) / n, "ns a packet");
     let row = Row { reference: "what was asked", ..row(case, method, format!("{} packets", packets * SEEDS.len()), cost) };
-    // Bartlett's formulas for a Gaussian chain: what n packets leave open.
+    // Bartlett's formulas give the standard errors of both figures for n packets of a Gaussian chain.
     let square = ASKED * ASKED;
     let (of_lag, of_sd) = (((1.0 - square) / n).sqrt(), (0.5 * (1.0 + square) / (1.0 - square) / n).sqrt());
     let note = |figure: String, noise: f64| format!("{figure}; {what}; this number of packets leaves {noise:.1e} open");
@@ -73,7 +79,7 @@ fn of_model(case: &str, method: &str, model: &LinkModel, what: &str, effort: Eff
     })
 }
 
-/// The delays of packets a millisecond apart, in the order in which they were sent \[s\].
+/// Returns the delays of packets a millisecond apart, in the order of sending \[s\].
 fn delays(model: &LinkModel, seed: u64, packets: usize) -> Vec<f64> {
     let mut link = Link::new(seed, &LinkName::between("left", "right"), model.clone());
     let mut delays = vec![0.0; packets];
@@ -81,12 +87,14 @@ fn delays(model: &LinkModel, seed: u64, packets: usize) -> Vec<f64> {
     let mut note = |link: &mut Link<usize>| {
         while let Some(event) = link.poll_event() {
             if let Fate::Delivered(at) = event.fate {
+                // The payload is the number of the packet: packets may arrive out of order.
                 delays[event.payload] = at.saturating_duration_since(event.offered).as_secs_f64();
             }
         }
     };
     for packet in 0..packets {
         now += Duration::from_millis(1);
+        // Packets on the way leave before the next packet is offered, in the order of time.
         while let Some(at) = link.poll_timeout().filter(|at| *at <= now) {
             link.handle_timeout(at).expect("time goes on");
             note(&mut link);
@@ -101,7 +109,7 @@ fn delays(model: &LinkModel, seed: u64, packets: usize) -> Vec<f64> {
     delays
 }
 
-/// The autocorrelation at lag one, and the variance.
+/// Returns the autocorrelation at lag one, and the variance.
 fn moments(delays: &[f64]) -> [f64; 2] {
     let n = real(delays.len());
     let mean = delays.iter().sum::<f64>() / n;

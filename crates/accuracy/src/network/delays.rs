@@ -1,4 +1,4 @@
-//! Ways to draw a delay: nanoseconds a draw against the distance of distributions and the error of a tail quantile.
+//! Methods to draw a delay: nanoseconds per draw against the distance of distributions and the error of a tail quantile.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -18,18 +18,20 @@ const DISTANCE: &str = "Kolmogorov distance [1]";
 const TAIL: &str = "99.9 % quantile [of its distance from the mean]";
 const EXACT_LAW: &str = "the exact law";
 
-/// The number of draws that are timed together.
+/// Number of draws that are timed together.
 const BATCH: u32 = 1000;
 
-/// How wrong a way is, and how that is known.
+/// Errors of a method, and a note on their origin.
 struct Wrong {
     distance: f64,
     tail: f64,
     note: String,
 }
 
+/// Measures the rows of all laws and of the table.
 pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let laws: Vec<(&'static str, Law)> = laws().into_iter().chain(further_laws()).collect();
+    // The normal law serves as Φ for all laws, because all have the same mean and deviation.
     let normal = laws[0].1.clone();
     for (name, law) in &laws {
         of_law(name, law, &normal, effort, done)?;
@@ -37,6 +39,7 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
     of_table(effort, done)
 }
 
+/// Measures the rows of one law.
 fn of_law(name: &'static str, law: &Law, normal: &Law, effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let look = effort.look;
     let (netem, fine) = (Netem::new(law), Fine::new(law));
@@ -62,7 +65,9 @@ fn of_law(name: &'static str, law: &Law, normal: &Law, effort: Effort, done: &mu
     ways.push(("65536 steps", with_words(|words| fine.step(next_word(words))), computed(look.steps(law, fine.delays()), "512 kB")));
     let lines = computed(look.lines(law, fine.delays()), "512 kB, straight lines between");
     ways.push(("65536 interpolated", with_words(|words| fine.interpolated(next_word(words))), lines));
+    // A side of the middle has `places_a_side` places.
     let places = 2 * look.places_a_side;
+    // Monotone functions of a normal number need no sampling: their distribution function is known at every place.
     let of_function = |delay: &dyn Fn(f64) -> f64, what: &str| {
         let tail = tail_error(law, look, delay((normal.quantile(look.quantile) - MEAN) / SD));
         let note = format!("computed at {places} places of ±8 normal deviations, so to rounding; {what}");
@@ -70,6 +75,7 @@ fn of_law(name: &'static str, law: &Law, normal: &Law, effort: Effort, done: &mu
     };
     let inverse = of_function(&|z| law.quantile(probability(normal, z)), "`Law::quantile` of a uniform number");
     ways.push(("exact inverse", with_words(|words| law.quantile(unit(next_word(words)))), inverse));
+    // `Law::draw` has two implementations, and the note names the one in use.
     let what = if matches!(name, "normal" | "gamma" | "lognormal") {
         "`Law::draw`, what the program draws: a function of the ziggurat's normal number"
     } else {
@@ -86,20 +92,20 @@ fn of_law(name: &'static str, law: &Law, normal: &Law, effort: Effort, done: &mu
     push(name, ways, EXACT_LAW, effort, done)
 }
 
-/// The law that a table is: what it should deliver is what it says.
+/// Measures the rows of the law given by a table. The entries are the exact distribution.
 fn of_table(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let table = Table::normal();
     let text: Vec<String> = table.entries().iter().map(ToString::to_string).collect();
     let table = DistTable::parse(&text.join(" ")).expect("the kernel's table is one");
     let law = Law::new(&Distribution::Table(table.clone().into()), MEAN, SD, None).expect("a law");
-    // Each of 2^16 evenly spaced words: the entries are 2^12, so each of them is drawn as often as it should be or it is not.
+    // There are 2¹⁶ evenly spaced words and 2¹² entries, so every entry must be drawn exactly 16 times.
     let mut delivered: Vec<f64> = (0..1_u64 << 16).map(|i| law.draw(i << 48 | 1 << 47, || 0)).collect();
     delivered.sort_by(f64::total_cmp);
     let mut distance = 0.0_f64;
     let mut end = 0_u32;
     for group in delivered.chunk_by(|a, b| a.total_cmp(b).is_eq()) {
         end += u32::try_from(group.len()).unwrap_or(u32::MAX);
-        // Entries that a table has at or below this one, without the law's own arithmetic.
+        // Share of entries at or below this delay, computed without the arithmetic of the law.
         let share = table.entries().partition_point(|entry| MEAN + SD / 8192.0 * f64::from(*entry) <= group[0] + 1e-12);
         let share = f64::from(u32::try_from(share).unwrap_or(u32::MAX)) / 4096.0;
         distance = distance.max((f64::from(end) / 65_536.0 - share).abs());
@@ -111,6 +117,7 @@ fn of_table(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError>
     push("table", vec![("draw", work, Wrong { distance, tail, note })], "the entries of the table, each as probable", effort, done)
 }
 
+/// Measures the costs of the methods in turns, and adds two rows per method.
 fn push(
     name: &str,
     ways: Vec<(&'static str, Work<'_>, Wrong)>,
@@ -134,7 +141,7 @@ fn push(
     Ok(())
 }
 
-/// A batch of draws.
+/// Returns a batch of draws as work.
 fn many<'a>(mut draw: impl FnMut() -> f64 + 'a) -> Work<'a> {
     Box::new(move || {
         for _ in 0..BATCH {
@@ -143,31 +150,34 @@ fn many<'a>(mut draw: impl FnMut() -> f64 + 'a) -> Work<'a> {
     })
 }
 
-/// The same of draws from uniform words.
+/// Like [`many`], for draws from uniform words.
 fn with_words<'a>(mut draw: impl FnMut(&mut u64) -> f64 + 'a) -> Work<'a> {
     let mut state = 1;
     many(move || draw(&mut state))
 }
 
+/// Returns the relative error of the quantile `found`.
 fn tail_error(law: &Law, look: Look, found: f64) -> f64 {
     let exact = law.quantile(look.quantile);
     ((found - exact) / (exact - MEAN)).abs()
 }
 
-/// Of n draws. Perfect ones are about 0.87/√n away too, on average: √(π/2)·ln 2 (Kolmogorov).
+/// Returns the errors of n draws. Even perfect draws have a mean distance of about 0.87/√n: √(π/2)·ln 2 (Kolmogorov).
 fn sampled(law: &Law, look: Look, count: usize, sampler: &mut impl FnMut() -> f64) -> Wrong {
     let mut delays: Vec<f64> = (0..count).map(|_| sampler()).collect();
     delays.sort_by(f64::total_cmp);
     let n = real(count);
+    // The empirical distribution function jumps at each draw, so both sides of each jump are compared.
     let apart = |(place, delay): (usize, &f64)| {
         let share = law.cdf(*delay);
         (share - real(place) / n).abs().max((real(place + 1) / n - share).abs())
     };
     let distance = delays.iter().enumerate().map(apart).fold(0.0, f64::max);
-    // The quantile of n draws has the deviation of their share over the density there, here by a difference.
+    // The standard deviation of a quantile of n draws is the deviation of its share, divided by the density. The density is a difference quotient here.
     let (p, exact) = (look.quantile, law.quantile(look.quantile));
     let step = 0.01 * (1.0 - p);
     let slope = (law.quantile(p + step) - law.quantile(p - step)) / (2.0 * step);
+    // Standard error of the quantile: deviation of the share, times the slope of the quantile function.
     let noise = slope * (p * (1.0 - p) / n).sqrt() / (exact - MEAN);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the draws")]
     let found = delays[(n * p) as usize];
@@ -178,22 +188,23 @@ fn sampled(law: &Law, look: Look, count: usize, sampler: &mut impl FnMut() -> f6
     Wrong { distance, tail: tail_error(law, look, found), note }
 }
 
-/// 2·σ of netem's uniform law \[ns\]: its jitter is half the width, √3 deviations of 2 ms.
+/// Width 2·√3·2 ms of netem's uniform law \[ns\]. Its jitter is half of the width, √3 deviations of 2 ms.
 const WIDTH: u32 = 6_928_203;
 
-/// The remainder of a uniform word of 32 bits, as the kernel takes it.
+/// Returns draws of a uniform delay as the kernel makes them: the remainder of a uniform word of 32 bits.
 fn kernel_uniform() -> Work<'static> {
     let mut prng = Prng::new(1);
     many(move || MEAN + (f64::from(prng.next_u32() % WIDTH) - 0.5 * f64::from(WIDTH)) * 1e-6)
 }
 
-/// Of 2³² = q·w + r words, the first r remainders of w have q + 1, the others q. So F(k) of the first k is k·(q + 1)/2³² up to r, and furthest from k/w
-/// there: r/w·(w − r)/2³². A delay in whole nanoseconds adds a step of 1/w at most.
+/// Returns the errors of the kernel's uniform delay. Of 2³² = q·w + r words, the first r of the w remainders have q + 1 words, and all later remainders have
+/// q words. The distribution function of the first k remainders is k·(q + 1)/2³² up to r, and its distance from k/w is largest at r: r/w·(w − r)/2³². A delay
+/// in whole nanoseconds adds a step of at most 1/w.
 fn kernel_uniform_error(law: &Law, look: Look) -> Wrong {
     let (words, width) = (4_294_967_296.0, f64::from(WIDTH));
     let rest = words - (words / width).floor() * width;
     let bias = rest / width * (width - rest) / words;
-    // The quantile lies where the remainders have q words each: the share from there to the end is (w − k)·q/2³².
+    // The quantile lies among the remainders with q words each, where the share from k to the end is (w − k)·q/2³².
     let place = width - (1.0 - look.quantile) * words / (words / width).floor();
     let tail = tail_error(law, look, MEAN + (place - 0.5 * width) * 1e-6);
     let note = "computed; the remainder of 32 bits, so that shorter delays are more probable, and whole nanoseconds".to_owned();

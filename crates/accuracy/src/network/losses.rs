@@ -1,4 +1,4 @@
-//! Loss models: how many packets it takes until the mean and the runs of losses are known, compared with theory.
+//! Loss models: number of packets until the mean loss and the mean run of losses are known, compared with theory.
 
 use cohaptic_units::{Bytes, Instant, Probability};
 use cohaptic_wan::netem::Netem;
@@ -12,15 +12,18 @@ use crate::{AccuracyError, Row};
 const MEAN: &str = "mean loss [relative]";
 const RUN: &str = "mean run of losses [relative]";
 
-/// A model and the other programs that have it.
+/// A loss model in this program and in the kernel.
 struct Case {
     name: &'static str,
+    /// Model of this program.
     ours: Loss,
-    /// The same in the words of `tc`, for the kernel.
+    /// Words of `tc` for the same model in the kernel.
     words: Option<String>,
+    /// Markov chain of the model, for the theory.
     chain: LossChain,
 }
 
+/// Returns the four models.
 fn cases() -> [Case; 4] {
     let p = |value| Probability::new(value).expect("a probability");
     let of_chance = |chance: Chance| {
@@ -38,6 +41,7 @@ fn cases() -> [Case; 4] {
         lost: vec![false, false, true, true],
     };
     let [gap, within, burst, _] = transitions;
+    // The order of `tc`: p13, p31, p32, p23 and p14.
     let percentages: Vec<String> = [gap[2], burst[0], burst[1], within[2], gap[3]].iter().map(|share| format!("{:.9}%", 100.0 * share)).collect();
     [
         Case { name: "loss, independent 5 %", ours: Loss::Independent(p(0.05)), words: Some("loss 5%".into()), chain: LossChain::of_two(0.05, 0.05) },
@@ -62,6 +66,7 @@ fn cases() -> [Case; 4] {
     ]
 }
 
+/// Measures the rows of all models.
 pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     for case in cases() {
         let expected = case.chain.expected();
@@ -74,17 +79,20 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
     Ok(())
 }
 
+/// Returns the link of the kernel's netem with these words of `tc`.
 pub(super) fn kernel(words: &str) -> LinkModel {
     let netem = Netem::parse(words).expect("words of tc");
     KernelNetem::new(netem, Vec::new()).expect("a netem that Linux takes").into()
 }
 
+/// Measures the rows of one model.
 fn of_model(case: &str, method: &str, model: &LinkModel, expected: Expected, effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let mut seed = 0;
     for (packets, runs) in effort.loss_runs {
         let (mut of_mean, mut of_run) = (0.0, 0.0);
         let start = processor_time();
         for _ in 0..*runs {
+            // A new seed for each run makes the runs independent.
             seed += 1;
             let seen = Seen::of(model, seed, *packets);
             of_mean += (seen.mean() / expected.mean - 1.0).powi(2);
@@ -92,9 +100,10 @@ fn of_model(case: &str, method: &str, model: &LinkModel, expected: Expected, eff
             done.check()?;
         }
         let (n, count) = (real(*packets), real(*runs));
+        // The cost of a row is the number of packets; the time per packet goes into the note.
         let each = nanos(processor_time() - start) / (n * count);
         let row = Row { reference: "the chain's stationary law", ..row(case, method, format!("{packets} packets"), (n, "packets")) };
-        // One note for both, so that a table which shows them in one line says it once.
+        // Both rows have the same note: a table with both errors in a line then shows the note once.
         let [mean, run] = [expected.mean_variance, expected.run_variance].map(|variance| (variance / n).sqrt());
         let note = format!("root mean square of {runs} runs; theory expects {mean:.1e} of the mean and {run:.1e} of the run; {each:.0} ns a packet");
         for (of, error_unit) in [(of_mean, MEAN), (of_run, RUN)] {
@@ -104,16 +113,19 @@ fn of_model(case: &str, method: &str, model: &LinkModel, expected: Expected, eff
     Ok(())
 }
 
-/// What a link lost.
+/// Losses of a link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Seen {
+    /// Number of packets sent.
     packets: usize,
+    /// Number of packets lost.
     lost: usize,
-    /// How often a loss followed a packet received.
+    /// Number of losses that follow a received packet.
     begun: usize,
 }
 
 impl Seen {
+    /// Sends `packets` packets through a link.
     fn of(model: &LinkModel, seed: u64, packets: usize) -> Self {
         let mut link = Link::new(seed, &LinkName::between("left", "right"), model.clone());
         let (mut seen, mut before) = (Self { packets, ..Self::default() }, false);
@@ -121,6 +133,7 @@ impl Seen {
         for _ in 0..packets {
             now += core::time::Duration::from_micros(1);
             link.handle_packet(now, Bytes::new(64), ()).expect("time goes on");
+            // Without a delay the packet leaves at the instant of its arrival.
             link.handle_timeout(now).expect("time goes on");
             while let Some(event) = link.poll_event() {
                 let lost = matches!(event.fate, Fate::Dropped(_));
@@ -136,7 +149,7 @@ impl Seen {
         real(self.lost) / real(self.packets)
     }
 
-    /// Zero, which is wrong by all of it, if nothing was lost.
+    /// Returns the mean run of losses; 0 without any loss, which has a relative error of 1.
     fn run(self) -> f64 {
         real(self.lost) / real(self.begun.max(1))
     }
@@ -146,7 +159,7 @@ impl Seen {
 mod tests {
     use super::*;
 
-    /// The chains that theory is asked about are those of the models.
+    /// The chains for the theory equal the chains of the models.
     #[test]
     fn theory_and_models_speak_of_the_same_chain() {
         for case in cases() {
@@ -159,7 +172,7 @@ mod tests {
         }
     }
 
-    /// By hand: Gilbert-Elliott with p = 1 % and r = 20 % loses 1/21, five in a row.
+    /// Gilbert-Elliott with p = 1 % and r = 20 % loses 1/21 of the packets, five in a row on average, computed by hand.
     #[test]
     fn a_known_chain_has_its_known_figures() {
         let [_, _, elliott, _] = cases();

@@ -1,4 +1,4 @@
-//! Ways to draw a delay: by tables as others do, by inverting the law, and as the program draws.
+//! Methods to draw a delay: tables as in other programs, inversion of the law, and the program's own draws.
 #![expect(
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
@@ -8,11 +8,11 @@
 
 use cohaptic_wan::law::{Distribution, Law};
 
-/// The laws that are compared: in milliseconds, 24 ± 2, those on a half-line from 20.
+/// Returns the compared laws with a delay of 24 ± 2 ms. Laws on a half-line begin at 20 ms.
 ///
 /// # Panics
 ///
-/// If one of them were refused, which a test would show.
+/// If a law is refused, which a test would show.
 #[must_use]
 pub fn laws() -> [(&'static str, Law); 4] {
     [
@@ -24,29 +24,29 @@ pub fn laws() -> [(&'static str, Law); 4] {
     .map(|(name, distribution, floor)| (name, Law::new(&distribution, MEAN, SD, Some(floor)).expect("a law")))
 }
 
-/// The laws that are compared in addition to those of [`laws`], with the same mean and deviation.
+/// Returns the laws that are compared in addition to [`laws`], with the same mean and deviation.
 ///
 /// # Panics
 ///
-/// If one of them were refused, which a test would show.
+/// If a law is refused, which a test would show.
 #[must_use]
 pub fn further_laws() -> [(&'static str, Law); 4] {
     [
         ("uniform", Distribution::Uniform, 0.0),
         ("Pareto-normal", Distribution::ParetoNormal, 0.0),
         ("Weibull", Distribution::Weibull, 20.0),
-        // So far below that nothing is cut off.
+        // This low floor cuts off nothing.
         ("Laplace", Distribution::Laplace, -200.0),
     ]
     .map(|(name, distribution, floor)| (name, Law::new(&distribution, MEAN, SD, Some(floor)).expect("a law")))
 }
 
-/// The mean of all laws.
+/// Mean of all laws \[ms\].
 pub const MEAN: f64 = 24.0;
-/// The standard deviation of all laws.
+/// Standard deviation of all laws \[ms\].
 pub const SD: f64 = 2.0;
 
-/// Uniform words (Steele, Lea & Flood 2014, `SplitMix64`): about a nanosecond each.
+/// Returns the next uniform word (Steele, Lea & Flood 2014, `SplitMix64`).
 #[inline]
 pub fn next_word(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
@@ -55,58 +55,58 @@ pub fn next_word(state: &mut u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The middle of one of 2⁵³ equal parts of (0, 1).
+/// Returns the middle of one of 2⁵³ equal parts of (0, 1).
 #[inline]
 #[must_use]
 pub fn unit(word: u64) -> f64 {
     ((word >> 11) as f64 + 0.5) * (1.0 / 9_007_199_254_740_992.0)
 }
 
-/// netem's way: 4096 entries of 16 bits, 8192·(F⁻¹(i/4096) − mean)/sd, one of them at random.
+/// Table in the format of netem: 4096 entries of 16 bits, 8192·(F⁻¹(i/4096) − mean)/sd, of which a draw picks one at random.
 #[derive(Clone, Debug)]
 pub struct Netem(Vec<i16>);
 
 impl Netem {
-    /// The table of a law. What 16 bits cannot hold, beyond four deviations, is cut off.
+    /// Returns the table of a law. Deviations beyond four, which 16 bits cannot hold, are cut off.
     #[must_use]
     pub fn new(law: &Law) -> Self {
         let entry = |i: u16| (8192.0 * (law.quantile(f64::from(i) / 4096.0) - MEAN) / SD).round() as i16;
         Self((0..4096).map(entry).collect())
     }
 
-    /// A draw.
+    /// Returns a draw from a uniform word.
     #[inline]
     #[must_use]
     pub fn draw(&self, word: u64) -> f64 {
         MEAN + SD / 8192.0 * f64::from(self.0[(word & 4095) as usize])
     }
 
-    /// The equally probable delays, sorted.
+    /// Returns the equally probable delays in ascending order.
     #[must_use]
     pub fn delays(&self) -> Vec<f64> {
         (0..self.0.len() as u64).map(|i| self.draw(i)).collect()
     }
 }
 
-/// 65536 quantiles as `f64`.
+/// Table of 65536 quantiles as `f64`.
 #[derive(Clone, Debug)]
 pub struct Fine(Vec<f64>);
 
 impl Fine {
-    /// The table of a law: its quantiles in the middle of 65536 equal parts.
+    /// Returns the table of a law: its quantiles in the middle of 65536 equal parts.
     #[must_use]
     pub fn new(law: &Law) -> Self {
         Self((0..65_536).map(|i| law.quantile((f64::from(i) + 0.5) / 65_536.0)).collect())
     }
 
-    /// One of them at random.
+    /// Returns a random entry, chosen by a uniform word.
     #[inline]
     #[must_use]
     pub fn step(&self, word: u64) -> f64 {
         self.0[(word >> 48) as usize]
     }
 
-    /// Linear interpolation between neighbours.
+    /// Returns the linear interpolation between neighbouring entries at a random position.
     #[inline]
     #[must_use]
     pub fn interpolated(&self, word: u64) -> f64 {
@@ -115,14 +115,14 @@ impl Fine {
         self.0[cell] + (position - cell as f64) * (self.0[cell + 1] - self.0[cell])
     }
 
-    /// The quantiles.
+    /// Returns the quantiles in ascending order.
     #[must_use]
     pub fn delays(&self) -> &[f64] {
         &self.0
     }
 }
 
-/// A draw of the law itself, with further words from the same generator.
+/// Returns a draw of the law itself, with further words from the same generator.
 #[inline]
 pub fn draw(law: &Law, state: &mut u64) -> f64 {
     let word = next_word(state);

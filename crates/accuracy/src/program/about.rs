@@ -1,4 +1,4 @@
-//! The line that says how rows were made: the command, the version, the processor and the date.
+//! Line about the origin of rows: the command, the version, the processor and the date.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -8,7 +8,7 @@ pub(crate) fn line(command: &str) -> String {
     format!("{command}, version {}, on {}, {}.", env!("CARGO_PKG_VERSION"), processor(), date(seconds / 86_400))
 }
 
-/// Returns the name of the processor where the system knows it, else its kind.
+/// Returns the name of the processor if the system reports a name, or else the architecture.
 fn processor() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let named = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));

@@ -13,8 +13,8 @@ use serde::Serialize;
 
 use super::failure::Failure;
 
-/// The file of the rows of a whole measurement, and that of an interrupted one. The names differ, so that a script that reads the first never takes the
-/// second for it.
+/// File of the rows of a whole measurement. The file of an interrupted measurement has another name, because a script for whole measurements must never
+/// read interrupted rows.
 const WHOLE: &str = "rows.csv";
 const PARTIAL: &str = "rows-interrupted.csv";
 
@@ -30,7 +30,7 @@ pub(crate) struct Conclusion<'a> {
 }
 
 impl Conclusion<'_> {
-    /// Writes the files and prints the rows. Rows are printed even if a file cannot be written, which is then the failure.
+    /// Writes the files and prints the rows. A file that cannot be written is a failure, but the rows are still printed.
     pub(crate) fn tell(&self) -> Result<(), Failure> {
         let written = self.out.map_or(Ok(()), |folder| self.write(folder));
         if self.json {
@@ -57,7 +57,7 @@ impl Conclusion<'_> {
     fn write(&self, folder: &Path) -> Result<(), Failure> {
         let (name, other) = if self.about.partial { (PARTIAL, WHOLE) } else { (WHOLE, PARTIAL) };
         write_file(folder.join(name), &csv(self.rows))?;
-        // Rows of an earlier measurement, which do not belong to the plots and the page written below.
+        // Rows of an earlier measurement do not belong to the plots and the page written below.
         let old = folder.join(other);
         match std::fs::remove_file(&old) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(Failure::File { verb: "remove", path: old, error }),
@@ -76,7 +76,7 @@ struct Document<'a> {
     schema: &'static str,
     version: u32,
     rows: Vec<RowDocument<'a>>,
-    /// `true` if the rows are only those measured until Ctrl-C or until a fault.
+    /// Whether the measurement ended early, by Ctrl-C or by a fault.
     interrupted: bool,
     wall_s: f64,
 }

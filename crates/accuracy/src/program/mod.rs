@@ -1,4 +1,4 @@
-//! The program: measures on a thread of its own, while this one waits for rows and for Ctrl-C.
+//! The program: measures in one thread, while the main thread waits for rows and for Ctrl-C.
 //!
 //! A row can take many seconds, during which no thread asks whether to go on. Rows and signals therefore come through one channel: at a signal the rows received so
 //! far are written at once, and the end of the process ends the measurement.
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments) -> ExitCode {
 
 /// Prints help, the version, or the fault of the arguments, and returns the exit status.
 pub(crate) fn usage(error: &clap::Error) -> ExitCode {
-    // On a terminal clap prints them, with the colours that it has.
+    // On a terminal clap prints the message itself, with colours.
     if error.use_stderr() || io::stdout().is_terminal() {
         error.exit();
     }
@@ -63,7 +63,7 @@ fn report(failure: &Failure) -> ExitCode {
 }
 
 fn measured(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    // Before the measurement: a folder that cannot be had must not cost ten minutes of it.
+    // Before the measurement: a folder without access must not cost ten minutes of measuring.
     let own = |folder: &PathBuf| OwnFolder::take(folder).map_err(|error| Failure::File { verb: "write", path: folder.clone(), error });
     let _own = arguments.out.as_ref().map(own).transpose()?;
     let start = Instant::now();
@@ -114,7 +114,7 @@ fn wait(events: Receiver<Event>) -> (Vec<Row>, Ending) {
     (rows, ending)
 }
 
-/// Returns a line on standard error that counts rows; hidden unless standard error is a terminal.
+/// Returns a line on standard error with the number of rows; hidden unless standard error is a terminal.
 fn progress() -> ProgressBar {
     let target = if io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     let style = ProgressStyle::with_template("{spinner} {pos} rows measured, {elapsed} passed: {msg}");

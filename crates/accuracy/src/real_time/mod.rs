@@ -1,7 +1,7 @@
-//! Leaving on time by the wall clock: processor time a packet against how late it leaves, asleep and awake.
+//! Release of packets by the wall clock: processor time per packet against lateness, with sleeping and with busy waiting.
 //!
-//! A [`Link`](cohaptic_wan::Link) says when each of its packets leaves; something waits for that time. Both numbers are measured and not computed: they
-//! are those of this machine with what else it did just then. The ways take turns, so that this hits all of them.
+//! A [`Link`](cohaptic_wan::Link) computes the instant at which each packet leaves, and a thread waits for that instant. Both numbers are measured, not
+//! computed, on this machine with its other load. The ways take turns, so that other load affects all ways.
 
 mod release;
 
@@ -11,30 +11,31 @@ use self::release::{Releases, Way};
 use crate::row::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
-/// How much work there is in the rows.
+/// Amount of work in the rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Effort {
-    /// How often each way has its turn.
+    /// Number of turns of each way.
     pub rounds: u32,
-    /// How long a turn is \[ms\].
+    /// Length of a turn \[ms\].
     pub turn_millis: u64,
 }
 
 impl Effort {
-    /// Six seconds.
+    /// Effort of six seconds.
     pub const QUICK: Self = Self { rounds: 2, turn_millis: 300 };
 
-    /// A minute.
+    /// Effort of a minute.
     pub const FULL: Self = Self { rounds: 6, turn_millis: 1000 };
 }
 
-/// The rows of this subject.
+/// Measures the rows of this subject.
 ///
 /// # Errors
 ///
-/// As [`crate::measure`].
+/// The errors of [`crate::measure`].
 pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
     let mut all: Vec<Releases> = Way::ALL.into_iter().map(Releases::new).collect();
+    // All ways take a turn in each round, with the same seed, so that each way releases the same packets.
     for round in 0..effort.rounds {
         for releases in &mut all {
             if watch.stops() {
@@ -48,6 +49,7 @@ pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError
     Ok(sink.rows)
 }
 
+/// Returns the rows of one way: median and 99 % of the lateness.
 fn rows_of(releases: &Releases) -> [Row; 2] {
     let summary = releases.lateness.summary();
     let note =

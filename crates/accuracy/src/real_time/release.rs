@@ -1,4 +1,4 @@
-//! A link by the wall clock, and the ways to wait for its packets.
+//! A link in real time, and the ways to wait for its packets.
 
 use std::io;
 use std::time::Duration;
@@ -9,21 +9,22 @@ use cohaptic_wan::{Delay, Distribution, Jitter, Link, LinkConfig, LinkName};
 
 use crate::cost::processor_time;
 
-/// How to wait for a packet's time.
+/// A way to wait for the instant of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Way {
-    /// Look every millisecond, as a timer wheel does.
+    /// Sleep until the next whole millisecond, as a timer wheel does.
     Wheel,
-    /// `std::thread::sleep` for the rest.
+    /// `std::thread::sleep` for the remaining span.
     Sleep,
-    /// `clock_nanosleep` until then.
+    /// `clock_nanosleep` until the instant.
     Until,
-    /// What the relay and live sessions do.
+    /// The pacer of the relay and of live sessions.
     Paced(Pacing),
-    /// Look at the clock, and do nothing else.
+    /// A loop that reads the clock.
     Busy,
 }
 
+/// Returns the pacer that spins for the last `micros` microseconds.
 const fn spin(micros: u64) -> Way {
     Way::Paced(Pacing::Spin { margin: Duration::from_micros(micros) })
 }
@@ -63,23 +64,24 @@ impl Way {
     }
 }
 
-/// What became of the packets that were waited for in one way.
+/// Results of one way.
 #[derive(Debug)]
 pub(super) struct Releases {
     pub(super) way: Way,
-    /// Of each packet that left.
+    /// Lateness of the released packets.
     pub(super) lateness: Lateness,
-    /// What the thread that released them used.
+    /// Processor time of the releasing threads.
     pub(super) processor: Duration,
-    /// Learns from turn to turn.
+    /// Pacer, which learns from turn to turn.
     pacer: Pacer,
 }
 
-/// Packets under way. Each that leaves comes back, so that about one leaves in a millisecond.
+/// Number of packets on the link. Each released packet is offered again, so about one packet leaves per millisecond.
 const UNDER_WAY: u32 = 24;
 
 impl Releases {
     pub(super) fn new(way: Way) -> Self {
+        // Ways without a pacer get an unused pacer.
         let pacing = match way {
             Way::Paced(pacing) => pacing,
             Way::Wheel | Way::Sleep | Way::Until | Way::Busy => Pacing::Sleep,
@@ -87,14 +89,15 @@ impl Releases {
         Self { way, lateness: Lateness::new(), processor: Duration::ZERO, pacer: Pacer::new(pacing) }
     }
 
-    /// Releases packets for that long, on a thread of its own, whose timer slack goes with it.
+    /// Releases packets for `span` in a thread of its own, so that the changed timer slack ends with the thread.
     pub(super) fn turn(&mut self, seed: u64, span: Duration) -> io::Result<()> {
         let done = std::thread::scope(|scope| scope.spawn(|| self.release(seed, span)).join());
         done.unwrap_or_else(|_| Err(io::Error::other("the thread that released packets panicked")))
     }
 
+    /// Releases packets for `span` in this thread.
     fn release(&mut self, seed: u64, span: Duration) -> io::Result<()> {
-        // No timer slack, which the system always grants; a refusal would be seen in the numbers.
+        // The thread asks for no timer slack, which the system always grants. A refusal would show in the numbers.
         let _ = prepare_thread(&Wishes::NONE);
         let mut link = link(seed);
         let started = processor_time();
@@ -104,7 +107,7 @@ impl Releases {
         }
         while let Some(at) = link.poll_timeout().filter(|at| *at <= Instant::ZERO + span) {
             self.wait(&clock, at)?;
-            // The link is told the instant that was due, and not the one at which somebody woke up.
+            // The link gets the due instant and not the instant of the wake-up, so that all ways release the same packets.
             link.handle_timeout(at).expect("time goes on");
             while let Some(event) = link.poll_event() {
                 self.lateness.record(clock.now().saturating_duration_since(event.at));
@@ -115,6 +118,7 @@ impl Releases {
         Ok(())
     }
 
+    /// Waits until `at` by this way.
     fn wait(&mut self, clock: &MonotonicClock, at: Instant) -> io::Result<()> {
         const WHEEL: u64 = 1_000_000;
         match self.way {
@@ -140,7 +144,7 @@ impl Releases {
     }
 }
 
-/// Sleeps until then. A signal may wake it earlier: then it sleeps again.
+/// Sleeps until `at`, and sleeps again after an early wake-up by a signal.
 fn sleep_until(clock: &MonotonicClock, at: Instant) -> io::Result<()> {
     while clock.now() < at {
         clock.block(Some(at), &[])?;
@@ -148,8 +152,9 @@ fn sleep_until(clock: &MonotonicClock, at: Instant) -> io::Result<()> {
     Ok(())
 }
 
+/// Returns a link with jitter.
 fn link(seed: u64) -> Link<u32> {
-    // From 7 to 41 ms, so that packets spread over time whatever they began with.
+    // Delays from 7 to 41 ms spread the packets over time, whatever their first instants were.
     let jitter = Jitter::new(Duration::from_millis(10), Distribution::Uniform);
     let delay = Delay::with_jitter(Duration::from_millis(24), jitter).expect("a law above zero");
     Link::new(seed, &LinkName::between("left", "right"), LinkConfig { delay, ..LinkConfig::default() })

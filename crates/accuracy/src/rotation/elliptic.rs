@@ -1,11 +1,11 @@
 //! Elliptic integrals and functions.
 
-/// The symmetric integral of the first kind, of numbers of which at most one is zero: Carlson 1979, by duplication.
+/// Returns Carlson's symmetric integral of the first kind of three numbers, of which at most one is zero, by duplication (Carlson 1979).
 pub(crate) fn carlson_rf([mut x, mut y, mut z]: [f64; 3]) -> f64 {
     loop {
         let mean = (x + y + z) / 3.0;
         let [a, b, c] = [x, y, z].map(|number| 1.0 - number / mean);
-        // The series leaves less than 3·10⁻³ of the sixth power.
+        // The truncation error of the series is below 3·10⁻³ of the sixth power.
         if a.abs().max(b.abs()).max(c.abs()) < 1e-3 {
             let (second, third) = (a * b - c * c, a * b * c);
             return (1.0 - second / 10.0 + third / 14.0 + second * second / 24.0 - 3.0 * second * third / 44.0) / libm::sqrt(mean);
@@ -16,20 +16,22 @@ pub(crate) fn carlson_rf([mut x, mut y, mut z]: [f64; 3]) -> f64 {
     }
 }
 
-/// How often arithmetic and geometric mean are taken: the distance is squared each time, and from 1 − m = 10⁻³⁰⁰ eleven are enough.
+/// Number of steps of the arithmetic–geometric mean. Each step squares the distance of the means, and from 1 − m = 10⁻³⁰⁰ eleven steps are enough.
 const STEPS: usize = 12;
 
-/// Jacobi's functions of one parameter m.
+/// Jacobi's elliptic functions of one parameter m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Jacobi {
+    /// 1 − m.
     complement: f64,
-    /// c/a of the arithmetic–geometric mean, from its first step on.
+    /// Ratios c/a of the arithmetic–geometric mean, from its first step on.
     ratios: [f64; STEPS],
+    /// Arithmetic–geometric mean of 1 and √(1 − m).
     mean: f64,
 }
 
 impl Jacobi {
-    /// Those of 1 − m, above 0 and at most 1.
+    /// Returns the functions of the parameter with 1 − m = `complement`, above 0 and at most 1.
     pub(crate) fn of_complement(complement: f64) -> Self {
         let (mut a, mut b) = (1.0, libm::sqrt(complement));
         let ratios = std::array::from_fn(|_| {
@@ -40,14 +42,15 @@ impl Jacobi {
         Self { complement, ratios, mean: a }
     }
 
-    /// K, a quarter of the period.
+    /// Returns K, a quarter of the period.
     pub(crate) fn quarter(&self) -> f64 {
         std::f64::consts::FRAC_PI_2 / self.mean
     }
 
-    /// sn, cn and dn of u: Abramowitz & Stegun 1964, 16.4.
+    /// Returns sn, cn and dn of u (Abramowitz & Stegun 1964, 16.4).
     pub(crate) fn at(&self, u: f64) -> [f64; 3] {
         let period = 4.0 * self.quarter();
+        // The reduction to one period keeps the digits of the amplitude.
         let u = u - period * (u / period).round();
         let amplitude = self
             .ratios
@@ -63,7 +66,7 @@ impl Jacobi {
 mod tests {
     use super::*;
 
-    /// 1 − m, u, the functions of u, and K, by mpmath 1.3.0 with 50 digits.
+    /// Values of 1 − m, u, the functions of u, and K, by mpmath 1.3.0 with 50 digits.
     const VALUES: [(f64, f64, [f64; 3], f64); 5] = [
         (1.0, 2.0, [0.909_297_426_825_681_7, -0.416_146_836_547_142_4, 1.0], std::f64::consts::FRAC_PI_2),
         (0.75, 0.3, [0.294_465_551_549_556_2, 0.955_662_094_545_250_7, 0.989_101_870_252_833_9], 1.685_750_354_812_596),

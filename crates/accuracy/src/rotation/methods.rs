@@ -1,4 +1,4 @@
-//! The ways of a free top from step to step.
+//! Methods for a free top from step to step.
 
 use std::array::from_fn;
 use std::time::Duration;
@@ -6,12 +6,12 @@ use std::time::Duration;
 use cohaptic_peer::Integrator;
 use cohaptic_peer::rotation::{Attitude, RotationStep, Spin, Triple};
 
-/// A way of a free top over one step.
+/// A method for a free top over one step.
 pub(crate) trait Advance {
     fn advance(&self, body: &mut Attitude);
 }
 
-/// The steps that the program has.
+/// The methods of the program.
 impl Advance for RotationStep {
     #[inline(always)]
     fn advance(&self, body: &mut Attitude) {
@@ -19,7 +19,7 @@ impl Advance for RotationStep {
     }
 }
 
-/// What the other steps are made of.
+/// Moments \[kg·m²\] and step length \[s\] of the methods of this file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Free {
     inertia: Triple,
@@ -36,12 +36,12 @@ impl Free {
     }
 }
 
-/// Turns about the axes x/2, y/2, z, y/2, x/2, each exact for the energy of that axis alone: Touma & Wisdom 1994. Second order.
+/// Rotations about the axes x/2, y/2, z, y/2, x/2, each exact for the energy of that axis alone (Touma & Wisdom 1994). Second order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Split(pub(crate) Free);
 
 impl Split {
-    /// The motion over a span with the energy of one axis alone: a turn about it, at its rate.
+    /// Rotates by the motion over a span with the energy of one axis alone: a rotation about this axis at its rate.
     #[inline(always)]
     fn turn(&self, axis: usize, span: f64, q: &mut [f64; 4], momentum: &mut Triple) {
         let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -51,6 +51,7 @@ impl Split {
         q[1 + axis] = u[axis] * cosine + w * sine;
         q[1 + j] = u[j] * cosine + u[k] * sine;
         q[1 + k] = u[k] * cosine - u[j] * sine;
+        // Double-angle formulas: the momentum turns by the whole angle, the quaternion by half of it.
         let (sine, cosine) = (2.0 * sine * cosine, 1.0 - 2.0 * sine * sine);
         (momentum[j], momentum[k]) = (momentum[j] * cosine + momentum[k] * sine, momentum[k] * cosine - momentum[j] * sine);
     }
@@ -67,8 +68,8 @@ impl Advance for Split {
     }
 }
 
-/// The implicit midpoint rule on the angular momentum in body axes, and Cayley's turn by the rate of its middle: Austin, Krishnaprasad & Wang 1993. Keeps
-/// energy and momentum. Second order.
+/// The implicit midpoint rule on the angular momentum in body axes, with Cayley's rotation by the rate at its middle (Austin, Krishnaprasad & Wang 1993).
+/// Conserves energy and momentum. Second order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Midpoint(pub(crate) Free);
 
@@ -77,7 +78,7 @@ impl Advance for Midpoint {
     fn advance(&self, body: &mut Attitude) {
         let before = self.0.momentum(body.rate);
         let (mut after, mut middle, mut moved) = (before, body.rate, f64::INFINITY);
-        // The map contracts by h·ω, so the change falls until it is rounding alone.
+        // The fixed-point map contracts by h·ω, so the change falls until only rounding is left.
         for _ in 0..100 {
             let sum: Triple = from_fn(|axis| before[axis] + after[axis]);
             middle = self.0.rate(sum.map(|sum| 0.5 * sum));
@@ -85,11 +86,13 @@ impl Advance for Midpoint {
             let next: Triple = from_fn(|axis| before[axis] + 0.5 * self.0.h * turning[axis]);
             let change = next.iter().zip(&after).map(|(next, after)| (next - after).abs()).fold(0.0, f64::max);
             after = next;
+            // A change that no longer falls is rounding: the iteration has converged.
             if change >= moved || change == 0.0 {
                 break;
             }
             moved = change;
         }
+        // Cayley's rotation is q·(1, ½h·ω), normalised.
         let half = middle.map(|rate| 0.5 * self.0.h * rate);
         let q = product(&body.orientation, half);
         let norm = libm::sqrt(q.iter().map(|q| q * q).sum());
@@ -97,7 +100,7 @@ impl Advance for Midpoint {
     }
 }
 
-/// The gyroscopic term is held over the step; the rest is exact, which for a free top is ω⁺ = ω + h·γ0 and a turn by h·ω + ½h²·γ0. First order.
+/// The gyroscopic term is held over the step, and the rest is exact, which for a free top is ω⁺ = ω + h·γ0 and a rotation by h·ω + ½h²·γ0. First order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Held(pub(crate) Free);
 
@@ -116,14 +119,14 @@ pub(crate) fn cross(a: Triple, b: Triple) -> Triple {
     from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
 }
 
-/// q·(1, u).
+/// Returns q·(1, u).
 #[inline(always)]
 fn product([w, x, y, z]: &[f64; 4], u: Triple) -> [f64; 4] {
     let turned = cross([*x, *y, *z], u);
     [w - x * u[0] - y * u[1] - z * u[2], w * u[0] + x + turned[0], w * u[1] + y + turned[1], w * u[2] + z + turned[2]]
 }
 
-/// A way from step to step.
+/// A method of rotation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Method {
     /// The program's `exact`.
@@ -162,7 +165,7 @@ impl Method {
         }
     }
 
-    /// Runs a free top and shows it after every step.
+    /// Runs a free top, and shows it after every step.
     pub(crate) fn run(self, inertia: Triple, start: Attitude, span: Duration, steps: u32, show: impl FnMut(u32, &Attitude)) {
         let free = Free { inertia, h: span.as_secs_f64() };
         let own = |integrator| Spin { inertia, damping: [0.0; 3] }.step(span, integrator, 1);

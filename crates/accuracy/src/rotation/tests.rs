@@ -1,15 +1,15 @@
-//! The closed form against a series with 100 bits, the methods against their orders and against what they keep.
+//! The closed form against a series with 100 bits, and the methods against their orders and their conserved quantities.
 
 use qd::Quad;
 
 use super::*;
 use crate::Unwatched;
 
-/// Orientation, then angular velocity.
+/// Components of the orientation, then of the angular velocity.
 type Numbers = [Quad; 7];
 
-/// One step by Taylor's series: ω̇ = γ(ω), q̇ = ½·q·(0, ω), coefficient by coefficient. In a span of 10 ms the terms fall by a factor of 20 or more, since no
-/// singularity is nearer than π/2 over λ = 6.6/s.
+/// Makes one step by Taylor's series of ω̇ = γ(ω), q̇ = ½·q·(0, ω), coefficient by coefficient. In a span of 10 ms the terms fall by a factor of 20 or more,
+/// because no singularity is nearer than π/2 over λ = 6.6/s.
 fn taylor(start: &Numbers, gyration: &[Quad; 3], span: Quad) -> Numbers {
     const ORDER: usize = 26;
     let mut terms = vec![*start];
@@ -31,8 +31,8 @@ fn taylor(start: &Numbers, gyration: &[Quad; 3], span: Quad) -> Numbers {
     from_fn(|place| terms.iter().rev().fold(Quad::ZERO, |sum, term| sum * span + term[place]))
 }
 
-/// The roundings of the closed form: u = λ·t + ε up to 132 has an error of some 10⁻¹⁴, which is 2·10⁻¹⁵ s of a motion at 12 rad/s; φ up to 240 rad has one
-/// of some 10⁻¹⁴ relative to 100 rad.
+/// The tolerances are roundings of the closed form. u = λ·t + ε up to 132 has an error of some 10⁻¹⁴, which is 2·10⁻¹⁵ s of a motion at 12 rad/s. φ up to 240
+/// rad has an error of some 10⁻¹⁴ relative to 100 rad.
 #[test]
 fn the_closed_form_is_the_series_with_100_bits() {
     let j = INERTIA.map(Quad::from_f64);
@@ -61,14 +61,14 @@ fn each_method_has_its_order() {
         (Method::Held, 1.0, 20),
         (Method::Euler, 1.0, 20),
     ] {
-        // A second of motion, in which first order has not lost count of the flips.
+        // Within a second of motion, a method of first order still counts the flips correctly.
         let error = |micros: u64| errors(&reference[..250], method, Duration::from_micros(micros))[0];
         let found = libm::log2(error(micros) / error(micros / 2));
         assert!((found - order).abs() < 0.1, "{method:?} has order {found}");
     }
 }
 
-/// Each of 20000 steps rounds some ten times by 2⁻⁵³ at most.
+/// Each of 20000 steps has some ten roundings of at most 2⁻⁵³.
 #[test]
 fn split_and_midpoint_keep_what_they_promise() {
     let reference = reference();

@@ -1,8 +1,8 @@
-//! Time: events in whole nanoseconds compared with steps of a millisecond.
+//! Representation of time: events in whole nanoseconds compared with steps of a millisecond.
 //!
-//! Other simulators of control over networks go in steps and have every time as a number of steps. What that does to delays, and to the answer whether a
-//! scene is stable, is compared with its cost; and where it does nothing at all, as for peers that tick together every millisecond when delays are
-//! rounded up, that is a row too.
+//! Other simulators of control over networks use steps, and represent every time as a number of steps. The rows compare the cost of both representations with
+//! the effect on delays and on the verdict of stability. Steps have no effect for peers that tick together every millisecond if delays are rounded up, which
+//! is a row too.
 
 mod events;
 mod steps;
@@ -29,12 +29,14 @@ const WRONG: &str = "wrong verdicts [1]";
 const DELAYS: &str = "instant of sampling plus the delay of the link";
 const VERDICTS: &str = "stability analysis of the scene as written, reduced";
 
-/// Clocks that are looked at.
+/// A setting of the peers' clocks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clocks {
+    /// Name of the setting.
     name: &'static str,
+    /// Period of the ticks.
     tick: Duration,
-    /// From each peer to the next.
+    /// Offset from each peer to the next.
     offset: Duration,
 }
 
@@ -44,14 +46,14 @@ pub(crate) const CLOCKS: [Clocks; 3] = [
     Clocks { name: "0.7 ms ticks in lockstep", tick: Duration::from_micros(700), offset: Duration::ZERO },
 ];
 
-/// The steps \[ns\] that are looked at.
+/// Compared steps \[ns\].
 const STEPS: [u64; 4] = [1_000_000, 100_000, 10_000, 1_000];
 
-/// The rows of this subject.
+/// Measures the rows of this subject.
 ///
 /// # Errors
 ///
-/// As [`crate::measure`].
+/// The errors of [`crate::measure`].
 pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
     let mut sink = RowSink { rows: Vec::new(), watch };
     for clocks in CLOCKS {
@@ -64,7 +66,7 @@ pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyErr
     Ok(sink.rows)
 }
 
-/// How time goes.
+/// A representation of time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Way {
     Events,
@@ -93,11 +95,13 @@ impl Way {
     }
 }
 
+/// Traffic and scenes of one setting of clocks.
 struct Work {
     clocks: Clocks,
     traffic: Traffic,
-    /// Each scene of the grid, and whether it is stable, where that can be told.
+    /// Scenes of the grid, each with its stiffness \[N/m\] and its verdict, as far as the verdict can be told.
     scenes: Vec<(Times, f64, bool)>,
+    /// Rounds in which costs are measured.
     rounds: usize,
 }
 
@@ -111,11 +115,13 @@ impl Work {
                 return Err(AccuracyError::Stopped);
             }
             let times = Times { tick, offset, delay };
+            // A scene without a clear verdict cannot be called right or wrong, so it is left out.
             scenes.extend(times.verdict(stiffness, Method::Reduced)?.map(|stable| (times, stiffness, stable)));
         }
         Ok(Self { clocks, traffic: Traffic::new(tick * 8, offset, sendings), scenes, rounds })
     }
 
+    /// Measures the rows of one representation of time.
     fn rows(&self, way: Way, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
         let traffic = &self.traffic;
         let mut errors = Errors::default();
@@ -155,7 +161,7 @@ impl Work {
         Ok(rows)
     }
 
-    /// The share of the grid in which the verdict is not that of the scene as written, and what else to know.
+    /// Returns the share of scenes whose verdict differs from the verdict of the scene as written, and a note.
     fn wrong(&self, way: Way, watch: &dyn Watch) -> Result<(f64, String), AccuracyError> {
         let (mut wrong, mut hidden) = (0_u32, 0_u32);
         for (times, stiffness, right) in &self.scenes {
@@ -163,9 +169,11 @@ impl Work {
                 return Err(AccuracyError::Stopped);
             }
             let found = match way {
+                // The full method pushes unit vectors through the peers of the program, so it is independent of the reference.
                 Way::Events => times.verdict(*stiffness, Method::Full)?,
                 Way::Steps(step, rounding) => times.in_steps(step, rounding).verdict(*stiffness, Method::Reduced)?,
             };
+            // An undecided verdict counts as wrong, because the scene as written has a clear verdict.
             wrong += u32::from(found != Some(*right));
             hidden += u32::from(found == Some(true) && !right);
         }

@@ -1,4 +1,4 @@
-//! The other way: time goes in steps, and everything happens at one.
+//! Network in steps: time advances in steps, and every event happens at a step.
 
 use std::time::Duration;
 
@@ -6,19 +6,19 @@ use cohaptic_units::Instant;
 
 use super::traffic::{Arrival, NODES, Traffic};
 
-/// The treatment of a time that lies between two steps.
+/// Treatment of a time between two steps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Rounding {
-    /// To the next step.
+    /// Round up to the next step.
     Up,
-    /// To the nearest one, in the middle to the next.
+    /// Round to the nearest step; a time in the middle goes to the next step.
     Nearest,
 }
 
 impl Rounding {
     pub(crate) const BOTH: [Self; 2] = [Self::Up, Self::Nearest];
 
-    /// How many steps a span takes.
+    /// Returns the number of steps in a span.
     pub(crate) fn steps(self, span: Duration, step: Duration) -> u64 {
         let (span, step) = (span.as_nanos(), step.as_nanos());
         let steps = match self {
@@ -28,6 +28,7 @@ impl Rounding {
         u64::try_from(steps).unwrap_or(u64::MAX)
     }
 
+    /// Returns a span rounded to whole steps.
     pub(crate) fn span(self, span: Duration, step: Duration) -> Duration {
         Duration::from_nanos(self.steps(span, step).saturating_mul(u64::try_from(step.as_nanos()).unwrap_or(u64::MAX)))
     }
@@ -38,30 +39,35 @@ impl Rounding {
 struct Flying {
     from: usize,
     to: usize,
+    /// Instant at which the sample was taken.
     taken: Instant,
 }
 
-/// Sends everything in steps: a sample goes out at the first step at or after it was taken, its delay is rounded to steps, and it arrives at a step. A
-/// list for each step to come, so that no packet is looked at in between.
+/// Sends all traffic in steps: a sample is sent at the first step at or after its instant, its delay is rounded to steps, and it arrives at a step. Packets
+/// wait in one list per future step, so that no packet is visited before its arrival.
 pub(crate) fn carry(traffic: &Traffic, step: Duration, rounding: Rounding, mut show: impl FnMut(Arrival)) {
     let delays = traffic.delays.map(|row| row.map(|delay| rounding.steps(delay, step)));
     let longest = delays.iter().flatten().copied().max().unwrap_or(0);
+    // No packet waits longer than the longest delay, so the lists can be reused in a ring.
     let mut lists: Vec<Vec<Flying>> = vec![Vec::new(); usize::try_from(longest + 1).unwrap_or(1)];
     let places = lists.len() as u64;
     let place = |step: u64| usize::try_from(step % places).unwrap_or(0);
     let mut numbers = [0; NODES];
     let (mut now, mut number, mut flying) = (Instant::ZERO, 0_u64, 0_usize);
     while flying > 0 || numbers.iter().any(|sent| *sent < traffic.rounds) {
+        // A node may send several times within one step.
         for from in 0..NODES {
             while numbers[from] < traffic.rounds && traffic.instant(from, numbers[from]) <= now {
                 let taken = traffic.instant(from, numbers[from]);
                 numbers[from] += 1;
                 for to in (0..NODES).filter(|to| *to != from) {
+                    // The delay is rounded by itself, as in a simulator whose links have delays in steps.
                     lists[place(number + delays[from][to])].push(Flying { from, to, taken });
                     flying += 1;
                 }
             }
         }
+        // Sendings come first: a packet with a delay of zero steps arrives at the step of its sending.
         let due = &mut lists[place(number)];
         flying -= due.len();
         for Flying { from, to, taken } in due.drain(..) {

@@ -1,4 +1,4 @@
-//! Every packet by both ways against its formula; verdicts against simulations.
+//! Every packet in both representations against its formula, and verdicts against simulations.
 #![allow(clippy::float_cmp, reason = "no error at all is exactly zero")]
 
 use cohaptic_harness::Model;
@@ -39,7 +39,8 @@ fn events_have_no_error_at_all() {
     }
 }
 
-/// Rounded up, a sample waits less than a step for its sending and its delay grows by less than a step; to the nearest, by half a step at most.
+/// With rounding up, a sample waits less than a step for its sending, and its delay grows by less than a step. With rounding to the nearest step, the delay
+/// changes by at most half a step.
 #[test]
 fn steps_err_by_less_than_two_steps() {
     for traffic in traffics() {
@@ -57,7 +58,7 @@ fn steps_err_by_less_than_two_steps() {
     }
 }
 
-/// In lockstep samples are taken at steps, so the mean error is that of the twelve delays rounded.
+/// In lockstep, samples are taken at steps, so the mean error is the mean rounding of the twelve delays.
 #[test]
 fn the_mean_error_in_lockstep_is_that_of_the_delays() {
     let traffic = &traffics()[0];
@@ -96,7 +97,7 @@ fn rounding_of(work: &Work, rounding: Rounding) -> f64 {
     work.wrong(Way::Steps(MILLISECOND, rounding), &Unwatched).unwrap().0
 }
 
-/// With d = ⌈delay/tick⌉ a delay that is rounded up to ticks does what it did before; to the nearest, it does not.
+/// A delay acts as d = ⌈delay/tick⌉ ticks, so rounding up to ticks changes no verdict, while rounding to the nearest tick does.
 #[test]
 fn rounding_up_to_the_tick_changes_no_verdict_in_lockstep_and_all_else_does() {
     let work = CLOCKS.map(|clocks| Work::new(clocks, QUICK, &Unwatched).unwrap());
@@ -109,8 +110,8 @@ fn rounding_up_to_the_tick_changes_no_verdict_in_lockstep_and_all_else_does() {
     }
 }
 
-/// Where steps turn the verdict, the program's simulation of the scene as written agrees with the analysis, and so does that of the scene in steps with
-/// the verdict there, unless 20 s are too short to tell.
+/// Where steps change the verdict, a simulation of the scene as written agrees with the analysis, and a simulation of the scene in steps agrees with its own
+/// verdict, unless 20 s are too short for a decision.
 #[test]
 fn simulations_say_the_same_on_both_sides() {
     let mut told = 0;

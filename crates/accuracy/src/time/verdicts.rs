@@ -1,4 +1,4 @@
-//! Whether a scene is stable, as written and as steps have it.
+//! Stability of a scene, as written and in steps.
 
 use std::path::Path;
 use std::time::Duration;
@@ -9,26 +9,26 @@ use cohaptic_stability::{Method, Verdict, analyse};
 use super::steps::Rounding;
 use crate::AccuracyError;
 
-/// Two equal peers whose clocks may be apart.
+/// Times of two equal peers, whose clocks may differ by an offset.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Times {
-    /// The tick of both; a sample goes out every eighth.
+    /// Period of the ticks of both peers. A sample is sent every eighth tick.
     pub(crate) tick: Duration,
-    /// By how much the second clock is late.
+    /// Offset of the second clock.
     pub(crate) offset: Duration,
-    /// One way.
+    /// Delay of both links.
     pub(crate) delay: Duration,
 }
 
 impl Times {
-    /// As a simulator has them in which every time is a number of steps. A tick takes a step at least.
+    /// Returns the times of a simulator in which every time is a number of steps. A tick has at least one step.
     pub(crate) fn in_steps(self, step: Duration, rounding: Rounding) -> Self {
         let Self { tick, offset, delay } = self;
         let tick = rounding.span(tick, step).max(step);
         Self { tick, offset: rounding.span(offset, step), delay: rounding.span(delay, step) }
     }
 
-    /// The scene with that coordination.
+    /// Returns the scene with the coordination stiffness `stiffness` \[N/m\].
     pub(crate) fn scene(self, stiffness: f64) -> Result<Scene, AccuracyError> {
         let Self { tick, offset, delay } = self;
         let [tick, update, offset, delay] = [tick, tick * 8, offset, delay].map(|span| span.as_nanos());
@@ -40,7 +40,7 @@ impl Times {
         Ok(Scene::parse(&text, Path::new("time.toml"), &[])?)
     }
 
-    /// Whether it is stable with that coordination; `None` if that cannot be told from not.
+    /// Returns whether the scene is stable with this stiffness; `None` if stable and unstable cannot be told apart.
     pub(crate) fn verdict(self, stiffness: f64, method: Method) -> Result<Option<bool>, AccuracyError> {
         Ok(match analyse(&self.scene(stiffness)?, method)?.verdict() {
             Verdict::Stable => Some(true),
@@ -50,17 +50,17 @@ impl Times {
     }
 }
 
-/// Delays and stiffnesses that go together: `side` of each.
+/// Returns all pairs of `side` delays and `side` stiffnesses.
 pub(crate) fn grid(side: u32) -> impl Iterator<Item = (Duration, f64)> {
     (0..side).flat_map(move |row| (0..side).map(move |column| (delay(row, side), stiffness(column, side))))
 }
 
-/// From 2 to 12 ms, in the middle of equal parts.
+/// Returns a delay from 2 to 12 ms, in the middle of one of `side` equal parts.
 fn delay(row: u32, side: u32) -> Duration {
     Duration::from_nanos(2_000_000 + 10_000_000 * u64::from(2 * row + 1) / u64::from(2 * side))
 }
 
-/// From 300 to 4800 N/m, each the same factor above the one before.
+/// Returns a stiffness from 300 to 4800 N/m, with a constant ratio between neighbours.
 fn stiffness(column: u32, side: u32) -> f64 {
     300.0 * libm::pow(16.0, f64::from(2 * column + 1) / f64::from(2 * side))
 }

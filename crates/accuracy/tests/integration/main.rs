@@ -1,4 +1,4 @@
-//! The rows as those who read them meet them: files that read back, documents that are well-formed, an end in good order.
+//! Rows as their readers meet them: files that read back, well-formed documents, and an orderly end.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 #![allow(clippy::float_cmp, reason = "what is written is what was measured, to the bit")]
 
@@ -13,7 +13,7 @@ mod watching;
 
 use cohaptic_accuracy::{Row, Subject};
 
-/// A row of made-up numbers.
+/// Returns a row of made-up numbers.
 pub(crate) fn row(method: &str, cost: Option<f64>, error: Option<f64>) -> Row {
     Row {
         subject: Subject::Motion,

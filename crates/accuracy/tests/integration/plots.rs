@@ -16,11 +16,11 @@ fn every_group_has_one_picture_with_a_line_for_each_method() {
     for text in [">one</text>", ">other</text>", "Cost [ns a tick]", "Error: position [m]"] {
         assert!(plot.svg.contains(text), "{text}");
     }
-    // A disc for each of the two points of the first method and one in the legend, a square for the one point of the second and one in the legend.
+    // There are two discs for the points of the first method and one in the legend, and one square for the point of the second method and one in the legend.
     assert_eq!((plot.svg.matches("<circle").count(), plot.svg.matches("<path class=\"f1\"").count()), (2 + 1, 1 + 1));
 }
 
-/// Zero has no logarithm: it is a triangle at the foot, and the legend and the caption say so.
+/// Zero has no logarithm, so it is a triangle at the foot, and legend and caption mention it.
 #[test]
 fn an_error_of_zero_is_at_the_foot_and_said() {
     let with = plots(&[row("one", Some(1.0), Some(1e-3)), row("exact", Some(2.0), Some(0.0))], Size::PAGE);

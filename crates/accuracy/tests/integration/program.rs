@@ -1,4 +1,4 @@
-//! The program as its users meet it: a command in a folder of its own, the exit status, standard output, standard error and files.
+//! The program as its users meet it: a command in a folder of its own, with exit status, standard output, standard error and files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 const NAMES: [&str; 6] = ["motion", "rotation", "time", "network", "analysis", "real-time"];
 
-/// A folder in which commands are typed, removed at the end.
+/// A temporary folder for commands, removed at the end.
 struct Folder(TempDir);
 
 impl Folder {
@@ -50,7 +50,7 @@ impl Folder {
         Outcome::of(self.command(line).output().unwrap())
     }
 
-    /// Returns what a command prints that succeeds, and that writes nothing to standard error but the page's name.
+    /// Returns the standard output of a command that succeeds, and that writes only the name of the page to standard error.
     fn text(&self, line: &str) -> String {
         let outcome = self.run(line);
         assert_eq!(outcome.status, Some(0), "{line}: {}", outcome.stderr);
@@ -72,7 +72,7 @@ impl Folder {
     }
 }
 
-/// What came of a command.
+/// Result of a command.
 struct Outcome {
     status: Option<i32>,
     stdout: String,
@@ -120,20 +120,20 @@ fn the_rows_the_plots_and_the_page_lie_in_the_folder() {
     for (record, row) in reader.records().map(Result::unwrap).zip(rows) {
         assert_eq!(&record[2], row["method"].as_str().unwrap());
         let (written, printed) = (record[6].parse::<f64>().ok(), row["error"].as_f64());
-        // The parser of JSON rounds in the last place.
+        // The JSON parser rounds in the last place.
         assert!(written == printed || (written.unwrap() / printed.unwrap() - 1.0).abs() < 1e-15, "{record:?} {row}");
     }
     let files = folder.files("out");
     assert!(files.iter().all(|file| !file.ends_with(".partial") && file != "rows-interrupted.csv"), "{files:?}");
     let plots: Vec<&String> = files.iter().filter(|file| file.ends_with(".svg")).collect();
-    // Four scenes with position and energy, and two of them with a boundary, whose cost has two units.
+    // Four scenes have position and energy, and two of them have a boundary, whose cost has two units.
     assert_eq!(plots.len(), 4 * 2 + 2 * 2, "{files:?}");
     let drawn: Vec<String> = plots.iter().map(|plot| folder.read(&format!("out/{plot}"))).collect();
     for (plot, svg) in plots.iter().zip(&drawn) {
         assert_eq!(faults(svg), [""; 0], "{plot}");
         assert!(svg.contains(" width=\"800\""), "{plot}");
     }
-    // The plots of this subject that the page of measured figures shows are among them.
+    // The page of measured figures shows plots of this subject, which must be among the files.
     let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/measured.md")).unwrap();
     let shown: Vec<&str> = page.split("](images/measured/").skip(1).filter_map(|rest| Some(rest.split_once(')')?.0)).collect();
     let of_motion: Vec<&&str> = shown.iter().filter(|plot| plot.starts_with("motion-")).collect();
@@ -154,7 +154,7 @@ fn plots_have_the_size_that_was_asked_for() {
         assert_eq!(faults(&svg), [""; 0], "{plot}");
     }
     assert!(folder.read("out/index.html").contains(" width=\"85mm\""));
-    // Without a folder there is no picture that could have a size.
+    // Without a folder there is no picture to which a size could apply.
     folder.assert_refused("--quick --only motion --size page", 2, &["--out"]);
     folder.assert_refused("--quick --only motion --out out --size huge", 2, &["one-column"]);
 }
@@ -193,7 +193,7 @@ fn a_full_standard_output_is_an_error() {
     }
 }
 
-/// Whether a process has a handler for SIGINT, number 2: bit 1 of the signals that it catches.
+/// Returns whether a process has a handler for SIGINT, number 2, which is bit 1 of the mask of caught signals.
 #[cfg(target_os = "linux")]
 fn listens(id: u32) -> bool {
     let status = fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();

@@ -3,8 +3,8 @@ use cohaptic_accuracy::real_time::{Effort, rows};
 
 use crate::rows::assert_sound;
 
-/// How late anything is depends on the machine. What does not: that packets left, that none left early (lateness is no negative number), that the median
-/// is not above the 99 %, and that each way has both rows.
+/// Lateness depends on the machine. The test asserts only what does not: packets left, none left early (lateness is not negative), the median is at most the
+/// 99 %, and each way has both rows.
 #[test]
 fn every_way_releases_packets() {
     let rows = rows(Effort { rounds: 2, turn_millis: 60 }, &Unwatched).unwrap();
@@ -13,12 +13,12 @@ fn every_way_releases_packets() {
     for pair in rows.chunks(2) {
         assert!(pair[0].error <= pair[1].error, "{pair:?}");
         let packets: u64 = pair[0].note.strip_prefix("measured over ").and_then(|note| note.split_once(' ')).unwrap().0.parse().unwrap();
-        // 24 packets come back after 24 ms on average, and are released up to the instant 60 ms, however late that is: at least each one once.
+        // 24 packets return after 24 ms on average, and are released up to the instant 60 ms, however late: at least once each.
         assert!(packets >= 48, "{pair:?}");
     }
 }
 
-/// Instants are those of the link, whoever waits: all ways release the same packets.
+/// Instants come from the link and not from the waiting thread, so all ways release the same packets.
 #[test]
 fn all_ways_release_the_same_packets() {
     let rows = rows(Effort { rounds: 1, turn_millis: 50 }, &Unwatched).unwrap();

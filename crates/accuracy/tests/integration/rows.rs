@@ -1,6 +1,6 @@
 use cohaptic_accuracy::Row;
 
-/// What every row of the measured subjects promises.
+/// Asserts the promises of every row of the measured subjects.
 pub(crate) fn assert_sound(rows: &[Row]) {
     assert!(!rows.is_empty());
     for row in rows {

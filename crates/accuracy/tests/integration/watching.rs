@@ -1,10 +1,10 @@
-//! Who watches sees every row, and can end the work.
+//! A watcher sees every row, and can end the measurement.
 
 use std::cell::RefCell;
 
 use cohaptic_accuracy::{AccuracyError, Options, Row, Subject, Unwatched, Watch, analysis, measure, network, real_time};
 
-/// Keeps what it sees and stops after so many rows.
+/// A watcher that keeps the rows and stops the measurement after `most` rows.
 struct Until {
     rows: RefCell<Vec<Row>>,
     most: usize,
@@ -49,7 +49,7 @@ fn subjects_that_measure_for_long_ask_the_watcher_too() {
     assert!(stopped(real_time::rows(real_time::Effort::QUICK, &until(0))));
 }
 
-/// Costs are measured; errors are computed, and the same every time.
+/// Costs are measured, but errors are computed and equal in every run.
 #[test]
 fn errors_are_the_same_every_time() {
     let errors = || -> Vec<(String, String, Option<u64>)> {
