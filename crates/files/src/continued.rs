@@ -1,16 +1,19 @@
-//! Files that outlast the process that began them.
+//! Opens a file of rows that a later process continues after an interruption.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Seek as _, SeekFrom};
 use std::path::Path;
 
-/// Opens a file of rows with which the same work goes on after an interruption, or begins the file. Rows are added after the first `whole` bytes \[bytes\]; all
-/// other bytes are cut off. One process at a time may do so: the owner of the folder ([`OwnFolder`](crate::OwnFolder)), or the worker whose name the file has.
+/// Opens a file of rows to continue it, or creates the file. Keeps the first `whole` bytes, cuts off all bytes after them, and writes after them. Only one
+/// process at a time may call this for a file: the owner of the folder ([`OwnFolder`](crate::OwnFolder)), or the worker whose name is part of the file's
+/// name.
 ///
 /// # Errors
 ///
-/// The error of the system; [`ErrorKind::InvalidInput`] for a link or a device. No process begins such a file, and the file that a link leads to would be cut off.
+/// The system's error, or [`ErrorKind::InvalidInput`] for a link or a device. This crate never creates a link under such a name, and the target of a link
+/// would lose its bytes.
 pub fn open_continued(path: &Path, whole: u64) -> io::Result<File> {
+    // `symlink_metadata`, because `metadata` would look at the target of the link.
     if fs::symlink_metadata(path).is_ok_and(|about| !about.is_file()) {
         return Err(io::Error::new(ErrorKind::InvalidInput, "it is no regular file: expected one, or none"));
     }

@@ -1,4 +1,7 @@
-//! Folders of files that belong together.
+//! A folder with one writing process at a time, so all files in the folder come from the same process.
+//!
+//! The owner is the process holding the lock file [`FOLDER_LOCK`] in the folder. Dropping the ownership removes a folder made by the owner if the folder is
+//! still empty.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -6,42 +9,47 @@ use std::path::{Path, PathBuf};
 
 use crate::lock::{self, Lock};
 
-/// The name of the lock in a folder. The file is there as long as a process writes into the folder. The file of a killed process stays, and hinders nobody.
+/// Name of the lock file in an owned folder. The file exists while a process owns the folder. A killed process leaves its lock file behind; the file alone
+/// does not block the next owner.
 pub const FOLDER_LOCK: &str = "cohaptic.lock";
 
-/// The most times that a folder is made which another process removes at the same time.
+/// Number of attempts to make a folder that another process keeps removing.
 const TRIES: u32 = 100;
 
-/// A folder that no other process takes as long as this value lives, so that its files are of one process. The system releases the folder when the process
-/// ends, however the process ends.
+/// Ownership of a folder: no other process can take the folder while this value lives. The system ends the ownership when the process ends, even if the
+/// process is killed.
 ///
-/// On a file system without locks nobody is refused, and only single files are whole.
+/// On a file system without locks, no process is refused. Single files are still written as a whole there, but files of two processes can mix.
 #[derive(Debug)]
 pub struct OwnFolder {
     path: PathBuf,
+    /// Lock on [`FOLDER_LOCK`]; `None` on a file system without locks.
     lock: Option<Lock>,
+    /// Whether the folder did not exist before [`OwnFolder::take`].
     is_new: bool,
 }
 
 impl OwnFolder {
-    /// Makes the folder if there is none, and takes it. Does not wait.
+    /// Takes the folder, and makes missing folders of the path. Does not wait for another owner.
     ///
     /// # Errors
     ///
-    /// [`ErrorKind::ResourceBusy`] if another process has the folder; and what the system says.
+    /// [`ErrorKind::ResourceBusy`] if another process or another value owns the folder; otherwise the system's error.
     pub fn take(path: &Path) -> io::Result<Self> {
         let (mut is_new, mut tries) = (false, 1);
         loop {
             is_new |= !path.exists();
             match fs::create_dir_all(path).and_then(|()| Self::locked(path)) {
                 Ok(lock) => return Ok(Self { path: path.to_path_buf(), lock, is_new }),
-                // A process that wrote nothing removes the folder that it had made.
+                // The owner before may remove its empty folder between `create_dir_all` and the creation of the lock file. The next round makes the folder
+                // again.
                 Err(error) if tries < TRIES && matches!(error.kind(), ErrorKind::NotFound | ErrorKind::AlreadyExists) => tries += 1,
                 Err(error) => return Err(error),
             }
         }
     }
 
+    /// Locks the folder's lock file. Returns `None` if the file system has no locks.
     fn locked(path: &Path) -> io::Result<Option<Lock>> {
         let file = path.join(FOLDER_LOCK);
         match Lock::take(&file) {
@@ -51,6 +59,7 @@ impl OwnFolder {
                 "another process writes into this folder: expected to be the only one; wait for it, or choose another folder",
             )),
             Err(error) if lock::is_impossible(&error) => {
+                // The attempt to lock has created the file, which nobody would remove later.
                 let _ = fs::remove_file(file);
                 Ok(None)
             }
@@ -58,7 +67,7 @@ impl OwnFolder {
         }
     }
 
-    /// Whether another process, or another value, has the folder. Nothing is written.
+    /// Returns whether another process, or another value of this process, owns the folder. Writes nothing.
     #[must_use]
     pub fn is_taken(path: &Path) -> bool {
         Lock::is_held(&path.join(FOLDER_LOCK))
@@ -67,9 +76,10 @@ impl OwnFolder {
 
 impl Drop for OwnFolder {
     fn drop(&mut self) {
+        // The lock file must be gone before `remove_dir`, which removes empty folders only.
         self.lock = None;
         if self.is_new {
-            // Nothing came of it, unless there are files.
+            // Fails on purpose if the owner wrote files.
             let _ = fs::remove_dir(&self.path);
         }
     }

@@ -1,18 +1,18 @@
-//! A lock for processes on several machines that share a folder: a lease, which its owner renews and which goes stale if the owner does not.
+//! A lock for processes of several machines with a common folder. The lock is a lease: a file renewed by its owner, and stale if the owner stops renewing.
 //!
-//! It needs of the file system what every one has, NFS among them: a file is made by one process alone (`O_EXCL`), a file that was closed is read as it was
-//! written by a process that opens it later, and the times of files come from one clock, that of the server. Locks of the system are not needed.
+//! Leases need only properties of every file system, NFS included: exactly one process succeeds in creating a file (`O_EXCL`), a process opening a file
+//! reads all bytes written before an earlier close, and all modification times come from the server's clock. Locks of the system are not needed.
 //!
-//! | rule | |
+//! | term | rule |
 //! | --- | --- |
-//! | owner | the first line of the file: host, process, and when it began |
-//! | heartbeat | the second line, a number; the owner writes the next one every [`BEAT`] |
-//! | stale | the file is older than [`STALE`], by the clock of its file system; or the owner was a process of this host that has ended |
-//! | a stale lease | is renamed away, which only one process can do, and then taken as if it had never been there |
-//! | a lease that is lost | its owner sees that at its next heartbeat, because another one stands in the file |
+//! | owner | first line of the file: host, process, and the time when the process began |
+//! | heartbeat | second line of the file, a number; the owner writes the next number every [`BEAT`] |
+//! | stale lease | the file was not written for [`STALE`], by the clock of the file system, or the owner was a process of this host that has ended |
+//! | takeover | a stale lease is renamed (only the first process succeeds), and the name is then taken like a free name |
+//! | lost lease | the owner notices the loss at its next heartbeat, because the file names another owner |
 //!
-//! A process that stands still for longer than [`STALE`] can lose its lease without knowing it until its next heartbeat. So two owners can work at the same
-//! time, for a moment: a lease saves work, and the files that its owners write must be right without it.
+//! A process standing still for longer than [`STALE`] can lose its lease and notices the loss at the next heartbeat only. Until then two owners can work at
+//! the same time. A lease therefore only saves double work: files written by owners must be right without the lease.
 
 use std::fmt;
 use std::fs::{self, OpenOptions};
@@ -22,28 +22,29 @@ use std::time::{Duration, SystemTime};
 
 use crate::partial::{self, PARTIAL};
 
-/// How often an owner renews its lease.
+/// Time between two heartbeats of an owner.
 pub const BEAT: Duration = Duration::from_secs(5);
 
-/// A lease that was not renewed for this long is stale: far longer than a file system takes to show what another machine wrote (60 s at most on NFS, whose
-/// clients ask again after `acregmax`).
+/// Time since the last renewal from which a lease is stale. Longer than any file system hides a write of another machine: NFS clients check a file again
+/// after `acregmax`, at most 60 s.
 pub const STALE: Duration = Duration::from_secs(90);
 
-/// A process that owns leases and writes files.
+/// A process that owns leases and writes files. The four fields together identify the process among the processes of all machines and all times.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Owner {
-    /// The name of its machine.
+    /// Name of the process's machine, reduced to characters allowed in file names.
     pub host: String,
-    /// Its number there.
+    /// Process number, unique within `space` at any one time.
     pub pid: u32,
-    /// Within which processes the number counts: a container has its own.
+    /// Name of the namespace of process numbers. A container has a namespace of its own.
     space: String,
-    /// What tells it from other processes with the same number.
+    /// Distinguishes the process from earlier processes with the same number: nanoseconds of the wall clock when the process began.
     begun: u64,
 }
 
 impl Owner {
-    /// This process. `begun` tells it from earlier ones with the same number: the time by the wall clock, to the nanosecond.
+    /// Returns this process as an owner. `begun` must differ from the values of earlier processes with the same number: nanoseconds of the wall clock when
+    /// the process began.
     #[must_use]
     pub fn here(begun: u64) -> Self {
         let host = fs::read_to_string("/proc/sys/kernel/hostname").ok().or_else(|| std::env::var("COMPUTERNAME").ok());
@@ -51,25 +52,28 @@ impl Owner {
         Self { host: plain(&host.unwrap_or_default()), pid: std::process::id(), space: plain(&space.unwrap_or_default()), begun }
     }
 
-    /// What no other process is called; fit for names of files.
+    /// Returns the unique name of the process, made of characters allowed in file names.
     #[must_use]
     pub fn name(&self) -> String {
         format!("{}-{}-{:x}", self.host, self.pid, self.begun)
     }
 
+    /// Reads the first line of a lease; `None` if the line has another form.
     fn read(line: &str) -> Option<Self> {
         let mut words = line.split(' ');
         let mut word = || words.next();
         Some(Self { host: word()?.to_owned(), pid: word()?.parse().ok()?, space: word()?.to_owned(), begun: word()?.parse().ok()? })
     }
 
-    /// Whether its process has ended for certain: it was on this machine, and is no more.
+    /// Returns whether the process has certainly ended: it ran on this machine, in this namespace, and runs no more. `false` also means "not known".
     fn has_ended(&self) -> bool {
         let here = Self::here(0);
+        // Numbers of another machine or of another namespace say nothing here. Systems other than Linux have no `/proc`.
         if (&here.host, &here.space) != (&self.host, &self.space) || !Path::new("/proc/self/stat").exists() {
             return false;
         }
-        // Behind the name, which may hold anything: Z is a process that has ended and was not waited for yet.
+        // The state follows the last ") ", because the name of the process may contain parentheses. Z is a process that has ended and was not yet waited
+        // for by its parent.
         match fs::read_to_string(format!("/proc/{}/stat", self.pid)) {
             Ok(stat) => stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with(['Z', 'X'])),
             Err(error) => error.kind() == io::ErrorKind::NotFound,
@@ -83,56 +87,60 @@ impl fmt::Display for Owner {
     }
 }
 
-/// The letters of a text that may stand in names of files; never nothing.
+/// Replaces characters that may not stand in a file name. Returns "unknown" for an empty text.
 fn plain(text: &str) -> String {
     let plain: String =
         text.trim().chars().map(|letter| if letter.is_ascii_alphanumeric() || ".:[]_-".contains(letter) { letter } else { '_' }).collect();
+    // Namespaces read `pid:[4026531836]`. The punctuation is dropped, because Windows forbids `:` in names of files.
     if plain.is_empty() { "unknown".to_owned() } else { plain.replace([':', '[', ']'], "") }
 }
 
-/// A lease, for as long as this value lives, its owner renews it, and nobody takes it over.
+/// Ownership of a lease. The ownership lasts while the value lives, the owner renews the lease in time, and no other process takes the lease over. Dropping
+/// the value gives the lease back.
 #[derive(Debug)]
 pub struct Lease {
+    /// File of the lease.
     path: PathBuf,
     owner: Owner,
+    /// Heartbeats written since the lease was taken.
     beats: u64,
 }
 
-/// Whether a lease was free.
+/// Result of [`Lease::take`].
 #[derive(Debug)]
 pub enum Taking {
-    /// It is this process's now.
+    /// This process owns the lease now.
     Taken(Lease),
-    /// Another process has it.
+    /// Another process holds the lease, and the lease is not stale.
     Held(Holder),
 }
 
-/// The process that has a lease.
+/// State of a held lease, as read at one moment.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Holder {
-    /// The process; `None` if the file does not say so, as in the moment in which it is made.
+    /// Process that holds the lease; `None` if the file names no process, as between its creation and the first write.
     pub owner: Option<Owner>,
-    /// How long ago it renewed the lease.
+    /// Time since the holder last renewed the lease, by the clock of the file system.
     pub age: Duration,
-    /// The whole file.
+    /// Content of the file, compared to see a heartbeat.
     text: String,
 }
 
 impl Holder {
-    /// Whether the lease may be taken over.
+    /// Returns whether another process may take the lease over.
     #[must_use]
     pub fn is_stale(&self) -> bool {
         self.age >= STALE || self.owner.as_ref().is_some_and(Owner::has_ended)
     }
 
-    /// Whether the lease was renewed, or taken, since it was looked at before: its holder lives.
+    /// Returns whether the lease was renewed or taken after `before` was read, and so has a living holder.
     #[must_use]
     pub fn has_lived_since(&self, before: &Self) -> bool {
-        // A file that is being written may look like anything, and is looked at again.
+        // Without the final newline the file is being written at this moment and proves nothing. The caller looks again later.
         self.text.ends_with('\n') && self.text != before.text
     }
 
-    /// The holder of a lease; `None` if nobody has it. `now` is the time by the clock of the file system.
+    /// Reads the holder of a lease; `None` if the file does not exist. `now` is the present time by the clock of the file system.
     fn read(path: &Path, now: SystemTime) -> io::Result<Option<Self>> {
         let read = || -> io::Result<(SystemTime, String)> { Ok((fs::metadata(path)?.modified()?, fs::read_to_string(path)?)) };
         match read() {
@@ -147,12 +155,13 @@ impl Holder {
 }
 
 impl Lease {
-    /// Takes a lease, unless another process has it and it is not stale. Does not wait.
+    /// Takes a lease that is free or stale. Does not wait.
     ///
     /// # Errors
     ///
-    /// The error of the system.
+    /// The system's error.
     pub fn take(path: &Path, owner: &Owner) -> io::Result<Taking> {
+        // The lease can change hands between any two calls, so each round begins with an attempt to create the file. The file system decides the race.
         loop {
             if let Some(lease) = Self::make(path, owner)? {
                 return Ok(Taking::Taken(lease));
@@ -160,13 +169,13 @@ impl Lease {
             match Holder::read(path, now_beside(path, owner)?)? {
                 Some(holder) if holder.is_stale() => take_away(path, owner, &holder)?,
                 Some(holder) => return Ok(Taking::Held(holder)),
-                // It was given back meanwhile.
+                // The holder gave the lease back between the two calls; the next round creates the file.
                 None => {}
             }
         }
     }
 
-    /// The lease, if its file could be made.
+    /// Creates the file of a lease; `None` if the file exists.
     fn make(path: &Path, owner: &Owner) -> io::Result<Option<Self>> {
         let mut file = match OpenOptions::new().write(true).create_new(true).open(path) {
             Ok(file) => file,
@@ -175,33 +184,36 @@ impl Lease {
         };
         let lease = Self { path: path.to_path_buf(), owner: owner.clone(), beats: 0 };
         if let Err(error) = file.write_all(lease.text().as_bytes()) {
-            // On a full disk it would be nobody's lease.
+            // On a full disk an empty file would stay, naming no owner, and would block all processes until stale.
             let _ = fs::remove_file(path);
             return Err(error);
         }
         Ok(Some(lease))
     }
 
+    /// Returns the content of the file: owner and heartbeat.
     fn text(&self) -> String {
         let Owner { host, pid, space, begun } = &self.owner;
         format!("{host} {pid} {space} {begun}\n{}\n", self.beats)
     }
 
-    /// Renews the lease; `false` if it is another process's by now.
+    /// Writes the next heartbeat. Returns `false` if another process has taken the lease over.
     ///
     /// # Errors
     ///
-    /// The error of the system.
+    /// The system's error.
     pub fn renew(&mut self) -> io::Result<bool> {
         if !self.is_mine()? {
             return Ok(false);
         }
         self.beats += 1;
-        // The number never gets shorter, so nothing of the text before is left behind it.
+        // Overwrites in place and does not truncate, so that no reader finds an empty file. The number never gets shorter, so no byte of the old text stays
+        // after the new text.
         OpenOptions::new().write(true).open(&self.path)?.write_all(self.text().as_bytes())?;
         Ok(true)
     }
 
+    /// Returns whether the file still names this owner.
     fn is_mine(&self) -> io::Result<bool> {
         match fs::read_to_string(&self.path) {
             Ok(text) => Ok(text.lines().next().and_then(Owner::read).as_ref() == Some(&self.owner)),
@@ -214,13 +226,14 @@ impl Lease {
 impl Drop for Lease {
     fn drop(&mut self) {
         if self.is_mine().unwrap_or(false) {
-            // If it stays it goes stale.
+            // A file that cannot be removed becomes stale by itself.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// The time by the clock of the file system: that of a file which was made now.
+/// Returns the present time by the clock of the file system: the modification time of a file created for this purpose. The clock of this machine may differ
+/// from the server's.
 fn now_beside(path: &Path, owner: &Owner) -> io::Result<SystemTime> {
     let (file, probe) = partial::create(&beside(path, owner))?;
     let made = file.metadata().and_then(|about| about.modified());
@@ -228,24 +241,26 @@ fn now_beside(path: &Path, owner: &Owner) -> io::Result<SystemTime> {
     made
 }
 
-/// A name in the same folder that nobody else uses.
+/// Returns a path in the folder of `path`, unique to the process of `owner`.
 fn beside(path: &Path, owner: &Owner) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(format!(".{}", owner.name()));
     name.into()
 }
 
-/// Takes a stale lease away. If another process did the same meanwhile and has it now, it is put back.
+/// Renames a stale lease and removes it. If the renamed file turns out to be a newer lease, taken by another process after `stale` was read, the lease is
+/// put back.
 fn take_away(path: &Path, owner: &Owner, stale: &Holder) -> io::Result<()> {
     let mut away = beside(path, owner).into_os_string();
     away.push(PARTIAL);
     let away = PathBuf::from(away);
     match fs::rename(path, &away) {
         Ok(()) => {}
-        // Somebody else was faster, or the answer of a file server was lost.
+        // Another process renamed the lease first, or the rename succeeded and its answer was lost.
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         Err(error) => return Err(error),
     }
+    // Compares texts and not times: a heartbeat or a new owner changes the text. If the name is taken again, the newest lease wins.
     if fs::read_to_string(&away).is_ok_and(|text| text != stale.text) && !path.exists() {
         return fs::rename(&away, path);
     }
@@ -255,16 +270,18 @@ fn take_away(path: &Path, owner: &Owner, stale: &Holder) -> io::Result<()> {
     }
 }
 
-/// The leases in a folder, by the names of their files, which are those that `is_lease` says; stale ones among them. Nothing but a file for a moment is written.
+/// Returns the leases of a folder with the names of their files, sorted by name, stale leases included. `is_lease` tells whether a name belongs to a lease.
+/// `reader` names the temporary file that is created and removed to read the clock of the file system; nothing else is written.
 ///
 /// # Errors
 ///
-/// The error of the system.
+/// The system's error.
 pub fn leases(folder: &Path, reader: &Owner, is_lease: impl Fn(&str) -> bool) -> io::Result<Vec<(String, Holder)>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder)? {
         names.extend(entry?.file_name().into_string().ok().filter(|name| is_lease(name)));
     }
+    // No lease needs the time, and a folder without leases stays unwritten.
     if names.is_empty() {
         return Ok(Vec::new());
     }
@@ -296,7 +313,7 @@ mod tests {
         }
     }
 
-    /// Makes the file older.
+    /// Moves the modification time of a file into the past.
     fn grow_old(path: &Path, by: Duration) {
         let file = OpenOptions::new().write(true).open(path).unwrap();
         let before = file.metadata().unwrap().modified().unwrap();
@@ -329,7 +346,7 @@ mod tests {
         grow_old(&path, BEAT);
         let mut second = taken(&path, &owner("b", 1));
         assert!(!first.renew().unwrap());
-        // It is not the first one's to give back any more.
+        // The first owner has lost the lease and must not remove the file.
         drop(first);
         assert!(second.renew().unwrap());
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
@@ -355,13 +372,13 @@ mod tests {
         core::mem::forget(taken(&path, &other));
         assert_eq!(held(&path, &Owner::here(2)).owner, Some(other));
         child.kill().unwrap();
-        // Not waited for yet: it has ended all the same, or does so now.
+        // Nobody has waited for the process yet. It counts as ended, now or in a moment.
         let ended = || matches!(Lease::take(&path, &Owner::here(2)).unwrap(), Taking::Taken(_));
         assert!((0..10_000_000).any(|_| ended()));
         child.wait().unwrap();
     }
 
-    /// Both have seen that the lease is stale; the slower one must not take away that of the faster one.
+    /// Both processes saw a stale lease. The slower process must not remove the new lease of the faster process.
     #[test]
     fn a_lease_that_was_taken_over_meanwhile_is_put_back() {
         let folder = tempfile::tempdir().unwrap();
@@ -393,7 +410,7 @@ mod tests {
                 let threads: Vec<_> = (0..4).map(|number| take(100 * (round + 1) + number)).collect();
                 threads.into_iter().filter_map(|thread| thread.join().unwrap()).collect()
             });
-            // A slow process may have taken away the lease of a fast one, which then sees it: one owner is left.
+            // A slow process may have renamed the lease of a fast process. The fast process notices at its next heartbeat, and a single owner is left.
             let mine = leases.iter_mut().filter_map(|lease| lease.renew().unwrap().then_some(())).count();
             assert_eq!(mine, 1, "round {round}");
         }

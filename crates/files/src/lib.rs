@@ -1,12 +1,16 @@
-//! Files: read up to a limit, written as a whole, and shared by processes on several machines.
+//! Reads files up to a limit, writes files as a whole, and shares folders with processes on other machines.
 //!
-//! You need it if your program reads files that may be too long, must never leave half a file under its name, or shares a folder with processes elsewhere
-//! ([`Lease`]).
+//! Use this crate if your program reads files of unknown length, must never leave half a file under its final name, or shares a folder with processes on
+//! other machines ([`Lease`]).
 //!
-//! A regular file that is longer than the limit is refused before it is read. A pipe or a device has no length and is read up to the limit.
+//! Reading: a regular file longer than the limit is refused before its first byte is read. A pipe or a device has no length; reading fails at the first
+//! byte beyond the limit.
 //!
-//! The feature `write` has all that writes. A file has its name only when it is whole ([`WholeFile`]). Files that belong together lie in a folder into which
-//! one process at a time writes ([`OwnFolder`]).
+//! Writing needs the feature `write`. A file gets its final name only when all bytes are on the disk ([`WholeFile`]). For several files with one author,
+//! [`OwnFolder`] keeps other processes out of a folder.
+//!
+//! The crate does not know what the files contain: callers choose the limit and parse the bytes.
+//!
 //! ```
 //! use std::io::Write as _;
 //!
@@ -54,39 +58,41 @@ pub use {
     whole::{WholeFile, write_whole, write_whole_by},
 };
 
-/// The most bytes of a TOML file, 16 MiB: a scene, or a file of links, of a relay or of a router. The tree of a text takes fifty times its length.
+/// Upper limit of the length of a TOML file \[byte\], 16 MiB: a scene, or a file of links, of a relay or of a router. Lower than [`MOST_BYTES`], because
+/// the tree of a parsed text takes about fifty times the length of the text.
 pub const MOST_TOML_BYTES: u64 = 16 << 20;
 
-/// The most bytes of another file that is read as a whole, 256 MiB: a trace, a replay of a scene, recorded motion, a table of a distribution, inputs,
-/// measurements, weights.
+/// Upper limit of the length of any other file read into memory as a whole \[byte\], 256 MiB: a trace, a replay of a scene, recorded motion, a table of a
+/// distribution, inputs, measurements, weights.
 pub const MOST_BYTES: u64 = 256 << 20;
 
-/// The most bytes of a file that is read piece by piece, 4 GiB: a capture, a log of fates, a part of a campaign.
+/// Upper limit of the length of a file that is read piece by piece \[byte\], 4 GiB: a capture, a log of fates, a part of a campaign.
 pub const MOST_CAPTURE_BYTES: u64 = 4 << 30;
 
-/// Opens a file that is read piece by piece and from several places, with a limit of its length \[bytes\].
+/// Opens a file for readers that seek, if the file is at most `most` bytes long. Only this call checks the length: reads from the returned file are not
+/// limited.
 ///
 /// # Errors
 ///
-/// As [`LimitedFile::open`].
+/// The errors of [`LimitedFile::open`].
 pub fn open(path: &Path, most: u64) -> io::Result<File> {
     LimitedFile::open(path, most).map(|limited| limited.file)
 }
 
-/// The bytes of a file.
+/// Returns all bytes of a file.
 ///
 /// # Errors
 ///
-/// The error of the system; and [`io::ErrorKind::FileTooLarge`] beyond [`MOST_BYTES`].
+/// The system's error, or [`io::ErrorKind::FileTooLarge`] for a file longer than [`MOST_BYTES`].
 pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     read_bytes_up_to(path, MOST_BYTES)
 }
 
-/// The bytes of a file, with a limit of their number.
+/// Returns all bytes of a file of at most `most` bytes.
 ///
 /// # Errors
 ///
-/// The error of the system; and [`io::ErrorKind::FileTooLarge`] beyond the limit.
+/// The system's error, or [`io::ErrorKind::FileTooLarge`] for a file longer than `most` bytes.
 pub fn read_bytes_up_to(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let mut from = LimitedFile::open(path, most)?;
     let mut bytes = Vec::new();
@@ -94,59 +100,64 @@ pub fn read_bytes_up_to(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The text of a file.
+/// Returns the text of a file.
 ///
 /// # Errors
 ///
-/// As [`read_bytes`], and [`io::ErrorKind::InvalidData`] for bytes that are no UTF-8.
+/// The errors of [`read_bytes`], and [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     read_text_up_to(path, MOST_BYTES)
 }
 
-/// The text of a file, with a limit of its length \[bytes\].
+/// Returns the text of a file of at most `most` bytes.
 ///
 /// # Errors
 ///
-/// As [`read_bytes_up_to`], and [`io::ErrorKind::InvalidData`] for bytes that are no UTF-8.
+/// The errors of [`read_bytes_up_to`], and [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
 pub fn read_text_up_to(path: &Path, most: u64) -> io::Result<String> {
     String::from_utf8(read_bytes_up_to(path, most)?).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text: expected UTF-8"))
 }
 
-/// A file that is read up to a limit, beyond which there is an error.
+/// An open file whose reads fail with [`io::ErrorKind::FileTooLarge`] once more than a given number of bytes was read.
 #[derive(Debug)]
 pub struct LimitedFile {
+    /// File to read from.
     file: File,
+    /// Limit \[byte\], counted from the first read.
     most: u64,
+    /// Bytes that may still be read before the limit.
     left: u64,
 }
 
 impl LimitedFile {
-    /// Opens a file with a limit of its length \[bytes\].
+    /// Opens a file of at most `most` bytes.
     ///
     /// # Errors
     ///
-    /// The error of the system; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer.
+    /// The system's error, or [`io::ErrorKind::FileTooLarge`] for a regular file longer than `most` bytes.
     pub fn open(path: &Path, most: u64) -> io::Result<Self> {
         Self::of(File::open(path)?, most)
     }
 
-    /// Puts a limit \[bytes\] on an open file.
+    /// Limits reads of an open file to `most` bytes, counted from its present position.
     ///
     /// # Errors
     ///
-    /// As [`LimitedFile::open`].
+    /// The errors of [`LimitedFile::open`], without the errors of opening.
     pub fn of(file: File, most: u64) -> io::Result<Self> {
         Self { file, most, left: most }.limited_to(most)
     }
 
-    /// The file with a lower limit of its length \[bytes\], once the bytes that were read have shown of which kind it is.
+    /// Replaces the limit by a lower one, `most` bytes. Bytes already read count towards the new limit. A caller does so after the first bytes have shown
+    /// the kind of the file.
     ///
     /// # Errors
     ///
-    /// The error of the system; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer, or if more was read.
+    /// The system's error, or [`io::ErrorKind::FileTooLarge`] if the file is a regular file longer than `most` bytes, or if more than `most` bytes were read.
     pub fn limited_to(self, most: u64) -> io::Result<Self> {
         let about = self.file.metadata()?;
         let read = self.most - self.left;
+        // Pipes and devices report a length of zero, whatever they will deliver. `read` limits them.
         let left = most.checked_sub(read).filter(|_| !about.is_file() || about.len() <= most);
         left.map(|left| Self { most, left, ..self }).ok_or_else(|| too_large(most))
     }
@@ -154,9 +165,10 @@ impl LimitedFile {
 
 impl Read for LimitedFile {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        // One byte more, to tell the end of the file from that of the limit.
+        // Asks for a byte beyond the limit, to distinguish a file of exactly `most` bytes from a longer file.
         let room = usize::try_from(self.left.saturating_add(1)).unwrap_or(usize::MAX).min(buffer.len());
         let count = self.file.read(&mut buffer[..room])?;
+        // Fails only if the byte beyond the limit was really there.
         match self.left.checked_sub(count as u64) {
             Some(left) => {
                 self.left = left;
@@ -168,6 +180,7 @@ impl Read for LimitedFile {
 }
 
 fn too_large(most: u64) -> io::Error {
+    // All limits in use are whole mebibytes, so the shift loses nothing.
     let mebibytes = most >> 20;
     io::Error::new(io::ErrorKind::FileTooLarge, format!("it is longer than {mebibytes} MiB: expected a file of at most that"))
 }
@@ -217,7 +230,7 @@ mod tests {
         assert_eq!(read_text(file.path()).unwrap(), "ä");
     }
 
-    /// It has no length, and no end.
+    /// `/dev/zero` has no length and no end.
     #[test]
     #[cfg(unix)]
     fn a_device_is_read_up_to_the_limit() {

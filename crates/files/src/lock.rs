@@ -1,4 +1,6 @@
-//! Locks of the system, for processes on one machine.
+//! Locks of the system (`flock`, or exclusive opening on Windows), for processes on one machine.
+//!
+//! Two uses: [`Lock`] is a lock with a file of its own, and [`hold`] and [`remove_left`] distinguish partial files in use from files left by killed processes.
 
 use std::fs::File;
 use std::io;
@@ -10,30 +12,30 @@ use rustix::{
     io::Errno,
 };
 
-/// A lock on a file of its own, which is removed with it. The system lets go of it when the process ends, however it ends.
+/// A lock on a file made for the lock and removed with the lock. The system releases the lock when the process ends, even if the process is killed.
 #[derive(Debug)]
 pub struct Lock {
     path: PathBuf,
-    /// Open as long as the lock is held.
+    /// Open file carrying the lock; `None` only while the value is dropped.
     file: Option<File>,
 }
 
 impl Lock {
-    /// Makes the file if there is none, and locks it. `None` if another process has it. Does not wait.
+    /// Takes the lock, and creates a missing file. Returns `None` if another process or another value holds the lock. Does not wait.
     ///
     /// # Errors
     ///
-    /// The error of the system, also that its file system has no locks.
+    /// The system's error, also if the file system has no locks.
     pub fn take(path: &Path) -> io::Result<Option<Self>> {
         Ok(locked(path)?.map(|file| Self { path: path.to_path_buf(), file: Some(file) }))
     }
 
-    /// Whether another process has it. Nothing is written; where the file system has no locks, none is held.
+    /// Returns whether another process or another value holds the lock. Writes nothing. The answer is `false` on a file system without locks.
     #[must_use]
     pub fn is_held(path: &Path) -> bool {
         match File::open(path) {
             Ok(file) => is_locked(&file),
-            // On Windows the file is open for its process alone.
+            // On Windows a held lock shows as a file that cannot be opened.
             Err(error) => cfg!(windows) && error.kind() != io::ErrorKind::NotFound,
         }
     }
@@ -41,6 +43,7 @@ impl Lock {
 
 #[cfg(unix)]
 fn is_locked(file: &File) -> bool {
+    // A shared lock is refused only if somebody holds the exclusive one. The shared lock ends when the caller closes the file.
     flock(file, FlockOperation::NonBlockingLockShared) == Err(Errno::WOULDBLOCK)
 }
 
@@ -49,12 +52,12 @@ fn is_locked(_: &File) -> bool {
     false
 }
 
-/// The file, open and locked; `None` if another process has locked it.
+/// Opens and locks a file; `None` if another process holds the lock.
 #[cfg(unix)]
 fn locked(path: &Path) -> io::Result<Option<File>> {
     loop {
         let file = File::options().read(true).write(true).create(true).truncate(false).open(path).or_else(|error| {
-            // A process of another user may have left the file, which is then open for reading alone, and can be locked all the same.
+            // A process of another user may have left the file. The file can then only be read, which is enough for a lock.
             if error.kind() == io::ErrorKind::PermissionDenied { File::open(path).map_err(|_| error) } else { Err(error) }
         })?;
         match flock(&file, FlockOperation::NonBlockingLockExclusive) {
@@ -62,14 +65,14 @@ fn locked(path: &Path) -> io::Result<Option<File>> {
             Err(Errno::WOULDBLOCK) => return Ok(None),
             Err(error) => return Err(error.into()),
         }
-        // The process that had it may have removed the file in between: the locked file is then no lock for anybody.
+        // The holder before may have removed the file between `open` and `flock`. The lock would then be on a file without a name, and the loop begins again.
         if is_at(&file, path)? {
             return Ok(Some(file));
         }
     }
 }
 
-/// Whether that is the file of that name.
+/// Returns whether `path` still names this open file.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt as _;
@@ -81,7 +84,7 @@ fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// The file, open for this process alone; `None` if another process has it open.
+/// Opens a file for this process only; `None` if another process has the file open.
 #[cfg(windows)]
 fn locked(path: &Path) -> io::Result<Option<File>> {
     use std::os::windows::fs::OpenOptionsExt as _;
@@ -96,15 +99,15 @@ fn locked(path: &Path) -> io::Result<Option<File>> {
 impl Drop for Lock {
     fn drop(&mut self) {
         if cfg!(windows) {
-            // No open file is removed there. A process that opens it now keeps it, and the file stays.
+            // Windows removes no open file. A process opening the file between the two lines owns the lock, and the removal fails.
             self.file = None;
         }
-        // Elsewhere while it is held: no other process can have taken it. A file that stays hinders nobody.
+        // On other systems the file is removed before the lock is released, so no other process can own the lock. A leftover file does not block.
         let _ = std::fs::remove_file(&self.path);
     }
 }
 
-/// Whether an error of [`Lock::take`] says that the file system has no locks.
+/// Returns whether an error of [`Lock::take`] says that the file system has no locks.
 #[cfg(unix)]
 pub(crate) fn is_impossible(error: &io::Error) -> bool {
     [Errno::NOLCK, Errno::NOSYS, Errno::OPNOTSUPP].iter().any(|errno| error.raw_os_error() == Some(errno.raw_os_error()))
@@ -115,14 +118,14 @@ pub(crate) fn is_impossible(_: &io::Error) -> bool {
     false
 }
 
-/// Locks a file that this process has made, as long as it is open, so that no other process takes it for one that was left. `false` if another process did that
-/// already, and removes it.
+/// Locks a new file of this process while the file is open, so that the file does not look abandoned. Returns `false` if another process was faster and
+/// removes the file.
 #[cfg(unix)]
 pub(crate) fn hold(file: &File, path: &Path) -> io::Result<bool> {
     match flock(file, FlockOperation::NonBlockingLockExclusive) {
         Ok(()) => is_at(file, path),
         Err(Errno::WOULDBLOCK) => Ok(false),
-        // Where there are no locks, no process removes the file of another one.
+        // On a file system without locks, `remove_left` fails too, and no process removes the files of another.
         Err(_) => Ok(true),
     }
 }
@@ -132,7 +135,8 @@ pub(crate) fn hold(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)
 }
 
-/// Removes a file that a process has left which has ended. `false` if something is there that cannot be told to be such a file.
+/// Removes a file whose process has ended. Returns `true` if the name is free afterwards, and `false` if the name belongs to a living process, a folder or
+/// a link.
 #[cfg(unix)]
 pub(crate) fn remove_left(path: &Path) -> bool {
     let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
@@ -149,7 +153,7 @@ pub(crate) fn remove_left(path: &Path) -> bool {
     if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
         return false;
     }
-    // Its owner may have renamed it before it was locked. After that only the owner of the lock does.
+    // Before the lock, the owner may have renamed the file and another process may have created a new one. After the lock, no other process touches the file.
     match is_at(&file, path) {
         Ok(true) => std::fs::remove_file(path).is_ok(),
         Ok(false) => true,
@@ -175,12 +179,12 @@ mod tests {
         assert!(Lock::take(&path).unwrap().is_none() && Lock::is_held(&path));
         drop(first);
         assert!(!path.exists());
-        // One that a killed process left is no hindrance.
+        // A killed process leaves its lock file behind. The file alone does not block.
         std::fs::write(&path, "").unwrap();
         assert!(Lock::take(&path).unwrap().is_some());
     }
 
-    /// Root may write into every file: this can fail for other users alone.
+    /// Root may write into every file, so this test can fail for other users only.
     #[test]
     #[cfg(unix)]
     fn a_file_that_may_only_be_read_can_be_locked() {

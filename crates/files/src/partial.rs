@@ -1,4 +1,7 @@
-//! Names of files that are being written.
+//! Creates the temporary file of a file being written.
+//!
+//! The file lies in the folder of the final file, so that a rename is enough to publish the bytes. A lock marks the file as in use: a file without a lock
+//! was left by a killed process, and is removed.
 
 use std::fs::File;
 use std::io::{self, ErrorKind};
@@ -6,28 +9,30 @@ use std::path::{Path, PathBuf};
 
 use crate::lock;
 
-/// The end of the name of a file that is being written.
+/// End of the name of every incomplete file.
 pub const PARTIAL: &str = ".partial";
 
-/// The most names that are tried: processes that write one file at the same time, and files under such names that cannot be removed.
+/// Number of names tried by [`create`]. A name is taken if another process writes under the name at this moment, or if the file of that name cannot be removed.
 const MOST: u32 = 1000;
 
-/// Makes a new file beside another one, and returns it with its name: that of the other one and [`PARTIAL`], as in `runs.csv.partial`. If another process
-/// writes under this name, or a link or a folder has it, a number stands before the end: `runs.csv.2.partial`.
+/// Creates a file next to `beside`, and returns the open file and its path. The name is the name of `beside` followed by [`PARTIAL`], as in
+/// `runs.csv.partial`. If that name is taken by a writing process, a link or a folder, a number from 2 on is put in: `runs.csv.2.partial`.
 ///
-/// Nothing is written into a file that is there already, and no link is followed. A file that a killed process left is removed.
+/// Never opens an existing file, and follows no link. A file left under the name by an ended process is removed first.
 pub(crate) fn create(beside: &Path) -> io::Result<(File, PathBuf)> {
     let mut number = 1;
     loop {
         let path = name(beside, number);
         match File::options().read(true).write(true).create_new(true).open(&path) {
             Ok(file) if lock::hold(&file, &path)? => return Ok((file, path)),
-            // Before the new file was locked, another process took it for a left one and removed it: the name is free again.
+            // Another process saw the new file before the lock, took the file for abandoned and removed the file. The name is free again.
             Ok(_) => {}
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                // The same number again: the name is free now.
                 if lock::remove_left(&path) {
                     continue;
                 }
+                // The error of the last attempt tells the user which name is in the way.
                 if number == MOST {
                     return Err(error);
                 }
@@ -38,6 +43,7 @@ pub(crate) fn create(beside: &Path) -> io::Result<(File, PathBuf)> {
     }
 }
 
+/// Returns the name of the partial file with this number. The number 1 is not written.
 fn name(beside: &Path, number: u32) -> PathBuf {
     let mut name = beside.as_os_str().to_owned();
     if number > 1 {

@@ -1,4 +1,4 @@
-//! Bytes that are put aside on a disk instead of in memory.
+//! A temporary file for data larger than memory.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Read, Seek as _, Write};
@@ -6,31 +6,32 @@ use std::path::{Path, PathBuf};
 
 use crate::partial;
 
-/// A file that is written once, read once, and removed when it is dropped. Its name ends in [`PARTIAL`](crate::PARTIAL), as that of any file that a killed
-/// process leaves.
+/// A file that is written once, then read once, and removed when the value is dropped. The name ends in [`PARTIAL`](crate::PARTIAL), to mark a file left by
+/// a killed process as unfinished.
 #[derive(Debug)]
 pub struct ScratchFile {
     writer: BufWriter<File>,
     trace: Trace,
 }
 
-/// The name of a file, which is removed with it.
+/// Path of the file; dropping the value removes the file.
 #[derive(Debug)]
 struct Trace(PathBuf);
 
 impl Drop for Trace {
     fn drop(&mut self) {
-        // A file that stays is swept with others of that end.
+        // A file left over still ends in `.partial`, the mark of removable files.
         let _ = fs::remove_file(&self.0);
     }
 }
 
 impl ScratchFile {
-    /// Begins a file beside another one, with the name of that, a dot and `what` in front of the end. Another process that does the same has a file of its own.
+    /// Creates a file next to `beside`. The name is the name of `beside`, a dot, `what`, and [`PARTIAL`](crate::PARTIAL). Processes that call this with the
+    /// same arguments get different files.
     ///
     /// # Errors
     ///
-    /// The error of the system.
+    /// The system's error.
     pub fn create(beside: &Path, what: &str) -> io::Result<Self> {
         let mut path = beside.as_os_str().to_owned();
         path.push(format!(".{what}"));
@@ -38,11 +39,11 @@ impl ScratchFile {
         Ok(Self { writer: BufWriter::with_capacity(1 << 16, file), trace: Trace(path) })
     }
 
-    /// The bytes that were written, from the first on. The file is removed with the reader.
+    /// Ends writing and returns a reader of all written bytes. The file is removed when the reader is dropped.
     ///
     /// # Errors
     ///
-    /// What the system says, of the last bytes too.
+    /// The system's error, also about buffered bytes that are written now.
     pub fn into_reader(self) -> io::Result<impl Read> {
         let Self { writer, trace } = self;
         let mut file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
@@ -61,7 +62,7 @@ impl Write for ScratchFile {
     }
 }
 
-/// Fields are dropped in this order: Windows removes no file that is open.
+/// Reader of a scratch file. Fields are dropped in order: the file must be closed before its removal, because Windows refuses to remove open files.
 struct ScratchReader {
     reader: BufReader<File>,
     _trace: Trace,

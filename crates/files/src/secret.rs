@@ -1,16 +1,16 @@
-//! Files with a secret in them: keys and tokens.
+//! Checks the permissions of files with a secret, such as a key or a token.
 
 use std::fs::File;
 use std::io;
 
-/// Returns the permissions (the lowest nine bits) of a file that others than its owner may read, write or run, and `None` if the file is its owner's alone.
+/// Returns the permissions (lowest nine bits of the mode) if users other than the owner may read, write or run the file, and `None` if only the owner may.
 ///
-/// The open file is asked, not its path, so nobody can put another file there between the question and the reading. On systems without such permissions the
-/// answer is always `None`.
+/// The function asks the open file and not its path, so nobody can replace the file between this check and the reading. On systems without such permissions
+/// the answer is always `None`.
 ///
 /// # Errors
 ///
-/// The error of the system when it is asked for the permissions.
+/// The system's error.
 #[cfg(unix)]
 pub fn open_to_others(file: &File) -> io::Result<Option<u32>> {
     use std::os::unix::fs::PermissionsExt as _;
@@ -19,7 +19,7 @@ pub fn open_to_others(file: &File) -> io::Result<Option<u32>> {
     Ok((mode & 0o077 != 0).then_some(mode))
 }
 
-/// Returns `None`: the system has no such permissions.
+/// Returns `None`, because the system has no such permissions.
 ///
 /// # Errors
 ///

@@ -1,28 +1,29 @@
-//! The place that the name of a file leads to.
+//! Decides where bytes written under a name must go: into a new file that is renamed, or into an existing stream.
 
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// The place of bytes that are written under a name.
+/// Destination of bytes written under a name.
 #[derive(Debug)]
 pub(crate) enum Target {
-    /// A regular file, or none yet. The name leads there without a link.
+    /// Path of a regular file, or of a file to be created, with all links resolved. The path can be replaced by a rename.
     Named(PathBuf),
-    /// A device, a pipe, a socket or an open file, which takes bytes as they come and is never replaced.
+    /// An open device, pipe, socket or file. Bytes are written at once, and the file of the name is never replaced.
     Stream(File),
 }
 
-/// The most links that lead from one to the next, as Linux allows.
+/// Number of links that are followed before a name counts as a circle. Linux has the same limit.
 const MOST_LINKS: u32 = 40;
 
 impl Target {
-    /// Follows a name. A pipe is opened, which waits for its reader.
+    /// Resolves a name. Opens the name if it belongs to a stream; opening a pipe waits for the reader.
     ///
     /// # Errors
     ///
-    /// The error of the system; [`ErrorKind::IsADirectory`] for a folder.
+    /// The system's error, or [`ErrorKind::IsADirectory`] for a folder.
     pub(crate) fn of(path: &Path) -> io::Result<Self> {
+        // The standard streams come first: a regular file that is standard output must not be renamed over.
         match fs::metadata(path) {
             Ok(about) if about.is_dir() => Err(ErrorKind::IsADirectory.into()),
             Ok(about) => match standard_stream(&about) {
@@ -30,12 +31,13 @@ impl Target {
                 None if about.is_file() => Self::followed(path),
                 None => open_stream(path, &about).map(Self::Stream),
             },
-            // A link may lead to a name that is free.
+            // The target of a dangling link is created, as `open` with `O_CREAT` would do.
             Err(error) if error.kind() == ErrorKind::NotFound => Self::followed(path),
             Err(error) => Err(error),
         }
     }
 
+    /// Follows links by hand, because `canonicalize` fails for a target that does not exist yet.
     fn followed(path: &Path) -> io::Result<Self> {
         let mut name = path.to_path_buf();
         for _ in 0..MOST_LINKS {
@@ -44,7 +46,7 @@ impl Target {
             }
             let folder = name.parent().unwrap_or_else(|| Path::new("")).to_path_buf();
             if is_of_processes(&folder) {
-                // The shell has emptied the file, unless it was to be appended to.
+                // Appends, because a shell has already truncated the file for `3> rows.csv`, and must keep the old rows for `3>> rows.csv`.
                 return File::options().append(true).open(path).map(Self::Stream);
             }
             name = folder.join(fs::read_link(&name)?);
@@ -53,13 +55,15 @@ impl Target {
     }
 }
 
-/// Whether links in a folder stand for files that a process has open, as `/dev/fd/3` does: a name that such a link shows need not lead to the file.
+/// Returns whether the links in a folder stand for open files of a process, as `/dev/fd/3` does. The text of such a link need not be a path to the file:
+/// the file may be deleted or belong to another root.
 fn is_of_processes(folder: &Path) -> bool {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     fs::canonicalize(folder).is_ok_and(|folder| folder.starts_with("/proc"))
 }
 
-/// Standard output or standard error, if a file is what one of them goes to. Opened anew the file would be written from its beginning, over the printed text.
+/// Returns standard output or standard error if either of the two is the file `about`. A file opened a second time would be written from its beginning,
+/// over the text that was printed before.
 #[cfg(unix)]
 fn standard_stream(about: &Metadata) -> Option<File> {
     use std::os::fd::AsFd as _;
@@ -74,7 +78,7 @@ fn standard_stream(_: &Metadata) -> Option<File> {
     None
 }
 
-/// Opens a device or a pipe, and connects to a socket, which cannot be opened.
+/// Opens a device or a pipe for writing, or connects to a socket, which `open` refuses.
 #[cfg(unix)]
 fn open_stream(path: &Path, about: &Metadata) -> io::Result<File> {
     use std::os::{fd::OwnedFd, unix::fs::FileTypeExt as _, unix::net::UnixStream};
@@ -158,7 +162,7 @@ mod tests {
         assert_eq!((text.as_str(), fs::metadata(&path).unwrap().file_type().is_socket()), ("row\n", true));
     }
 
-    /// By links, so that an error in this crate replaces no device.
+    /// Uses links to devices, so that a fault in this crate replaces a link and not a device.
     #[test]
     #[cfg(target_os = "linux")]
     fn a_device_is_written_to_and_its_errors_are_told() {
@@ -173,7 +177,7 @@ mod tests {
         assert!([null, full].iter().all(|device| fs::metadata(device).unwrap().file_type().is_char_device()));
     }
 
-    /// As `--csv /dev/fd/3` with `3>> rows.csv` in a shell.
+    /// The shell command `program --csv /dev/fd/3 3>> rows.csv` does this.
     #[test]
     #[cfg(target_os = "linux")]
     fn a_file_that_is_open_is_added_to() {

@@ -1,4 +1,7 @@
-//! Files that have their name only when they are whole and with the disk.
+//! A file with its final name only when all bytes are on the disk.
+//!
+//! The bytes go into a partial file in the same folder, which is renamed at the end. Streams (devices, pipes, sockets, open files) cannot be renamed and
+//! take the bytes directly.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Write};
@@ -7,43 +10,45 @@ use std::path::{Path, PathBuf};
 use crate::partial;
 use crate::target::Target;
 
-/// A file being written under another name in the same folder. The other name ends in [`PARTIAL`](crate::PARTIAL), and no other process writes under it. The
-/// file takes its own name in [`finish`](Self::finish); a file that was there until then is replaced. If two processes write one file, the file of the last is
-/// there, whole. If the file is dropped unfinished, its beginning stays under the other name until the file is written again.
+/// A file that is written under a temporary name in the same folder. The temporary name ends in [`PARTIAL`](crate::PARTIAL) and is used by this value only.
+/// [`finish`](Self::finish) gives the file its final name and replaces an older file of that name. If two processes write files of the same name, the file
+/// finished last stays, complete. A value dropped unfinished leaves the temporary file until the next writer of the same name removes the leftover.
 ///
-/// A link is followed: the file that it leads to is written, or made. A device, a pipe or a socket takes the bytes as they come, and stays what it is. So does
+/// If the final name is a link, the target of the link is written or created. A device, a pipe or a socket takes the bytes as they are written, and so does
 /// a file to which standard output or standard error goes.
 #[derive(Debug)]
 pub struct WholeFile {
+    /// Path as the caller gave it, before links are followed.
     path: PathBuf,
     place: Place,
     writer: BufWriter<File>,
 }
 
-/// Where bytes go.
+/// Destination of the bytes.
 #[derive(Debug)]
 enum Place {
-    /// Into a new file, which takes the name of the target.
+    /// The new file `partial`, which is renamed to `target` at the end.
     Beside { partial: PathBuf, target: PathBuf },
-    /// Into the device, the pipe, the socket or the open file that has the name.
+    /// The stream that has the caller's name: a device, a pipe, a socket or an open file.
     Within,
 }
 
 impl WholeFile {
-    /// Begins a file of that name. For a pipe, waits for its reader.
+    /// Begins a file with the final name `path`. Waits for the reader if `path` is a pipe.
     ///
     /// # Errors
     ///
-    /// The error of the system about the name, or about the file beside it.
+    /// The system's error about `path`, or about the temporary file.
     pub fn create(path: impl Into<PathBuf>) -> io::Result<Self> {
         Self::begin(path.into(), "")
     }
 
-    /// Begins a file of that name, which processes on other machines may be writing too: the other name has that of this worker in it.
+    /// Begins a file with the final name `path`, possibly written by processes on other machines at the same time. The temporary name contains `worker`,
+    /// because locks do not tell abandoned temporary files of other machines.
     ///
     /// # Errors
     ///
-    /// As [`WholeFile::create`].
+    /// The errors of [`WholeFile::create`].
     pub fn create_by(path: impl Into<PathBuf>, worker: &str) -> io::Result<Self> {
         Self::begin(path.into(), &format!(".{worker}"))
     }
@@ -61,13 +66,13 @@ impl WholeFile {
         Ok(Self { path, place, writer: BufWriter::with_capacity(1 << 16, file) })
     }
 
-    /// The name that it was begun with.
+    /// Returns the final name, as the caller gave it.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The name of the file in which the bytes are until [`finish`](Self::finish).
+    /// Returns the path under which the bytes lie until [`finish`](Self::finish): the temporary path, or the final path of a stream.
     #[must_use]
     pub fn written_to(&self) -> &Path {
         match &self.place {
@@ -76,11 +81,11 @@ impl WholeFile {
         }
     }
 
-    /// Writes the rest, waits until all is with the disk, and gives the file its name.
+    /// Writes buffered bytes, waits until all bytes are on the disk, and gives the file its final name.
     ///
     /// # Errors
     ///
-    /// The error of the system. The file stays under the other name.
+    /// The system's error. The file then keeps its temporary name.
     pub fn finish(mut self) -> io::Result<()> {
         self.give_name()
     }
@@ -89,30 +94,33 @@ impl WholeFile {
         self.writer.flush()?;
         let synced = self.writer.get_ref().sync_all();
         let Place::Beside { partial, target } = &self.place else {
-            // Pipes, terminals and most devices keep nothing that could be waited for, and say so.
+            // Pipes, terminals and most devices store nothing, and refuse `fsync` with either of these errors, although the bytes have arrived.
             return synced
                 .or_else(|error| if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) { Ok(()) } else { Err(error) });
         };
         synced?;
+        // Read before the rename: the length identifies the file if the answer to the rename is lost.
         let length = self.writer.get_ref().metadata()?.len();
         fs::rename(partial, target).or_else(|error| if is_renamed(partial, target, length) { Ok(()) } else { Err(error) })?;
-        // The name too is to outlast a loss of power. Not every file system can do that for folders; then the name of before may come back, and no more.
+        // The folder is synced too, so that the new name survives a loss of power. Some file systems cannot sync folders. After a loss of power, the older
+        // file can then have the name, which is still a complete file.
         if let Some(folder) = target.parent() {
             let _ = File::open(folder).and_then(|folder| folder.sync_all());
         }
         Ok(())
     }
 
-    /// Removes the beginning of a file that could not be written.
+    /// Removes the temporary file after a failed write.
     fn abandon(self) {
         if let Place::Beside { partial, .. } = &self.place {
-            // The error to report is the failure to write, not a beginning that stays.
+            // The caller reports the failed write. A temporary file that cannot be removed is harmless.
             let _ = fs::remove_file(partial);
         }
     }
 }
 
-/// Whether a file was renamed although the system says that it was not: a file server that answers too late is asked again, and finds the other name gone.
+/// Returns whether `partial` was renamed to `target` although the system reported an error. A network file system repeats a request whose answer was lost,
+/// and the second request finds no `partial`.
 fn is_renamed(partial: &Path, target: &Path, length: u64) -> bool {
     let is_whole = || fs::metadata(target).is_ok_and(|found| found.len() == length);
     fs::symlink_metadata(partial).is_err_and(|error| error.kind() == ErrorKind::NotFound) && is_whole()
@@ -128,24 +136,25 @@ impl Write for WholeFile {
     }
 }
 
-/// Writes a [`WholeFile`]. If anything fails, nothing of it is left, and the file that had the name before is as it was.
+/// Writes a file through [`WholeFile`]. If anything fails, the temporary file is removed, and an older file of the name is unchanged.
 ///
 /// # Errors
 ///
-/// Those of `write`, and of the system.
+/// The error of `write`, or the system's error.
 pub fn write_whole<E: From<io::Error>>(path: &Path, write: impl FnOnce(&mut WholeFile) -> Result<(), E>) -> Result<(), E> {
     written(WholeFile::create(path)?, write)
 }
 
-/// [`write_whole`] of a file that other processes may be writing too: see [`WholeFile::create_by`].
+/// Like [`write_whole`], for a file possibly written by processes on other machines at the same time: see [`WholeFile::create_by`].
 ///
 /// # Errors
 ///
-/// Those of [`write_whole`].
+/// The errors of [`write_whole`].
 pub fn write_whole_by<E: From<io::Error>>(path: &Path, worker: &str, write: impl FnOnce(&mut WholeFile) -> Result<(), E>) -> Result<(), E> {
     written(WholeFile::create_by(path, worker)?, write)
 }
 
+/// Runs `write` and finishes the file, or removes the file if one of the two fails.
 fn written<E: From<io::Error>>(mut file: WholeFile, write: impl FnOnce(&mut WholeFile) -> Result<(), E>) -> Result<(), E> {
     let written = write(&mut file).and_then(|()| Ok(file.give_name()?));
     if written.is_err() {
@@ -182,7 +191,7 @@ mod tests {
         drop(file);
         assert!(!path.exists());
         assert_eq!(fs::read(folder.path().join("trajectory.csv.partial")).unwrap(), b"t,peer\n");
-        // The next one takes the place of a beginning that nobody goes on with.
+        // The next writer of the name removes the temporary file that nobody continues.
         WholeFile::create(&path).unwrap().finish().unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
@@ -217,7 +226,7 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
-    /// The answer of a file server to the first request was lost, and the second finds nothing to rename.
+    /// The first rename succeeded and its answer was lost; the repeated rename finds no file to rename.
     #[test]
     fn a_file_that_has_its_name_already_is_finished_and_another_one_is_not() {
         let folder = tempfile::tempdir().unwrap();
