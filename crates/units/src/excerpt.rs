@@ -1,6 +1,6 @@
-//! A line of a source and the place in it that is meant, ready to be shown.
+//! An excerpt for error messages: a line of a source text, with carets below the marked place.
 //!
-//! Whatever stands in the source, the excerpt is one line of at most [`LONGEST`] characters without control characters.
+//! The shown line has at most [`LONGEST`] characters plus two ellipses, and no control characters, whatever the source contains.
 
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
@@ -9,26 +9,27 @@ use core::ops::Range;
 
 use crate::Visible;
 
-/// The longest line that is shown whole [character].
+/// Length of the longest line shown whole \[character\].
 const LONGEST: usize = 200;
 
-/// Where a span begins, and its line.
+/// A line of a source, and the marked place in the line.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Excerpt {
-    /// From 1.
+    /// Number of the line, from 1.
     pub line: usize,
-    /// From 1, in characters of the source.
+    /// Column of the marked place, from 1, in characters of the source.
     pub column: usize,
-    /// The line as shown.
+    /// Line as shown: escaped, and cut around the marked place if too long.
     pub shown: String,
-    /// How many shown characters stand before the caret.
+    /// Number of shown characters before the first caret.
     before: usize,
-    /// How many carets; at least one.
+    /// Number of carets, at least one.
     width: usize,
 }
 
 impl Excerpt {
-    /// Finds a span of bytes in a text. A span over several lines is shown on its first one; one past the end at the end.
+    /// Makes the excerpt for a span of bytes of `text`. A span of several lines is marked up to the end of its first line. A span past the end of the text
+    /// marks the end.
     #[must_use]
     pub fn new(text: &str, span: Range<usize>) -> Self {
         let Spot { line, marked } = Spot::of(text, span);
@@ -39,14 +40,16 @@ impl Excerpt {
         Self::cut(number, column, &before, &shown(marked), &after)
     }
 
-    /// Keeps the neighbourhood of the caret where the line is too long.
+    /// Cuts a long line to [`LONGEST`] characters around the first caret, and marks cuts with an ellipsis.
     fn cut(line: usize, column: usize, before: &Shown, marked: &Shown, after: &Shown) -> Self {
         let mut shown: Vec<char> = before.0.iter().chain(&marked.0).chain(&after.0).copied().collect();
         let (mut caret, mut width) = (before.0.len(), marked.0.len().max(1));
         if shown.len() > LONGEST {
+            // Half of the characters stand before the caret. Near the beginning of the line, more than half follow the caret.
             let first = caret.saturating_sub(LONGEST / 2);
             let last = (first + LONGEST).min(shown.len());
             let cut_end = last < shown.len();
+            // The end is cut first, because draining the beginning would shift `last`.
             shown.truncate(last);
             shown.drain(..first);
             caret -= first;
@@ -62,11 +65,12 @@ impl Excerpt {
         Self { line, column, shown: shown.into_iter().collect(), before: caret, width }
     }
 
-    /// Writes the line between bars with carets under the place; the number of the line stands before it if `numbered`.
+    /// Writes three lines, each after a vertical bar: an empty line, the source line, and carets below the marked place. The number of the source line
+    /// stands before its bar if `numbered`.
     ///
     /// # Errors
     ///
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn write(&self, f: &mut fmt::Formatter<'_>, numbered: bool) -> fmt::Result {
         let number = if numbered { self.line.to_string() } else { String::new() };
         let margin = number.len();
@@ -76,12 +80,12 @@ impl Excerpt {
     }
 }
 
-/// The bytes of a line of a text, without its end, and those of a span that begins in it. All are boundaries of characters.
+/// Byte ranges of a line of a text and of the marked part in the line. All ends lie on boundaries between characters.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Spot {
-    /// The line.
+    /// Range of the line, without its end of line.
     pub line: Range<usize>,
-    /// The part of the span in this line; empty at the end of the text for a span past it.
+    /// Range of the part of the span inside the line. Empty at the end of the text for a span past the end.
     pub marked: Range<usize>,
 }
 
@@ -93,11 +97,13 @@ impl Spot {
         let end = character_boundary(text, span.end.max(start));
         let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
         let line_end = text[start..].find('\n').map_or(text.len(), |newline| start + newline);
+        // A Windows line ends in "\r\n"; the carriage return belongs to the end and not to the line.
         let line_end = if text[start..line_end].ends_with('\r') { line_end - 1 } else { line_end };
         Self { line: line_start..line_end, marked: start..end.min(line_end).max(start) }
     }
 }
 
+/// Characters of a text as shown, control characters escaped.
 struct Shown(Vec<char>);
 
 impl Shown {
@@ -106,8 +112,9 @@ impl Shown {
     }
 }
 
-/// The last boundary between characters at or before that byte.
+/// Returns the last boundary between characters at or before `byte`.
 fn character_boundary(text: &str, byte: usize) -> usize {
+    // The loop ends at 0 at the latest, which is always a boundary.
     let mut byte = byte.min(text.len());
     while !text.is_char_boundary(byte) {
         byte -= 1;

@@ -1,4 +1,4 @@
-//! Frequencies: hertz at interfaces, radians per second in formulas.
+//! Frequencies: hertz at interfaces, radians per second in formulas. The conversions below are the only place with the factor 2π.
 
 /// A frequency \[Hz\].
 #[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]

@@ -1,4 +1,4 @@
-//! A point in simulated time.
+//! Points in simulated time.
 
 use core::fmt;
 use core::ops::{Add, AddAssign, Sub};
@@ -6,39 +6,40 @@ use core::time::Duration;
 
 /// A point in time, counted in nanoseconds since the scene began.
 ///
-/// The count is a `u64`: a scene may last 584 years. Spans are [`core::time::Duration`]; a negative span does not exist.
+/// The count is a `u64`, enough for 584 years. A span between two instants is a [`core::time::Duration`] and never negative.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Instant(u64);
 
 impl Instant {
-    /// The beginning of the scene.
+    /// Beginning of the scene.
     pub const ZERO: Self = Self(0);
-    /// The last instant that can be counted, 584.5 years after the beginning.
+    /// Last instant with a count, 584.5 years after the beginning.
     pub const MAX: Self = Self(u64::MAX);
 
-    /// The instant a number of nanoseconds after the beginning.
+    /// Returns the instant `nanos` nanoseconds after the beginning.
     #[must_use]
     #[inline]
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
-    /// Nanoseconds since the beginning.
+    /// Returns the time since the beginning \[ns\], exactly.
     #[must_use]
     #[inline]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
 
-    /// Seconds since the beginning, rounded to the nearest `f64` \[s\].
+    /// Returns the time since the beginning \[s\], rounded to the nearest `f64`.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a reading for people and for sampling hand forces: rounded to the nearest f64 on purpose")]
     pub const fn as_secs_f64(self) -> f64 {
-        // One division, correctly rounded for counts below 2^53 ns (104 days), so that 0.001 s reads as the double nearest to 0.001.
+        // A single division, correctly rounded for counts below 2^53 ns (104 days). A multiplication by 1e-9 would round twice, and 1 ms would not read as
+        // 0.001.
         self.0 as f64 / 1e9
     }
 
-    /// The instant `span` later, or `None` beyond [`Instant::MAX`].
+    /// Returns the instant `span` later, or `None` beyond [`Instant::MAX`].
     #[must_use]
     #[inline]
     pub fn checked_add(self, span: Duration) -> Option<Self> {
@@ -46,21 +47,21 @@ impl Instant {
         self.0.checked_add(nanos).map(Self)
     }
 
-    /// The instant `span` later, or [`Instant::MAX`] if that cannot be counted.
+    /// Returns the instant `span` later, or [`Instant::MAX`] if the sum is beyond [`Instant::MAX`].
     #[must_use]
     #[inline]
     pub fn saturating_add(self, span: Duration) -> Self {
         self.checked_add(span).unwrap_or(Self::MAX)
     }
 
-    /// The instant a number of nanoseconds later, or [`Instant::MAX`] if that cannot be counted.
+    /// Returns the instant `nanos` nanoseconds later, or [`Instant::MAX`] if the sum is beyond [`Instant::MAX`].
     #[must_use]
     #[inline]
     pub const fn saturating_add_nanos(self, nanos: u64) -> Self {
         Self(self.0.saturating_add(nanos))
     }
 
-    /// The span since `earlier`, or `None` if `earlier` is later than `self`.
+    /// Returns the span since `earlier`, or `None` if `earlier` is later than `self`.
     #[must_use]
     #[inline]
     pub const fn checked_duration_since(self, earlier: Self) -> Option<Duration> {
@@ -70,7 +71,7 @@ impl Instant {
         }
     }
 
-    /// The span since `earlier`, zero if `earlier` is later than `self`.
+    /// Returns the span since `earlier`, or zero if `earlier` is later than `self`.
     #[must_use]
     #[inline]
     pub const fn saturating_duration_since(self, earlier: Self) -> Duration {
@@ -83,7 +84,7 @@ impl Add<Duration> for Instant {
 
     /// # Panics
     ///
-    /// Beyond [`Instant::MAX`], 584 years after the beginning.
+    /// If the sum is beyond [`Instant::MAX`], 584 years after the beginning.
     #[inline]
     fn add(self, span: Duration) -> Self {
         self.checked_add(span).expect("an instant is within 584 years of the beginning")
@@ -101,7 +102,7 @@ impl Sub for Instant {
 
     /// # Panics
     ///
-    /// If `earlier` is later than `self`: negative spans do not exist.
+    /// If `earlier` is later than `self`, because no negative span exists.
     #[inline]
     fn sub(self, earlier: Self) -> Duration {
         self.checked_duration_since(earlier).expect("the subtrahend is not later than the minuend")
@@ -115,7 +116,7 @@ impl fmt::Debug for Instant {
 }
 
 impl fmt::Display for Instant {
-    /// Exact, in seconds without trailing zeros: `0.024s`.
+    /// Writes the time since the beginning exactly, in seconds without trailing zeros: `0.024s`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         crate::print::Seconds(*self).fmt(f)?;
         f.write_str("s")

@@ -1,12 +1,12 @@
-//! Typed quantities of network and time, and the text they are written as in scenes.
+//! Typed quantities of networks and time, and their text forms in scenes and messages.
 //!
-//! You need it if your program reads or writes quantities with units: durations, rates, sizes and probabilities.
+//! Use this crate if your program reads or writes quantities with units: durations, rates, sizes and probabilities.
 //!
-//! Everything that must be exact is an integer in a newtype: an [`Instant`] is a count of nanoseconds since the scene began, a [`Rate`] bits per
-//! second, a [`Bytes`] bytes. [`Probability`] is a checked `f64`, [`Hertz`] and [`RadPerSec`] keep the factor 2π in one place. Mechanical
-//! quantities (masses, stiffnesses, forces) are plain `f64` in SI units elsewhere, because they become matrices at once.
+//! Quantities with exact arithmetic are integers in newtypes: an [`Instant`] counts nanoseconds since the scene began, a [`Rate`] bits per second, a
+//! [`Bytes`] bytes. [`Probability`] is a checked `f64`. [`Hertz`] and [`RadPerSec`] keep the factor 2π in a single place. Mechanical quantities (masses,
+//! stiffnesses, forces) are plain `f64` in SI units in the other crates, because matrices are made of them.
 //!
-//! This crate does not know what the quantities are used for. Read [`Instant`] first.
+//! This crate does not know the use of the quantities. Read [`Instant`] first.
 //!
 //! ```
 //! use cohaptic_units::{Bytes, Instant, Rate, parse};

@@ -1,6 +1,6 @@
-//! From text to quantities.
+//! Parses quantities from text.
 //!
-//! Decimals are read exactly, as integers, and rounded once, half up, to the unit of the quantity. What was expected is part of every error.
+//! Decimals are read exactly, as integers, and rounded once, half up, to the unit of the quantity. Every error contains the expected form.
 
 use alloc::string::{String, ToString};
 use core::fmt;
@@ -8,32 +8,32 @@ use core::time::Duration;
 
 use crate::{Bytes, Probability, Rate, Visible};
 
-/// Why a text is not the quantity that was expected.
+/// Error for a text without the expected quantity.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum ParseError {
-    /// The text does not begin with a decimal number, or has a sign or an exponent.
+    /// Error for a text without a decimal number at the beginning, or with a sign or an exponent.
     Number {
-        /// The text as given.
+        /// Text as given.
         text: String,
-        /// What would have been right.
+        /// Expected form, with examples.
         expected: &'static str,
     },
-    /// The number has no unit, or one that this quantity does not have.
+    /// Error for a number without a unit, or with a unit unknown to the quantity.
     Unit {
-        /// The text as given.
+        /// Text as given.
         text: String,
-        /// What stood where the unit belongs; may be empty.
+        /// Text found in the place of the unit; possibly empty.
         unit: String,
-        /// What would have been right.
+        /// Expected form, with examples.
         expected: &'static str,
-        /// The units that there are, in words.
+        /// Known units, separated by commas.
         units: &'static str,
     },
-    /// The number is too large, or zero where zero has no meaning.
+    /// Error for a number too large for the quantity, or for zero where zero has no meaning.
     Range {
-        /// The text as given.
+        /// Text as given.
         text: String,
-        /// What would have been right.
+        /// Expected form, with examples.
         expected: &'static str,
     },
 }
@@ -52,16 +52,17 @@ impl fmt::Display for ParseError {
 
 impl core::error::Error for ParseError {}
 
+/// Describes a wrong unit for the message of [`ParseError::Unit`].
 fn no_unit(unit: &str) -> String {
     if unit.is_empty() { "no unit".to_string() } else { alloc::format!("unknown unit \"{}\"", Visible(unit)) }
 }
 
-/// Reads a duration: a decimal number and `ns`, `us` (or `µs`, with the micro sign U+00B5 or the Greek letter U+03BC), `ms`, `s`, `min` or `h`. `nsec`, `usec`,
-/// `msec` and `sec` are the same. Rounded once, to the nearest nanosecond.
+/// Parses a duration: a decimal number and `ns`, `us` (or `µs`, with the micro sign U+00B5 or the Greek letter U+03BC), `ms`, `s`, `min` or `h`. The names
+/// `nsec`, `usec`, `msec` and `sec` are accepted too. Rounds once, to the nearest nanosecond.
 ///
 /// # Errors
 ///
-/// [`ParseError`] if there is no number, no such unit, or more than 584 years.
+/// [`ParseError`] for a missing number, an unknown unit, or more than 584 years.
 pub fn duration(text: &str) -> Result<Duration, ParseError> {
     const EXPECTED: &str = "a duration such as \"8ms\", \"1.5s\" or \"250us\"";
     const UNITS: &str = "ns, us, ms, s, min, h";
@@ -86,11 +87,11 @@ pub fn duration(text: &str) -> Result<Duration, ParseError> {
     Ok(Duration::from_nanos(nanos))
 }
 
-/// Reads a rate: a decimal number and `bit`, `kbit`, `Mbit` or `Gbit`, bits per second, powers of ten.
+/// Parses a rate: a decimal number and `bit`, `kbit`, `Mbit` or `Gbit`, in bits per second and powers of ten.
 ///
 /// # Errors
 ///
-/// [`ParseError`] if there is no number, no such unit, or the rate is zero or more than 2⁶⁴ bit/s.
+/// [`ParseError`] for a missing number, an unknown unit, zero, or more than 2⁶⁴ bit/s.
 pub fn rate(text: &str) -> Result<Rate, ParseError> {
     const EXPECTED: &str = "a rate above zero such as \"10Mbit\" or \"64kbit\" (bits per second)";
     let units = [("bit", 1), ("kbit", 1_000), ("Mbit", 1_000_000), ("Gbit", 1_000_000_000)];
@@ -98,21 +99,22 @@ pub fn rate(text: &str) -> Result<Rate, ParseError> {
     Rate::bits_per_sec(bits).ok_or_else(|| ParseError::Range { text: text.to_string(), expected: EXPECTED })
 }
 
-/// Reads a size: a decimal number and `B`, `kB` or `MB`, powers of ten.
+/// Parses a size: a decimal number and `B`, `kB` or `MB`, in powers of ten.
 ///
 /// # Errors
 ///
-/// [`ParseError`] if there is no number, no such unit, or more than 2⁶⁴ bytes.
+/// [`ParseError`] for a missing number, an unknown unit, or more than 2⁶⁴ bytes.
 pub fn size(text: &str) -> Result<Bytes, ParseError> {
     const EXPECTED: &str = "a size such as \"64B\", \"1500B\" or \"64kB\"";
     quantity(text, &[("B", 1), ("kB", 1_000), ("MB", 1_000_000)], EXPECTED, "B, kB, MB").map(Bytes::new)
 }
 
-/// Reads a probability in percent: `"1.5%"`. A probability from 0 to 1 is written as a plain number, which is not text.
+/// Parses a probability in percent: `"1.5%"`. Scenes write a probability from 0 to 1 as a plain number, not as text, so this function refuses a number
+/// without the percent sign.
 ///
 /// # Errors
 ///
-/// [`ParseError`] if there is no number, no percent sign, or more than 100 %.
+/// [`ParseError`] for a missing number, a missing percent sign, or more than 100 %.
 pub fn probability(text: &str) -> Result<Probability, ParseError> {
     const EXPECTED: &str = "a probability such as 0.015 or \"1.5%\"";
     let (number, unit) = split(text, EXPECTED)?;
@@ -124,11 +126,12 @@ pub fn probability(text: &str) -> Result<Probability, ParseError> {
     Probability::new(percent / 100.0).map_err(|_| ParseError::Range { text: text.to_string(), expected: EXPECTED })
 }
 
-/// Splits `"24.5ms"` into `"24.5"` and `"ms"`; space between the two is allowed.
+/// Splits `"24.5ms"` into `"24.5"` and `"ms"`. Spaces between the two are allowed.
 fn split<'a>(text: &'a str, expected: &'static str) -> Result<(&'a str, &'a str), ParseError> {
     let trimmed = text.trim();
     let end = trimmed.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(trimmed.len());
     let (number, unit) = trimmed.split_at(end);
+    // A number has at least one digit and at most one point, the only other character in `number`.
     let digits = number.bytes().filter(u8::is_ascii_digit).count();
     if digits == 0 || number.len() - digits > 1 {
         return Err(ParseError::Number { text: text.to_string(), expected });
@@ -136,7 +139,7 @@ fn split<'a>(text: &'a str, expected: &'static str) -> Result<(&'a str, &'a str)
     Ok((number, unit.trim_start()))
 }
 
-/// The value of `text` in the base unit, exact up to one rounding, half up.
+/// Returns the value of `text` in the base unit, exact except for a single rounding, half up. `scales` has the units with their sizes in base units.
 fn quantity(text: &str, scales: &[(&str, u64)], expected: &'static str, units: &'static str) -> Result<u64, ParseError> {
     let (number, unit) = split(text, expected)?;
     let out_of_range = || ParseError::Range { text: text.to_string(), expected };
@@ -148,7 +151,8 @@ fn quantity(text: &str, scales: &[(&str, u64)], expected: &'static str, units: &
         value = value.checked_mul(10).and_then(|v| v.checked_add(u128::from(digit - b'0'))).ok_or_else(out_of_range)?;
     }
     let mut value = value.checked_mul(u128::from(scale)).ok_or_else(out_of_range)?;
-    // Digits beyond the 18th change nothing after rounding to the base unit: the largest scale is 3.6e12.
+    // Digits beyond the 18th cannot change the rounded result, because the largest scale is 3.6e12. The cut keeps the products below in range: 10^18 ·
+    // 3.6e12 · 2 < 2^128.
     let fraction = &fraction[..fraction.len().min(18)];
     let mut numerator: u128 = 0;
     let mut denominator: u128 = 1;
@@ -156,6 +160,7 @@ fn quantity(text: &str, scales: &[(&str, u64)], expected: &'static str, units: &
         numerator = numerator * 10 + u128::from(digit - b'0');
         denominator *= 10;
     }
+    // Adds the fraction, numerator/denominator · scale, rounded half up: doubling both sides and adding the denominator is adding one half.
     value += (numerator * u128::from(scale) * 2 + denominator) / (2 * denominator);
     u64::try_from(value).map_err(|_| out_of_range())
 }

@@ -1,4 +1,4 @@
-//! How quantities are printed: exactly, and so that [`crate::parse`] reads the same value back.
+//! Prints quantities exactly, in the forms read by [`crate::parse`].
 
 use alloc::borrow::ToOwned;
 use alloc::format;
@@ -8,7 +8,7 @@ use core::time::Duration;
 
 use crate::Instant;
 
-/// An instant as exact decimal seconds without trailing zeros and without a unit: `0.024`.
+/// Prints an instant as exact decimal seconds without trailing zeros and without a unit: `0.024`.
 #[derive(Clone, Copy, Debug)]
 pub struct Seconds(pub Instant);
 
@@ -19,7 +19,7 @@ impl fmt::Display for Seconds {
     }
 }
 
-/// A span in the unit that reads best, exactly: `24ms`, `1.5s`, `250us`.
+/// Prints a span exactly, in the largest unit not longer than the span: `24ms`, `1.5s`, `250us`. Zero prints as `0s`.
 #[derive(Clone, Copy, Debug)]
 pub struct Span(pub Duration);
 
@@ -40,7 +40,7 @@ impl fmt::Display for Span {
     }
 }
 
-/// A number of things: `1 change`, `2 changes`, `0 entries`, `3 axes`.
+/// Prints a number and a noun, which is given in the singular and takes the plural where needed: `1 change`, `2 changes`, `0 entries`, `3 axes`.
 #[derive(Clone, Copy, Debug)]
 pub struct Counted<'a, N>(pub N, pub &'a str);
 
@@ -58,50 +58,53 @@ impl<N: Copy + fmt::Display + PartialEq + From<u8>> fmt::Display for Counted<'_,
     }
 }
 
-/// A number as people write it: `0.45`, `1000`, and in powers of ten where it has many digits before or behind the point: `1e300`. Both read back as the same.
+/// Prints a number in plain decimals (`0.45`, `1000`), or in powers of ten (`1e300`) if the size is at least 1e15 or below 1e-6. Parsing either form gives
+/// the same number.
 #[derive(Clone, Copy, Debug)]
 pub struct Number(pub f64);
 
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let size = if self.0 < 0.0 { -self.0 } else { self.0 };
-        // Not finite numbers are words in either form.
+        // NaN and infinities take the second branch, and print as words in both forms.
         let is_plain = size == 0.0 || (1e-6..1e15).contains(&size);
         if is_plain { write!(f, "{}", self.0) } else { write!(f, "{:e}", self.0) }
     }
 }
 
-/// The number of six decimal digits that is nearest to a number.
+/// Rounds a number to six significant decimal digits.
 #[must_use]
 pub fn six_digits(number: f64) -> f64 {
     format!("{number:.5e}").parse().unwrap_or(number)
 }
 
-/// A number as messages say it: to six digits, as [`Number`], in powers of ten where digits before the point are cut off. `0.0311812`, `1.23457e8`.
+/// Prints a number for messages: rounded to six significant digits, and otherwise like [`Number`]. Numbers of seven or more digits before the point use
+/// powers of ten if rounding has changed them. Examples: `0.0311812`, `1.23457e8`.
 #[derive(Clone, Copy, Debug)]
 pub struct SixDigits(pub f64);
 
 impl fmt::Display for SixDigits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rounded = six_digits(self.0);
-        // Zeros in the place of digits that were cut off would be read as digits.
+        // Without a power of ten, 123456789 would print as 123457000, and a reader would take the zeros for measured digits.
         let size = if rounded < 0.0 { -rounded } else { rounded };
         if size >= 1e6 && rounded.to_bits() != self.0.to_bits() { write!(f, "{rounded:e}") } else { fmt::Display::fmt(&Number(rounded), f) }
     }
 }
 
-/// A field of a file of comma-separated values, quoted where it must be (RFC 4180).
+/// Returns a field of a file of comma-separated values, quoted if necessary (RFC 4180).
 #[must_use]
 pub fn csv_field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { csv_quoted(text) } else { text.to_owned() }
 }
 
-/// A field of a file of comma-separated values, in quotes (RFC 4180).
+/// Returns a field of a file of comma-separated values in quotes, with inner quotes doubled (RFC 4180).
 #[must_use]
 pub fn csv_quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
 
+/// Writes `whole` and the fraction `rest`/10^`digits`, without trailing zeros. `rest` is below 10^`digits`.
 fn decimal(f: &mut fmt::Formatter<'_>, whole: u64, mut rest: u64, mut digits: usize) -> fmt::Result {
     write!(f, "{whole}")?;
     if rest == 0 {

@@ -2,14 +2,14 @@
 
 use core::fmt;
 
-/// A probability, between 0 and 1, both included.
+/// A probability from 0 to 1, both included.
 #[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]
 pub struct Probability(f64);
 
-/// Why a number is no probability.
+/// Error for a number outside 0 to 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ProbabilityError {
-    /// The number that was given.
+    /// Number as given.
     pub value: f64,
 }
 
@@ -23,40 +23,41 @@ impl fmt::Display for ProbabilityError {
 impl core::error::Error for ProbabilityError {}
 
 impl Probability {
-    /// Never.
+    /// Probability of an event that never happens.
     pub const ZERO: Self = Self(0.0);
-    /// Always.
+    /// Probability of an event that always happens.
     pub const ONE: Self = Self(1.0);
 
-    /// Checks that `value` lies in 0..=1.
+    /// Returns the probability `value`.
     ///
     /// # Errors
     ///
-    /// [`ProbabilityError`] for a number outside, a NaN or an infinity.
+    /// [`ProbabilityError`] for a number outside 0 to 1, a NaN or an infinity.
     pub fn new(value: f64) -> Result<Self, ProbabilityError> {
         if (0.0..=1.0).contains(&value) { Ok(Self(value)) } else { Err(ProbabilityError { value }) }
     }
 
-    /// The number, from 0 to 1.
+    /// Returns the number, from 0 to 1.
     #[must_use]
     pub const fn get(self) -> f64 {
         self.0
     }
 
-    /// Whether an event of this probability happens, given 64 uniform random bits.
+    /// Returns whether an event of this probability happens, given 64 uniform random bits.
     ///
-    /// 0 never happens and 1 always does. In between the chance is exact for the top 53 bits of `bits`, an error of at most 2⁻⁵³.
+    /// For 0 the result is always `false`, for 1 always `true`. Otherwise the top 53 bits decide, and the chance differs from the probability by at most 2⁻⁵³.
     #[must_use]
     #[inline]
     #[expect(clippy::cast_precision_loss, reason = "the top 53 bits of a u64 are exact in an f64")]
     pub fn happens(self, bits: u64) -> bool {
         const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
+        // The left side is an integer from 0 to 2^53 - 1, exact as an f64. So 1.0 exceeds all values, and 0.0 none.
         ((bits >> 11) as f64) < self.0 * TWO_POW_53
     }
 }
 
 impl fmt::Display for Probability {
-    /// As a percentage: `1.5%`.
+    /// Writes the probability in percent: `1.5%`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}%", self.0 * 100.0)
     }

@@ -1,4 +1,4 @@
-//! Bits per second.
+//! Data rates.
 
 use core::fmt;
 use core::num::NonZeroU64;
@@ -6,12 +6,12 @@ use core::time::Duration;
 
 use crate::Bytes;
 
-/// A data rate [bit/s], never zero. "Unlimited" is `Option::<Rate>::None`.
+/// A data rate \[bit/s\], never zero. An unlimited rate is `Option::<Rate>::None`.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct Rate(NonZeroU64);
 
 impl Rate {
-    /// The rate of a number of bits per second; `None` for zero, which is not a rate.
+    /// Returns the rate of `bits` per second, or `None` for zero.
     #[must_use]
     pub const fn bits_per_sec(bits: u64) -> Option<Self> {
         match NonZeroU64::new(bits) {
@@ -20,29 +20,29 @@ impl Rate {
         }
     }
 
-    /// Bits per second.
+    /// Returns the rate \[bit/s\].
     #[must_use]
     pub const fn as_bits_per_sec(self) -> u64 {
         self.0.get()
     }
 
-    /// How long `size` occupies a line of this rate: 8·size/rate, rounded **up** to a nanosecond, so that no window of time ever carries more bits
-    /// than the rate allows. Saturates at 584 years.
+    /// Returns the time for sending `size` at this rate: 8·size/rate, rounded **up** to a nanosecond, so that no window of time carries more bits than the
+    /// rate allows. Saturates at 584 years.
     #[must_use]
     pub fn serialisation_time(self, size: Bytes) -> Duration {
         self.transmission_time(u128::from(size.get()) * 8 * 1_000_000_000)
     }
 
-    /// How long it takes to send the rest of a packet, given in bit·ns/s (bits times 10⁹), rounded up to a nanosecond.
-    ///
-    /// The odd unit keeps a change of rate in the middle of a packet exact: see [`Rate::bits_sent`].
+    /// Returns the time for sending the rest of a packet, rounded up to a nanosecond. The rest is given in units of 10⁻⁹ bit, as returned by
+    /// [`Rate::bits_sent`], so that a change of the rate in the middle of a packet rounds nothing. Saturates at 584 years.
     #[must_use]
     pub fn transmission_time(self, giga_bits: u128) -> Duration {
         let nanos = giga_bits.div_ceil(u128::from(self.0.get()));
         Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
     }
 
-    /// What this rate carries in `span`, in units of 10⁻⁹ bit, so that nothing is rounded. Saturates; a span of at most 584 years never does.
+    /// Returns the amount sent in `span` in units of 10⁻⁹ bit, which makes the product of nanoseconds and bit/s exact. Saturates; a span of at most 584
+    /// years never does.
     #[must_use]
     pub fn bits_sent(self, span: Duration) -> u128 {
         span.as_nanos().saturating_mul(u128::from(self.0.get()))
@@ -50,7 +50,7 @@ impl Rate {
 }
 
 impl fmt::Display for Rate {
-    /// In the largest SI unit that needs no fraction: `10Mbit`.
+    /// Writes the rate in the largest SI unit without a fraction: `10Mbit`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let bits = self.0.get();
         let (value, unit) = [(1_000_000_000, "Gbit"), (1_000_000, "Mbit"), (1_000, "kbit")]

@@ -1,24 +1,24 @@
-//! Bytes.
+//! Sizes in bytes.
 
 use core::fmt;
 use core::ops::{Add, AddAssign, Sub, SubAssign};
 
-/// A size \[byte\]. Sums saturate: no queue holds 2⁶⁴ bytes.
+/// A size \[byte\]. Sums saturate at 2⁶⁴ - 1 and differences at zero.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 pub struct Bytes(u64);
 
 impl Bytes {
-    /// No bytes.
+    /// Size zero.
     pub const ZERO: Self = Self(0);
 
-    /// A number of bytes.
+    /// Returns the size of `bytes` bytes.
     #[must_use]
     #[inline]
     pub const fn new(bytes: u64) -> Self {
         Self(bytes)
     }
 
-    /// The number of bytes.
+    /// Returns the size \[byte\].
     #[must_use]
     #[inline]
     pub const fn get(self) -> u64 {

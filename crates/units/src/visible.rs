@@ -1,9 +1,9 @@
-//! Texts of strangers on a screen: nothing in them moves the cursor, turns the direction of writing, or hides.
+//! Shows untrusted text on a terminal: no character of the text moves the cursor, changes the direction of writing, or is invisible.
 
 use alloc::string::String;
 use core::fmt::{self, Write as _};
 
-/// A text as it may be shown on one line: control characters, format characters and separators of lines as escapes, `\u{202e}`.
+/// Prints a text for a single line: control characters, format characters and line separators appear as escapes such as `\u{202e}`.
 #[derive(Clone, Copy, Debug)]
 pub struct Visible<'a>(pub &'a str);
 
@@ -13,7 +13,7 @@ impl fmt::Display for Visible<'_> {
     }
 }
 
-/// The same for several lines: line breaks stay.
+/// Returns a text of several lines with escapes as in [`Visible`]. Line feeds stay.
 #[must_use]
 pub fn visible_lines(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
@@ -27,7 +27,7 @@ pub fn visible_lines(text: &str) -> String {
     shown
 }
 
-/// Whether a character does something to a screen other than showing itself: general categories Cc, Cf, Zl and Zp of Unicode 16.
+/// Returns whether a character acts on a terminal instead of showing a glyph: general categories Cc, Cf, Zl and Zp of Unicode 16.
 #[must_use]
 pub fn is_hidden(c: char) -> bool {
     c.is_control()
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
     use alloc::string::ToString as _;
 
-    /// UnicodeData 16.0: 170 characters of category Cf, 65 of Cc, one each of Zl and Zp.
+    /// UnicodeData 16.0: 170 characters of category Cf, 65 of Cc, and a single character each of Zl and Zp.
     #[test]
     fn the_characters_are_as_many_as_unicode_has() {
         assert_eq!(('\0'..=char::MAX).filter(|c| is_hidden(*c)).count(), 170 + 65 + 1 + 1);
