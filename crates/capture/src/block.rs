@@ -1,4 +1,7 @@
-//! The three blocks of a capture, little-endian (draft-ietf-opsawg-pcapng, sections 4.1 to 4.3), and the UDP datagram in IPv4 around a payload (RFC 791, RFC 768).
+//! Bytes of a capture: the three kinds of pcapng blocks, little-endian (draft-ietf-opsawg-pcapng, sections 4.1 to 4.3), and a UDP datagram in IPv4 around a
+//! payload (RFC 791, RFC 768).
+//!
+//! The functions append to a `Vec` and know nothing of packets of an emulator: [`CaptureWriter`](super::CaptureWriter) passes numbers, bytes and comments.
 
 use std::borrow::Cow;
 
@@ -11,16 +14,17 @@ const OPTION_SECTION_APPLICATION: u16 = 4;
 const OPTION_INTERFACE_NAME: u16 = 2;
 const OPTION_INTERFACE_RESOLUTION: u16 = 9;
 
-/// Raw IP, IPv4 or IPv6 by its first four bits.
+/// Link type of frames without a link-layer header. The first four bits of a frame distinguish IPv4 from IPv6.
 const LINKTYPE_RAW: u16 = 101;
 
+/// Returns the first block of a file: byte order, version 1.0 and the name of this program.
 pub(super) fn section_header() -> Vec<u8> {
     let mut to = Vec::new();
     block(&mut to, SECTION_HEADER, |to| {
         word(to, 0x1A2B_3C4D);
         half(to, 1);
         half(to, 0);
-        // The length of the section is not known.
+        // All ones: length of the section unknown, because the writer does not seek back.
         to.extend(u64::MAX.to_le_bytes());
         option(to, OPTION_SECTION_APPLICATION, b"cohaptic");
         end_of_options(to);
@@ -28,24 +32,27 @@ pub(super) fn section_header() -> Vec<u8> {
     to
 }
 
+/// Returns the block of the only interface, named `name`, with timestamps in nanoseconds.
 pub(super) fn interface_description(name: &str) -> Vec<u8> {
     let mut to = Vec::new();
     block(&mut to, INTERFACE_DESCRIPTION, |to| {
         half(to, LINKTYPE_RAW);
         half(to, 0);
-        // No limit to the captured length of a packet.
+        // Zero: no limit of the captured length.
         word(to, 0);
         option(to, OPTION_INTERFACE_NAME, up_to(name, usize::from(u16::MAX)).as_bytes());
-        // 10⁻⁹ s.
+        // Timestamps count units of 10⁻⁹ s.
         option(to, OPTION_INTERFACE_RESOLUTION, &[9]);
         end_of_options(to);
     });
     to
 }
 
+/// Appends a packet, captured `nanos` nanoseconds after 1970-01-01 00:00 UTC, with a comment.
 #[expect(clippy::cast_possible_truncation, reason = "the two halves of a 64-bit count")]
 pub(super) fn enhanced_packet(to: &mut Vec<u8>, nanos: u64, frame: &Frame<'_>, comment: &str) {
     block(to, ENHANCED_PACKET, |to| {
+        // Index of the interface; the file describes a single interface.
         word(to, 0);
         word(to, (nanos >> 32) as u32);
         word(to, nanos as u32);
@@ -57,12 +64,14 @@ pub(super) fn enhanced_packet(to: &mut Vec<u8>, nanos: u64, frame: &Frame<'_>, c
     });
 }
 
-/// A block of that type: its length stands before and after what `body` writes.
+/// Appends a block of type `kind`. The body is written by `body`. The length of the whole block stands before and after the body.
 fn block(to: &mut Vec<u8>, kind: u32, body: impl FnOnce(&mut Vec<u8>)) {
     let start = to.len();
     word(to, kind);
+    // Placeholder for the length, overwritten below.
     word(to, 0);
     body(to);
+    // The four bytes added are the second copy of the length, not yet written.
     let whole = length(to.len() - start + 4);
     word(to, whole);
     to[start + 4..start + 8].copy_from_slice(&whole.to_le_bytes());
@@ -79,7 +88,7 @@ fn end_of_options(to: &mut Vec<u8>) {
     word(to, 0);
 }
 
-/// Bytes, and zeros up to the next multiple of four.
+/// Appends bytes, and zeros up to the next multiple of four.
 fn padded(to: &mut Vec<u8>, bytes: &[u8]) {
     to.extend_from_slice(bytes);
     to.extend_from_slice(&[0; 3][..bytes.len().next_multiple_of(4) - bytes.len()]);
@@ -97,7 +106,7 @@ fn length(bytes: usize) -> u32 {
     u32::try_from(bytes).expect("a block holds one datagram and a line of text")
 }
 
-/// The beginning of a text, of at most a number of bytes.
+/// Returns the longest prefix of a text of at most `most` bytes. The cut lies between two characters.
 fn up_to(text: &str, most: usize) -> &str {
     let cut = (0..=most.min(text.len())).rev().find(|&cut| text.is_char_boundary(cut)).unwrap_or(0);
     &text[..cut]
@@ -105,7 +114,7 @@ fn up_to(text: &str, most: usize) -> &str {
 
 const IP_HEADER: usize = 20;
 const UDP_HEADER: usize = 8;
-/// What the 16 bits of the IP length leave.
+/// Length of the longest UDP payload \[byte\], limited by the 16 bits of the length in the IP header.
 const LONGEST_PAYLOAD: usize = 65_535 - IP_HEADER - UDP_HEADER;
 
 const SOURCE: [u8; 4] = [192, 0, 2, 1];
@@ -113,18 +122,21 @@ const DESTINATION: [u8; 4] = [192, 0, 2, 2];
 const SOURCE_PORT: u16 = 49_152;
 const DESTINATION_PORT: u16 = 49_153;
 const UDP: u8 = 17;
-/// RFC 3168: congestion experienced.
+/// Codepoint "congestion experienced" of the ECN field (RFC 3168).
 const CONGESTION_EXPERIENCED: u8 = 0b11;
 
-/// A packet, or its beginning.
+/// A frame of a capture: the whole packet, or the captured beginning of the packet.
 pub(super) struct Frame<'a> {
+    /// Captured bytes, at most `length`.
     pub(super) captured: Cow<'a, [u8]>,
-    /// Its length when it was sent \[byte\].
+    /// Length of the packet on the link \[byte\].
     pub(super) length: usize,
 }
 
+/// Builds the frame of UDP datagram number `sequence` with a payload of `size` bytes, of which the first `payload.len()` bytes are known.
 pub(super) fn build(sequence: u64, marked: bool, payload: &[u8], size: usize) -> Frame<'static> {
     let payload_length = size.max(payload.len()).min(LONGEST_PAYLOAD);
+    // A payload shorter than `size` stays short: the frame is then marked as cut off.
     let payload = &payload[..payload.len().min(LONGEST_PAYLOAD)];
     let [ip_length, udp_length] = [IP_HEADER + UDP_HEADER + payload_length, UDP_HEADER + payload_length].map(sixteen_bits);
 
@@ -132,6 +144,7 @@ pub(super) fn build(sequence: u64, marked: bool, payload: &[u8], size: usize) ->
     ip[0] = 0x45; // version 4, five words of header
     ip[1] = if marked { CONGESTION_EXPERIENCED } else { 0 };
     ip[2..4].copy_from_slice(&ip_length);
+    // The last two bytes, so the identification is the sequence number modulo 2^16.
     ip[4..6].copy_from_slice(&sequence.to_be_bytes()[6..]);
     ip[8] = 64; // hops left
     ip[9] = UDP;
@@ -144,10 +157,11 @@ pub(super) fn build(sequence: u64, marked: bool, payload: &[u8], size: usize) ->
     udp[0..2].copy_from_slice(&SOURCE_PORT.to_be_bytes());
     udp[2..4].copy_from_slice(&DESTINATION_PORT.to_be_bytes());
     udp[4..6].copy_from_slice(&udp_length);
+    // The checksum covers the whole payload. With a cut payload the field stays zero, which means "no checksum" in IPv4.
     if payload.len() == payload_length {
         let pseudo_header = [&SOURCE[..], &DESTINATION, &[0, UDP], &udp_length].concat();
         let checksum = !sum(sum(sum(0, &pseudo_header), &udp), payload);
-        // Zero means "none"; the other zero of ones' complement stands for it.
+        // A computed zero is sent as all ones, the other zero of ones' complement, because a zero field means "no checksum".
         udp[6..8].copy_from_slice(&if checksum == 0 { u16::MAX } else { checksum }.to_be_bytes());
     }
     Frame { captured: [&ip[..], &udp, payload].concat().into(), length: IP_HEADER + UDP_HEADER + payload_length }
@@ -157,11 +171,12 @@ fn sixteen_bits(length: usize) -> [u8; 2] {
     u16::try_from(length).expect("the payload is cut").to_be_bytes()
 }
 
-/// The ones' complement sum of 16-bit words (RFC 1071); an odd byte is padded with zero.
+/// Adds 16-bit words in ones' complement (RFC 1071) to `start`; an odd last byte is padded with zero.
 fn sum(start: u16, bytes: &[u8]) -> u16 {
     bytes.chunks(2).fold(start, |sum, pair| {
         let word = u16::from_be_bytes([pair[0], pair.get(1).copied().unwrap_or(0)]);
         let (sum, carry) = sum.overflowing_add(word);
+        // The end-around carry cannot overflow: a sum with a carry is at most 0xfffe.
         sum + u16::from(carry)
     })
 }
@@ -178,7 +193,7 @@ mod tests {
             assert_ne!(captured[26..28], [0, 0]);
             other_zero += u32::from(captured[26..28] == [0xff, 0xff]);
         }
-        // Of the 65 536 payloads, 65 535 different sums: one checksum comes twice, and one of all would be zero.
+        // The 65 536 payloads have 65 535 different sums in ones' complement, so a single checksum occurs twice. A computed zero occurs at least once.
         assert!((1..=2).contains(&other_zero), "{other_zero}");
     }
 }

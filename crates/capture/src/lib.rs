@@ -1,8 +1,8 @@
-//! The fates of packets as a capture file that packet analysers open (pcapng, draft-ietf-opsawg-pcapng).
+//! Writes fates of packets as a capture file (pcapng, draft-ietf-opsawg-pcapng), for packet analysers.
 //!
-//! You need it if you want to look at the packets of an emulated link in Wireshark or tshark.
+//! Use this crate if you want to look at the packets of an emulated link in Wireshark or tshark.
 //!
-//! A [`CaptureWriter`] writes every record as one frame at the instant at which it happened, with the fate as its comment:
+//! A [`CaptureWriter`] writes each record as a frame at the instant of the fate, with the fate as the frame's comment:
 //!
 //! ```text
 //! packet 17 delivered after 24.1ms, copy 1, marked
@@ -10,10 +10,10 @@
 //! packet 19 duplicated
 //! ```
 //!
-//! so that in an analyser `frame.comment contains "dropped"` shows what was lost. The frames are raw IPv4 (`LINKTYPE_RAW`) with UDP, both checksums
-//! right, from 192.0.2.1:49152 to 192.0.2.2:49153 (RFC 5737: addresses of documentation), and the number of the packet, modulo 2¹⁶, as IP
-//! identification. A mark of congestion is the CE codepoint. Packets whose headers are known are written as they are
-//! ([`CaptureWriter::write_packet`]). Time zero is 1970-01-01 00:00 UTC, timestamps count nanoseconds.
+//! In an analyser, the filter `frame.comment contains "dropped"` then shows the lost packets. The frames are raw IPv4 (`LINKTYPE_RAW`) with UDP, with both
+//! checksums, from 192.0.2.1:49152 to 192.0.2.2:49153 (RFC 5737: addresses of documentation). The IP identification is the number of the packet modulo 2¹⁶.
+//! A congestion mark is the CE codepoint. A packet with known headers is written unchanged ([`CaptureWriter::write_packet`]). Time zero is 1970-01-01 00:00
+//! UTC, and timestamps count nanoseconds.
 //!
 //! ```
 //! use cohaptic_capture::CaptureWriter;
@@ -43,40 +43,42 @@ use cohaptic_wan::{Fate, PacketRecord};
 
 /// Writes records as frames, in the order of the calls.
 ///
-/// Give it a [`std::io::BufWriter`]. Call [`CaptureWriter::finish`] to hear of errors of the last frames.
+/// Pass a [`std::io::BufWriter`], since each frame is a write of its own. Call [`CaptureWriter::finish`] to learn of errors of the last frames.
 #[derive(Debug)]
 pub struct CaptureWriter<W> {
+    /// Destination of the file.
     to: W,
+    /// Buffer of a single block, kept to avoid an allocation per frame.
     block: Vec<u8>,
 }
 
 impl<W: Write> CaptureWriter<W> {
-    /// Begins a capture whose one interface has that name: that of the link, say. A name is cut at 65 535 bytes.
+    /// Begins a capture with a single interface named `interface`, for instance with the name of the link. The name is cut at 65 535 bytes.
     ///
     /// # Errors
     ///
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn new(mut to: W, interface: &str) -> io::Result<Self> {
         to.write_all(&block::section_header())?;
         to.write_all(&block::interface_description(interface))?;
         Ok(Self { to, block: Vec::new() })
     }
 
-    /// Writes one frame whose packet is known: IPv4 or IPv6 from its first octet on, as it was sent.
+    /// Writes a frame for a packet with known bytes: IPv4 or IPv6 from the first octet on, unchanged.
     ///
     /// # Errors
     ///
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn write_packet(&mut self, record: &PacketRecord, packet: &[u8]) -> io::Result<()> {
         self.write_frame(record, &block::Frame { captured: packet.into(), length: packet.len() })
     }
 
-    /// Writes one frame. `payload` is what the packet carried, as far as it is known: if it is shorter than [`PacketRecord::size`], the frame
-    /// is marked as cut off after it and has no UDP checksum. A UDP payload has at most 65 507 bytes; the rest of a larger packet is not written.
+    /// Writes a frame for a packet without known headers. `payload` has the known bytes of the packet. If `payload` is shorter than [`PacketRecord::size`],
+    /// the frame is marked as cut off and has no UDP checksum. A UDP payload has at most 65 507 bytes; the rest of a larger packet is not written.
     ///
     /// # Errors
     ///
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn write(&mut self, record: &PacketRecord, payload: &[u8]) -> io::Result<()> {
         let size = usize::try_from(record.size.get()).unwrap_or(usize::MAX);
         let datagram = block::build(record.sequence, record.marked, payload, size);
@@ -89,18 +91,18 @@ impl<W: Write> CaptureWriter<W> {
         self.to.write_all(&self.block)
     }
 
-    /// Ends the capture: flushes the writer and gives it back.
+    /// Ends the capture: flushes the writer and returns the writer.
     ///
     /// # Errors
     ///
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn finish(mut self) -> io::Result<W> {
         self.to.flush()?;
         Ok(self.to)
     }
 }
 
-/// What became of a packet, in words.
+/// Comment of a frame: the fate of the packet in words.
 struct Comment<'a>(&'a PacketRecord);
 
 impl fmt::Display for Comment<'_> {

@@ -31,7 +31,7 @@ struct Frame {
     comment: String,
 }
 
-/// As an independent library reads it.
+/// Reads the frames with an independent library.
 fn frames_by_library(file: &[u8]) -> Vec<Frame> {
     let mut frames = Vec::new();
     for block in PcapNGSlice::from_slice(file).unwrap() {
@@ -57,7 +57,7 @@ fn frames_by_library(file: &[u8]) -> Vec<Frame> {
     frames
 }
 
-/// As the specification says, by hand: block by block, every length twice.
+/// Reads the frames by hand, block by block as the specification says, and checks both lengths of each block.
 fn frames_by_hand(mut file: &[u8]) -> Vec<Frame> {
     let word = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     let mut frames = Vec::new();
@@ -84,7 +84,7 @@ fn frames_by_hand(mut file: &[u8]) -> Vec<Frame> {
     frames
 }
 
-/// The sum of the 16-bit words of ones' complement, done in 64 bits and folded at the end.
+/// Adds 16-bit words in ones' complement, by another method than the code: in 64 bits, folded at the end.
 fn ones_complement(bytes: &[u8]) -> u64 {
     let mut sum: u64 = bytes.chunks(2).map(|pair| u64::from(pair[0]) << 8 | u64::from(pair.get(1).copied().unwrap_or(0))).sum();
     while sum > 0xffff {
@@ -138,7 +138,7 @@ proptest! {
         let data = &frames[0].data;
         prop_assert_eq!(&data[28..], &payload[..]);
         prop_assert_eq!(frames[0].original, data.len());
-        // A header with its checksum sums to all ones (RFC 1071).
+        // A header with its checksum adds to all ones (RFC 1071).
         prop_assert_eq!(ones_complement(&data[..20]), 0xffff);
         let pseudo = [&data[12..20], &[0, 17], &data[24..26], &data[20..]].concat();
         prop_assert_eq!(ones_complement(&pseudo), 0xffff);
