@@ -1,56 +1,58 @@
-//! Where the real-time side leaves what the HTTP side shows, and what the HTTP side asks for.
+//! The board between the real-time side of a run and the HTTP side: snapshots go to the HTTP side, changes of links come back.
 
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 use crate::{Description, Snapshot};
 
-/// The last [`Snapshot`] of a run, and its [`Description`]. One run may follow another.
+/// The newest [`Snapshot`] of a run, and the run's [`Description`]. A later run can replace an earlier run on the same board.
 ///
-/// Neither side waits for the other: what reads holds the lock for as long as it takes to count a reference, and what publishes tries once.
+/// The real-time side never waits: [`publish`](Self::publish) gives up if the lock is taken. Readers hold the lock only to count up references.
 #[derive(Debug)]
 pub struct Board {
     latest: Mutex<Latest>,
 }
 
-/// A snapshot with its number, and what its numbers belong to.
+/// A snapshot, with its number and the description of its run.
 #[derive(Clone, Debug)]
 pub struct Latest {
-    /// The run.
+    /// Description of the run.
     pub description: Arc<Description>,
-    /// How many snapshots were published, this one included; 0 before the first. Two that have the same number are the same.
+    /// Number of snapshots and new runs put up so far, this one included; 0 before the first. Equal numbers mean equal contents.
     pub number: u64,
-    /// The snapshot; before the first one, a run in which nothing has happened.
+    /// Newest snapshot; before the first, the default snapshot with nothing counted.
     pub snapshot: Arc<Snapshot>,
 }
 
 impl Board {
-    /// A board on which nothing has happened yet.
+    /// Creates a board for a run without a snapshot.
     #[must_use]
     pub fn new(description: Description) -> Self {
         Self { latest: Mutex::new(Latest { description: Arc::new(description), number: 0, snapshot: Arc::default() }) }
     }
 
-    /// The run.
+    /// Returns the description of the present run.
     #[must_use]
     pub fn description(&self) -> Arc<Description> {
         self.latest().description
     }
 
-    /// Another run takes the place of this one: nothing has happened in it yet.
+    /// Replaces the run by a new run without a snapshot.
     pub fn begin(&self, description: Description) {
         let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        // The number continues, so that no reader mistakes the first snapshot of the new run for a snapshot already sent.
         *latest = Latest { description: Arc::new(description), number: latest.number + 1, snapshot: Arc::default() };
     }
 
-    /// Puts a snapshot up in place of the last one, without ever waiting. About 20 times a second is often enough.
+    /// Replaces the snapshot, without waiting. About 20 times per second is often enough.
     ///
-    /// `Ok` has the snapshot that it replaced, so that the caller chooses when to free it, or fills it anew if nobody holds it any more.
+    /// Returns the replaced snapshot, so that the caller decides when to free or reuse the memory.
     ///
     /// # Errors
     ///
-    /// The snapshot itself, if somebody was reading at that very moment. The last one of a run is worth another attempt.
+    /// The given snapshot, if a reader holds the lock at this moment. A caller should try again with the last snapshot of a run.
     pub fn publish(&self, snapshot: Arc<Snapshot>) -> Result<Arc<Snapshot>, Arc<Snapshot>> {
         let mut latest = match self.latest.try_lock() {
+            // The lock protects plain data without invariants, so a panic of another thread leaves nothing half done.
             Ok(latest) => latest,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return Err(snapshot),
@@ -59,29 +61,32 @@ impl Board {
         Ok(core::mem::replace(&mut latest.snapshot, snapshot))
     }
 
-    /// The last snapshot and its number.
+    /// Returns the newest snapshot with its number.
     #[must_use]
     pub fn latest(&self) -> Latest {
         self.latest.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
-/// Reads and changes the links of a run, one call at a time. Keys are read on the thread of the server and should take microseconds: until then nobody else
-/// is answered. A change is made on another thread and may take longer, for instance to read files; other changes and readers of keys wait for it.
+/// Reads and changes the links of a run, one call at a time.
 ///
-/// The implementor reads and checks what it is given and hands the change to the real-time side, which takes it up at an instant of its own.
+/// [`keys`](Self::keys) is called on the thread of the server and should take microseconds, because no other request is answered meanwhile.
+/// [`change`](Self::change) is called on another thread and may take longer, for instance to read files. Other changes and readers of keys wait until the
+/// change is made.
+///
+/// The implementor checks a change and passes the change to the real-time side, which applies the change at an instant of its own choice.
 pub trait LinkEditor: Send {
-    /// The keys that this link was told, each once, in any order, with their values as TOML text: `("delay", "\"40ms\"")`. A key at its default
-    /// may be left out. The number is below that of the links in the [`Description`](crate::Description).
+    /// Returns the keys given to link number `link`, each once and in any order, with values as TOML text: `("delay", "\"40ms\"")`. A key at its default
+    /// may be left out. `link` is below the number of links in the [`Description`](crate::Description).
     fn keys(&self, link: usize) -> Vec<(String, String)>;
 
-    /// Lays keys over those of each of these links, or changes nothing at all.
+    /// Sets keys on each of several links, or changes nothing at all. Keys not named keep their values.
     ///
-    /// `links` has at least one number, each below that of the links, none twice. Of `keys` there is at least one and none twice. A key is of ASCII
-    /// letters, digits, `_` and `-`; a value is TOML text: `"40ms"` with its quotes, `0.01`, `{ packets = [3] }`.
+    /// `links` has at least one number, each below the number of links and none twice. `keys` has at least one entry and no key twice. A key consists of
+    /// ASCII letters, digits, `_` and `-`. A value is TOML text: `"40ms"` with its quotes, `0.01`, `{ packets = [3] }`.
     ///
     /// # Errors
     ///
-    /// Why it cannot be, as it is shown to the user: which key, what was found, what was expected.
+    /// The reason of the refusal, for the user: the key, the value found and the value expected.
     fn change(&mut self, links: &[usize], keys: &[(String, String)]) -> Result<(), String>;
 }

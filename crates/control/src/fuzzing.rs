@@ -1,4 +1,4 @@
-//! Live control without sockets, for the fuzz targets `http` and `websocket`. Compiled with `--cfg fuzzing` alone.
+//! Live control without sockets, for the fuzz targets `http` and `websocket`. Compiled only with `--cfg fuzzing`.
 
 use core::future::poll_fn;
 use core::pin::{Pin, pin};
@@ -16,10 +16,10 @@ use crate::http::{self, App, Pace, Shown, hand};
 use crate::ticket::Ticket;
 use crate::{Board, LinkEditor, Stage, Token};
 
-/// A connection is over when this number of polls in turn has moved no byte.
+/// Number of polls in a row without a moved byte, after which a connection counts as over.
 const IDLE_POLLS: u32 = 16;
 
-/// A server whose connections are bytes.
+/// A server for connections whose bytes are given.
 pub struct Site {
     router: Router,
     stage: Arc<dyn Stage>,
@@ -33,11 +33,11 @@ impl core::fmt::Debug for Site {
 }
 
 impl Site {
-    /// A server as [`serve_stage`](crate::serve_stage) starts it, with the same token for guests.
+    /// Creates a server like [`serve_stage`](crate::serve_stage), but without a token for guests.
     ///
     /// # Errors
     ///
-    /// If the system gives no runtime.
+    /// The system's error if no runtime can be created.
     pub fn new(token: Token, board: Arc<Board>, editor: Box<dyn LinkEditor>, stage: Arc<dyn Stage>) -> io::Result<Self> {
         let app = App {
             board,
@@ -56,7 +56,7 @@ impl Site {
         Ok(Self { router: http::router(app), stage, runtime })
     }
 
-    /// The bytes that the server answers to those of one connection.
+    /// Returns the server's answers to the bytes `sent` on a connection.
     #[must_use]
     pub fn answer(&self, sent: &[u8]) -> Vec<u8> {
         let shared = Arc::new(Mutex::new(Shared::default()));
@@ -65,19 +65,19 @@ impl Site {
             select(pin!(http::answer_bytes(bytes, self.router.clone())), pin!(rest(&shared))).await;
         });
         let answers = core::mem::take(&mut lock(&shared).answers);
-        // A task that waits for an upgrade hears that the connection is over.
+        // Runs tasks that wait for an upgrade of the connection, until they learn that the connection is over.
         self.runtime.block_on(rest(&shared));
         answers
     }
 
-    /// Moves a hand by the frames of a page.
+    /// Moves hand number `hand` by WebSocket frames.
     pub fn hear(&self, hand: usize, sent: &[u8]) {
         let bytes = Bytes { left: sent.to_vec(), place: 0, ends: true, shared: Arc::default() };
         self.runtime.block_on(hand::hear(Arc::clone(&self.stage), hand, bytes));
     }
 }
 
-/// Ends when a connection no longer moves.
+/// Returns when a connection has moved no byte for [`IDLE_POLLS`] polls.
 async fn rest(shared: &Mutex<Shared>) {
     let (mut before, mut idle) = (0, 0);
     poll_fn(|context| {
@@ -87,6 +87,7 @@ async fn rest(shared: &Mutex<Shared>) {
         if idle > IDLE_POLLS {
             return Poll::Ready(());
         }
+        // Polls again after the other tasks, since no event from outside will come.
         context.waker().wake_by_ref();
         Poll::Pending
     })
@@ -100,15 +101,15 @@ fn lock(shared: &Mutex<Shared>) -> std::sync::MutexGuard<'_, Shared> {
 #[derive(Default)]
 struct Shared {
     answers: Vec<u8>,
-    /// Bytes in both directions.
+    /// Bytes moved so far, both directions together.
     moved: usize,
 }
 
-/// A stream of these bytes.
+/// Stream with given bytes to read, and a record of the bytes written.
 struct Bytes {
     left: Vec<u8>,
     place: usize,
-    /// Whether the stream ends behind them, or its other end waits.
+    /// Whether reading ends after the last byte. Otherwise reading waits forever.
     ends: bool,
     shared: Arc<Mutex<Shared>>,
 }

@@ -1,6 +1,6 @@
-//! Live control over HTTP: what a run in wall time counts, and changes of its links, for programs and for people.
+//! Live control over HTTP: shows the counters of a run in wall time, and changes the run's links.
 //!
-//! You need it if a program in real time shows its counters and takes changes of its links over HTTP.
+//! Use this crate if your real-time program should show its counters and take changes of its links over HTTP.
 //!
 //! ```text
 //!   real-time side ── publish ──► Board ──► server thread ──► page, JSON, events, Prometheus text
@@ -8,9 +8,11 @@
 //!          └────────── LinkEditor ◄───────────────┘
 //! ```
 //!
-//! This crate knows nothing of haptics, of scenes or of what the links carry. The real-time side publishes a [`Snapshot`] on a [`Board`] now and
-//! then and never waits for anybody; changes go through a [`LinkEditor`]. [`serve()`] answers on a thread of its own, on loopback, and every request
-//! must show a [`Token`]. The routes are in `docs/live-control.md`.
+//! The real-time side publishes a [`Snapshot`] on a [`Board`] from time to time and never waits. Changes go through a [`LinkEditor`]. [`serve()`] answers
+//! on a thread of its own, by default on loopback only, and every request must show a [`Token`]. The routes are in `docs/live-control.md`.
+//!
+//! This crate does not know haptics, scenes, or the contents of packets.
+//!
 //! ```
 //! use std::sync::Arc;
 //!

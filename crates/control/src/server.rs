@@ -1,4 +1,4 @@
-//! The server: a thread with a runtime of its own.
+//! The server: a thread with its own single-threaded runtime.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -13,57 +13,57 @@ use crate::http::{self, App, Pace, Shown};
 use crate::ticket::Ticket;
 use crate::{Board, LinkEditor, Stage, Token, TokenError};
 
-/// Where to listen, and which requests to let in.
+/// Address and admission rules of a server.
 #[derive(Clone, Debug)]
 pub struct ServerConfig {
-    /// Where to listen. Port 0: any free one.
+    /// Address to listen on. Port 0 takes any free port.
     pub address: SocketAddr,
-    /// The secret that every request must show; `None`: a random one.
+    /// Secret to be shown by every request; `None` for a random secret.
     pub token: Option<Token>,
-    /// Whether an address may be given that other machines reach. All traffic, the token too, can then be read on the way.
+    /// Whether `address` may be reachable from other machines. The traffic is not encrypted, so anybody on the way can read the token.
     pub allow_remote: bool,
-    /// Names by which the server may be asked for, besides `localhost` and addresses, such as `"lab-pc.example"`. Other names are refused, so that
-    /// no page of another site reaches the server by a name that it points here (DNS rebinding).
+    /// Accepted names in the `Host` header, besides `localhost` and addresses, such as `"lab-pc.example"`. Requests for other names are refused, so that a
+    /// page of another site cannot reach the server through a name pointing to this machine (DNS rebinding).
     pub hosts: Vec<String>,
 }
 
 impl ServerConfig {
-    /// A random token, nothing but loopback.
+    /// Returns a configuration with a random token and loopback addresses only.
     #[must_use]
     pub const fn new(address: SocketAddr) -> Self {
         Self { address, token: None, allow_remote: false, hosts: Vec::new() }
     }
 }
 
-/// Why there is no server.
+/// Error of starting a server.
 #[derive(Debug, Error)]
 pub enum ServeError {
-    /// Other machines would reach it.
+    /// The address is reachable from other machines, and remote access is not allowed.
     #[error(
         "live control would be open to other machines at {address}: listen on 127.0.0.1 or [::1] and reach it from elsewhere through `ssh -L`, or allow \
          remote access (--allow-remote); it is not encrypted"
     )]
     NotLoopback {
-        /// The address.
+        /// Address asked for.
         address: SocketAddr,
     },
-    /// The system gives no such socket.
+    /// The system refused to listen on the address.
     #[error("live control cannot listen on {address}: {source}; port 0 takes any that is free")]
     Listen {
-        /// The address.
+        /// Address asked for.
         address: SocketAddr,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
-    /// There is no token.
+    /// No token could be made.
     #[error(transparent)]
     Token(#[from] TokenError),
-    /// The system gives no thread, or no events.
+    /// The system refused a thread or a runtime.
     #[error("live control cannot start its thread: {0}")]
     Thread(io::Error),
 }
 
-/// A server that runs until it is stopped or dropped.
+/// A running server. Dropping the value stops the server.
 #[derive(Debug)]
 pub struct Server {
     address: SocketAddr,
@@ -74,26 +74,27 @@ pub struct Server {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Starts a server on a thread of its own.
+/// Starts a server on a thread of its own. Connections are accepted from the return of this function on.
 ///
 /// # Errors
 ///
-/// [`ServeError`] if it may not or cannot listen there. When this returns `Ok`, connections are taken.
+/// [`ServeError`] if the address is not allowed, or if the system refuses a socket, a thread or random numbers.
 pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>) -> Result<Server, ServeError> {
     start(config, board, editor, None)
 }
 
-/// Starts a server of a run in which people take part from a page; links to hand out have a token of their own, with which nothing can be changed.
+/// Starts the server of a run in which people take part from a page. Links for guests contain a token of their own, which allows no changes except of a hand.
 ///
 /// # Errors
 ///
-/// As [`serve()`].
+/// The errors of [`serve()`].
 pub fn serve_stage(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, stage: Arc<dyn Stage>) -> Result<Server, ServeError> {
     start(config, board, editor, Some(stage))
 }
 
 fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, stage: Option<Arc<dyn Stage>>) -> Result<Server, ServeError> {
     let address = config.address;
+    // An IPv4 loopback address may come mapped into IPv6, which only the canonical form shows.
     if !address.ip().to_canonical().is_loopback() && !config.allow_remote {
         return Err(ServeError::NotLoopback { address });
     }
@@ -102,9 +103,11 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
         None => Token::random()?,
     };
     let listen = |source| ServeError::Listen { address, source };
+    // Bound here and not on the thread, so that the caller gets the error, and the port chosen for port 0.
     let listener = TcpListener::bind(address).map_err(listen)?;
     listener.set_nonblocking(true).map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
+    // A second token, so that the host can hand out links without giving away the right to change the run.
     let guests = if stage.is_some() { Some(Token::random()?) } else { None };
     let ticket = Arc::new(Ticket::default());
     let app = App {
@@ -121,6 +124,7 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
         patience: http::PATIENCE,
     };
     let runtime = Builder::new_current_thread().enable_io().enable_time().build().map_err(ServeError::Thread)?;
+    // The conversion registers the socket with the runtime, which must be entered for this.
     let listener = {
         let _inside = runtime.enter();
         tokio::net::TcpListener::from_std(listener).map_err(listen)?
@@ -129,10 +133,10 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
     let run = move || {
         runtime.block_on(async {
             tokio::spawn(http::answer_all(listener, http::router(app)));
-            // An error means that the server was dropped, which is the same.
+            // An error means that the sender was dropped with the server, which asks for the same end.
             let _: Result<(), oneshot::error::RecvError> = stopped.await;
         });
-        // Open answers, such as events, end with the runtime.
+        // Ends open answers, such as streams of events, without waiting for their readers.
         runtime.shutdown_background();
     };
     let thread = std::thread::Builder::new().name("live-control".to_owned()).spawn(run).map_err(ServeError::Thread)?;
@@ -140,43 +144,44 @@ fn start(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>, s
 }
 
 impl Server {
-    /// Where it listens.
+    /// Returns the address listened on, with the real port.
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// The address of the page, with the token: a secret.
+    /// Returns the address of the page, including the token. The address is a secret.
     #[must_use]
     pub fn url(&self) -> String {
         format!("http://{}/?token={}", self.reachable(), self.token.secret())
     }
 
-    /// An address that leads to the page once, for a program that opens browsers: other users of the machine see the arguments of its programs, and the
-    /// token is not among them. The last address given is the one that leads there. If the system has no random numbers, it is [`Server::url`].
+    /// Returns an address of the page for a program that opens a browser. The address works once, and only the newest address works. The token is not part
+    /// of the address, because other users of the machine can see the arguments of programs. Without random numbers from the system, returns
+    /// [`Server::url`] instead.
     #[must_use]
     pub fn open_url(&self) -> String {
         self.ticket.issue().map_or_else(|_| self.url(), |ticket| format!("http://{}/open?ticket={}", self.reachable(), ticket.secret()))
     }
 
-    /// The link to hand out to those who are to take part, with a token of their own; `None` if nobody takes part from a page.
+    /// Returns the link for guests, with the guests' token; `None` if the run has no part for people.
     #[must_use]
     pub fn join_url(&self) -> Option<String> {
         self.guests.as_ref().map(|guests| format!("http://{}/join?token={}", self.reachable(), guests.secret()))
     }
 
-    /// The secret that requests must show.
+    /// Returns the secret to be shown by requests.
     #[must_use]
     pub const fn token(&self) -> &Token {
         &self.token
     }
 
-    /// Ends it, and every connection with it. Returns when its thread has ended.
+    /// Stops the server and all its connections. Returns when the thread has ended.
     pub fn stop(self) {
         drop(self);
     }
 
-    /// An unspecified address is where one listens, not where one calls.
+    /// Returns an address to connect to. An unspecified address such as 0.0.0.0 is for listening only, so loopback takes its place.
     fn reachable(&self) -> SocketAddr {
         let mut address = self.address;
         if address.ip().is_unspecified() {
@@ -192,11 +197,11 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         if let Some(stop) = self.stop.take() {
-            // Gone already if the thread ended by itself.
+            // Fails if the thread has ended by itself, which is harmless.
             let _: Result<(), ()> = stop.send(());
         }
         if let Some(thread) = self.thread.take() {
-            // A panic in there was reported when it happened.
+            // A panic of the thread was already reported by the panic hook.
             let _: std::thread::Result<()> = thread.join();
         }
     }

@@ -1,125 +1,126 @@
-//! What a run shows: its names, which do not change while it lasts, and numbers at one instant, which do.
+//! The published state of a run: names, constant during the run, and numbers at one instant.
 
 use core::time::Duration;
 
 use serde::Serialize;
 
-/// The numbers of a run at one instant. What belongs to links, peers, clocks and measures stands in the order of the [`Description`](crate::Description).
+/// Numbers of a run at one instant. Entries for links, peers, clocks and measures are in the order of the [`Description`](crate::Description).
 ///
-/// A list that is shorter than that of the description is filled up with nothing counted yet, one that is longer is cut.
+/// A list shorter than in the description counts as filled up with defaults, and a longer list as cut.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Snapshot {
-    /// Since the run began.
+    /// Time since the run began.
     pub elapsed: Duration,
-    /// Why the run is not valid so far, such as too many late ticks; `None` while it is.
+    /// Reason why the run is not valid, such as too many late ticks; `None` as long as the run is valid.
     pub invalid: Option<String>,
-    /// How late each clock of the description was, since the run began.
+    /// Lateness of each clock since the run began, indexed by clock.
     pub lateness: Vec<Quantiles>,
-    /// Counters of each link, since the run began.
+    /// Counters of each link since the run began, indexed by link.
     pub links: Vec<LinkCounters>,
-    /// Each participant.
+    /// State of each participant, indexed by peer.
     pub peers: Vec<PeerView>,
-    /// How many datagrams were refused, by cause, since the run began.
+    /// Refused datagrams since the run began, by cause.
     pub refused: Vec<(&'static str, u64)>,
-    /// The value of each measure of the description so far; `None` where it has none.
+    /// Present value of each measure, indexed by measure; `None` for a measure without a value yet.
     pub measures: Vec<Option<f64>>,
 }
 
-/// A distribution of spans in a few numbers. With a count of 0 the others say nothing.
+/// Summary of a distribution of spans. With a count of 0 the other fields have no meaning.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Quantiles {
-    /// How many spans were seen.
+    /// Number of spans.
     pub count: u64,
-    /// Their sum.
+    /// Sum of all spans.
     pub sum: Duration,
-    /// Half of them are shorter.
+    /// Median: half of the spans are shorter.
     pub p50: Duration,
-    /// 99 % of them are shorter.
+    /// Quantile 0.99.
     pub p99: Duration,
-    /// 99.9 % of them are shorter.
+    /// Quantile 0.999.
     pub p999: Duration,
-    /// The longest.
+    /// Longest span.
     pub max: Duration,
 }
 
-/// What one link did so far. `offered + duplicated = delivered + Σ dropped + in flight`.
+/// Counters of a link since the run began. `offered + duplicated = delivered + Σ dropped + in_flight`.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct LinkCounters {
     /// Packets handed to the link.
     pub offered: u64,
-    /// Extra copies that it made.
+    /// Extra copies made by the link.
     pub duplicated: u64,
-    /// Packets that came out of it, copies included.
+    /// Packets that came out of the link, copies included.
     pub delivered: u64,
-    /// Bytes of the packets that came out of it.
+    /// Bytes of the delivered packets.
     pub delivered_bytes: u64,
-    /// Packets dropped, by the name of the cause. Causes that never happened may be left out.
+    /// Dropped packets by name of the cause. Causes with zero packets may be left out.
     pub dropped: Vec<(&'static str, u64)>,
-    /// Packets that it marked: congestion experienced.
+    /// Packets marked by the link with "congestion experienced".
     pub marked: u64,
-    /// Packets of which it flipped bits.
+    /// Packets with bits flipped by the link.
     pub damaged: u64,
-    /// Packets inside it now.
+    /// Packets inside the link now.
     pub in_flight: u64,
-    /// The mean time in the link of all that was delivered; `None` before the first delivery.
+    /// Mean delay of all delivered packets; `None` before the first delivery.
     pub mean_delay: Option<Duration>,
-    /// The delays of what was delivered of late: in the last second or so, as the publisher likes. A count of 0: nothing was.
+    /// Delays of packets delivered recently, for instance in the last second; the publisher chooses the window. The count is 0 if no packet was delivered.
     pub recent_delay: Quantiles,
 }
 
 impl LinkCounters {
-    /// Packets dropped for any reason.
+    /// Returns the number of packets dropped for any reason. Saturates.
     #[must_use]
     pub fn dropped_in_all(&self) -> u64 {
         self.dropped.iter().fold(0, |sum, (_, count)| sum.saturating_add(*count))
     }
 }
 
-/// One participant at one instant.
+/// State of a participant at one instant.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct PeerView {
-    /// Whether it takes part.
+    /// Whether the participant takes part.
     pub status: Presence,
-    /// How long ago it was last heard; `None` if it is here, or never was heard.
+    /// Time since the participant was last heard; `None` if the participant runs in this program or was never heard.
     pub age: Option<Duration>,
-    /// Where its copy of the object is, for each axis \[m\]; empty if there is none.
+    /// Position of the participant's copy of the object \[m\], indexed by axis; empty without a copy.
     pub position: Vec<f64>,
-    /// The force that its user feels, for each axis \[N\]; empty if it is not known.
+    /// Force felt by the participant's user \[N\], indexed by axis; empty if unknown.
     pub force: Vec<f64>,
-    /// How it is turned; `None` if the object does not turn.
+    /// Orientations; `None` if the object does not rotate.
     pub turn: Option<TurnView>,
 }
 
-/// How a participant is turned, and where its device is: what a picture in depth needs. Orientations are unit quaternions (w, x, y, z) from body to world axes.
+/// Orientation of a participant's copy, and pose of the participant's device, for a picture in depth. Orientations are unit quaternions (w, x, y, z) from
+/// body to world axes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct TurnView {
-    /// The orientation of its copy.
+    /// Orientation of the copy of the object.
     pub orientation: [f64; 4],
-    /// Where its device is \[m\]; `None` if that is not known here.
+    /// Position of the device \[m\]; `None` if unknown here.
     pub device: Option<[f64; 3]>,
-    /// The orientation of its device; `None` for one that does not turn.
+    /// Orientation of the device; `None` for a device without rotation.
     pub device_orientation: Option<[f64; 4]>,
 }
 
-/// Whether a participant takes part.
+/// Presence of a participant.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 pub enum Presence {
-    /// It runs in this program.
+    /// The participant runs in this program.
     Here,
-    /// It runs elsewhere and was heard of late.
+    /// The participant runs elsewhere and was heard recently.
     Present,
-    /// It runs elsewhere and was not heard for too long: its figures are old.
+    /// The participant runs elsewhere and was not heard for too long. The figures shown are old.
     Stale,
-    /// It was never heard.
+    /// The participant was never heard.
     #[default]
     Absent,
 }
 
 impl Presence {
-    /// All of them.
+    /// All values, in the order of the declaration.
     pub const ALL: [Self; 4] = [Self::Here, Self::Present, Self::Stale, Self::Absent];
 
-    /// Its name.
+    /// Returns the name shown to users.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -131,48 +132,48 @@ impl Presence {
     }
 }
 
-/// The run, in names. The numbers of a [`Snapshot`](crate::Snapshot) stand in the same order.
+/// Names of a run. The numbers of a [`Snapshot`](crate::Snapshot) are in the same order.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Description {
-    /// Which command runs.
+    /// Command of the run.
     pub kind: Kind,
-    /// The title of the run: the name of a scene, or an address.
+    /// Title of the run: the name of a scene, or an address.
     pub title: String,
-    /// The links. Their places are the numbers by which they are asked for.
+    /// Links. The index of a link is its number in requests.
     pub links: Vec<LinkName>,
-    /// The participants, or none.
+    /// Participants; empty for a run without participants.
     pub peers: Vec<PeerName>,
-    /// The clocks whose lateness is measured, such as `"tick of left"` or `"release"`.
+    /// Clocks with measured lateness, such as `"tick of left"` or `"release"`.
     pub clocks: Vec<String>,
-    /// The measures that are computed while it runs, or none.
+    /// Measures computed during the run; may be empty.
     pub measures: Vec<MeasureLabel>,
-    /// The object, if it turns.
+    /// Shape of the object; `None` if the object does not rotate.
     pub body: Option<Body>,
 }
 
-/// An object that turns, in its body axes.
+/// Shape of a rotating object, in body axes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Body {
-    /// The edges of the box as which it is drawn \[m\].
+    /// Lengths of the edges of the box drawn for the object \[m\], indexed by axis.
     pub edges: [f64; 3],
-    /// Where each participant grasps it, from the centre of mass \[m\], in the order of [`Description::peers`].
+    /// Position of each participant's grasp, from the centre of mass \[m\], indexed by peer.
     pub grasps: Vec<[f64; 3]>,
 }
 
-/// The command that runs.
+/// Command of a run.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// A scene in wall time.
     Live,
-    /// Datagrams of programs that know nothing of it.
+    /// Datagrams between programs that do not know of the emulation.
     Relay,
     /// Whole packets between networks.
     Router,
 }
 
 impl Kind {
-    /// Its name, as it is written on the command line.
+    /// Returns the name of the command on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -183,33 +184,33 @@ impl Kind {
     }
 }
 
-/// A link in names.
+/// Name and ends of a link.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 pub struct LinkName {
-    /// The link itself, such as `"left->right"`; no other link has it.
+    /// Name of the link, unique in the run, such as `"left->right"`.
     pub name: String,
-    /// Where it begins.
+    /// Name of the sender.
     pub from: String,
-    /// Where it ends.
+    /// Name of the receiver.
     pub to: String,
 }
 
-/// A measure in words.
+/// Name, unit and meaning of a measure.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MeasureLabel {
-    /// No other measure has it. It ends in the unit.
+    /// Name of the measure, unique in the run, with the unit as its last part.
     pub name: String,
-    /// The unit.
+    /// Unit of the value.
     pub unit: &'static str,
-    /// Its meaning, without the last full stop.
+    /// Meaning of the measure, as a sentence without its final full stop.
     pub about: &'static str,
 }
 
-/// A participant in names.
+/// Name and kind of a participant.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 pub struct PeerName {
-    /// No other participant has it.
+    /// Name of the participant, unique in the run.
     pub name: String,
-    /// What it is, in a word or two, such as `"simulated Falcon"`.
+    /// Kind of the participant in a word or two, such as `"simulated Falcon"`.
     pub kind: String,
 }

@@ -1,66 +1,67 @@
-//! A run in which people take part from a page.
+//! The interface of a run in which people take part from a page.
 
 use std::sync::Arc;
 
 use serde_json::Value;
 
-/// The person who asks: the one who started the run, or somebody to whom a link was handed out.
+/// Role of the person behind a request, recognised by the token.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Role {
-    /// May change links, begin the run anew and compare.
+    /// The person who started the run: may change links, restart the run and compare.
     Host,
-    /// May look on and move a hand.
+    /// A person with a guest link: may watch and move a hand.
     Guest,
 }
 
-/// A file of a run.
+/// A file offered for download.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct StageFile {
-    /// Its type, such as `"text/csv"`.
+    /// MIME type, such as `"text/csv"`.
     pub kind: &'static str,
-    /// What it holds.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 
-/// A run in which people take part from a page. Called on threads of the server, several at once; nothing here may wait for the real-time side.
+/// A run in which people take part from a page. The methods are called on threads of the server, possibly several at once, and must not wait for the
+/// real-time side.
 pub trait Stage: Send + Sync {
-    /// What a page must know of the run beyond its state: a JSON object. Its `part` changes when the run begins anew.
+    /// Returns a JSON object with everything that a page must know of the run besides its state. The entry `part` changes when the run restarts.
     fn facts(&self, role: Role) -> Value;
 
-    /// The newest picture of everything that moves, as JSON text, and its number, which grows.
+    /// Returns the newest picture of the motion as JSON text, and the picture's number. Numbers grow from picture to picture.
     fn frame(&self) -> (u64, Arc<str>);
 
-    /// Takes a hand that nobody has: that one, or any. Gives its number.
+    /// Takes the free hand `wanted`, or any free hand for `None`. Returns the number of the hand.
     ///
     /// # Errors
     ///
-    /// Why there is none, as it is shown to the user.
+    /// The reason of the refusal, for the user.
     fn take_hand(&self, wanted: Option<usize>) -> Result<usize, String>;
 
-    /// The hand is there now, or has let go.
+    /// Sets the position of a hand \[m\]; `None` lets go of the object.
     ///
     /// # Errors
     ///
-    /// Why it cannot be there.
+    /// The reason why the hand cannot be at the position.
     fn move_hand(&self, hand: usize, position: Option<[f64; 3]>) -> Result<(), String>;
 
-    /// Lets the hand go; somebody else may take it.
+    /// Gives a hand back, for somebody else to take.
     fn leave_hand(&self, hand: usize);
 
-    /// Begins the run anew with something changed, where it stands.
+    /// Restarts the run, with the change described by `wish`.
     ///
     /// # Errors
     ///
-    /// Why it cannot be, as it is shown to the user; nothing changes.
+    /// The reason of the refusal, for the user. Nothing has changed then.
     fn begin_anew(&self, wish: &Value) -> Result<(), String>;
 
-    /// Runs what was recorded in other ways, as fast as it goes, and gives what came of each: a JSON object.
+    /// Runs the recorded motion under other conditions, faster than real time, and returns the results as a JSON object.
     ///
     /// # Errors
     ///
-    /// Why it cannot be, as it is shown to the user.
+    /// The reason of the refusal, for the user.
     fn compare(&self) -> Result<Value, String>;
 
-    /// The file of that name, of what was recorded last; `None` if there is none.
+    /// Returns a file of the newest recording by its name; `None` if no such file exists.
     fn file(&self, name: &str) -> Option<StageFile>;
 }

@@ -1,22 +1,22 @@
-//! A ticket: a secret that is worth the token once.
+//! Tickets: secrets that replace the token for a single request.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::{Token, TokenError};
 
-/// A ticket, if one was issued and not yet used.
+/// The valid ticket; `None` before the first is issued and after its use.
 #[derive(Debug, Default)]
 pub(crate) struct Ticket(Mutex<Option<Token>>);
 
 impl Ticket {
-    /// Issues a ticket; one that was issued before is worth nothing any more.
+    /// Issues a ticket. An earlier ticket becomes invalid.
     pub(crate) fn issue(&self) -> Result<Token, TokenError> {
         let ticket = Token::random()?;
         *self.lock() = Some(ticket.clone());
         Ok(ticket)
     }
 
-    /// Whether this is the ticket, which is used up then.
+    /// Returns whether `offered` is the valid ticket. The ticket is invalid afterwards.
     pub(crate) fn redeem(&self, offered: &[u8]) -> bool {
         let mut ticket = self.lock();
         let is_it = ticket.as_ref().is_some_and(|ticket| ticket.is(offered));

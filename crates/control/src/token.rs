@@ -1,4 +1,4 @@
-//! The secret that opens the server.
+//! The secret shown by every request.
 
 use core::fmt;
 use core::str::FromStr;
@@ -6,56 +6,56 @@ use core::str::FromStr;
 use subtle::ConstantTimeEq as _;
 use thiserror::Error;
 
-/// The bytes of a random token: 160 bits.
+/// Length of a random token \[byte\]: 160 bits.
 const RANDOM_BYTES: usize = 20;
-/// Shorter tokens are refused: 22 random characters of 64 are 132 bits.
+/// Length of the shortest accepted token \[character\]: 22 random characters out of 64 have 132 bits.
 const SHORTEST: usize = 22;
-/// Longer tokens are refused.
+/// Length of the longest accepted token \[character\].
 const LONGEST: usize = 256;
 
-/// A secret that every request must show. It is compared in a time that does not tell how much of it was right, and [`fmt::Debug`] does not show it.
+/// A secret that every request must show. The time of a comparison does not depend on the content, and [`fmt::Debug`] hides the secret.
 #[derive(Clone)]
 pub struct Token(String);
 
-/// Why there is no token.
+/// Error of making a token.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
 pub enum TokenError {
-    /// Too short to be secret, or too long to be carried.
+    /// The token is too short to be secret, or too long for an address.
     #[error("a token of {found} characters: expected {SHORTEST} to {LONGEST}, random ones; leave it out to get one")]
     Length {
-        /// How many characters it has.
+        /// Length of the refused token \[character\].
         found: usize,
     },
-    /// A character that an address would have to escape.
+    /// The token has a character with a meaning in addresses.
     #[error("a token with {found:?}: expected letters, digits, '-', '.', '_' and '~' only, so that it can stand in an address")]
     Character {
-        /// The first such character.
+        /// First forbidden character.
         found: char,
     },
-    /// The system gave no random numbers.
+    /// The system returned no random numbers.
     #[error("the system gives no random numbers for a token ({0}): give a token of your own")]
     NoRandomNumbers(String),
 }
 
 impl Token {
-    /// A token of 160 random bits of the system, in 40 hexadecimal digits.
+    /// Returns a token of 160 random bits from the system, as 40 hexadecimal digits.
     ///
     /// # Errors
     ///
-    /// [`TokenError::NoRandomNumbers`] if the system has none.
+    /// [`TokenError::NoRandomNumbers`] if the system returns no random numbers.
     pub fn random() -> Result<Self, TokenError> {
         let mut bytes = [0; RANDOM_BYTES];
         getrandom::fill(&mut bytes).map_err(|error| TokenError::NoRandomNumbers(error.to_string()))?;
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }
 
-    /// The token in clear, to be shown to its owner.
+    /// Returns the secret in clear, to be shown to its owner.
     #[must_use]
     pub fn secret(&self) -> &str {
         &self.0
     }
 
-    /// Whether this is it. How long that takes depends on the length of the offered text alone.
+    /// Returns whether `offered` equals the secret. The time depends only on the length of `offered`.
     pub(crate) fn is(&self, offered: &[u8]) -> bool {
         self.0.as_bytes().ct_eq(offered).into()
     }

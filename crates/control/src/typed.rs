@@ -1,16 +1,16 @@
-//! Values between JSON, what people type, and TOML text.
+//! Converts values between JSON, text typed by people, and TOML text.
 //!
-//! Text follows the rule of `--set KEY=VALUE`: it is TOML, and a value that is not TOML is taken as text. So `40ms`, `0.01` and `{ packets = [3] }` are
-//! all typed without quotes.
+//! Typed text follows the rule of `--set KEY=VALUE`: text that is valid TOML is taken as TOML, and all other text as a string. So `40ms`, `0.01` and `{
+//! packets = [3] }` can be typed without quotes.
 
 use serde_json::Value as Json;
 use toml::{Table, Value as Toml};
 
-/// A JSON value as TOML text. A string is what somebody typed; strings within lists and objects are strings.
+/// Converts a JSON value to TOML text. A string at the top level counts as typed text; strings inside lists and objects stay strings.
 ///
 /// # Errors
 ///
-/// What TOML has no word for: `null`, and integers beyond 64 bits with a sign.
+/// The reason why TOML cannot express the value: `null`, or an integer beyond a signed 64-bit integer.
 pub(crate) fn from_json(value: &Json) -> Result<String, String> {
     match value {
         Json::String(text) => Ok(typed(text).to_string()),
@@ -18,9 +18,10 @@ pub(crate) fn from_json(value: &Json) -> Result<String, String> {
     }
 }
 
-/// TOML text as people type it: without quotes where it does not need them. [`from_json`] reads it back.
+/// Converts TOML text to the text that a person would type, without quotes where none are needed. [`from_json`] converts the result back.
 pub(crate) fn shown(toml: &str) -> String {
     match parse(toml) {
+        // Quotes stay around a string that would otherwise parse as another value, such as "1".
         Some(Toml::String(text)) if parse(&text).is_none() => text,
         Some(_) | None => toml.to_owned(),
     }
@@ -30,10 +31,11 @@ fn typed(text: &str) -> Toml {
     parse(text).unwrap_or_else(|| Toml::String(text.to_owned()))
 }
 
-/// The value that a text is, if it is one and nothing more.
+/// Parses a text as a single TOML value; `None` if the text is anything else.
 fn parse(text: &str) -> Option<Toml> {
     let mut table: Table = toml::from_str(&format!("value = {text}")).ok()?;
     let value = table.remove("value")?;
+    // A text with a line break could define further keys, and is then no single value.
     table.is_empty().then_some(value)
 }
 
@@ -43,6 +45,7 @@ fn converted(value: &Json) -> Result<Toml, String> {
         Json::Bool(value) => Toml::Boolean(*value),
         Json::Number(number) => match (number.as_i64(), number.as_f64()) {
             (Some(integer), _) => Toml::Integer(integer),
+            // `as_f64` accepts integers above `i64::MAX` too, and would lose their last digits.
             (None, Some(float)) if !number.is_u64() => Toml::Float(float),
             (None, Some(_) | None) => return Err(format!("{number} is too large")),
         },

@@ -1,4 +1,4 @@
-//! The JSON shapes of the routes: spans in seconds, sizes in bytes, positions in metres, forces in newtons, orientations as quaternions (w, x, y, z).
+//! JSON of the routes. Spans are in seconds, sizes in bytes, positions in metres, forces in newtons, and orientations quaternions (w, x, y, z).
 
 use core::time::Duration;
 
@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use crate::{Description, Latest, LinkCounters, MeasureLabel, PeerView, Quantiles, Snapshot};
 
-/// Everything that changes by itself, with the names.
+/// Returns the whole state of a run with its names: clocks, links, peers, measures.
 pub(crate) fn state(latest: &Latest) -> Value {
     let (description, snapshot) = (&*latest.description, &*latest.snapshot);
     let mut state = json!({
@@ -30,7 +30,7 @@ pub(crate) fn state(latest: &Latest) -> Value {
     state
 }
 
-/// One link with its counters.
+/// Returns a link's names and counters. `number` is below the number of links.
 pub(crate) fn link(description: &Description, snapshot: &Snapshot, number: usize) -> Value {
     let none = LinkCounters::default();
     let name = &description.links[number];
@@ -54,7 +54,7 @@ pub(crate) fn link(description: &Description, snapshot: &Snapshot, number: usize
     })
 }
 
-/// Distributions of lateness and of delay.
+/// Returns the distributions of clock lateness and of recent link delay.
 pub(crate) fn histograms(latest: &Latest) -> Value {
     let (description, snapshot) = (&*latest.description, &*latest.snapshot);
     let links = description.links.iter().enumerate().map(|(number, name)| {
@@ -77,7 +77,7 @@ fn clocks(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
     description.clocks.iter().enumerate().map(clock).collect()
 }
 
-/// Measures without a value are `null`.
+/// Returns the measures; a measure without a value is `null`.
 fn measures(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
     let measure = |(number, label): (usize, &MeasureLabel)| {
         let value = snapshot.measures.get(number).copied().flatten();
@@ -111,7 +111,7 @@ fn peers(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
     description.peers.iter().enumerate().map(peer).collect()
 }
 
-/// Unknown figures are `null`.
+/// Returns a distribution in seconds. Without observations all quantiles are `null`.
 fn quantiles(quantiles: &Quantiles) -> Value {
     let seconds = |span: Duration| (quantiles.count > 0).then_some(span.as_secs_f64());
     json!({
@@ -124,7 +124,7 @@ fn quantiles(quantiles: &Quantiles) -> Value {
     })
 }
 
-/// Counts by cause. A cause that is named twice counts as the sum.
+/// Returns counts by cause. Counts of a cause listed twice are added, because a JSON object has each name once.
 fn counted(causes: &[(&'static str, u64)]) -> Map<String, Value> {
     let mut map = Map::new();
     for (cause, count) in causes {

@@ -1,4 +1,4 @@
-//! Bodies of requests: whole, not too long, and not too slow.
+//! Reads bodies of requests, with limits of length and time.
 
 use axum::body::{Body, Bytes, to_bytes};
 use axum::http::StatusCode;
@@ -6,7 +6,7 @@ use tokio::time::timeout;
 
 use super::{App, Refusal};
 
-/// Reads a body of at most `most` bytes.
+/// Reads a body of at most `most` bytes within the server's patience.
 pub(super) async fn read(app: &App, body: Body, most: usize) -> Result<Bytes, Refusal> {
     let whole = timeout(app.patience, to_bytes(body, most)).await;
     let late = |_| Refusal::new(StatusCode::REQUEST_TIMEOUT, format!("expected the whole body within {:?}", app.patience));

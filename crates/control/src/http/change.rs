@@ -1,4 +1,4 @@
-//! Changes of links.
+//! Routes that change links.
 
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ use super::read::{named, with_keys};
 use super::{Refusal, body as bodies, json as answer};
 use crate::typed;
 
-/// Bodies beyond this are refused \[bytes\]. Every key of a link at its longest is a hundredth of it.
+/// Length of the longest accepted body \[byte\]. All keys of a link at their longest fill about a hundredth.
 const LARGEST_BODY: usize = 64 * 1024;
 
-/// Lays keys over those of one link.
+/// `PATCH /api/links/{link}`: sets keys of a single link.
 pub(super) async fn one(State(app): State<Arc<App>>, path: Result<Path<String>, PathRejection>, body: Body) -> Result<Response, Refusal> {
     let link = named(&app, path)?;
     let keys = keys(&app, body).await?;
@@ -26,7 +26,7 @@ pub(super) async fn one(State(app): State<Arc<App>>, path: Result<Path<String>, 
     Ok(answer(&with_keys(&app, &[link]).await.pop().unwrap_or_default()))
 }
 
-/// Lays keys over those of all links, or of none if one of them cannot take them.
+/// `PATCH /api/links`: sets keys of all links, or of none if a link refuses the keys.
 pub(super) async fn all(State(app): State<Arc<App>>, body: Body) -> Result<Response, Refusal> {
     let keys = keys(&app, body).await?;
     let links: Vec<usize> = (0..app.board.description().links.len()).collect();
@@ -37,14 +37,14 @@ pub(super) async fn all(State(app): State<Arc<App>>, body: Body) -> Result<Respo
     Ok(answer(&json!({ "links": with_keys(&app, &links).await })))
 }
 
-/// On a thread of its own, because keys may name files: others are answered meanwhile.
+/// Passes keys to the editor on another thread, because the editor may read files. The lock on the editor is held until the end, which keeps changes in order.
 async fn change(app: &App, links: Vec<usize>, keys: Vec<(String, String)>) -> Result<(), Refusal> {
     let mut editor = app.editor().await;
     let changed = apart(move || editor.change(&links, &keys)).await;
     changed.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the change broke off"))?.map_err(unprocessable)
 }
 
-/// The keys that a body asks for, with their values as TOML text.
+/// Reads the keys of a body, with their values as TOML text.
 async fn keys(app: &App, body: Body) -> Result<Vec<(String, String)>, Refusal> {
     let body = bodies::read(app, body, LARGEST_BODY).await?;
     let keys: Map<String, Value> = serde_json::from_slice(&body)
@@ -55,6 +55,7 @@ async fn keys(app: &App, body: Body) -> Result<Vec<(String, String)>, Refusal> {
     keys.into_iter().map(|(key, value)| pair(key, &value)).collect()
 }
 
+/// Checks a key's name and converts its value.
 fn pair(key: String, value: &Value) -> Result<(String, String), Refusal> {
     let bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
     if key.is_empty() || !key.chars().all(bare) {

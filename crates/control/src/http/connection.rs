@@ -1,4 +1,4 @@
-//! Connections: taken at once, given a place, and ended when they take too long.
+//! Accepts connections, gives each a place, and ends slow connections.
 
 use core::pin::pin;
 use core::time::Duration;
@@ -19,30 +19,32 @@ use tokio::net::{TcpListener, TcpStream};
 use super::patient::Patient;
 use super::places::{Limits, Places, Seat};
 
-/// How long the head of a request may take, from its connection or from the answer before it, and how long an answer waits for a reader.
+/// Time for the head of a request, counted from the connection or from the answer before, and time that an answer waits for a slow reader.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
-/// When no connection can be taken, because there are too many open files, it is tried again after this.
+/// Pause after a failed accept, for instance with too many open files.
 const RETRY: Duration = Duration::from_millis(100);
-/// The largest head of a request, and the largest part of unread answers that is kept \[byte\].
+/// Length of the longest accepted head of a request, and of the unread answers kept in memory \[byte\].
 const BUFFER: usize = 16 * 1024;
 
-/// Takes connections for ever.
+/// Accepts connections forever, with the usual limits.
 pub(crate) async fn answer_all(listener: TcpListener, router: Router) {
     answer_within(listener, router, Limits::USUAL, PATIENCE).await;
 }
 
+/// Accepts connections forever, with given limits.
 async fn answer_within(listener: TcpListener, router: Router, limits: Limits, patience: Duration) {
     let places = Places::new(limits);
     loop {
         match listener.accept().await {
             Ok((stream, address)) => {
                 tokio::spawn(answer(stream, router.clone(), places.take(address.ip()), patience));
-                // Connections whose request has come already are read before the next connection may take their place.
+                // Lets a connection with a complete request show its token before the next connection may displace the stranger.
                 tokio::task::yield_now().await;
             }
-            // The client gave the connection up before the server took it.
+            // The client gave up before the connection was accepted.
             Err(error) if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) => {}
             Err(_) => {
+                // The likely error is too many open files. Ending a stranger's connection frees one.
                 places.send_one_away();
                 tokio::time::sleep(RETRY).await;
             }
@@ -50,30 +52,30 @@ async fn answer_within(listener: TcpListener, router: Router, limits: Limits, pa
     }
 }
 
-/// Answers what one connection asks, until it ends.
+/// Answers the requests of a TCP connection until its end.
 async fn answer(stream: TcpStream, router: Router, seat: Arc<Seat>, patience: Duration) {
-    // Events are small and should not wait for one another.
+    // Without a delay for coalescing, because events are small and should be seen at once.
     let _set: io::Result<()> = stream.set_nodelay(true);
     converse(stream, router, seat, patience).await;
 }
 
-/// Answers what comes over a stream, until it ends.
+/// Answers the requests of a stream until its end, or until the connection loses its place.
 async fn converse(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router, seat: Arc<Seat>, patience: Duration) {
     let routes = TowerToHyperService::new(router);
     let shown = Arc::clone(&seat);
     let service = service_fn(move |mut request: Request<Incoming>| {
-        // The guard tells the place which token was shown.
+        // The guard finds the connection's place in the request, to record the role shown.
         request.extensions_mut().insert(Arc::clone(&shown));
         routes.call(request)
     });
     let mut builder = Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(patience).max_buf_size(BUFFER);
     let serving = builder.serve_connection(TokioIo::new(Patient::new(stream, patience)), service).with_upgrades();
-    // Whichever way it ends, nobody is left to be told: the program at the other end has gone, spoke no HTTP, or was too slow.
+    // The result is ignored: on an error the other end is gone, does not speak HTTP, or is too slow, and nobody could be told.
     select(pin!(serving), pin!(seat.sent_away())).await;
 }
 
-/// Answers what comes over a stream from this machine that has the only place.
+/// Answers the requests of a stream as if from this machine, on a server without other connections.
 #[cfg(fuzzing)]
 pub(crate) async fn answer_bytes(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router) {
     let seat = Places::new(Limits::USUAL).take(std::net::Ipv4Addr::LOCALHOST.into());
@@ -89,10 +91,10 @@ mod tests {
     use super::*;
     use crate::http::tests::{Site, TOKEN};
 
-    /// Longer than the patience of the server below, and short of a wait for ever.
+    /// Longer than the patience of the server below, and shorter than forever.
     const LONG: Duration = Duration::from_secs(30);
 
-    /// The routes of a site over real sockets, by a server that has little patience.
+    /// Starts a server with little patience on a real socket.
     fn server() -> SocketAddr {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         listener.set_nonblocking(true).unwrap();
@@ -116,10 +118,10 @@ mod tests {
         stream
     }
 
-    /// Everything until the server ends the connection.
+    /// Reads until the server ends the connection.
     fn rest(mut stream: TcpStream) -> String {
         let mut bytes = Vec::new();
-        // A connection that was reset has ended too; one that stays open fails the test by its time.
+        // A reset connection has ended too. A connection that stays open fails the test by its timeout.
         let ended = stream.read_to_end(&mut bytes);
         assert!(ended.is_ok() || ended.is_err_and(|error| error.kind() == io::ErrorKind::ConnectionReset));
         String::from_utf8_lossy(&bytes).into_owned()
@@ -142,7 +144,7 @@ mod tests {
         let mut stream = send(address, "");
         let page = request("GET", "/") + "\r\n";
         stream.set_write_timeout(Some(LONG)).unwrap();
-        // Of pages that nobody reads the system keeps some. Then the server takes no more requests, and at last it closes the connection.
+        // The system buffers some of the unread pages. Then the server stops reading requests, and finally closes the connection.
         let ended = (0..).find_map(|_| stream.write_all(page.as_bytes()).err()).unwrap();
         assert!(matches!(ended.kind(), io::ErrorKind::ConnectionReset | io::ErrorKind::BrokenPipe), "{ended}");
     }
@@ -153,7 +155,7 @@ mod tests {
         for beginning in ["", "GET / HTTP/1.1\r\nHost:"] {
             assert_eq!(rest(send(address, beginning)), "", "{beginning:?}");
         }
-        // After an answer, too.
+        // The same after an answer.
         let answer = rest(send(address, &(request("GET", "/api/state") + "\r\nGET /")));
         assert_eq!(answer.matches("HTTP/1.1 200").count(), 1, "{answer}");
     }
@@ -173,7 +175,7 @@ mod tests {
         let answer = rest(send(address, &events));
         assert!(answer.starts_with("HTTP/1.1 503 ") && answer.contains("too many"), "{answer}");
         drop(open.pop());
-        // The server sees at its next event that nobody reads it.
+        // The server notices the missing reader at its next event.
         let begun = Instant::now();
         while !rest(send(address, &(request("GET", "/api/state") + "Connection: close\r\n\r\n"))).starts_with("HTTP/1.1 200") {
             assert!(begun.elapsed() < LONG, "the place is never free");

@@ -1,7 +1,7 @@
-//! Frames of a WebSocket, counted as their bytes come in.
+//! Limits the rate of WebSocket frames, counted in the bytes of the stream.
 //!
-//! A reader of messages does not see the frames that a message consists of, and a message may consist of any number of empty frames. So frames are counted
-//! below the messages, in the bytes themselves.
+//! A reader of messages does not see the frames inside a message, and a message may have any number of empty frames. So this module counts frames in the
+//! bytes below the WebSocket library.
 
 use core::pin::Pin;
 use core::task::{Context, Poll, ready};
@@ -11,28 +11,28 @@ use std::io;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
-/// As many places as the fastest screen shows, and half as many again.
+/// Accepted frames per second: half as many again as a 240 Hz screen sends positions.
 pub(super) const MOST_A_SECOND: u32 = 360;
 
-/// Where in a frame the next byte lies (RFC 6455, section 5.2).
+/// Position of the next byte in a frame (RFC 6455, section 5.2).
 #[derive(Clone, Copy, Debug)]
 enum At {
-    /// The first byte of the head.
+    /// First byte of the head.
     First,
-    /// The second byte of the head: whether there is a mask, and the length or the kind of the length.
+    /// Second byte of the head: the mask bit, and the length or the kind of the extended length.
     Second,
-    /// Bytes of a longer length, most significant first: how many are left, the length so far, and the bytes of the mask.
+    /// Extended length, most significant byte first: bytes left, value so far, and length of the mask \[byte\].
     Length(u8, u64, u64),
-    /// Bytes of mask and content that are left; at least one.
+    /// Bytes of mask and content left, at least one.
     Content(u64),
 }
 
-/// Counts frames.
+/// Parser of frame boundaries, and nothing else of a frame.
 #[derive(Clone, Copy, Debug)]
 struct Frames(At);
 
 impl Frames {
-    /// Returns how many frames begin in these bytes, which follow those of the call before.
+    /// Returns the number of frames beginning in `bytes`, which continue the bytes of the call before.
     fn begun_in(&mut self, mut bytes: &[u8]) -> u32 {
         let mut begun = 0;
         while let Some((byte, rest)) = bytes.split_first() {
@@ -54,6 +54,7 @@ impl Frames {
                     if left > 1 { At::Length(left - 1, length, mask) } else { content(length.saturating_add(mask)) }
                 }
                 At::Content(left) => {
+                    // The content is skipped at once, not byte by byte. `here` is at least 1, so the loop makes progress.
                     let here = usize::try_from(left).unwrap_or(usize::MAX).min(bytes.len());
                     bytes = &bytes[here..];
                     self.0 = content(left - here as u64);
@@ -66,11 +67,12 @@ impl Frames {
     }
 }
 
+/// Returns the state with `left` bytes of content to come; without content the next frame begins.
 const fn content(left: u64) -> At {
     if left == 0 { At::First } else { At::Content(left) }
 }
 
-/// A second, and the frames that came in it.
+/// Frame counter of the present second.
 #[derive(Clone, Copy, Debug)]
 struct Rate {
     began: Instant,
@@ -78,7 +80,7 @@ struct Rate {
 }
 
 impl Rate {
-    /// Whether these frames more are not too many.
+    /// Counts `frames` more at `now`. Returns whether the second is within its limit.
     fn admits(&mut self, now: Instant, frames: u32) -> bool {
         if now.duration_since(self.began) >= Duration::from_secs(1) {
             *self = Self { began: now, count: 0 };
@@ -88,7 +90,7 @@ impl Rate {
     }
 }
 
-/// A stream of frames, which fails where more than [`MOST_A_SECOND`] of them come.
+/// Stream wrapper whose reads fail after more than [`MOST_A_SECOND`] frames in a second.
 #[derive(Debug)]
 pub(super) struct Counted<S> {
     stream: S,
@@ -104,6 +106,7 @@ impl<S> Counted<S> {
 
 impl<S: AsyncRead + Unpin> AsyncRead for Counted<S> {
     fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        // The buffer may hold earlier bytes, which were counted before.
         let before = buffer.filled().len();
         ready!(Pin::new(&mut self.stream).poll_read(cx, buffer))?;
         let begun = self.frames.begun_in(&buffer.filled()[before..]);
@@ -143,7 +146,7 @@ mod tests {
         assert!(!rate.admits(begin + Duration::from_secs(10), MOST_A_SECOND + 1), "at once, as one at a time");
     }
 
-    /// A frame of a length, with a mask or without, the length written in the short way or in a longer one.
+    /// Returns a frame with or without a mask. `way` chooses the short or an extended form of the length.
     fn frame(length: usize, is_masked: bool, way: u8) -> Vec<u8> {
         let mask = if is_masked { 0x80 } else { 0 };
         let mut frame = vec![0x00];
@@ -163,7 +166,7 @@ mod tests {
     }
 
     proptest! {
-        /// However the bytes are cut: each frame counts once, when its first byte is there.
+        /// Each frame counts once, at its first byte, however the bytes are cut.
         #[test]
         fn frames_are_counted_whatever_their_bytes_are_cut_into(
             frames in prop::collection::vec((0..300_usize, any::<bool>(), 0..3_u8), 0..20),

@@ -1,4 +1,4 @@
-//! Which requests are let in: those that ask for this host and show the token; and what every answer says about itself.
+//! Admission of requests by host and token, and security headers of all answers.
 
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use super::places::Seat;
 use super::{App, Refusal, page};
 use crate::Role;
 
-/// What every answer says about itself, unless it says something else.
+/// Headers added to every answer without a header of the same name.
 const HEADERS: [(HeaderName, &str); 7] = [
     (header::CONTENT_SECURITY_POLICY, "default-src 'none'; frame-ancestors 'none'"),
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
@@ -23,16 +23,19 @@ const HEADERS: [(HeaderName, &str); 7] = [
     (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
 ];
 
-/// Lets a request through to its route, or refuses it.
+/// Passes a request to its route, or refuses the request.
 pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let mut request = request;
     let seat = request.extensions().get::<Arc<Seat>>().cloned();
+    // The host is checked before the token: a page of another site must not learn whether a token is right.
     let known = check_host(&app, request.uri(), request.headers());
     let admitted = known.and_then(|()| check_token(&app, request.uri(), request.headers())).and_then(|role| sit(seat.as_deref(), role));
+    // Only guests wait for their turn, so guests cannot delay the host.
     if matches!(admitted, Ok(Role::Guest)) {
         app.pace.turn().await;
     }
     let mut answer = match admitted.and_then(|role| may(role, request.method())) {
+        // Tried only without a token, since every try uses the ticket up.
         Err(refusal) if refusal.status == StatusCode::UNAUTHORIZED && has_ticket(&app, request.uri(), request.method()) => {
             Redirect::to(&format!("/?token={}", app.token.secret())).into_response()
         }
@@ -40,7 +43,7 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
             request.extensions_mut().insert(role);
             next.run(request).await
         }
-        // A person with a browser gets a place to enter the token.
+        // A browser gets a page with a field for the token instead of JSON.
         Err(refusal)
             if refusal.status == StatusCode::UNAUTHORIZED
                 && ["/", "/join", "/details", "/open"].contains(&request.uri().path())
@@ -53,7 +56,7 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
     if answer.status() == StatusCode::UNAUTHORIZED {
         answer.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
     }
-    // The places of strangers are few: each has one answer.
+    // Connections without a token have few places. Closing after each answer frees the place.
     if seat.is_some_and(|seat| seat.is_strange()) {
         answer.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
     }
@@ -63,7 +66,7 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
     answer
 }
 
-/// Gives the connection a place among those with this role.
+/// Counts the connection among the connections of `role`, or refuses if all places of the role are taken.
 fn sit(seat: Option<&Seat>, role: Role) -> Result<Role, Refusal> {
     if seat.is_some_and(|seat| !seat.show(role)) {
         return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "too many connections are open with this token: close some, or try again later"));
@@ -71,7 +74,7 @@ fn sit(seat: Option<&Seat>, role: Role) -> Result<Role, Refusal> {
     Ok(role)
 }
 
-/// A guest changes nothing but a hand.
+/// Refuses all requests of guests except GET. A WebSocket for a hand begins with GET too.
 fn may(role: Role, method: &Method) -> Result<Role, Refusal> {
     if role == Role::Guest && method != Method::GET {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "only the person who started the run may change it: this token is that of a guest"));
@@ -79,12 +82,14 @@ fn may(role: Role, method: &Method) -> Result<Role, Refusal> {
     Ok(role)
 }
 
+/// Refuses requests for unknown hosts, in the `Host` header or in the request line.
 fn check_host(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
     let mut hosts = headers.get_all(header::HOST).iter();
     let (Some(host), None) = (hosts.next(), hosts.next()) else {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "expected exactly one Host header"));
     };
     let known = |authority: &str| is_known(authority, &app.hosts);
+    // The request line may name the host too, and must then name a known host as well.
     if !host.to_str().is_ok_and(known) || !uri.authority().is_none_or(|authority| known(authority.as_str())) {
         return Err(Refusal::new(
             StatusCode::FORBIDDEN,
@@ -94,12 +99,13 @@ fn check_host(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> 
     Ok(())
 }
 
-/// Whether a browser comes with the ticket, which is used up then.
+/// Returns whether the request comes with the valid ticket. The ticket is invalid afterwards.
 fn has_ticket(app: &App, uri: &Uri, method: &Method) -> bool {
     let offered = || uri.query().unwrap_or_default().split('&').find_map(|part| part.strip_prefix("ticket="));
     uri.path() == "/open" && method == Method::GET && offered().is_some_and(|offered| app.ticket.redeem(offered.as_bytes()))
 }
 
+/// Returns the role of the token, shown in the header `Authorization` or in the query.
 fn check_token(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Role, Refusal> {
     let in_header = headers.get_all(header::AUTHORIZATION).iter().filter_map(|value| bearer(value.as_bytes()));
     let in_query = uri.query().unwrap_or_default().split('&').filter_map(|part| part.strip_prefix("token=")).map(str::as_bytes);
@@ -116,10 +122,10 @@ fn check_token(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<Role, Refusa
     })
 }
 
-/// Whether a host, with or without a port, is one to be asked for.
+/// Returns whether the server answers for a host, given with or without a port.
 ///
-/// An attacker may point a name at this machine, so that a page may talk to it: requests of that page ask by that name. So addresses are let in, and
-/// names that are known.
+/// An attacker can point a name of his own at this machine and let a page of that name send requests. A browser puts the attacker's name into `Host`. So
+/// only addresses, `localhost` and configured names are accepted.
 fn is_known(authority: &str, names: &[String]) -> bool {
     let (host, port) = match authority.strip_prefix('[') {
         Some(inside) => inside.split_once(']').unwrap_or_default(),
@@ -134,6 +140,7 @@ fn is_known(authority: &str, names: &[String]) -> bool {
     is_port && is_host
 }
 
+/// Returns the token of a header `Authorization: Bearer TOKEN`.
 fn bearer(value: &[u8]) -> Option<&[u8]> {
     let (scheme, token) = value.split_at_checked(7)?;
     scheme.eq_ignore_ascii_case(b"bearer ").then(|| token.trim_ascii())

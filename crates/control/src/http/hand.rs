@@ -1,4 +1,4 @@
-//! A hand of a page, over a WebSocket: places in, pictures of the motion out.
+//! The WebSocket of a page with a hand: positions of the hand come in, pictures of the motion go out.
 
 use core::pin::pin;
 use core::time::Duration;
@@ -25,30 +25,32 @@ use super::play::stage;
 use super::{App, Refusal};
 use crate::Stage;
 
-/// A longer message is no place: three numbers with all their digits take 75 bytes.
+/// Length of the longest accepted message \[byte\]. Three numbers with all digits take 75 bytes.
 const LONGEST: usize = 128;
-/// Some places at once \[byte\].
+/// Length of the read buffer \[byte\], enough for several positions.
 const READ_AT_ONCE: usize = 8 * LONGEST;
-/// A picture of the motion is sent so often at most.
+/// Shortest time between two pictures of the motion.
 const EVERY: Duration = Duration::from_millis(16);
-/// A page that takes no picture for so long is gone.
+/// Time after which a page that accepts no picture counts as gone.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A place, or `None` for a hand that lets go.
+/// Position of a hand \[m\], or `None` for a hand that lets go.
 type Place = Option<[f64; 3]>;
 
-/// Reads what a page says of its hand: a list of three finite numbers, or `null`.
+/// Parses a message of a page: a list of three finite numbers, or `null`. Returns `None` for any other text.
 fn read(text: &str) -> Option<Place> {
     let place: Place = serde_json::from_str(text).ok()?;
     place.is_none_or(|place| place.iter().all(|x| x.is_finite())).then_some(place)
 }
 
-/// Takes a hand for the page that asks, and goes on over a WebSocket. Without `hand=` in the query it is any that is free; `hand=none` only looks on.
+/// `GET /api/hand`: takes a hand for a page, and switches to a WebSocket. The query `hand=NUMBER` asks for a hand, `hand=none` only watches, and a missing
+/// `hand` takes any free hand.
 pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -> Result<Response, Refusal> {
     let stage = stage(&app)?;
     check_origin(request.headers())?;
     let wanted = wanted(request.uri())?;
     let seat = request.extensions().get::<Arc<Seat>>().cloned();
+    // The answer is made first, so that a request without a WebSocket takes no hand.
     let answer = create_response_with_body(&request, Body::empty)
         .map_err(|error| Refusal::new(StatusCode::UPGRADE_REQUIRED, format!("expected a WebSocket: {error}")))?;
     let upgrade = hyper::upgrade::on(&mut request);
@@ -61,7 +63,8 @@ pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -
     Ok(answer.into_response())
 }
 
-/// A page of another site cannot know the token; a browser says besides where a page comes from.
+/// Refuses pages of other sites by the `Origin` header, which browsers always send with a WebSocket. Such a page could not know the token either; this is a
+/// second barrier.
 fn check_origin(headers: &HeaderMap) -> Result<(), Refusal> {
     let text = |name| headers.get(name).and_then(|value: &axum::http::HeaderValue| value.to_str().ok());
     let foreign = text(header::ORIGIN).is_some_and(|origin| origin.strip_prefix("http://") != text(header::HOST));
@@ -71,12 +74,14 @@ fn check_origin(headers: &HeaderMap) -> Result<(), Refusal> {
     Ok(())
 }
 
+/// Hand asked for in a query.
 enum Wanted {
     Any,
     None,
     One(usize),
 }
 
+/// Parses the query of a request for a hand.
 fn wanted(uri: &Uri) -> Result<Wanted, Refusal> {
     let said = uri.query().unwrap_or_default().split('&').find_map(|part| part.strip_prefix("hand="));
     match said {
@@ -89,7 +94,7 @@ fn wanted(uri: &Uri) -> Result<Wanted, Refusal> {
     }
 }
 
-/// A hand that is left when its page goes, however it goes.
+/// A taken hand. Dropping the value gives the hand back, however the connection ends.
 struct Taken {
     stage: Arc<dyn Stage>,
     hand: usize,
@@ -101,13 +106,14 @@ impl Drop for Taken {
     }
 }
 
-/// Limits of a WebSocket: sizes of messages and frames from a page.
+/// Returns the limits of messages and frames from a page.
 fn limits() -> WebSocketConfig {
     WebSocketConfig::default().max_message_size(Some(LONGEST)).max_frame_size(Some(LONGEST)).read_buffer_size(READ_AT_ONCE)
 }
 
-/// `seat` is the place of the connection, which is taken for as long as this goes on.
+/// Serves the WebSocket of a page until its end. Holds `seat`, the place of the connection, as long.
 async fn talk(stage: Arc<dyn Stage>, hand: Result<Option<usize>, String>, upgrade: OnUpgrade, seat: Option<Arc<Seat>>) {
+    // A refused hand is told to the page, which may still watch.
     let greeting = match &hand {
         Ok(hand) => json!({ "hand": hand }),
         Err(reason) => json!({ "hand": null, "refused": reason }),
@@ -118,13 +124,14 @@ async fn talk(stage: Arc<dyn Stage>, hand: Result<Option<usize>, String>, upgrad
     let socket: WebSocketStream<Counted<TokioIo<Upgraded>>> = WebSocketStream::from_raw_socket(stream, End::Server, Some(limits())).await;
     let (mut out, incoming) = socket.split();
     if send(&mut out, greeting.to_string()).await {
-        // Whichever ends first ends the other.
+        // Whichever future ends first ends both.
         select(pin!(listen(&taken, incoming)), pin!(show(&*stage, out))).await;
     }
+    // The hand and the place are free only after the end of both directions.
     drop((taken, seat));
 }
 
-/// Moves the hand until the page goes, or says something that no page says.
+/// Moves the hand by the messages of a page, until the page goes or sends a message no page sends.
 async fn listen(taken: &Option<Taken>, mut incoming: impl Incoming<Item = Result<Message, Error>> + Unpin) {
     while let Some(Ok(message)) = incoming.next().await {
         let place = match message {
@@ -141,17 +148,17 @@ async fn listen(taken: &Option<Taken>, mut incoming: impl Incoming<Item = Result
     }
 }
 
-/// Moves a hand by the bytes of a page, until they end or say something that no page says.
+/// Moves a hand by the bytes of a page, until the bytes end or contain a message no page sends.
 #[cfg(fuzzing)]
 pub(crate) async fn hear(stage: Arc<dyn Stage>, hand: usize, stream: impl tokio::io::AsyncRead + tokio::io::AsyncWrite + Unpin) {
     let (_, incoming) = WebSocketStream::from_raw_socket(Counted::new(stream), End::Server, Some(limits())).await.split();
     listen(&Some(Taken { stage, hand }), incoming).await;
 }
 
-/// Shows each new picture of the motion until the page takes no more.
+/// Sends each new picture of the motion, until the page accepts no more.
 async fn show(stage: &dyn Stage, mut out: impl Sink<Message> + Unpin) {
     let mut ticks = interval(EVERY);
-    // A slow page gets fewer, not old ones.
+    // A slow page gets fewer pictures, not old pictures.
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut shown = 0;
     loop {
@@ -166,7 +173,7 @@ async fn show(stage: &dyn Stage, mut out: impl Sink<Message> + Unpin) {
     }
 }
 
-/// Whether it was taken.
+/// Sends a message. Returns whether the page accepted the message in time.
 async fn send(out: &mut (impl Sink<Message> + Unpin), text: String) -> bool {
     matches!(timeout(PATIENCE, out.send(Message::text(text))).await, Ok(Ok(())))
 }
@@ -189,7 +196,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Whatever comes: what is read is finite, and nothing breaks.
+        /// Any text is refused or gives finite numbers, and no text panics.
         #[test]
         fn whatever_comes_is_a_place_or_refused(text in prop_oneof![".*", r"[\[\], 0-9eE.+-]{0,64}", Just("[".repeat(100))]) {
             if let Some(Some(place)) = read(&text) {

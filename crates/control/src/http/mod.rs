@@ -1,4 +1,4 @@
-//! The routes and their answers.
+//! Routes of the server and the state shared by their answers.
 
 mod apart;
 mod body;
@@ -37,42 +37,42 @@ pub(crate) use connection::{PATIENCE, answer_all};
 pub(crate) use pace::Pace;
 pub(crate) use shown::Shown;
 
-/// What all answers are made from.
+/// State shared by all requests.
 pub(crate) struct App {
     pub(crate) board: Arc<Board>,
-    /// The last snapshot as text.
+    /// Newest snapshot as text.
     pub(crate) shown: Shown,
-    /// Waited for without keeping the thread: a change may read files.
+    /// Editor of the links. An asynchronous lock, because a change may read files while others wait.
     pub(crate) editor: Arc<Mutex<Box<dyn LinkEditor>>>,
     pub(crate) token: Token,
     pub(crate) ticket: Arc<Ticket>,
-    /// That of those to whom a link was handed out.
+    /// Token of guests; `None` for a run without guests.
     pub(crate) guests: Option<Token>,
     pub(crate) hosts: Vec<String>,
-    /// If people take part from a page.
+    /// Run in which people take part; `None` for other runs.
     pub(crate) stage: Option<Arc<dyn Stage>>,
-    /// One comparison takes a core.
+    /// Permit of the only comparison at a time, since a comparison keeps a core busy.
     pub(crate) comparing: Semaphore,
-    /// The turns of guests' requests.
+    /// Turns of guests' requests.
     pub(crate) pace: Pace,
-    /// How long a body may take.
+    /// Time limit of a request's body.
     pub(crate) patience: Duration,
 }
 
 impl App {
-    /// The editor, as soon as no change is being made.
+    /// Locks the editor, after waiting for the present change.
     async fn editor(&self) -> OwnedMutexGuard<Box<dyn LinkEditor>> {
         Arc::clone(&self.editor).lock_owned().await
     }
 
-    /// The number of the link that a path names, if there is one.
+    /// Parses the number of a link; `None` if no link has the number.
     fn link(&self, text: &str) -> Option<usize> {
-        // Written in one way only: no sign, no leading zeros.
+        // Each link has a single address: signs and leading zeros are refused.
         text.parse::<usize>().ok().filter(|link| *link < self.board.description().links.len() && link.to_string() == text)
     }
 }
 
-/// The routes, behind the guard.
+/// Builds the routes, all protected by the guard.
 pub(crate) fn router(app: App) -> Router {
     let app = Arc::new(app);
     let pages = if app.stage.is_some() { play::routes() } else { Router::new().route("/", get(page::page)) };
@@ -85,11 +85,12 @@ pub(crate) fn router(app: App) -> Router {
         .route("/metrics", get(read::metrics))
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed)
+        // Layers added last run first: the guard sees every request, also for unknown paths.
         .layer(from_fn_with_state(Arc::clone(&app), guard::guard))
         .with_state(app)
 }
 
-/// A refusal with its reason, as it is shown to the user: `{"error": "…"}`.
+/// A refusal with its reason for the user, sent as `{"error": "…"}`.
 #[derive(Debug)]
 struct Refusal {
     status: StatusCode,
@@ -108,12 +109,12 @@ impl IntoResponse for Refusal {
     }
 }
 
-/// A value as the body of an answer.
+/// Answers with JSON.
 fn json(value: &Value) -> Response {
     ([(header::CONTENT_TYPE, HeaderValue::from_static("application/json"))], format!("{value}\n")).into_response()
 }
 
-/// There is no such path.
+/// Refuses an unknown path.
 async fn not_found(uri: Uri) -> Refusal {
     Refusal::new(
         StatusCode::NOT_FOUND,
@@ -124,7 +125,7 @@ async fn not_found(uri: Uri) -> Refusal {
     )
 }
 
-/// There is such a path, but not for this method.
+/// Refuses a known path with a wrong method.
 async fn method_not_allowed(method: Method, uri: Uri) -> Refusal {
     let expected = match uri.path() {
         path if path.starts_with("/api/links") => "GET or PATCH",

@@ -1,26 +1,27 @@
-//! The turns of guests: their requests are answered one after the other, so that all guests together do not take the whole time of the server's thread.
+//! Turns of guests: requests of guests are answered one at a time with pauses, so that all guests together leave time for the host.
 
 use core::time::Duration;
 use std::sync::{Mutex, PoisonError};
 
 use tokio::time::{Instant, sleep_until};
 
-/// A guest's request begins that long after the one before it at the earliest. A page asks for four things when it is opened.
+/// Shortest time between the beginnings of two guests' requests. A page sends four requests when opened.
 const EVERY: Duration = Duration::from_millis(5);
 
-/// Turns, one every [`EVERY`].
+/// Queue of turns, [`EVERY`] apart.
 #[derive(Debug, Default)]
 pub(crate) struct Pace {
-    /// When the next turn may be; `None` before the first one.
+    /// Earliest instant of the next turn; `None` before the first.
     next: Mutex<Option<Instant>>,
 }
 
 impl Pace {
-    /// Waits for a turn.
+    /// Waits for the next free turn.
     pub(super) async fn turn(&self) {
         sleep_until(self.reserve(Instant::now())).await;
     }
 
+    /// Reserves a turn and returns its instant, `now` or later.
     fn reserve(&self, now: Instant) -> Instant {
         let mut next = self.next.lock().unwrap_or_else(PoisonError::into_inner);
         let turn = next.map_or(now, |next| next.max(now));

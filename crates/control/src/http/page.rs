@@ -1,4 +1,4 @@
-//! The page, compiled in: one document, whose style and script are known to the browser by their hashes.
+//! The pages, compiled into the program: single documents, with style and script allowed by their hashes.
 
 use std::sync::LazyLock;
 
@@ -50,18 +50,19 @@ const PLAY_SCRIPT: &str = concat!(
 
 static PLAY: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/play/page.html"), PLAY_STYLE, PLAY_SCRIPT));
 
-/// A document with what it may do.
+/// A page with its content security policy.
 struct Document {
     html: String,
     policy: HeaderValue,
 }
 
 impl Document {
-    /// Puts style and script where the document names them.
+    /// Inserts style and script in the places marked `{{style}}` and `{{script}}`.
     fn new(html: &str, style: &str, script: &str) -> Self {
-        // A script is run in strict mode of its own: nothing of it is global.
+        // The function keeps all names of the script local.
         let script = format!("(() => {{\n'use strict';\n{script}\n}})();");
         let hash = |text: &str| STANDARD.encode(Sha256::digest(text.as_bytes()));
+        // Only this style and this script may run: names from a scene that contain HTML cannot add a script.
         let policy = format!(
             "default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; connect-src 'self'; img-src data:; form-action 'self'; \
              base-uri 'none'; frame-ancestors 'none'",
@@ -81,17 +82,17 @@ impl Document {
     }
 }
 
-/// The page itself.
+/// Answers with the page of counters and links.
 pub(super) async fn page() -> Response {
     PAGE.answer(StatusCode::OK)
 }
 
-/// The page of a run in which people take part.
+/// Answers with the page of a run in which people take part.
 pub(super) async fn play() -> Response {
     PLAY.answer(StatusCode::OK)
 }
 
-/// For a browser that has not shown the token: takes it from the tab, where the page left it, or asks for it.
+/// Answers a browser without a token: the document reads the token from the tab's storage, or asks for the token.
 pub(super) fn door() -> Response {
     DOOR.answer(StatusCode::UNAUTHORIZED)
 }

@@ -1,4 +1,4 @@
-//! A stream to a program that may not read: a write that does not get on for a while ends the connection.
+//! A stream with a time limit for writes, against clients that do not read.
 
 use core::pin::Pin;
 use core::task::{Context, Poll, ready};
@@ -8,12 +8,12 @@ use std::io;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep};
 
-/// A stream whose writes fail if the other end takes nothing for that long.
+/// Stream wrapper. A write fails with [`io::ErrorKind::TimedOut`] if the other end accepts nothing for `patience`.
 #[derive(Debug)]
 pub(super) struct Patient<S> {
     stream: S,
     patience: Duration,
-    /// When the write that waits has waited for too long.
+    /// Timer of the waiting write; meaningful only while `is_waiting`.
     overdue: Pin<Box<Sleep>>,
     is_waiting: bool,
 }
@@ -23,12 +23,13 @@ impl<S> Patient<S> {
         Self { stream, patience, overdue: Box::pin(sleep(patience)), is_waiting: false }
     }
 
-    /// Passes on the result of a write, or an error if the write has waited for too long.
+    /// Passes on the result of a write, or fails if the write has waited for too long.
     fn timed<T>(&mut self, cx: &mut Context<'_>, written: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
         if written.is_ready() {
             self.is_waiting = false;
             return written;
         }
+        // The timer begins with the first pending poll of a write and restarts after each progress.
         if !self.is_waiting {
             self.is_waiting = true;
             self.overdue.as_mut().reset(Instant::now() + self.patience);

@@ -1,4 +1,4 @@
-//! Places of connections: the host, guests and strangers have places of their own, so that neither guests nor strangers keep the host out.
+//! Places of connections: limits the open connections of hosts, guests and strangers separately, so that neither guests nor strangers can keep the host out.
 
 use core::net::{IpAddr, Ipv6Addr};
 use std::collections::{BTreeMap, VecDeque};
@@ -8,14 +8,14 @@ use tokio::sync::Notify;
 
 use crate::Role;
 
-/// How many connections of each kind may be open. The real-time side shares the limit of open files with them, which is often 1024.
+/// Limits of open connections. Connections share the process's limit of open files, often 1024, with the real-time side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// Connections on which no token was shown yet.
+    /// Most connections without a shown token.
     pub(super) strangers: usize,
-    /// Connections with the token of guests.
+    /// Most connections with the token of guests.
     pub(super) guests: usize,
-    /// Connections with the token of the host.
+    /// Most connections with the token of the host.
     pub(super) hosts: usize,
 }
 
@@ -30,7 +30,7 @@ impl Limits {
     }
 }
 
-/// The places of a server.
+/// All places of a server, free and taken.
 #[derive(Debug)]
 pub(super) struct Places {
     limits: Limits,
@@ -38,14 +38,15 @@ pub(super) struct Places {
 }
 
 #[derive(Debug, Default)]
+/// Taken places. Each connection counts once: as a stranger, a guest or a host.
 struct Taken {
-    /// In order of arrival.
+    /// Strangers in order of arrival, and so in ascending order of `number`.
     strangers: VecDeque<Stranger>,
-    /// How many of the strangers come from each network.
+    /// Number of strangers by network. Entries are never zero.
     networks: BTreeMap<IpAddr, usize>,
     guests: usize,
     hosts: usize,
-    /// Connections so far.
+    /// Number of connections so far; gives each stranger a unique number.
     arrived: u64,
 }
 
@@ -61,7 +62,8 @@ impl Places {
         Arc::new(Self { limits, taken: Mutex::default() })
     }
 
-    /// Gives a new connection the place of a stranger. If all are taken, another stranger goes, as [`send_one_away`](Self::send_one_away) says.
+    /// Takes a stranger's place for a new connection. If all are taken, another stranger loses its place first, chosen as in
+    /// [`send_one_away`](Self::send_one_away).
     pub(super) fn take(self: &Arc<Self>, address: IpAddr) -> Arc<Seat> {
         let mut taken = self.lock();
         if taken.strangers.len() >= self.limits.strangers {
@@ -74,8 +76,8 @@ impl Places {
         Arc::new(Seat { places: Arc::clone(self), number, sent_away, role: Mutex::new(None) })
     }
 
-    /// Ends the oldest connection on which no token was shown yet, of the network that has most of them: a flood from elsewhere does not send away the
-    /// host before its first request has come.
+    /// Ends the oldest stranger's connection from the network with the most strangers. So a flood from another network does not displace a host whose first
+    /// request is still on the way.
     pub(super) fn send_one_away(&self) {
         self.lock().send_one_away();
     }
@@ -87,6 +89,7 @@ impl Places {
 
 impl Taken {
     fn send_one_away(&mut self) {
+        // The network with the most strangers is the likely source of a flood.
         let Some(most) = self.networks.iter().max_by_key(|(_, count)| **count).map(|(network, _)| *network) else { return };
         let oldest = self.strangers.iter().find(|stranger| stranger.network == most).map(|stranger| stranger.number);
         if let Some(stranger) = oldest.and_then(|number| self.remove(number)) {
@@ -94,9 +97,9 @@ impl Taken {
         }
     }
 
-    /// Takes a connection from among the strangers, if it is there.
+    /// Removes a connection from the strangers; `None` if the connection is no stranger any more.
     fn remove(&mut self, number: u64) -> Option<Stranger> {
-        // Numbers grow in order of arrival.
+        // Numbers grow in order of arrival, so the queue is sorted by number.
         let at = self.strangers.binary_search_by_key(&number, |stranger| stranger.number).ok()?;
         let stranger = self.strangers.remove(at)?;
         if let Some(count) = self.networks.get_mut(&stranger.network) {
@@ -116,7 +119,8 @@ impl Taken {
     }
 }
 
-/// The addresses that one machine can choose from freely count as one: those of IPv6 that begin with the same 64 bits.
+/// Returns the network of an address, counted as a single client: the first 64 bits of an IPv6 address, since a machine can choose the other bits freely,
+/// and the whole of an IPv4 address.
 fn network_of(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V4(address) => address.into(),
@@ -124,28 +128,30 @@ fn network_of(address: IpAddr) -> IpAddr {
     }
 }
 
-/// The place of a connection, which is free again when the last part of the connection ends: the page that it serves, or the WebSocket that it became.
+/// The place of a connection. Shared by all parts of the connection (requests in progress, a WebSocket), and free again when the last part is dropped.
 #[derive(Debug)]
 pub(super) struct Seat {
     places: Arc<Places>,
     number: u64,
     sent_away: Arc<Notify>,
-    /// The highest role that was shown; `None`: a stranger.
+    /// Highest role shown on the connection; `None` for a stranger.
     role: Mutex<Option<Role>>,
 }
 
 impl Seat {
-    /// Whether no token was shown on this connection.
+    /// Returns whether no token was shown on the connection.
     pub(super) fn is_strange(&self) -> bool {
         self.role().is_none()
     }
 
-    /// Gives the connection a place among those of this role; one that showed the token of the host stays the host's. `false`: there is no place.
+    /// Moves the connection to the places of `role`. A host's connection stays a host's. Returns `false` if all places of `role` are taken; the connection
+    /// then keeps its old place.
     pub(super) fn show(&self, role: Role) -> bool {
         let mut shown = self.role();
         if *shown == Some(role) || *shown == Some(Role::Host) {
             return true;
         }
+        // The order of locks is the same in all methods: first the seat's role, then the places.
         let mut taken = self.places.lock();
         if *taken.count(role) >= self.places.limits.of(role) {
             return false;
@@ -159,7 +165,7 @@ impl Seat {
         true
     }
 
-    /// Returns when the connection is to end because others need its place.
+    /// Returns when the connection must end, because a newer connection took its place.
     pub(super) async fn sent_away(&self) {
         self.sent_away.notified().await;
     }
@@ -170,6 +176,7 @@ impl Seat {
 }
 
 impl Drop for Seat {
+    // The connection still counts for its last role, or as a stranger unless it was sent away.
     fn drop(&mut self) {
         let role = *self.role();
         let mut taken = self.places.lock();
@@ -194,7 +201,7 @@ mod tests {
         Places::new(Limits { strangers, guests, hosts })
     }
 
-    /// Whether the connection was asked to end.
+    /// Returns whether the connection was asked to end.
     fn is_sent_away(seat: &Seat) -> bool {
         use futures_util::FutureExt as _;
 
@@ -237,7 +244,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever happens: nobody has more places than there are, and when all have gone every place is free.
+        /// After any sequence of steps no role has more connections than places, and all places are free after the last connection.
         #[test]
         fn places_are_counted_right(steps in prop::collection::vec((0..3_u8, 0..8_usize, any::<bool>()), 0..200)) {
             let places = places(3, 2, 1);

@@ -1,4 +1,4 @@
-//! The routes of a run in which people take part from a page.
+//! Routes of a run in which people take part from a page.
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use super::apart::apart;
 use super::{App, Refusal, body as bodies, hand, json as answer, page};
 use crate::{Role, Stage};
 
-/// A wish is a few words.
+/// Length of the longest accepted wish \[byte\]: a small JSON object.
 const LARGEST_WISH: usize = 4096;
 
-/// The routes. The page of a run that nobody takes part in is here at `/details`.
+/// Returns the routes. The page of counters, which has the path `/` in other runs, has the path `/details` here.
 pub(super) fn routes() -> Router<Arc<App>> {
     Router::new()
         .route("/", get(page::play))
@@ -42,22 +42,23 @@ async fn begin_anew(State(app): State<Arc<App>>, body: Body) -> Result<Response,
     let body = bodies::read(&app, body, LARGEST_WISH).await?;
     let wish: Value = serde_json::from_slice(&body).map_err(|error| unprocessable(format!("expected a JSON object: {error}")))?;
     let stage = stage(&app)?;
-    // The scene is read anew, and the files that it names.
+    // The restart reads the scene and its files, which may take long.
     let begun = apart(move || stage.begin_anew(&wish).map(|()| stage.facts(Role::Host))).await;
     let begun = begun.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the new part broke off"))?;
     Ok(answer(&begun.map_err(unprocessable)?))
 }
 
-/// Takes a while: others are answered meanwhile, on the thread of the server.
+/// `POST /api/compare`: runs the comparison on another thread, because a comparison takes a while. A second comparison at the same time is refused.
 async fn compare(State(app): State<Arc<App>>) -> Result<Response, Refusal> {
     let stage = stage(&app)?;
+    // The permit ends with this request, also if the client goes away before the comparison has ended.
     let _one = app.comparing.try_acquire().map_err(|_| Refusal::new(StatusCode::CONFLICT, "a comparison is running: wait for its result"))?;
     let compared = apart(move || stage.compare()).await;
     let compared = compared.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the comparison broke off"))?;
     Ok(answer(&compared.map_err(|reason| Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, reason))?))
 }
 
-/// For the host alone: a record may be large, and guests who all ask for it at once would fill the memory.
+/// `GET /api/files/{name}`: sends a file to the host. Guests are refused, because many guests asking for a large recording at once would fill the memory.
 async fn file(State(app): State<Arc<App>>, axum::Extension(role): axum::Extension<Role>, Path(name): Path<String>) -> Result<Response, Refusal> {
     if role != Role::Host {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "only the person who started the run may have its record: this token is that of a guest"));

@@ -1,4 +1,4 @@
-//! Answers that change nothing: JSON, metrics, and server-sent events with the state whenever a new one was published.
+//! Routes without changes: state, links, histograms and metrics, and a stream of events with each new state.
 
 use core::convert::Infallible;
 use core::time::Duration;
@@ -16,39 +16,39 @@ use tokio::time::{Interval, MissedTickBehavior, interval};
 use super::{App, Refusal, json as answer};
 use crate::{metrics, typed, views};
 
-/// Everything that changes by itself.
+/// `GET /api/state`: the whole state.
 pub(super) async fn state(State(app): State<Arc<App>>) -> Response {
     let shown = app.shown.latest(&app.board);
     ([(header::CONTENT_TYPE, HeaderValue::from_static("application/json"))], shown.json.clone()).into_response()
 }
 
-/// Every link with its counters and keys.
+/// `GET /api/links`: all links with counters and keys.
 pub(super) async fn links(State(app): State<Arc<App>>) -> Response {
     let all: Vec<usize> = (0..app.board.description().links.len()).collect();
     answer(&json!({ "links": with_keys(&app, &all).await }))
 }
 
-/// One link with its counters and keys.
+/// `GET /api/links/{link}`: a link with counters and keys.
 pub(super) async fn link(State(app): State<Arc<App>>, path: Result<Path<String>, PathRejection>) -> Result<Response, Refusal> {
     let link = named(&app, path)?;
     Ok(answer(&with_keys(&app, &[link]).await.pop().unwrap_or_default()))
 }
 
-/// Distributions of lateness and of delay.
+/// `GET /api/histograms`: distributions of clock lateness and of link delay.
 pub(super) async fn histograms(State(app): State<Arc<App>>) -> Response {
     answer(&views::histograms(&app.board.latest()))
 }
 
-/// All counters as Prometheus reads them.
+/// `GET /metrics`: all counters in Prometheus' text format.
 pub(super) async fn metrics(State(app): State<Arc<App>>) -> Response {
     let latest = app.board.latest();
     let text = metrics::text(&latest.description, &latest);
     ([(header::CONTENT_TYPE, HeaderValue::from_static("text/plain; version=0.0.4; charset=utf-8"))], text).into_response()
 }
 
-/// The link that a path names.
+/// Returns the number of the link named by a path, or a refusal for an unknown link.
 pub(super) fn named(app: &App, path: Result<Path<String>, PathRejection>) -> Result<usize, Refusal> {
-    // A path that is not UTF-8 names no link either.
+    // A path with bytes outside UTF-8 becomes the empty text, which is no number.
     let text = path.map(|Path(text)| text).unwrap_or_default();
     app.link(&text).ok_or_else(|| {
         let expected = match app.board.description().links.len() {
@@ -60,8 +60,9 @@ pub(super) fn named(app: &App, path: Result<Path<String>, PathRejection>) -> Res
     })
 }
 
-/// Links with their counters and keys.
+/// Returns the links with counters and keys, in the given order.
 pub(super) async fn with_keys(app: &App, links: &[usize]) -> Vec<Value> {
+    // The wait for a change may be long, so the snapshot is taken after the lock, and is new.
     let editor = app.editor().await;
     let latest = app.board.latest();
     let view = |link: &usize| {
@@ -70,26 +71,29 @@ pub(super) async fn with_keys(app: &App, links: &[usize]) -> Vec<Value> {
         view["keys"] = keys.into();
         view
     };
-    // Another run, with fewer links, may have taken the place of the one that was asked about.
+    // A run with fewer links may have replaced the run of the request.
     links.iter().filter(|link| **link < latest.description.links.len()).map(view).collect()
 }
 
-/// How often it is looked whether there is something new.
+/// Time between two checks for a new snapshot.
 const EVERY: Duration = Duration::from_millis(100);
-/// After this number of looks without anything new a comment says that the server is still there: 1 s.
+/// Number of checks without a new snapshot, after which a comment line shows that the server is alive: 1 s.
 const QUIET: u32 = 10;
 
+/// State of a stream of events.
 struct Listener {
     app: Arc<App>,
     ticks: Interval,
+    /// Number of the snapshot sent last; `None` before the first.
     sent: Option<u64>,
+    /// Checks without a new snapshot since the last line sent.
     quiet: u32,
 }
 
-/// The state at once, then each time that it was published anew, at most ten times a second.
+/// `GET /api/events`: a stream of server-sent events. Sends the state at once, and then each new state, at most ten per second.
 pub(super) async fn events(State(app): State<Arc<App>>) -> Response {
     let mut ticks = interval(EVERY);
-    // A slow reader gets less, not the past.
+    // A slow reader gets fewer states, and always the newest.
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let listener = Listener { app, ticks, sent: None, quiet: 0 };
     let events = unfold(listener, |mut listener| async {

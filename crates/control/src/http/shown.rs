@@ -1,4 +1,4 @@
-//! The last snapshot as text, made once for all connections that show it.
+//! Text of the newest snapshot, made once for all connections.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -6,23 +6,23 @@ use axum::body::Bytes;
 
 use crate::{Board, views};
 
-/// A snapshot as text.
+/// Texts of a snapshot.
 #[derive(Clone, Debug)]
 pub(super) struct Text {
-    /// The number of the snapshot.
+    /// Number of the snapshot.
     pub(super) number: u64,
-    /// The state as JSON, with the end of its line.
+    /// State as a line of JSON, with the end of line.
     pub(super) json: Bytes,
-    /// The state as an event of a stream.
+    /// State as a server-sent event.
     pub(super) event: Bytes,
 }
 
-/// The newest [`Text`] that somebody asked for. Without it the same state would be written again for each stream of events, ten times a second.
+/// Cache of the newest requested [`Text`]. Without the cache, each stream of events would convert the same state again, ten times per second.
 #[derive(Debug, Default)]
 pub(crate) struct Shown(Mutex<Option<Arc<Text>>>);
 
 impl Shown {
-    /// The last snapshot of the board.
+    /// Returns the text of the board's newest snapshot.
     pub(super) fn latest(&self, board: &Board) -> Arc<Text> {
         let latest = board.latest();
         let mut shown = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -30,8 +30,9 @@ impl Shown {
             return Arc::clone(text);
         }
         let head = format!("event: state\nid: {}\ndata: ", latest.number);
-        // JSON is one line, so it is one line of data.
+        // An event of several lines would need "data: " before each. JSON from serde_json is a single line.
         let event = Bytes::from(format!("{head}{}\n\n", views::state(&latest)));
+        // The JSON lies inside the event, so both share the memory. The event ends in two line feeds, and the JSON keeps the first.
         let json = event.slice(head.len()..event.len() - 1);
         let text = Arc::new(Text { number: latest.number, json, event });
         *shown = Some(Arc::clone(&text));

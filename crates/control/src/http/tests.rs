@@ -1,4 +1,4 @@
-//! The routes without a socket: admission, answers, and what reaches the editor.
+//! Routes without a socket: admission, answers, and calls of the editor.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex};
@@ -18,11 +18,11 @@ use crate::{Board, Body as ObjectBody, Description, Kind, LinkCounters, LinkEdit
 
 pub(super) const TOKEN: &str = "a-token-of-more-than-22-characters";
 
-/// Links, and keys with values.
+/// Links and keys of a call of the editor.
 type Call = (Vec<usize>, Vec<(String, String)>);
 type Calls = Arc<Mutex<Vec<Call>>>;
 
-/// Writes down what it is asked for, and refuses the key `bad`.
+/// An editor that records its calls and refuses the key `bad`.
 struct Recorder(Calls);
 
 impl LinkEditor for Recorder {
@@ -93,7 +93,7 @@ impl Site {
         })
     }
 
-    /// A request that is let in.
+    /// Returns the answer to a request with the right token.
     fn ask(&self, method: &str, path: &str, body: impl Into<Body>) -> Answer {
         self.send(request(method, path).header("authorization", format!("Bearer {TOKEN}")).body(body.into()).unwrap())
     }
@@ -133,7 +133,7 @@ fn the_state_has_measures_where_the_run_has_some() {
     assert!(!state.as_object().unwrap().contains_key("measures"));
 }
 
-/// Turned a quarter about z, with a device that turns; the second one is not known yet.
+/// The first peer is turned by a quarter about z and has a device with an orientation. The second peer is unknown yet.
 #[test]
 fn attitudes_are_in_the_state_of_an_object_that_turns_alone() {
     let names = |name: &str| PeerName { name: name.to_owned(), kind: "simulated".to_owned() };
@@ -183,7 +183,7 @@ fn the_token_is_taken_from_a_header_or_from_the_address() {
     assert_eq!(lower.status, StatusCode::OK);
 }
 
-/// The address for a program that opens browsers leads to the page once; then, and by another host, it leads nowhere.
+/// The address for opening a browser leads to the page once. A second use is refused, and so is another host.
 #[test]
 fn a_ticket_leads_to_the_page_once() {
     let site = Site::new(1);
@@ -300,7 +300,7 @@ fn links_are_shown_with_counters_and_keys() {
     let all = site.ask("GET", "/api/links", "").json();
     assert_eq!(all["links"].as_array().unwrap().len(), 2);
     assert_eq!(all["links"][0], one);
-    // Nothing was published for the second.
+    // No counters were published for the second link.
     assert_eq!((&all["links"][1]["offered"], &all["links"][1]["keys"]["delay"]), (&json!(0), &json!("1ms")));
 }
 
@@ -367,7 +367,7 @@ proptest! {
     fn whatever_is_asked_is_answered(method in "[A-Z]{1,7}", path in "/[ -~]{0,40}", body in prop::collection::vec(any::<u8>(), 0..200)) {
         prop_assume!(!path.starts_with("/api/events"));
         let built = request(&method, &path).header("authorization", format!("Bearer {TOKEN}")).body(Body::from(body));
-        // Not every text is an address; those that are not never get here.
+        // Some texts are no addresses, and the HTTP library refuses to build the request.
         if let Ok(request) = built {
             prop_assert!(Site::new(2).send(request).status.as_u16() < 500);
         }

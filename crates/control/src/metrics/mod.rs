@@ -1,4 +1,4 @@
-//! The counters as Prometheus reads them. The table of names is in `docs/live-control.md`.
+//! Counters of a run as Prometheus metrics. The table of names is in `docs/live-control.md`.
 
 mod exposition;
 #[cfg(test)]
@@ -11,7 +11,7 @@ use exposition::Measure::{Counter, Gauge, Summary};
 
 use crate::{Description, Latest, LinkCounters, PeerView, Presence, Quantiles, Snapshot};
 
-/// A counter of links: its name, what it counts, and where it is.
+/// A counter of links: name of the metric, help text, and access to the value.
 type LinkCount = (&'static str, &'static str, fn(&LinkCounters) -> u64);
 
 const LINK_COUNTERS: [LinkCount; 6] = [
@@ -25,7 +25,7 @@ const LINK_COUNTERS: [LinkCount; 6] = [
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Everything on the board.
+/// Returns all metrics of the newest snapshot as text.
 pub(crate) fn text(description: &Description, latest: &Latest) -> String {
     let mut out = Exposition::default();
     run(&mut out, description, latest);
@@ -127,13 +127,13 @@ fn labels(name: &crate::LinkName) -> [(&str, &str); 3] {
     [("link", &name.name), ("from", &name.from), ("to", &name.to)]
 }
 
-/// The quantiles with their names; NaN if nothing was seen.
+/// Returns the quantiles with their labels \[s\]; NaN without observations.
 fn spans(quantiles: &Quantiles) -> [(&'static str, f64); 4] {
     let seconds = |span: Duration| if quantiles.count == 0 { f64::NAN } else { span.as_secs_f64() };
     [("0.5", seconds(quantiles.p50)), ("0.99", seconds(quantiles.p99)), ("0.999", seconds(quantiles.p999)), ("1", seconds(quantiles.max))]
 }
 
-/// No sample may stand there twice: a cause that is named again is added.
+/// Adds the counts of causes listed twice, because a sample may occur only once in the text.
 fn merged(causes: &[(&'static str, u64)]) -> Vec<(&'static str, u64)> {
     let mut sums: Vec<(&'static str, u64)> = Vec::with_capacity(causes.len());
     for (cause, count) in causes {

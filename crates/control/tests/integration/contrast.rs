@@ -1,11 +1,11 @@
-//! The colours of the pages, on light and on dark ground: contrast as the Web Content Accessibility Guidelines 2.2 ask for it, 4.5:1 for text (success
-//! criterion 1.4.3) and 3:1 for what is drawn and for the borders of controls (1.4.11).
+//! Contrast of the pages' colours on a light and on a dark background, by the Web Content Accessibility Guidelines 2.2: 4.5:1 for text (success criterion
+//! 1.4.3), and 3:1 for drawings and for borders of controls (1.4.11).
 
 use std::collections::BTreeMap;
 
 const STYLE: &str = include_str!("../../page/style.css");
 
-/// Text, and the ground on which it stands.
+/// Pairs of a text colour and its background, by their names in the style sheet.
 const TEXT: [(&str, &str); 16] = [
     ("ink", "card"),
     ("ink", "ground"),
@@ -21,12 +21,12 @@ const TEXT: [(&str, &str); 16] = [
     ("warn", "warn-ground"),
     ("bad", "card"),
     ("bad", "bad-ground"),
-    // Of buttons, and of buttons that are pressed.
+    // Buttons and pressed buttons.
     ("card", "accent"),
     ("card", "good"),
 ];
 
-/// What is drawn, and borders of controls, and the ground on which they are.
+/// Pairs of the colour of a drawing or of a control's border, and the background.
 const DRAWN: [(&str, &str); 15] = [
     ("c0", "card"),
     ("c1", "card"),
@@ -45,7 +45,7 @@ const DRAWN: [(&str, &str); 15] = [
     ("faint", "ground"),
 ];
 
-/// The colours in a part of the style sheet, by name: `--name: #rrggbb`.
+/// Reads the colours of a part of the style sheet by name: `--name: #rrggbb`.
 fn colours(style: &str) -> BTreeMap<&str, [u8; 3]> {
     let declared = style.split("--").skip(1).filter_map(|rest| rest.split_once(": #"));
     let is_name = |name: &str| name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'-');
@@ -59,7 +59,7 @@ fn colours(style: &str) -> BTreeMap<&str, [u8; 3]> {
         .collect()
 }
 
-/// The relative luminance of WCAG 2.2, from 0 to 1.
+/// Returns the relative luminance of WCAG 2.2, from 0 to 1.
 fn luminance(colour: [u8; 3]) -> f64 {
     let linear = |channel: u8| {
         let share = f64::from(channel) / 255.0;
@@ -69,7 +69,7 @@ fn luminance(colour: [u8; 3]) -> f64 {
     0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
 
-/// From 1 to 21.
+/// Returns the contrast of two colours, from 1 to 21.
 fn contrast(one: [u8; 3], other: [u8; 3]) -> f64 {
     let (one, other) = (luminance(one), luminance(other));
     (one.max(other) + 0.05) / (one.min(other) + 0.05)
@@ -79,7 +79,7 @@ fn contrast(one: [u8; 3], other: [u8; 3]) -> f64 {
 fn the_ratio_is_that_of_the_guidelines() {
     assert!((contrast([255; 3], [0; 3]) - 21.0).abs() < 1e-12);
     assert!((contrast([7, 8, 9], [7, 8, 9]) - 1.0).abs() < 1e-12);
-    // The lightest grey that is text on white: #767676 has 4.54, #777777 has 4.48.
+    // The lightest grey accepted as text on white is #767676 with 4.54; #777777 has 4.48.
     assert!(contrast([0x76; 3], [255; 3]) > 4.5 && contrast([0x77; 3], [255; 3]) < 4.5);
 }
 

@@ -1,4 +1,4 @@
-//! Floods of strangers and guests: under each of them the host's page answers.
+//! Floods of strangers and of guests: the host's page answers during each flood.
 
 use core::net::SocketAddr;
 use core::time::Duration;
@@ -12,10 +12,10 @@ use serde_json::Value;
 
 use crate::run::{NoLinks, TOKEN, empty_board};
 
-/// More than an answer ever takes on a busy machine, and less than the 10 s after which a server ends a connection that is too slow.
+/// Longer than an answer takes on a busy machine, and shorter than the 10 s after which the server ends a slow connection.
 const SOON: Duration = Duration::from_secs(8);
 
-/// A run in which everybody looks on.
+/// A run whose people only watch.
 struct Onlookers;
 
 impl Stage for Onlookers {
@@ -62,12 +62,12 @@ impl Flooded {
         self.0.address()
     }
 
-    /// The query that shows the token of guests.
+    /// Returns the query with the token of guests.
     fn guest(&self) -> String {
         self.0.join_url().unwrap().split_once('?').unwrap().1.to_owned()
     }
 
-    /// Connections that each say this, and go on.
+    /// Opens connections, sends `text` on each, and keeps the connections open.
     fn send(&self, count: usize, text: &str) -> Vec<TcpStream> {
         (0..count).map(|_| self.connect(text)).collect()
     }
@@ -76,12 +76,12 @@ impl Flooded {
         let mut stream = TcpStream::connect(self.address()).unwrap();
         stream.set_read_timeout(Some(SOON)).unwrap();
         stream.set_write_timeout(Some(Duration::from_millis(50))).unwrap();
-        // A client that is sent away at once has said nothing.
+        // A connection ended at once cannot be written to, which is fine.
         let _said = stream.write_all(text.as_bytes());
         stream
     }
 
-    /// Asks for the page as the host does, several times.
+    /// Asks for the page several times as the host.
     fn assert_answers(&self, flood: &str) {
         for path in ["/", "/api/state", "/"] {
             let begun = Instant::now();
@@ -161,7 +161,7 @@ fn guests_have_as_many_places_as_there_are_and_get_them_back() {
     }
 }
 
-/// A record may be large, and an answer is kept until it is read.
+/// A recording may be large, and the server keeps an answer until it is read.
 #[test]
 fn the_record_is_for_the_host_alone() {
     let server = Flooded::new();
@@ -172,7 +172,7 @@ fn the_record_is_for_the_host_alone() {
     }
 }
 
-/// A message in any number of empty parts never ends, so that counting messages never ends the connection.
+/// A message with endless empty parts never ends, so a limit of messages would never end the connection.
 #[test]
 fn a_message_of_endless_empty_parts_ends_the_connection() {
     let server = Flooded::new();
@@ -181,7 +181,7 @@ fn a_message_of_endless_empty_parts_ends_the_connection() {
     hand.read_exact(&mut answered).unwrap();
     assert_eq!(&answered, b"HTTP/1.1 101");
     hand.set_write_timeout(Some(SOON)).unwrap();
-    // A text that goes on, and empty parts of it; each has a mask of zeros.
+    // The first frame of a text, then empty continuation frames, each with a mask of zeros.
     hand.write_all(&[0x01, 0x80, 0, 0, 0, 0]).unwrap();
     let parts = [0x00, 0x80, 0, 0, 0, 0].repeat(10_000);
     let begun = Instant::now();

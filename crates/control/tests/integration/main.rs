@@ -1,4 +1,4 @@
-//! The server as programs and people meet it: over a real socket, and in a real browser.
+//! Tests of the server from outside: over a real socket, and in a real browser.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says so")]
 

@@ -1,4 +1,4 @@
-//! A run that is not one: it publishes numbers that follow formulas, and writes down what it is told.
+//! A stand-in for a run: publishes numbers that follow formulas, and records changes.
 
 use core::time::Duration;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,10 +13,10 @@ use cohaptic_control::{
 
 pub(crate) const TOKEN: &str = "a-token-of-more-than-22-characters";
 
-/// The keys of each link, by name.
+/// Keys with values, indexed by link.
 type Keys = Vec<Vec<(String, String)>>;
 
-/// Everything that was told, in order: links, keys.
+/// Changes in order: links and keys.
 pub(crate) type Told = Arc<Mutex<Vec<(Vec<usize>, Vec<(String, String)>)>>>;
 
 struct Editor {
@@ -45,7 +45,7 @@ impl LinkEditor for Editor {
     }
 }
 
-/// A server over a run with these many links and peers.
+/// A server and its run with given numbers of links and peers.
 pub(crate) struct Run {
     pub(crate) server: Option<Server>,
     pub(crate) board: Arc<Board>,
@@ -55,12 +55,12 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    /// Nothing is published by itself.
+    /// Starts a run that publishes nothing by itself.
     pub(crate) fn still(links: usize, peers: usize) -> Self {
         Self::of(description(links, peers), 0)
     }
 
-    /// One peer with a plate of 0.4 m × 0.3 m at the origin, which is turned so and stays so.
+    /// Starts a run with a single peer, whose plate of 0.4 m × 0.3 m at the origin keeps the given orientation.
     pub(crate) fn turned(orientation: [f64; 4]) -> Self {
         let body = Some(Body { edges: [0.4, 0.3, 0.0], grasps: vec![[0.2, 0.15, 0.0]] });
         let run = Self::of(Description { body, ..description(1, 1) }, 0);
@@ -83,14 +83,14 @@ impl Run {
         Self { server: Some(server), board, told, ended: Arc::default(), publisher: None }
     }
 
-    /// Publishes 20 times a second. `port` 0: any.
+    /// Starts a run that publishes 20 times per second. Port 0 takes any free port.
     pub(crate) fn moving(links: usize, peers: usize, axes: usize, port: u16) -> Self {
         let mut run = Self::of(description(links, peers), port);
         let (board, ended) = (Arc::clone(&run.board), Arc::clone(&run.ended));
         run.publisher = Some(std::thread::spawn(move || {
             let begin = Instant::now();
             while !ended.load(Ordering::Relaxed) {
-                // A snapshot that was not taken is followed by another.
+                // A snapshot refused by the board is followed by the next.
                 let _taken = board.publish(Arc::new(snapshot(begin.elapsed(), links, peers, axes)));
                 std::thread::sleep(Duration::from_millis(50));
             }
@@ -102,7 +102,7 @@ impl Run {
         self.server.as_ref().unwrap()
     }
 
-    /// The port, which is free again when this returns.
+    /// Stops the server and returns its port, which is free again.
     pub(crate) fn stop(mut self) -> u16 {
         let port = self.server().address().port();
         self.server.take().unwrap().stop();
@@ -114,13 +114,13 @@ impl Drop for Run {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(publisher) = self.publisher.take() {
-            // A test that fails must not panic again; without its numbers it does fail.
+            // A panic of the publisher is not repeated, because the test would abort without its message. The test fails anyway without the numbers.
             let _ended = publisher.join();
         }
     }
 }
 
-/// The links of a run that has none.
+/// An editor for a run without links.
 pub(crate) struct NoLinks;
 
 impl LinkEditor for NoLinks {
@@ -133,7 +133,7 @@ impl LinkEditor for NoLinks {
     }
 }
 
-/// The board of a run that has nothing.
+/// Returns the board of a run without links, peers, clocks and measures.
 pub(crate) fn empty_board() -> Arc<Board> {
     let description = Description {
         kind: Kind::Router,
@@ -168,7 +168,7 @@ fn description(links: usize, peers: usize) -> Description {
     }
 }
 
-/// The whole part of a number that counts something.
+/// Returns the whole part of a count.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of a made-up run, far below 2^53")]
 fn whole(number: f64) -> u64 {
     number as u64

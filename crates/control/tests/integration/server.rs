@@ -1,4 +1,4 @@
-//! Over a real socket: addresses, events, the end.
+//! The server over a real socket: addresses, events, and the end.
 
 use core::net::SocketAddr;
 use core::time::Duration;
@@ -10,10 +10,10 @@ use cohaptic_control::{Board, ServeError, ServerConfig, Snapshot, serve};
 
 use crate::run::{NoLinks, Run, TOKEN, empty_board};
 
-/// Nothing here takes long; a wait without end would hide what went wrong.
+/// Far longer than any wait here takes, so that a fault fails the test instead of blocking it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Again and again: a reader may be in the way at the very moment.
+/// Publishes a snapshot, again and again if a reader holds the board's lock.
 fn publish(board: &Board, elapsed: Duration) {
     let mut snapshot = Arc::new(Snapshot { elapsed, ..Snapshot::default() });
     while let Err(refused) = board.publish(snapshot) {
@@ -29,7 +29,7 @@ fn send(address: SocketAddr, request: &str) -> TcpStream {
     stream
 }
 
-/// The whole answer, as text.
+/// Sends a request and returns the whole answer as text.
 fn ask(run: &Run, method: &str, path: &str, body: &str) -> String {
     let address = run.server().address();
     let length = body.len();
@@ -70,7 +70,7 @@ fn events_come_for_what_is_published_and_end_with_the_server() {
     assert!(line_with("event:").contains("state"));
     assert!(line_with("data:").contains("\"elapsed_s\":7.0"));
     let port = run.stop();
-    // The stream ends, and the port is free.
+    // The stream of events ends, and the port is free.
     assert!(lines.all(|line| line.is_err() || line.is_ok_and(|line| !line.contains("data:"))));
     drop(std::net::TcpListener::bind(("127.0.0.1", port)).unwrap());
 }
@@ -104,7 +104,7 @@ fn publishing_goes_on_while_others_read() {
     };
     let mut published = 0;
     while published < 1000 {
-        // A snapshot comes back if somebody reads; it is not lost.
+        // The board returns the snapshot if a reader holds the lock.
         match board.publish(Arc::new(Snapshot { elapsed: Duration::from_secs(published + 1), ..Snapshot::default() })) {
             Ok(before) => {
                 assert_eq!(before.elapsed, Duration::from_secs(published));
@@ -127,7 +127,7 @@ fn what_is_no_http_does_no_harm() {
         let mut stream = send(address, nonsense);
         stream.shutdown(Shutdown::Write).unwrap();
         let mut answer = Vec::new();
-        // An answer or a closed connection: both are an end.
+        // An answer and a closed connection both count as an end.
         let _read = stream.read_to_end(&mut answer);
         assert!(answer.is_empty() || answer.starts_with(b"HTTP/1.1 4"), "{nonsense:?}: {}", String::from_utf8_lossy(&answer));
     }

@@ -1,4 +1,4 @@
-//! A browser of its own, without a window, and one page in it.
+//! A headless browser with a single page.
 
 use core::time::Duration;
 use std::io::{BufRead as _, BufReader};
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
-/// Every wait ends after this; a machine that is busy takes its time.
+/// Time limit of every wait, generous for a busy machine.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 const ARGUMENTS: [&str; 12] = [
@@ -31,18 +31,18 @@ const ARGUMENTS: [&str; 12] = [
     "about:blank",
 ];
 
-/// A browser with one page, spoken to in the Chrome `DevTools` protocol (<https://chromedevtools.github.io/devtools-protocol/>).
+/// A browser with a single page, controlled through the Chrome `DevTools` protocol (<https://chromedevtools.github.io/devtools-protocol/>).
 pub(crate) struct Browser {
     child: Child,
     _folder: TempDir,
     socket: WebSocket<TcpStream>,
     session: Option<String>,
     asked: u64,
-    /// What the page complained about: exceptions, and what its policy forbade.
+    /// Complaints of the page: exceptions, and violations of its content security policy.
     pub(crate) complaints: Vec<String>,
 }
 
-/// Where a browser is, if there is one.
+/// Returns the path of a browser; `None` if no browser is installed.
 fn program() -> Option<PathBuf> {
     if let Some(given) = std::env::var_os("CHROMIUM") {
         return Some(given.into());
@@ -53,7 +53,7 @@ fn program() -> Option<PathBuf> {
 }
 
 impl Browser {
-    /// A browser, or `None` with a message where there is none.
+    /// Starts a browser, or prints a message and returns `None` if no browser is installed.
     pub(crate) fn start() -> Option<Self> {
         let Some(program) = program() else {
             eprintln!("skipped: no browser; install chromium, or name one in CHROMIUM");
@@ -70,11 +70,11 @@ impl Browser {
             .unwrap();
         let stderr = child.stderr.take().unwrap();
         let (found, address) = mpsc::channel();
-        // Reads to the end: a browser that cannot complain stops.
+        // Reads to the end, because a browser stops when its error output is full.
         std::thread::spawn(move || {
             for line in BufReader::new(stderr).lines().map_while(Result::ok) {
                 if let Some((_, address)) = line.split_once("DevTools listening on ") {
-                    // Nobody listens any more if the test was given up.
+                    // The receiver is gone if the test has failed.
                     let _sent = found.send(address.to_owned());
                 }
             }
@@ -96,12 +96,12 @@ impl Browser {
         Some(browser)
     }
 
-    /// Asks for something that is done, and waits for the answer.
+    /// Calls a method of the protocol and returns its result.
     pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.attempt(method, parameters).unwrap_or_else(|error| panic!("{method}: {error}"))
     }
 
-    /// Asks for something, and waits for the answer or for why there is none.
+    /// Calls a method of the protocol and returns its result or its error.
     fn attempt(&mut self, method: &str, parameters: Value) -> Result<Value, Value> {
         self.asked += 1;
         let id = self.asked;
@@ -126,14 +126,14 @@ impl Browser {
         }
     }
 
-    /// The value of an expression on the page.
+    /// Evaluates an expression on the page and returns its value.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let mut answer = self.call("Runtime.evaluate", json!({ "expression": expression, "returnByValue": true, "awaitPromise": true }));
         assert!(answer["exceptionDetails"].is_null(), "{expression}: {}", answer["exceptionDetails"]);
         answer["result"]["value"].take()
     }
 
-    /// Waits until an expression holds. While what it speaks of is not there, or the page is just being left, it does not.
+    /// Waits until an expression is true. An exception counts as false, for instance while the page is loading.
     pub(crate) fn wait(&mut self, expression: &str) {
         let question = json!({ "expression": format!("!!({expression})"), "returnByValue": true });
         self.wait_for(expression, |browser| {
@@ -141,7 +141,7 @@ impl Browser {
         });
     }
 
-    /// Waits until something holds.
+    /// Waits until `holds` returns true; `what` is for the message of a failure.
     pub(crate) fn wait_for(&mut self, what: &str, mut holds: impl FnMut(&mut Self) -> bool) {
         let begin = Instant::now();
         while !holds(self) {
@@ -153,13 +153,13 @@ impl Browser {
         }
     }
 
-    /// Opens an address and waits until its text has been read.
+    /// Opens an address and waits until the document is parsed.
     pub(crate) fn open(&mut self, address: &str) {
         self.call("Page.navigate", json!({ "url": address }));
         self.wait("location.href !== 'about:blank' && document.readyState === 'complete'");
     }
 
-    /// Presses a key and lets it go, in what has the focus.
+    /// Presses and releases a key in the focused element.
     pub(crate) fn press(&mut self, key: &str, code: u32) {
         for kind in ["rawKeyDown", "keyUp"] {
             self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code }));
@@ -169,7 +169,7 @@ impl Browser {
         }
     }
 
-    /// Clicks into the middle of an element.
+    /// Clicks in the middle of an element.
     pub(crate) fn click(&mut self, selector: &str) {
         self.value(&format!("document.querySelector({selector:?}).scrollIntoView({{ block: 'center' }})"));
         let middle = format!(
@@ -181,7 +181,7 @@ impl Browser {
         }
     }
 
-    /// Presses the mouse at a point, moves it by that much in small steps of 16 ms each, and leaves it pressed.
+    /// Presses the mouse button at `from`, moves the mouse by `by` in small steps of 16 ms each, and keeps the button pressed.
     #[allow(dead_code, reason = "some tests drag nothing")]
     pub(crate) fn drag(&mut self, from: [f64; 2], by: [f64; 2], steps: u32) {
         let [x, y] = from;
@@ -194,14 +194,14 @@ impl Browser {
         }
     }
 
-    /// Types a text into a field in place of what is there.
+    /// Replaces the text of a field.
     pub(crate) fn type_into(&mut self, selector: &str, text: &str) {
         self.click(selector);
         self.value(&format!("document.querySelector({selector:?}).select()"));
         self.call("Input.insertText", json!({ "text": text }));
     }
 
-    /// Saves what is seen as NAME.png, if `COHAPTIC_SCREENSHOTS` names a folder.
+    /// Saves a screenshot as NAME.png if `COHAPTIC_SCREENSHOTS` names a folder.
     pub(crate) fn picture(&mut self, name: &str) {
         let Some(folder) = std::env::var_os("COHAPTIC_SCREENSHOTS") else { return };
         let size = self.call("Page.getLayoutMetrics", json!({}))["cssContentSize"].clone();
@@ -212,7 +212,7 @@ impl Browser {
     }
 }
 
-/// A browser that nobody speaks to yet ends with the test too.
+/// A browser process that ends with the test even before its session begins.
 struct Unborn(Option<Child>);
 
 impl Drop for Unborn {
@@ -225,7 +225,7 @@ impl Drop for Unborn {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // In order, so that its folder is left alone; otherwise by force. Nothing here may panic: a test may be failing.
+        // First an orderly end, so that the browser stops using its folder, then by force. Nothing here may panic, because a test may be failing.
         self.session = None;
         let close = json!({ "id": self.asked + 1, "method": "Browser.close" }).to_string();
         let _asked = self.socket.send(Message::text(close));

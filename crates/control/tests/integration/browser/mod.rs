@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::run::{Run, TOKEN};
 
-/// How many points of a canvas are near to a colour of the page.
+/// Counts the pixels of a canvas near a colour of the page.
 fn painted(browser: &mut Browser, canvas: &str, colour: &str) -> u64 {
     let script = format!(
         "(() => {{
@@ -31,7 +31,7 @@ fn wait_painted(browser: &mut Browser, canvas: &str, colour: &str) {
     browser.wait_for(&format!("{canvas} has something in {colour}"), |browser| painted(browser, canvas, colour) > 20);
 }
 
-/// Waits until a canvas looks different.
+/// Waits until the picture of a canvas changes.
 fn wait_moving(browser: &mut Browser, canvas: &str) {
     let picture = format!("document.getElementById({canvas:?}).toDataURL()");
     let before = browser.value(&picture);
@@ -80,7 +80,7 @@ fn sees_the_run(browser: &mut Browser) {
     browser.wait("document.querySelector('#links tr .delivered').textContent.length > 0");
     browser.wait("document.querySelector('#links tr .asked').textContent.includes('delay 24ms')");
     assert!(text(browser, "#links tr").contains("left → right"));
-    // Names are text, whatever they look like.
+    // Names appear as text even if they contain HTML.
     assert_eq!(text(browser, "h1"), "cohaptic live three people lift a <b>cube</b>");
     assert_eq!(text(browser, "#valid"), "valid");
     browser.wait("document.querySelector('#peers .pill.stale').textContent === 'stale · heard 2.3 s ago'");
@@ -107,7 +107,7 @@ fn moves_a_slider(browser: &mut Browser, run: &Run) {
     }
     wait_told(browser, run, &[0], "delay", "\"27ms\"");
     browser.wait("document.querySelector('#links tr .asked').textContent.includes('delay 27ms')");
-    // The list of links is gone through by keys too.
+    // The list of links can be used with the keyboard.
     browser.value("document.getElementById('link-0').focus()");
     browser.press("ArrowDown", 40);
     browser.wait("document.getElementById('link-1').checked && document.getElementById('field-delay').value === '25ms'");
@@ -139,11 +139,11 @@ fn is_told_what_was_wrong(browser: &mut Browser) {
     browser.press("Enter", 13);
     browser.wait("document.getElementById('answer').textContent.includes('did you mean \"delay\"?')");
     assert_eq!(browser.value("document.getElementById('other-key').value"), json!("dlay"), "to be mended");
-    // That the browser notes an answer of 422 is as it should be.
+    // The browser's message about the answer 422 is expected.
     browser.complaints.retain(|complaint| !complaint.contains("422"));
 }
 
-/// Without the token in the address the server asks for it, and the tab knows it.
+/// Reloads without the token in the address: the page takes the token from the tab's storage.
 fn reloads(browser: &mut Browser) {
     browser.value("document.getElementById('links').replaceChildren()");
     browser.call("Page.reload", json!({}));
@@ -186,7 +186,7 @@ fn a_hundred_links_are_as_good_as_six() {
     assert_eq!(browser.complaints, [""; 0]);
 }
 
-/// Width and height of the drawing in the colour of the first peer \[px\].
+/// Returns width and height of the drawing in the first peer's colour \[px\].
 fn drawn(browser: &mut Browser) -> [f64; 2] {
     let script = "(() => {
         const canvas = document.getElementById('copies');
@@ -204,7 +204,7 @@ fn drawn(browser: &mut Browser) -> [f64; 2] {
     [0, 1].map(|side| sides[side].as_f64().unwrap())
 }
 
-/// Puts a slider there as its keys do.
+/// Sets a slider to an angle by the keys for the slider.
 fn look_from(browser: &mut Browser, slider: &str, degrees: i64) {
     browser.value(&format!("document.getElementById({slider:?}).focus()"));
     let now = browser.value(&format!("Number(document.getElementById({slider:?}).value)")).as_i64().unwrap();
@@ -212,12 +212,12 @@ fn look_from(browser: &mut Browser, slider: &str, degrees: i64) {
     while browser.value(&format!("document.getElementById({slider:?}).value")) != json!(degrees.to_string()) {
         browser.press(key, code);
     }
-    // Two frames: one that begins after the key, and its end.
+    // Waits for two frames: the first begins after the key, and the second ends the drawing of the first.
     browser.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))");
 }
 
-/// A plate of 0.4 m × 0.3 m from above, from the front and from the side, as it is and after a quarter turn about z. A line is 1.8 px wide, and colours fade at its
-/// borders; the depth of the plate (3 % of its length, so that it is seen from the side) changes the scale of the nearer face by 0.4 %.
+/// Draws a plate of 0.4 m × 0.3 m from above, from the front and from the side, before and after a quarter turn about z. Lines are 1.8 px wide and fade at
+/// their edges. The depth of the plate, 3 % of its length, is needed to see the plate from the side, and changes the scale of the nearer face by 0.4 %.
 #[test]
 #[ignore = ".ci/nightly runs it: it needs a browser"]
 fn an_object_that_turns_is_drawn_in_depth() {
@@ -241,7 +241,7 @@ fn an_object_that_turns_is_drawn_in_depth() {
         let front = drawn(&mut browser);
         look_from(&mut browser, "around", 90);
         let side = drawn(&mut browser);
-        // From there the nearer edge is half a plate nearer than the middle, of five radii of 0.29 m: larger by up to 0.2 m in 1.4 m.
+        // From the front the nearer edge is half a plate nearer than the middle, seen from a distance of five radii of 0.29 m: larger by up to 0.2 m in 1.4 m.
         assert!((front[0] / scale / x - 1.0).abs() < 0.2 && front[1] < 0.15 * front[0], "{front:?}");
         assert!((side[0] / scale / y - 1.0).abs() < 0.2 && side[1] < 0.15 * side[0], "{side:?}");
         assert!((side[0] > front[0]) == (y > x), "{front:?} {side:?}");
@@ -249,7 +249,7 @@ fn an_object_that_turns_is_drawn_in_depth() {
     assert_eq!(browser.complaints, [""; 0]);
 }
 
-/// Who has the address alone is asked for the token, and again if it is wrong.
+/// Opens the address without the token: the page asks for the token, and asks again after a wrong token.
 fn enters_the_token(browser: &mut Browser, run: &Run) {
     browser.value("sessionStorage.clear()");
     browser.open(&format!("http://{}/", run.server().address()));
@@ -276,7 +276,7 @@ fn one_link_without_peers_is_enough() {
     browser.picture("one");
     enters_the_token(&mut browser, &run);
     assert_eq!(browser.complaints, [""; 0]);
-    // A run that stands still is told from one that goes on.
+    // The page tells a run without new snapshots from a run in progress.
     let silent = Run::still(1, 0);
     browser.open(&silent.server().url());
     browser.wait("document.getElementById('trouble').textContent.startsWith('The run has reported nothing')");
