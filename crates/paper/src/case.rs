@@ -1,4 +1,4 @@
-//! A scene of the paper with the numbers that its claims are about.
+//! A scene of the paper, given by the numbers that occur in the paper's claims.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,41 +8,41 @@ use cohaptic_stability::{Method, Radius, analyse};
 
 use crate::PaperError;
 
-/// Which coordination.
+/// Law of coordination.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Strategy {
-    /// Average-position, equation (4).
+    /// Average-position coordination, equation (4).
     Ap,
-    /// Proportional-derivative, equation (1).
+    /// Proportional-derivative coordination, equation (1).
     Pd,
 }
 
-/// What each copy of the object weighs.
+/// Mass of each copy of the object.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Mass {
-    /// mO/N, as the paper prints it.
+    /// mO/N, as printed in the paper.
     Split,
     /// mO.
     Whole,
 }
 
-/// Equal peers with equal links. Of them the first ones touch the object.
+/// A scene of equal peers with equal links. The first `touching` peers touch the object.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Case {
     pub(crate) strategy: Strategy,
     pub(crate) peers: usize,
     pub(crate) mass: Mass,
-    /// KT [N/m].
+    /// Coordination stiffness KT \[N/m\].
     pub(crate) stiffness: f64,
-    /// BT [N·s/m].
+    /// Coordination damping BT \[N·s/m\].
     pub(crate) damping: f64,
-    /// KC [N/m].
+    /// Stiffness KC of the coupling to the device \[N/m\].
     pub(crate) coupling_stiffness: f64,
-    /// BC [N·s/m].
+    /// Damping BC of the coupling to the device \[N·s/m\].
     pub(crate) coupling_damping: f64,
-    /// One way [µs].
+    /// Delay of each link, one way \[µs\].
     pub(crate) delay_us: u32,
-    /// How many peers touch the object.
+    /// Number of peers touching the object, at most `peers`.
     pub(crate) touching: usize,
     /// Whether all gains are scaled with the number of peers.
     pub(crate) scaled: bool,
@@ -78,7 +78,7 @@ impl Mass {
 }
 
 impl Case {
-    /// Section 4 of the paper: N peers, KT = 1000 N/m, BT = BC = 5 N·s/m, KC = 3500 N/m, Td = Tn = 8 ms; all touch.
+    /// Returns the scene of the paper's Section 4 for N peers: KT = 1000 N/m, BT = BC = 5 N·s/m, KC = 3500 N/m, Td = Tn = 8 ms, all peers touching.
     pub(crate) const fn paper(strategy: Strategy, peers: usize) -> Self {
         Self {
             strategy,
@@ -94,12 +94,12 @@ impl Case {
         }
     }
 
-    /// The same with the other strategy.
+    /// Returns the same scene with another strategy.
     pub(crate) const fn with(self, strategy: Strategy) -> Self {
         Self { strategy, ..self }
     }
 
-    /// The scene as a file.
+    /// Returns the text of the scene file.
     pub(crate) fn text(&self) -> String {
         let Self { strategy, peers, mass, stiffness, damping, coupling_stiffness, coupling_damping, delay_us, touching, scaled } = *self;
         let scaling = if scaled { "\nscaling = \"inverse-n\"" } else { "" };
@@ -114,6 +114,7 @@ impl Case {
             strategy.key(),
             f64::from(delay_us) / 1000.0
         );
+        // If all peers touch, the line is removed: the default contact then holds for all peers, without entries of their own.
         if touching == peers {
             text = text.replace("contact = \"none\"\n", "");
         }
@@ -129,12 +130,12 @@ impl Case {
         Ok(Scene::parse(&self.text(), Path::new("paper.toml"), &[])?)
     }
 
-    /// Its spectral radius over a frame of 8 ms.
+    /// Returns the spectral radius of the scene over a frame of 8 ms.
     pub(crate) fn radius(&self) -> Result<Radius, PaperError> {
         Ok(analyse(&self.scene()?, Method::Reduced)?.radius)
     }
 
-    /// What it is, for people.
+    /// Describes the case for people.
     pub(crate) fn words(&self) -> String {
         let Self { strategy, peers, mass, stiffness, damping, coupling_stiffness, coupling_damping, delay_us, touching, scaled } = *self;
         let touch = if touching == peers { "all touch".to_owned() } else { format!("{touching} of {peers} touch") };
@@ -152,7 +153,7 @@ impl Case {
 mod tests {
     use super::*;
 
-    /// crates/stability/tests/reference/radii.json, computed with 50 digits apart from the program.
+    /// The reference is crates/stability/tests/reference/radii.json, computed with 50 digits by another program.
     #[test]
     fn cases_have_the_radii_of_the_reference() {
         let anchor = Case::paper(Strategy::Ap, 3);

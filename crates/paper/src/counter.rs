@@ -1,7 +1,8 @@
-//! The smallest scene in which something happens that a claim says does not.
+//! Searches for the smallest counterexample of a claim.
 //!
-//! Candidates are gone through in a fixed order, from the simple to the complicated: the fewest peers, then the shortest delay, then the roundest numbers, the paper's own
-//! first. Of the first in which it happens the delay is then shortened, a millisecond at a time, for as long as it still happens.
+//! Candidates are tried in a fixed order, from simple to complicated: fewest peers first, then the shortest delay, then the roundest numbers, with the
+//! paper's own numbers first. The delay of the first counterexample is then shortened in steps of a millisecond, as long as the scene stays a
+//! counterexample.
 
 use cohaptic_stability::Verdict;
 use rayon::prelude::*;
@@ -9,30 +10,31 @@ use rayon::prelude::*;
 use crate::case::{Case, Mass, Strategy};
 use crate::{PaperError, Watch};
 
-/// The numbers of peers that are tried.
+/// Numbers of peers tried.
 pub(crate) const PEERS: [usize; 5] = [2, 3, 4, 5, 8];
-/// The delays that are tried, one way [µs].
+/// Delays tried, one way \[µs\].
 const DELAYS: [u32; 6] = [0, 4000, 8000, 16_000, 24_000, 48_000];
-/// KT, the roundest first [N/m].
+/// Values of KT tried, the roundest first \[N/m\].
 const STIFFNESSES: [f64; 9] = [1000.0, 2000.0, 100.0, 5000.0, 500.0, 200.0, 3000.0, 4000.0, 1500.0];
-/// KC, the paper's first [N/m].
+/// Values of KC tried, the paper's first \[N/m\].
 const COUPLINGS: [f64; 4] = [3500.0, 1000.0, 2000.0, 5000.0];
-/// BT = BC, the paper's first [N·s/m].
+/// Values of BT = BC tried, the paper's first \[N·s/m\].
 const DAMPINGS: [f64; 2] = [5.0, 0.0];
-/// A radius nearer to 1 than this convinces nobody.
+/// Least distance of a spectral radius from 1 that counts as a clear verdict.
 const MARGIN: f64 = 1e-4;
 
-/// All candidates, the simplest first, with AP.
+/// Returns all candidates with AP, the simplest first.
 fn candidates() -> Vec<Case> {
     let mut all: Vec<(usize, Case)> = Vec::new();
     for peers in PEERS {
         for delay_us in DELAYS {
+            // Candidates with equal peers and delay begin here and are sorted by complexity: the sum of the positions in the lists above. The sort is stable.
             let begin = all.len();
             for (k, stiffness) in STIFFNESSES.into_iter().enumerate() {
                 for (c, coupling_stiffness) in COUPLINGS.into_iter().enumerate() {
                     for (b, damping) in DAMPINGS.into_iter().enumerate() {
                         for (m, mass) in Mass::BOTH.into_iter().enumerate() {
-                            // All touch, then one, then two of them, and so on.
+                            // All touch first, then one peer, two peers, and so on.
                             for (t, touching) in std::iter::once(peers).chain(1..peers).enumerate() {
                                 let paper = Case::paper(Strategy::Ap, peers);
                                 let case =
@@ -49,9 +51,10 @@ fn candidates() -> Vec<Case> {
     all.into_iter().map(|(_, case)| case).collect()
 }
 
-/// The smallest candidate in which it happens; `None` if it happens in none.
+/// Returns the smallest candidate for which `happens` is true; `None` if no candidate is.
 pub(crate) fn smallest(watch: &dyn Watch, happens: impl Fn(&Case) -> Result<bool, PaperError> + Sync) -> Result<Option<Case>, PaperError> {
-    // Whatever stops the search, stops it at the same candidate with any number of threads.
+    // `find_map_first` returns the first match in the order of the candidates, so the result does not depend on the number of threads. The same holds for
+    // errors.
     let found = candidates().par_iter().find_map_first(|case| {
         if watch.stops() {
             return Some(Err(PaperError::Stopped));
@@ -73,19 +76,19 @@ pub(crate) fn smallest(watch: &dyn Watch, happens: impl Fn(&Case) -> Result<bool
     Ok(Some(case))
 }
 
-/// Whether a case is stable, clearly.
+/// Returns whether a case is clearly stable: by more than [`MARGIN`].
 pub(crate) fn is_stable(case: &Case) -> Result<bool, PaperError> {
     let radius = case.radius()?;
     Ok(radius.verdict() == Verdict::Stable && radius.value < 1.0 - MARGIN)
 }
 
-/// Whether a case is unstable, clearly.
+/// Returns whether a case is clearly unstable: by more than [`MARGIN`].
 pub(crate) fn is_unstable(case: &Case) -> Result<bool, PaperError> {
     let radius = case.radius()?;
     Ok(radius.verdict() == Verdict::Unstable && radius.value > 1.0 + MARGIN)
 }
 
-/// The case with one peer more, which touches if all do.
+/// Returns the case with one more peer. The new peer touches the object if all others do.
 pub(crate) const fn one_more_peer(case: &Case) -> Case {
     let touching = if case.touching == case.peers { case.peers + 1 } else { case.touching };
     Case { peers: case.peers + 1, touching, ..*case }

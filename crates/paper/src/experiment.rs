@@ -1,4 +1,4 @@
-//! The experiments of Section 5, from the scenes that are shipped for them.
+//! The experiments of the paper's Section 5, simulated with the shipped scenes.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -12,66 +12,67 @@ use cohaptic_units::Instant;
 use crate::case::Strategy;
 use crate::{PaperError, Watch};
 
-/// The record of one peer: one entry for each time.
+/// Record of a peer. The three lists are indexed like [`Trace::times`].
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct PeerTrace {
-    /// [m]
+    /// Position of the peer's copy \[m\].
     pub(crate) position: Vec<f64>,
-    /// [m/s]
+    /// Velocity of the peer's copy \[m/s\].
     pub(crate) velocity: Vec<f64>,
-    /// [N]
+    /// Coordination force on the peer's copy \[N\].
     pub(crate) force: Vec<f64>,
 }
 
-/// What happened in a simulation.
+/// Record of a simulation.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Trace {
-    /// [s]
+    /// Times of the record \[s\].
     pub(crate) times: Vec<f64>,
     pub(crate) peers: Vec<PeerTrace>,
 }
 
-/// A run of Section 5.1: two move the object, a third one does not touch it.
+/// A run of Section 5.1: two peers move the object, and a third peer does not touch the object.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct StabilityTest {
     pub(crate) strategy: Strategy,
-    /// KT [N/m].
+    /// Coordination stiffness KT \[N/m\].
     pub(crate) stiffness: f64,
+    /// Whether the users are arms that follow a sine. Otherwise the users are forces.
     pub(crate) arms: bool,
-    /// One way [ms].
+    /// Delay one way \[ms\].
     pub(crate) delay_ms: u32,
     pub(crate) radius: Radius,
     pub(crate) trace: Trace,
 }
 
-/// A run of Section 5.2: one pushes with 1.5 N, two do not touch the object.
+/// A run of Section 5.2: one peer pushes with 1.5 N, and two peers do not touch the object.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Travel {
     pub(crate) strategy: Strategy,
-    /// One way [ms].
+    /// Delay one way \[ms\].
     pub(crate) delay_ms: u32,
     pub(crate) radius: Radius,
-    /// The radius of what a push can excite: the pushed copy and the mean of the others.
+    /// Spectral radius of the motions excited by a symmetric push: the pushed copy and the mean of the others.
     pub(crate) excited: Radius,
-    /// The radius of how the two untouched copies swing against each other.
+    /// Spectral radius of the two untouched copies swinging against each other, not excited by the push.
     pub(crate) apart: Radius,
-    /// When the pushed copy has gone 20 mm [s].
+    /// Time at which the pushed copy has moved 20 mm \[s\]; `None` if never.
     pub(crate) time: Option<f64>,
-    /// The viscosity that the hand meets at low speed, by the admittance [N·s/m].
+    /// Viscosity felt by a slow hand, from the admittance \[N·s/m\].
     pub(crate) viscosity: f64,
     pub(crate) trace: Trace,
 }
 
 impl Travel {
-    /// Whether the push itself makes the object diverge.
+    /// Returns whether the push itself makes the object diverge.
     pub(crate) fn diverges(&self) -> bool {
         self.excited.verdict() == Verdict::Unstable
     }
 }
 
-/// How far the object goes in Section 5.2 [m].
+/// Distance of the object in Section 5.2 \[m\].
 pub(crate) const DISTANCE: f64 = 0.02;
-/// The delays that "48 ms" may mean, one way [ms]: that of a round trip, and as it stands.
+/// The two readings of the paper's delay of 48 ms, one way \[ms\]: half of a round trip, and the number itself.
 pub(crate) const DELAYS_MS: [u32; 2] = [24, 48];
 
 const STABILITY_SCENES: [(Strategy, f64, bool, &str); 8] = [
@@ -88,23 +89,24 @@ const STABILITY_SCENES: [(Strategy, f64, bool, &str); 8] = [
 const TRAVEL_SCENES: [(Strategy, &str); 2] =
     [(Strategy::Ap, include_str!("../scenarios/5-2-ap.toml")), (Strategy::Pd, include_str!("../scenarios/5-2-pd.toml"))];
 
-/// The scene of Section 5.2 with that strategy, as a file.
+/// Returns the scene file of Section 5.2 for a strategy.
 pub(crate) fn travel_text(strategy: Strategy) -> &'static str {
     TRAVEL_SCENES.iter().find(|(of, _)| *of == strategy).map_or("", |(_, text)| text)
 }
 
-/// The scene of Section 5.1 with that strategy and stiffness, as a file.
+/// Returns the scene file of Section 5.1 for a strategy, a stiffness \[N/m\], and users with or without arms.
 pub(crate) fn stability_text(strategy: Strategy, stiffness: f64, arms: bool) -> &'static str {
     let wanted = |scene: &&(Strategy, f64, bool, &str)| scene.0 == strategy && (scene.1 - stiffness).abs() < 0.5 && scene.2 == arms;
     STABILITY_SCENES.iter().find(wanted).map_or("", |(.., text)| text)
 }
 
-/// Runs Section 5.1: both strategies, both stiffnesses, with and without arms, for both delays. The users move at about 1 Hz, as in Figure 7.
+/// Simulates Section 5.1: both strategies and stiffnesses, with and without arms, for both delays. The users move at 1 Hz, about as fast as in Figure 7.
 pub(crate) fn stability_tests(watch: &dyn Watch) -> Result<Vec<StabilityTest>, PaperError> {
     let mut tests = Vec::new();
     for delay_ms in DELAYS_MS {
         for (strategy, stiffness, arms, text) in STABILITY_SCENES {
             let hand = if arms { "hand.follows" } else { "hand" };
+            // The shipped scenes move more slowly; the paper's Figure 7 shows about 1 Hz.
             let faster = ["left", "right"].map(|peer| format!("peers.{peer}.{hand}.sine.frequency=1.0"));
             let overrides: Vec<String> = faster.into_iter().chain([format!("link.delay={delay_ms}ms")]).collect();
             let scene = Scene::parse(text, Path::new("5-1.toml"), &overrides)?;
@@ -116,7 +118,7 @@ pub(crate) fn stability_tests(watch: &dyn Watch) -> Result<Vec<StabilityTest>, P
     Ok(tests)
 }
 
-/// Runs Section 5.2: both strategies for both delays.
+/// Simulates Section 5.2: both strategies for both delays.
 pub(crate) fn travels(watch: &dyn Watch) -> Result<Vec<Travel>, PaperError> {
     let mut travels = Vec::new();
     for delay_ms in DELAYS_MS {
@@ -126,6 +128,7 @@ pub(crate) fn travels(watch: &dyn Watch) -> Result<Vec<Travel>, PaperError> {
             let viscosity = Admittance::of(&scene, 0)?.fit_low_frequency().viscosity.value;
             let analysis = away_from_walls(&scene)?;
             let part = |wanted: fn(PartKind) -> bool| {
+                // The largest radius over the wanted parts of all modes.
                 let of = analysis.modes.iter().flat_map(|mode| &mode.parts).filter(|part| wanted(part.kind)).map(|part| part.radius);
                 of.fold(Radius { value: 0.0, error: 0.0 }, Radius::or)
             };
@@ -138,7 +141,7 @@ pub(crate) fn travels(watch: &dyn Watch) -> Result<Vec<Travel>, PaperError> {
     Ok(travels)
 }
 
-/// The closed form while the object touches no wall and one-sided contacts are closed.
+/// Analyses a scene as long as the object touches no wall and one-sided contacts stay closed. Walls and one-sided contacts are not linear.
 fn away_from_walls(scene: &Scene) -> Result<Analysis, PaperError> {
     let mut scene = scene.clone();
     scene.object.enclosure = None;
@@ -150,10 +153,10 @@ fn away_from_walls(scene: &Scene) -> Result<Analysis, PaperError> {
     Ok(analyse(&scene, Method::Reduced)?)
 }
 
-/// One tick of this number is kept: every 4 ms.
+/// Number of ticks per recorded tick: with ticks of 1 ms, a record every 4 ms.
 const KEPT: u64 = 4;
 
-/// Simulates a scene of equal ticks of 1 ms, and says when the first peer's copy has gone a distance [m].
+/// Simulates a scene with ticks of 1 ms. Returns the record, and the time at which the first peer's copy has moved `distance` \[m\].
 fn simulate(scene: &Scene, distance: f64, watch: &dyn Watch) -> Result<(Trace, Option<f64>), PaperError> {
     let mut recorder = Recorder {
         trace: Trace { times: Vec::new(), peers: vec![PeerTrace::default(); scene.peers.len()] },
@@ -167,11 +170,12 @@ fn simulate(scene: &Scene, distance: f64, watch: &dyn Watch) -> Result<(Trace, O
     if watch.stops() { Err(PaperError::Stopped) } else { Ok((recorder.trace, recorder.reached)) }
 }
 
+/// Observer of a simulation: records every fourth tick, and finds the time of the given distance.
 struct Recorder<'a> {
     trace: Trace,
     distance: f64,
     start: f64,
-    /// When the first peer's copy was looked at last, and how far it had gone.
+    /// Time \[s\] and distance \[m\] of the first peer's copy at the tick before.
     last: (f64, f64),
     reached: Option<f64>,
     watch: &'a dyn Watch,
@@ -189,6 +193,7 @@ impl Observer for Recorder<'_> {
         if row.peer == 0 {
             let gone = (row.object.position[0] - self.start).abs();
             if self.reached.is_none() && gone >= self.distance {
+                // Linear interpolation between two ticks. `gone` exceeds `gone_before`, because the tick before was below the distance.
                 let (before, gone_before) = self.last;
                 self.reached = Some(before + (t - before) * (self.distance - gone_before) / (gone - gone_before));
             }
@@ -240,7 +245,7 @@ mod tests {
         }
     }
 
-    /// The law of momentum of scenarios/README.md gives 1.138 s and 2.255 s, to 2 %.
+    /// The law of momentum in scenarios/README.md gives 1.138 s and 2.255 s, right to 2 %.
     #[test]
     fn section_5_2_takes_as_long_as_the_viscosity_law_says() {
         let travels = travels(&Unwatched).unwrap();

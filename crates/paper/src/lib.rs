@@ -1,12 +1,13 @@
-//! The figures and claims of Rakhsha & Constantinescu (2015) again.
+//! Reproduces the figures and claims of Rakhsha & Constantinescu (2015).
 //!
-//! You need it if you compare the figures and claims of the paper with those of a changed model.
+//! Use this crate to compare the paper's figures and claims with the results of a changed model.
 //!
-//! [`reproduce`] computes everything anew: stability regions, admittances and simulated experiments, and for each claim of the paper a [`Verdict`] that
-//! rests on those numbers alone. Where a claim fails, the smallest scene found in which it fails is given with it. [`page`] makes one page of it.
+//! [`reproduce`] computes stability regions, admittances and simulated experiments anew, and for each claim of the paper a [`Verdict`] based only on the
+//! computed numbers. If a claim fails, the smallest counterexample found is added as a scene. [`page`] makes an HTML page of the results.
 //!
-//! Nothing here reads a clock, draws a random number or prints: the same options give the same bytes. What the paper's experiments felt like to people is
-//! not reproduced; where its printed parameters do not give its printed numbers, the claims say so.
+//! The crate reads no clock, draws no random numbers and prints nothing: equal options give equal bytes. The impressions of the paper's test persons are
+//! not reproduced. If the paper's printed parameters do not give its printed numbers, the claims say so.
+//!
 //! ```
 //! use cohaptic_paper::{Options, Unwatched, Verdict, reproduce};
 //!
@@ -31,25 +32,25 @@ use cohaptic_stability::{AdmittanceError, AnalysisError, FamilyError, KeyRangeEr
 pub use claims::{Claim, Verdict};
 pub use figures::{Figure, Table};
 
-/// How closely everything is looked at, and how large it is drawn.
+/// Resolution of the computation, and size of the drawings.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Options {
-    /// Coarser grids, in some seconds instead of a minute.
+    /// Whether to use coarser grids, for a result in some seconds instead of a minute.
     pub quick: bool,
-    /// The size of the drawings.
+    /// Size of the drawings.
     pub size: Size,
 }
 
-/// The paper again.
+/// All results.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Reproduction {
-    /// What the paper claims and what came out, in the order of the paper.
+    /// Claims with the computed results, in the order of the paper.
     pub claims: Vec<Claim>,
-    /// The figures, in the order of the paper.
+    /// Figures, in the order of the paper.
     pub figures: Vec<Figure>,
 }
 
-/// How many steps [`Watch::one_more`] is called for, about.
+/// Returns the approximate number of calls of [`Watch::one_more`] in [`reproduce`].
 #[must_use]
 pub fn steps(options: Options) -> usize {
     region::Atlas::size(options) + 3
@@ -59,7 +60,7 @@ pub fn steps(options: Options) -> usize {
 ///
 /// # Errors
 ///
-/// [`PaperError::Stopped`] if `watch` asks for it; another one if a scene of the paper cannot be analysed, which would be a fault of this crate.
+/// [`PaperError::Stopped`] if `watch` ends the work. Any other error is a fault of this crate: a scene of the paper that cannot be analysed.
 pub fn reproduce(options: Options, watch: &dyn Watch) -> Result<Reproduction, PaperError> {
     let atlas = region::Atlas::fill(options, watch)?;
     let travels = experiment::travels(watch)?;
@@ -70,16 +71,16 @@ pub fn reproduce(options: Options, watch: &dyn Watch) -> Result<Reproduction, Pa
     Ok(Reproduction { claims, figures })
 }
 
-/// Sees how far the work is, and may end it.
+/// Observer of the progress, able to end the work. Called from several threads.
 pub trait Watch: Sync {
-    /// One of the [`crate::steps`] is done.
+    /// Notes the end of a step; [`steps`](crate::steps) tells their number.
     fn one_more(&self);
 
-    /// Whether the work is to be given up.
+    /// Returns whether the work must end early.
     fn stops(&self) -> bool;
 }
 
-/// Nobody watches.
+/// A [`Watch`] that ignores the progress and never ends the work.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Unwatched;
 
@@ -91,28 +92,28 @@ impl Watch for Unwatched {
     }
 }
 
-/// Why there is no reproduction.
+/// Error of [`reproduce`].
 #[derive(Debug, thiserror::Error)]
 pub enum PaperError {
-    /// The watcher asked for an end.
+    /// The watcher ended the work.
     #[error("given up before the end")]
     Stopped,
-    /// A scene of the paper is refused.
+    /// A scene of the paper was refused.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A scene of the paper cannot be analysed.
+    /// A scene of the paper could not be analysed.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
-    /// A scene of the paper has no admittance.
+    /// The admittance of a scene of the paper could not be computed.
     #[error(transparent)]
     Admittance(#[from] AdmittanceError),
-    /// A stability region cannot be computed.
+    /// A stability region could not be computed.
     #[error(transparent)]
     Map(#[from] MapError),
-    /// A stability region cannot be computed.
+    /// The scenes of a stability region could not be made.
     #[error(transparent)]
     Family(#[from] FamilyError),
-    /// The gains of a stability region make no range.
+    /// The gains of a stability region gave no range.
     #[error(transparent)]
     Range(#[from] KeyRangeError),
 }

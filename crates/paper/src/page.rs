@@ -1,10 +1,10 @@
-//! One page of HTML that shows it all.
+//! An HTML page with all results.
 
 use cohaptic_picture::page::{Html, Mark, Page, Table};
 
 use crate::{Claim, Figure, Reproduction, Verdict};
 
-/// The page.
+/// Returns the page.
 #[must_use]
 pub fn html(reproduction: &Reproduction) -> String {
     let about = "Every figure and claim of R. Rakhsha and D. Constantinescu, “Average-Position Coordination for Distributed Multi-User Networked Haptic Cooperation”, \
@@ -23,7 +23,7 @@ pub fn html(reproduction: &Reproduction) -> String {
     page.html()
 }
 
-/// The first word or two, which also say the verdict without colour.
+/// Returns a verdict in a word or two, readable without colours.
 fn short(verdict: &Verdict) -> Html {
     match verdict {
         Verdict::Holds => Html::mark(Mark::Good, "holds"),
@@ -50,18 +50,18 @@ fn figure_on_page(figure: &Figure) -> Html {
     Html::figure(&figure.id, content)
 }
 
-/// A share as a percentage.
+/// Writes a share as a percentage.
 pub(crate) fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
-/// Shares as percentages, one after the other.
+/// Writes shares as percentages, separated by commas.
 pub(crate) fn percents(shares: &[f64]) -> String {
     let all: Vec<String> = shares.iter().map(|share| format!("{:.1}", 100.0 * share)).collect();
     format!("{} %", all.join(", "))
 }
 
-/// A time [s], or that there is none.
+/// Writes a time \[s\], or words for a missing time.
 pub(crate) fn seconds(time: Option<f64>) -> String {
     time.map_or_else(|| "not reached".to_owned(), |time| format!("{time:.3} s"))
 }

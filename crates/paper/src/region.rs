@@ -1,7 +1,8 @@
-//! Stability regions over KT × KC: the paper's Figures 3 and 4, for every reading of what they leave open.
+//! Stability regions over KT × KC as in the paper's Figures 3 and 4, for every reading of the paper.
 //!
-//! The paper says that each copy has the mass mO/N and that Td is a delay, and Section 5 that its delay is that of a round trip. So each region is there for both masses and
-//! for 8 ms and 4 ms one way. Cells are looked at in their middle, so that the share of stable cells is the midpoint rule for the area.
+//! According to the paper each copy has the mass mO/N and Td is a delay; according to its Section 5 the delay is that of a round trip. So each region is
+//! computed for both masses, and for 8 ms and 4 ms one way. Cells are analysed at their centres, so the share of stable cells is the midpoint rule for the
+//! area.
 
 use std::path::Path;
 
@@ -11,21 +12,22 @@ use crate::Watch;
 use crate::case::{Case, Mass, Strategy};
 use crate::{Options, PaperError};
 
-/// The numbers of peers in the figures.
+/// Numbers of peers in the figures.
 pub(crate) const PEERS: [usize; 5] = [2, 3, 4, 5, 8];
-/// KT and KC go from 0 to this [N/m].
+/// Upper end of KT and KC in the figures, from 0 \[N/m\].
 pub(crate) const HIGHEST: f64 = 6000.0;
 
-/// What the regions of one panel have in common.
+/// Parameters common to the regions of a panel.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Setting {
-    /// BT = BC [N·s/m].
+    /// Damping BT = BC \[N·s/m\].
     pub(crate) damping: f64,
     pub(crate) mass: Mass,
-    /// One way [µs].
+    /// Delay one way \[µs\].
     pub(crate) delay_us: u32,
 }
 
+/// Stability region of a strategy and a number of peers.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Region {
     pub(crate) setting: Setting,
@@ -34,14 +36,14 @@ pub(crate) struct Region {
     pub(crate) map: Map,
 }
 
-/// All regions.
+/// All regions of the figures.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Atlas {
     pub(crate) regions: Vec<Region>,
 }
 
 impl Setting {
-    /// In the order of the figures.
+    /// Returns all settings in the order of the figures.
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Vec::new();
         for damping in [0.0, 5.0] {
@@ -63,7 +65,7 @@ impl Setting {
 }
 
 impl Region {
-    /// The share of the square that is stable.
+    /// Returns the stable share of the square, from 0 to 1.
     pub(crate) fn area(&self) -> f64 {
         share(self.cells().filter(|stable| *stable).count(), self.cells().count())
     }
@@ -73,12 +75,13 @@ impl Region {
     }
 }
 
-/// One count over another.
+/// Returns the ratio of two counts; 0 for a `whole` of 0.
 pub(crate) fn share(part: usize, whole: usize) -> f64 {
     let number = |count: usize| f64::from(u32::try_from(count).unwrap_or(u32::MAX));
     number(part) / number(whole.max(1))
 }
 
+/// Returns the parameters of all regions, in the order of the computation.
 impl Atlas {
     fn wanted() -> Vec<(Setting, Strategy, usize)> {
         let strategies =
@@ -86,13 +89,15 @@ impl Atlas {
         Setting::all().into_iter().flat_map(strategies).collect()
     }
 
-    /// How many regions there are.
+    /// Returns the number of regions.
     pub(crate) fn size(_options: Options) -> usize {
         Self::wanted().len()
     }
 
+    /// Computes all regions; counts a step of `watch` per region.
     pub(crate) fn fill(options: Options, watch: &dyn Watch) -> Result<Self, PaperError> {
         let cells: u32 = if options.quick { 30 } else { 150 };
+        // Half of a cell: the grid points lie at the centres of the cells.
         let half = HIGHEST / (2.0 * f64::from(cells));
         let range = |key: &str| KeyRange { key: key.to_owned(), low: half, high: HIGHEST - half, unit: String::new() };
         let side = usize::try_from(cells).unwrap_or(1);
@@ -102,6 +107,7 @@ impl Atlas {
             let keys = vec![range("coordination.stiffness"), range("peer.coupling.stiffness")];
             let family = Family::new(&case.text(), Path::new("paper.toml"), &[], keys)?;
             let map = Map::fill(&family, Grid::new(side, side)?, |_| (), || watch.stops())?;
+            // The map stays incomplete only if the watcher ended the work.
             if !map.is_complete() {
                 return Err(PaperError::Stopped);
             }
@@ -111,17 +117,17 @@ impl Atlas {
         Ok(Self { regions })
     }
 
-    /// That of a strategy and a number of peers.
+    /// Returns the region of a strategy and a number of peers.
     pub(crate) fn region(&self, setting: Setting, strategy: Strategy, peers: usize) -> Option<&Region> {
         self.regions.iter().find(|region| region.setting == setting && region.strategy == strategy && region.peers == peers)
     }
 
-    /// The share that is stable, for each number of peers.
+    /// Returns the stable shares, indexed like [`PEERS`].
     pub(crate) fn areas(&self, setting: Setting, strategy: Strategy) -> Vec<f64> {
         PEERS.iter().filter_map(|peers| self.region(setting, strategy, *peers)).map(Region::area).collect()
     }
 
-    /// The share of the square that is stable with PD and not with AP.
+    /// Returns the share of the square that is stable with PD and unstable with AP.
     pub(crate) fn only_pd(&self, setting: Setting, peers: usize) -> f64 {
         match (self.region(setting, Strategy::Ap, peers), self.region(setting, Strategy::Pd, peers)) {
             (Some(ap), Some(pd)) => share(ap.cells().zip(pd.cells()).filter(|(ap, pd)| *pd && !ap).count(), ap.cells().count()),

@@ -1,4 +1,4 @@
-//! The paper at coarse resolution: what every verdict is, and that the page and the drawings are well formed.
+//! The reproduction at coarse resolution: every verdict, and well-formed page and drawings.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 
 use std::sync::OnceLock;
@@ -19,7 +19,7 @@ fn claim(id: &str) -> &'static Claim {
     quick().claims.iter().find(|claim| claim.id == id).unwrap_or_else(|| panic!("no claim {id}"))
 }
 
-/// Parts from docs/results.md and crates/stability/tests/reference/radii.json, to the digits printed there.
+/// Values from docs/results.md and crates/stability/tests/reference/radii.json, to the digits printed there.
 #[test]
 fn numbers_are_those_that_were_computed_apart_from_the_program() {
     for (id, parts) in [
@@ -61,7 +61,7 @@ fn a_second_time_every_byte_is_the_same() {
     assert_eq!(page::html(&second), page::html(quick()));
 }
 
-/// One column is 85 mm; where two plots with their labels need more, a drawing is a little wider.
+/// A column is 85 mm wide. A drawing is a little wider if two plots with their labels need more.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn drawings_have_the_size_that_was_asked_for_and_numbers_do_not_depend_on_it() {

@@ -1,4 +1,4 @@
-//! The experiments of Section 5.
+//! Claims about the experiments of Section 5.
 
 use super::{Claim, Verdict};
 use crate::case::Strategy;
@@ -9,7 +9,7 @@ pub(super) fn claims(tests: &[StabilityTest], travels: &[Travel]) -> Vec<Claim> 
     vec![outcomes(tests), less_time(travels), times(travels), both_stable(travels)]
 }
 
-/// What the paper saw: PD is unstable at 2100 N/m, and nothing else is.
+/// Returns whether a result agrees with the paper: PD unstable at 2100 N/m, everything else stable.
 fn is_seen(test: &StabilityTest) -> bool {
     let stable = test.radius.verdict() == cohaptic_stability::Verdict::Stable;
     stable != (test.strategy == Strategy::Pd && test.stiffness > 2000.0)
@@ -80,7 +80,7 @@ fn less_time(travels: &[Travel]) -> Claim {
     )
 }
 
-/// How far a time may be from the paper's: the reading of a plot, and what a motor and a person add.
+/// Largest accepted relative difference from a time in the paper. Covers the reading of a plot, and the effects of a motor and a person.
 const NEAR: f64 = 0.1;
 
 fn times(travels: &[Travel]) -> Claim {
@@ -100,6 +100,7 @@ fn times(travels: &[Travel]) -> Claim {
         "{}. The paper's 48 ms is said to be the round trip; the printed parameters do not give both of its times with either reading.",
         lines.join("; ")
     );
+    // The first time outside the tolerance is the counterexample of the claim.
     let worst = apart.first();
     let verdict = match worst {
         None => Verdict::Holds,
@@ -119,6 +120,7 @@ fn times(travels: &[Travel]) -> Claim {
 }
 
 fn both_stable(travels: &[Travel]) -> Claim {
+    // Only 24 ms one way, because the paper calls its 48 ms a round trip.
     let unstable = |travel: &&Travel| travel.delay_ms == 24 && travel.radius.verdict() != cohaptic_stability::Verdict::Stable;
     let radii: Vec<String> = travels
         .iter()

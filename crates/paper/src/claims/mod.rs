@@ -1,4 +1,4 @@
-//! What the paper claims, and what came out.
+//! Claims of the paper, each with the computed result.
 
 mod experiments;
 mod performance;
@@ -14,33 +14,33 @@ use crate::figures::admittance::Responses;
 use crate::region::Atlas;
 use crate::{Options, PaperError};
 
-/// A claim of the paper with what came out.
+/// A claim of the paper with the computed result.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Claim {
-    /// A short name.
+    /// Short name, unique among the claims.
     pub id: &'static str,
-    /// What the paper says.
+    /// The claim in words.
     pub claim: &'static str,
-    /// The paper's figure for it, or where it stands.
+    /// Place in the paper: a figure, an equation or a section.
     pub paper: &'static str,
-    /// What was computed.
+    /// Computed result in words.
     pub ours: String,
-    /// Whether it holds.
+    /// Whether the claim holds.
     pub verdict: Verdict,
-    /// The scene that shows it, as a file: the smallest one found in which the claim fails.
+    /// Scene file of the smallest counterexample found; `None` if the claim holds or no scene shows the failure.
     pub scene: Option<String>,
-    /// What to do with that scene, and what comes out.
+    /// How to run `scene`, and the result; present if `scene` is.
     pub how: Option<String>,
 }
 
-/// Whether a claim holds.
+/// Verdict on a claim.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Verdict {
-    /// In everything that was looked at.
+    /// The claim holds in all cases computed.
     Holds,
-    /// Only there.
+    /// The claim holds only in the described cases.
     HoldsWhere(String),
-    /// Not there.
+    /// The claim fails in the described case.
     FailsAt(String),
 }
 
@@ -59,13 +59,13 @@ impl Claim {
         Self { id, claim, paper, ours, verdict, scene: None, how: None }
     }
 
-    /// With the smallest scene in which something else happens.
+    /// Adds the smallest counterexample.
     fn with_scene(self, case: &Case, how: String) -> Self {
         Self { scene: Some(case.text()), how: Some(how), ..self }
     }
 }
 
-/// All claims, in the order of the paper.
+/// Computes all claims, in the order of the paper.
 pub(crate) fn all(
     atlas: &Atlas,
     responses: &Responses,
@@ -83,9 +83,10 @@ pub(crate) fn all(
     Ok(claims)
 }
 
+/// Numbers of peers in [`many_peers`].
 const PEERS: [usize; 4] = [3, 5, 50, 1000];
 
-/// Beyond the paper: many peers.
+/// Computes the claim beyond the paper: the cost of an analysis does not grow with the number of peers.
 fn many_peers() -> Result<Vec<Claim>, PaperError> {
     let mut lines = Vec::new();
     let mut same = true;
@@ -96,6 +97,7 @@ fn many_peers() -> Result<Vec<Claim>, PaperError> {
             for peers in PEERS {
                 let case = Case { touching: 1, scaled, ..Case::paper(strategy, peers) };
                 let analysis = analyse(&case.scene()?, Method::Reduced)?;
+                // The cost is set by the largest block, and must be the same for all numbers of peers.
                 let largest = analysis.modes.iter().flat_map(|mode| &mode.parts).map(|part| part.size).max().unwrap_or(0);
                 sizes.push(largest);
                 radii.push(format!("{} (N = {peers}, {} states)", short(analysis.radius.value), analysis.dimension));
@@ -111,7 +113,7 @@ fn many_peers() -> Result<Vec<Claim>, PaperError> {
     Ok(vec![Claim::new("any-number", claim, "beyond the paper: up to five users, “arbitrary N” is future work", ours, verdict)])
 }
 
-/// A radius, in few letters where it is large.
+/// Writes a spectral radius in few characters.
 fn short(radius: f64) -> String {
     if radius < 1000.0 { format!("{radius:.4}") } else { format!("{radius:.1e}") }
 }

@@ -1,4 +1,4 @@
-//! What a hand feels: Figure 5 and the viscosity.
+//! Claims about the admittance of the object: Figure 5 and the viscosity.
 
 use super::regions::without_strategy;
 use super::{Claim, Verdict};
@@ -13,13 +13,15 @@ pub(super) fn claims(responses: &Responses, _options: Options, watch: &dyn Watch
     Ok(vec![less_viscous(responses, watch)?, law(responses), grows(responses), nearer(responses)])
 }
 
-/// Fits of AP with those of PD of the same scene, both stable: nobody can feel what diverges.
+/// Returns pairs of AP and PD fits of otherwise equal scenes. Both scenes must be stable, because nobody can feel a diverging scene; with two peers AP and
+/// PD are the same.
 fn pairs(responses: &Responses) -> impl Iterator<Item = (&Fit, &Fit)> {
+    // The sweep makes AP and PD of each scene next to each other, so the two filtered lists have equal scenes at equal positions.
     let of = |strategy: Strategy| responses.fits.iter().filter(move |fit| fit.case.strategy == strategy);
     of(Strategy::Ap).zip(of(Strategy::Pd)).filter(|(ap, pd)| ap.case.peers > 2 && ap.is_stable && pd.is_stable)
 }
 
-/// The viscosity of a case as far as it can be felt: of a stable scene.
+/// Returns the viscosity of a case \[N·s/m\], or `None` for an unstable scene, whose viscosity nobody could feel.
 fn felt(case: &Case) -> Result<Option<f64>, PaperError> {
     let admittance = cohaptic_stability::Admittance::of(&case.scene()?, 0)?;
     let stable = admittance.verdict() == cohaptic_stability::Verdict::Stable;
@@ -41,7 +43,7 @@ fn less_viscous(responses: &Responses, watch: &dyn Watch) -> Result<Claim, Paper
         [3, 4, 5].map(printed).join("; "),
         all.len()
     );
-    // Below one part in a million nobody can tell.
+    // A difference below a millionth counts as equal.
     let found = smallest(watch, |case| {
         if case.peers < 3 || case.touching == 0 || case.mass == Mass::Whole && case.damping == 0.0 {
             return Ok(false);
@@ -49,6 +51,7 @@ fn less_viscous(responses: &Responses, watch: &dyn Watch) -> Result<Claim, Paper
         Ok(felt(case)?.zip(felt(&case.with(Strategy::Pd))?).is_some_and(|(ap, pd)| ap > pd * (1.0 + 1e-6)))
     })?;
     let verdict = |place: String| if place.is_empty() { Verdict::Holds } else { Verdict::FailsAt(place) };
+    // The search may find nothing although pairs of the sweep fail, because the sweep has other parameters.
     let place = match &found {
         Some(case) => without_strategy(case),
         None if less < all.len() => format!("{} of {} pairs of scenes", all.len() - less, all.len()),
@@ -95,6 +98,7 @@ fn grows(responses: &Responses) -> Claim {
     let mut shrinks = Vec::new();
     let mut looked_at = 0_usize;
     for fit in responses.fits.iter().filter(|fit| fit.is_stable) {
+        // The next larger number of peers in an otherwise equal scene; "all touch" is compared with "all touch".
         let like = |other: &&Fit| {
             let touches = (fit.case.touching == fit.case.peers) == (other.case.touching == other.case.peers);
             let same = Case { peers: fit.case.peers, touching: fit.case.touching, ..other.case } == fit.case;

@@ -1,4 +1,4 @@
-//! The stability regions: Figures 3 and 4.
+//! Claims about stability regions: Figures 3 and 4.
 
 use super::{Claim, Verdict};
 use crate::case::{Case, Strategy};
@@ -7,7 +7,7 @@ use crate::page::{percent, percents};
 use crate::region::{Atlas, PEERS, Setting};
 use crate::{PaperError, Watch};
 
-/// "Largely unaffected" is taken to mean: an area within this share of that of two peers.
+/// Relative change of the area, compared with two peers, up to which the area counts as "largely unaffected".
 const UNAFFECTED: f64 = 0.2;
 
 pub(super) fn claims(atlas: &Atlas, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {
@@ -17,12 +17,12 @@ pub(super) fn claims(atlas: &Atlas, watch: &dyn Watch) -> Result<Vec<Claim>, Pap
     Ok(claims)
 }
 
-/// A list of settings, in words.
+/// Joins settings in words.
 fn list(settings: &[Setting]) -> String {
     settings.iter().map(Setting::words).collect::<Vec<_>>().join("; ")
 }
 
-/// Settings in which something holds, and the others.
+/// Divides all settings into those with `holds` true and those with `holds` false.
 fn split(holds: impl Fn(Setting) -> bool) -> (Vec<Setting>, Vec<Setting>) {
     Setting::all().into_iter().partition(|setting| holds(*setting))
 }
@@ -52,7 +52,7 @@ fn larger(atlas: &Atlas) -> Claim {
     Claim::new("region-larger", claim, "Figs. 3, 4", ours, verdict(&holds, &fails))
 }
 
-/// Whether PD is stable and AP is not: a point of PD's region outside AP's.
+/// Returns whether PD is clearly stable and AP clearly unstable: a point of PD's region outside AP's.
 fn only_pd_is_stable(case: &Case) -> Result<bool, PaperError> {
     Ok(case.peers > 2 && is_stable(&case.with(Strategy::Pd))? && is_unstable(case)?)
 }
@@ -63,6 +63,7 @@ fn contains(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
     let shares: Vec<String> = outside.iter().map(|setting| format!("up to {} ({})", percent(most(*setting)), setting.words())).collect();
     let shares = if shares.is_empty() { "none".to_owned() } else { shares.join("; ") };
     let found = smallest(watch, only_pd_is_stable)?;
+    // Section 5 without arms: two of three peers touching, and 48 ms read as a round trip.
     let section_5 = Case { delay_us: 24_000, touching: 2, ..Case::paper(Strategy::Ap, 3) };
     let ours = format!(
         "Of the square of Figs. 3 and 4, all touching, stable with PD and not with AP: {shares}. In Section 5, two of three touching without arms, 24 ms one way, KT = 1000 N/m: \
@@ -84,13 +85,14 @@ fn contains(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
     })
 }
 
-/// A case in words, both strategies being meant.
+/// Describes a case without its strategy, for statements about both strategies.
 pub(super) fn without_strategy(case: &Case) -> String {
     let words = case.words();
     words.strip_prefix("AP, ").or_else(|| words.strip_prefix("PD, ")).unwrap_or(&words).to_owned()
 }
 
 fn unaffected(atlas: &Atlas, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {
+    // The change of largest size, with its sign.
     let change = |setting: Setting, strategy: Strategy| {
         let areas = atlas.areas(setting, strategy);
         let two = areas.first().copied().unwrap_or(f64::NAN);

@@ -1,4 +1,4 @@
-//! The effective coordination stiffness: equations (3) and (6), and what a scene on an ideal network does.
+//! Claims about the effective coordination stiffness: equations (3) and (6), compared with simulated scenes on an ideal network.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -11,21 +11,21 @@ use super::{Claim, Verdict};
 use crate::case::{Case, Strategy};
 use crate::{PaperError, Watch};
 
-/// The numbers of peers that are looked at.
+/// Numbers of peers computed.
 const PEERS: [usize; 8] = [2, 3, 4, 5, 8, 16, 32, 50];
-/// KT [N/m].
+/// Coordination stiffness KT of the simulated scenes \[N/m\].
 const STIFFNESS: f64 = 1000.0;
-/// The tick and the period of sending: an ideal network is one without delay and with no limit to its rate [s].
+/// Tick of the simulation and period of sending \[s\]. The ideal network has no delay and no limit of its rate, so packets are at most a tick old.
 const TICK: f64 = 1e-4;
 
-/// What was found for one number of peers, KT being 1.
+/// Effective stiffness for a number of peers, in units of KT.
 struct Found {
     peers: usize,
-    /// The largest eigenvalue of the stiffness matrix.
+    /// Largest eigenvalue of the stiffness matrix.
     matrix: f64,
-    /// What the copies of a scene swing with.
+    /// Stiffness measured from the swinging copies of a simulated scene.
     scene: f64,
-    /// How fast they swing [Hz].
+    /// Frequency of the swing \[Hz\].
     hz: f64,
 }
 
@@ -36,6 +36,7 @@ pub(super) fn claims(watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {
 }
 
 fn bounded(ap: &[Found], pd: &[Found]) -> Claim {
+    // The bound must hold by the formula and in the simulated scenes.
     let falls = ap.windows(2).all(|pair| pair[1].matrix < pair[0].matrix && pair[1].scene < pair[0].scene);
     let rises = pd.windows(2).all(|pair| pair[1].matrix > pair[0].matrix && pair[1].scene > pair[0].scene);
     let is_bounded = ap.iter().all(|found| found.matrix <= 2.0 + 1e-9 && found.scene <= 2.0 + 1e-6);
@@ -75,21 +76,24 @@ fn one(strategy: Strategy, peers: usize, scaled: bool, watch: &dyn Watch) -> Res
         return Err(PaperError::Stopped);
     }
     let n = crate::region::share(peers, 1);
-    // Equations (3) and (6), KT = 1.
+    // Equations (3) and (6) with KT = 1: diagonal and other entries of the stiffness matrix.
     let (own, other) = match strategy {
         Strategy::Pd => (n - 1.0, -1.0),
         Strategy::Ap => (1.0, -1.0 / (n - 1.0)),
     };
     let matrix = Matrix::from_fn(peers, peers, |row, column| if row == column { own } else { other });
+    // The matrix is symmetric, so the imaginary parts are rounding.
     let matrix = eigenvalues(&matrix).iter().map(|value| value.re).fold(0.0, f64::max);
     let stiffness = swing(strategy, peers, scaled)?;
+    // A copy has the mass mO/N with mO = 0.45 kg.
     let hz = (stiffness * n / 0.45).sqrt() / std::f64::consts::TAU;
     Ok(Found { peers, matrix, scene: stiffness / STIFFNESS, hz })
 }
 
-/// The stiffness with which one copy, moved away from the others, swings against them [N/m].
+/// Returns the stiffness with which a copy, moved away from the others, swings against the others \[N/m\].
 ///
-/// With forces held over a tick T, the distance d of two copies of the mass m obeys d₂ − 2d₁ + d₀ = −q·(d₁ + d₀) with q = κT²/2m, exactly; q is fitted to all ticks.
+/// With forces held over a tick T, the distance d of two copies of mass m obeys exactly d₂ − 2d₁ + d₀ = −q·(d₁ + d₀) with q = κT²/2m. The function fits q
+/// to all ticks by least squares.
 fn swing(strategy: Strategy, peers: usize, scaled: bool) -> Result<f64, PaperError> {
     let case = Case { strategy, stiffness: STIFFNESS, damping: 0.0, delay_us: 0, touching: 0, scaled, ..Case::paper(strategy, peers) };
     let overrides = ["coordination.update=0.1ms", "peer.tick=0.1ms", "scene.duration=0.1s", "peers.peer1.position=0.001"].map(str::to_owned);
@@ -97,6 +101,7 @@ fn swing(strategy: Strategy, peers: usize, scaled: bool) -> Result<f64, PaperErr
     let mut distances = Distances::default();
     let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut distances);
     let (mut above, mut below) = (0.0, 0.0);
+    // Least squares for q: minimises the sum of (d₂ − 2d₁ + d₀ + q·(d₁ + d₀))² over all ticks.
     for d in distances.all.windows(3) {
         above += (2.0 * d[1] - d[0] - d[2]) * (d[1] + d[0]);
         below += (d[1] + d[0]) * (d[1] + d[0]);
@@ -105,7 +110,7 @@ fn swing(strategy: Strategy, peers: usize, scaled: bool) -> Result<f64, PaperErr
     Ok(above / below * 2.0 * mass / (TICK * TICK))
 }
 
-/// The distance between the first two copies at every tick.
+/// Observer of the distance between the first two copies, at every tick \[m\].
 #[derive(Default)]
 struct Distances {
     first: f64,
@@ -121,6 +126,7 @@ impl Observer for Distances {
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         match row.peer {
+            // Ticks of one instant come in the order of the peers, so `first` is of the same instant.
             0 => self.first = row.object.position[0],
             1 => self.all.push(self.first - row.object.position[0]),
             _ => {}

@@ -1,4 +1,4 @@
-//! Figure 5: the admittance of the object.
+//! Figure 5: admittance of the object.
 
 use std::fmt::Write as _;
 
@@ -34,8 +34,9 @@ fn name(case: &Case) -> String {
     if case.peers == 2 { "N = 2".to_owned() } else { format!("{} N = {}", case.strategy.word(), case.peers) }
 }
 
-/// One colour for each number of peers; PD has dashes.
+/// Returns the style of a curve: a colour per number of peers, and dashes for PD.
 fn look(case: &Case) -> Look {
+    // Looks repeat their colours after seven numbers with another dash, so PD gets the colour of AP with dashes.
     const COLOURS: usize = 7;
     let number = case.peers - 2;
     if case.strategy == Strategy::Pd { Look::of(number + COLOURS) } else { Look::of(number).solid() }
@@ -47,6 +48,7 @@ fn panel(responses: &Responses, one: bool, magnitude: bool) -> Panel {
         let values = if magnitude { &curve.decibels } else { &curve.phases };
         Line::new(points(values), look(&curve.case)).named(name(&curve.case))
     });
+    // The admittance of a mass, 1/(iωm), has the phase −90° at all frequencies.
     let ideal = if magnitude { responses.ideal() } else { vec![-90.0; responses.frequencies.len()] };
     let frequency = Axis::new("Frequency").symbol("f").unit("Hz").logarithmic().range(0.01, 40.0);
     let up = if magnitude {

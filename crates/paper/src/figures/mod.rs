@@ -1,4 +1,4 @@
-//! The figures of the paper again.
+//! Figures of the paper, computed anew.
 
 pub(crate) mod admittance;
 mod bode;
@@ -12,29 +12,29 @@ use crate::experiment::{StabilityTest, Travel};
 use crate::region::Atlas;
 use admittance::Responses;
 
-/// A figure with what belongs to it.
+/// A figure with its data.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Figure {
-    /// A short name, also that of its files.
+    /// Short name, also used in names of files.
     pub id: String,
-    /// What it shows.
+    /// Title of the figure.
     pub title: String,
-    /// What agrees with the paper and what does not.
+    /// Caption: agreement and differences with the paper.
     pub caption: String,
-    /// The paper's numbers, and the computed ones.
+    /// Numbers of the paper and computed numbers.
     pub table: Table,
-    /// The drawing, an SVG document with a ground of its own, light or dark as its reader prefers.
+    /// Drawing as an SVG document with its own background, light or dark by the reader's preference.
     pub svg: String,
-    /// The numbers behind it, as CSV.
+    /// Data of the drawing as CSV.
     pub csv: String,
 }
 
-/// A small table.
+/// A small table of text.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Table {
-    /// What stands above the columns.
+    /// Names of the columns.
     pub head: Vec<String>,
-    /// The rows, each as long as the head.
+    /// Rows, each as long as `head`.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -44,7 +44,7 @@ impl Table {
     }
 }
 
-/// All figures, drawn in this size, in the order of the paper.
+/// Draws all figures in the given size, in the order of the paper.
 pub(crate) fn all(atlas: &Atlas, responses: &Responses, tests: &[StabilityTest], travels: &[Travel], size: Size) -> Vec<Figure> {
     let mut figures = regions::figures(atlas, size);
     figures.push(bode::figure(responses, size));

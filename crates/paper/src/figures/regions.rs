@@ -31,6 +31,7 @@ fn panel(atlas: &Atlas, setting: Setting, strategy: Strategy) -> Panel {
     let lines = PEERS.iter().enumerate().filter_map(|(number, peers)| {
         let region = atlas.region(setting, strategy, *peers)?;
         let closed = |line: cohaptic_stability::Polyline| {
+            // A closed contour repeats its first point, so that the drawn line closes.
             let first = line.points.first().copied().filter(|_| line.closed);
             line.points.into_iter().chain(first).map(kilo).collect::<Vec<_>>()
         };

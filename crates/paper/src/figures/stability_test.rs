@@ -8,7 +8,7 @@ use super::{Figure, Table};
 use crate::case::Strategy;
 use crate::experiment::{PeerTrace, StabilityTest};
 
-/// The paper's ordinates: ±3 cm and ±6 N.
+/// Range of the position \[cm\], a little wider than the paper's ±3 cm. The range of the force \[N\] below is the paper's.
 const POSITION_CM: (f64, f64) = (-4.0, 4.0);
 const FORCE_N: (f64, f64) = (-6.0, 6.0);
 

@@ -9,7 +9,7 @@ use crate::case::Strategy;
 use crate::experiment::{DISTANCE, PeerTrace, Travel};
 use crate::page::seconds;
 
-/// What the paper measured for 20 mm [s].
+/// Times for 20 mm in the paper.
 const PAPER: [(Strategy, &str); 2] = [(Strategy::Pd, "1.514 s"), (Strategy::Ap, "1.22 s")];
 
 pub(super) fn figure(travels: &[Travel], delay_ms: u32, size: Size) -> Figure {
@@ -48,16 +48,16 @@ pub(super) fn figure(travels: &[Travel], delay_ms: u32, size: Size) -> Figure {
     }
 }
 
-/// How much of the scene is shown, a little more than in the paper [s].
+/// Length of the drawn part of the scene, a little longer than in the paper \[s\].
 const SHOWN: f64 = 3.0;
 
-/// A quantity over time: its axis (name, symbol, unit), its range, how it is had from a trace, and what that is multiplied by.
+/// A quantity over time: axis (name, symbol, unit), range, access to the values of a trace, and factor to the unit of the axis.
 struct Quantity {
     axis: (&'static str, &'static str, &'static str),
     range: (f64, f64),
     values: fn(&PeerTrace) -> &[f64],
     scale: f64,
-    /// Whether it is the one that the distance is marked in.
+    /// Whether the quantity is the position, whose panel shows the distance of 20 mm.
     is_position: bool,
 }
 
@@ -79,6 +79,7 @@ fn panel(travel: &Travel, quantity: &Quantity) -> Panel {
         .titled(travel.strategy.word())
         .with_all(travel.trace.peers.iter().enumerate().map(line));
     if quantity.is_position {
+        // The push moves the object towards negative positions.
         let goal = 100.0 * (travel.trace.peers[0].position.first().copied().unwrap_or(0.0) - DISTANCE);
         panel = panel.with(Line::level(goal).named("20 mm"));
         if let Some(time) = travel.time {
