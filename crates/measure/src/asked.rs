@@ -1,4 +1,4 @@
-//! What a link is asked for, as far as it follows from its configuration.
+//! Figures asked of a link: means, quantiles and shares that follow from the configuration of the link.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,72 +9,72 @@ use serde::Serialize;
 
 use crate::series::count_u64;
 
-/// The figures that the laws of a link have, of one packet of a steady stream. What does not follow from a law is left out.
+/// Figures asked of a link for a packet of a steady stream. A figure without a law is `None` or empty.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct Asked {
-    /// The mean of the propagation delay \[s\], that of a cut law included.
+    /// Mean of the propagation delay \[s\], also of a law cut at zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_s: Option<f64>,
-    /// Its standard deviation \[s\]; zero if the delay is constant.
+    /// Standard deviation of the propagation delay \[s\]; zero for a constant delay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sd_s: Option<f64>,
-    /// The least delay \[s\].
+    /// Least propagation delay \[s\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_s: Option<f64>,
-    /// Quantiles \[s\] by probability.
+    /// Quantiles of the propagation delay \[s\], by probability.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub quantiles_s: BTreeMap<&'static str, f64>,
-    /// The autocorrelation of the delays at lags of 1 to 10 packets, none lost. Empty if the delay is constant.
+    /// Autocorrelation of the delays at lags of 1 to 10 packets, without losses. Empty for a constant delay.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub autocorrelation: Vec<f64>,
-    /// The long-run share of packets that the loss model takes.
+    /// Share of packets lost by the loss model in the long run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// The mean number of packets that it takes one after another.
+    /// Mean number of packets lost in a row.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_run_mean: Option<f64>,
-    /// The autocorrelation of losses at lags of 1 to 10 packets. Empty where there is no simple law.
+    /// Autocorrelation of losses at lags of 1 to 10 packets. Empty for a model without a simple law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub loss_autocorrelation: Vec<f64>,
-    /// The share of packets of which a copy is made.
+    /// Share of packets with a copy made by the link.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub duplicated: Option<f64>,
-    /// The share of packets of which bits are flipped.
+    /// Share of packets with bits flipped by the link.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damaged: Option<f64>,
-    /// The rate of the line \[bit/s\], framing included.
+    /// Rate of the bottleneck \[bit/s\], framing included.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bit_s: Option<f64>,
-    /// How the figures of packets come about.
+    /// Stages of the link, as far as a comparison must know them.
     #[serde(skip)]
     pub(crate) stages: Stages,
 }
 
-/// What one has to know of a link to tell one stage's work from another's.
+/// Properties of a link needed to attribute a packet's fate to a stage.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Stages {
-    /// The delay of the link; `None` if something else than its law makes a packet's delay what it is.
+    /// Delay of the link; `None` if a packet's delay depends on more than the delay's law.
     pub(crate) delay: Option<cohaptic_wan::Delay>,
-    /// Packets are marked instead of lost.
+    /// Whether the loss model marks packets instead of dropping packets.
     pub(crate) marks: bool,
-    /// Copies are made before losses.
+    /// Whether copies are made before losses.
     pub(crate) copies_first: bool,
 }
 
-/// The quantiles of [`Asked`], and whether enough packets of a usual measurement lie beyond.
+/// Names and probabilities of the quantiles in [`Asked`].
 pub(crate) const QUANTILES: [(&str, f64); 7] =
     [("0.01", 0.01), ("0.05", 0.05), ("0.25", 0.25), ("0.5", 0.5), ("0.75", 0.75), ("0.95", 0.95), ("0.99", 0.99)];
 const LAGS: u32 = 10;
 
 impl Asked {
-    /// The figures asked of a link over which packets of that size go, one every so often. A link with states, a replay and the kernel's netem have no
-    /// laws of their own: nothing is known of them.
+    /// Returns the figures asked of a link for packets of `size`, sent `every` so often. A link with states, a replay, and the kernel's netem have no laws
+    /// here, and the result is empty.
     #[must_use]
     pub fn of(model: &LinkModel, every: Duration, size: Bytes) -> Self {
         model.as_fixed().map_or_else(Self::default, |config| Self::of_config(config, every, size))
     }
 
-    /// The figures asked of one configuration.
+    /// Returns the figures asked of a single configuration, as [`of`](Self::of) does.
     #[must_use]
     pub fn of_config(config: &LinkConfig, every: Duration, size: Bytes) -> Self {
         let law = config.delay.law();
@@ -107,7 +107,7 @@ impl Asked {
                 listed.map_or(sd, |listed| libm::sqrt(sd * sd + listed.variance))
             }),
             least_s: (!traced).then(|| config.delay.least().as_secs_f64()),
-            // Of a sum of delays, quantiles and autocorrelation do not follow from those of its parts.
+            // The quantiles and the autocorrelation of a sum of delays do not follow from those of the parts.
             quantiles_s: law
                 .filter(|_| listed.is_none())
                 .map(|law| QUANTILES.into_iter().map(|(name, p)| (name, seconds(law.quantile(p)))).collect())
@@ -157,7 +157,8 @@ mod tests {
         Asked::of_config(&config, Duration::from_millis(1), Bytes::new(64))
     }
 
-    /// p = 1 %, r = 25 %: runs of 4, and the chain forgets by 1 − p − r a packet. DAR(1) with ρ = 0.5 at 5 %: runs of 1/(0.5·0.95).
+    /// With p = 1 % and r = 25 %, runs have a mean of 4, and the chain forgets by the factor 1 − p − r per packet. DAR(1) with ρ = 0.5 at 5 % has runs of
+    /// 1/(0.5·0.95).
     #[test]
     fn runs_of_losses_follow_from_the_chain() {
         let chain = asked("loss gemodel 1% 25%");
@@ -172,7 +173,7 @@ mod tests {
     fn figures_follow_from_the_laws() {
         let asked = asked("delay 40ms 4ms 50% distribution normal loss gemodel 1% 9% duplicate 2% corrupt 3%");
         assert_eq!((asked.mean_s, asked.sd_s), (Some(0.04), Some(0.004)));
-        // A normal law: ρⁿ; the quantile of 0.95 lies 1.6449 deviations above the mean.
+        // The autocorrelation of a normal law is ρⁿ, and the quantile 0.95 lies 1.6449 deviations above the mean.
         assert!(asked.autocorrelation.iter().zip(1..).all(|(found, lag)| (found - 0.5_f64.powi(lag)).abs() < 1e-12));
         assert!((asked.quantiles_s["0.95"] - (0.04 + 1.644_853_626_951_472_7 * 0.004)).abs() < 1e-12);
         assert!((asked.loss.unwrap() - 0.1).abs() < 1e-12);

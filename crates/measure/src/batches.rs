@@ -1,58 +1,60 @@
-//! How certain figures of a correlated series are, by the means of batches; and into how many batches it may be cut so that their means are nearly
-//! independent.
+//! Uncertainty of figures of a correlated series, by the means of batches.
 //!
-//! The means of batches tell how certain the mean of a series is, whatever its law, as long as a batch is much longer than the memory of the series. The
-//! memory is the integrated autocorrelation time τ = 1 + 2·Σ rₖ of the means of up to 240 fine batches, summed up to the first lag of 3τ or more (Sokal
-//! 1997, "Monte Carlo methods in statistical mechanics", section 3). A batch is 4τ long or longer, so that neighbours of a series that forgets
-//! exponentially, e^(−t/T), for which τ = 2T, are correlated by 7 % at most; what that takes off the variance of a mean of length L, the share T/L, is put back.
+//! Input is a series of numbers in order of time. Output is a standard error or an interval, or a number of batches whose means are nearly independent.
+//!
+//! The means of batches tell the uncertainty of the mean of a series under any law, if a batch is much longer than the memory of the series. The memory is
+//! the integrated autocorrelation time τ = 1 + 2·Σ rₖ of the means of up to 240 fine batches, summed up to the first lag of 3τ or more (Sokal 1997, "Monte
+//! Carlo methods in statistical mechanics", section 3). A batch has a length of at least 4τ. For a series with exponential memory e^(−t/T), with τ = 2T,
+//! neighbouring batches are then correlated by 7 % at most. This correlation lowers the variance of a mean of length L by the share T/L, which is put back.
 
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use crate::series::{NORMAL_975, count, floor, mean, variance, wilson, wilson_of_effective};
 
-/// More batches are never needed: Schmeiser (1982, Operations Research 30(3)) found 10 to 30 to be right for any length.
+/// Most batches used: Schmeiser (1982, Operations Research 30(3)) found 10 to 30 to be enough for any length.
 pub(crate) const MOST: usize = 30;
-/// With fewer numbers than this in a batch, its mean is no summary of anything.
+/// Fewest numbers in a batch whose mean is used.
 const LEAST_LENGTH: usize = 10;
-/// Fine batches, of which the memory is measured.
+/// Number of fine batches for measuring the memory.
 const FINE: usize = 240;
-/// How long a batch is at least \[τ\].
+/// Shortest length of a batch \[τ\].
 const LENGTH: f64 = 4.0;
-/// How far autocorrelations are summed up \[τ\].
+/// Largest lag of the sum of autocorrelations \[τ\].
 const WINDOW: f64 = 3.0;
 
-/// With fewer numbers than this a mean has no standard error.
+/// Fewest numbers whose mean gets a standard error.
 const LEAST_NUMBERS: usize = 300;
-/// With fewer batches than this their means say little of how certain the mean of all is.
+/// Fewest batches whose means tell the uncertainty of the mean of all numbers.
 const LEAST_BATCHES: usize = 10;
-/// The 0.975 quantile of Student's law with 29 degrees of freedom, those of 30 batches.
+/// Quantile 0.975 of Student's law with 29 degrees of freedom, for 30 batches.
 const STUDENT_975: f64 = 2.045_229_642_132_703;
 
-/// Batches whose means are nearly independent.
+/// Division of a series into batches with nearly independent means.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Batches {
+    /// Number of batches.
     pub(crate) count: usize,
-    /// What the variance of their means is to be multiplied by for what correlation is left.
+    /// Factor for the variance of the batch means, which makes up for the remaining correlation.
     pub(crate) correction: f64,
 }
 
-/// Why a series has too few.
+/// Reason why a series cannot be divided into enough batches.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum TooFew {
-    /// It is short.
+    /// The series has too few numbers.
     Short,
-    /// It is short for its memory.
+    /// The series is too short for its memory.
     LongMemory {
-        /// Its integrated autocorrelation time, in shares of its length.
+        /// Integrated autocorrelation time, as a share of the length of the series.
         memory: f64,
-        /// The greatest memory that would do, likewise.
+        /// Largest memory that allows enough batches, as a share of the length.
         allowed: f64,
     },
 }
 
 impl Batches {
-    /// At least `least` and at most 30 for a series whose values deviate from their expectation by that. Deviations of up to `resolution` are rounding and
-    /// no memory.
+    /// Divides a series into at least `least` and at most 30 batches. `deviations` are the values minus their expectation. If all means of fine batches are
+    /// within `resolution`, their variation counts as rounding, not as memory.
     pub(crate) fn of(deviations: &[f64], least: usize, resolution: f64) -> Result<Self, TooFew> {
         let most = (deviations.len() / LEAST_LENGTH).min(MOST);
         if most < least {
@@ -61,18 +63,19 @@ impl Batches {
         let length = deviations.len().div_ceil(FINE);
         let fine: Vec<f64> = deviations.chunks_exact(length).filter_map(mean).collect();
         let time = if fine.iter().all(|deviation| deviation.abs() <= resolution) { 1.0 } else { integrated_time(&fine) };
-        // Nothing below `most` is too large for a `usize`.
+        // `most` is at most 30, so the conversion of counts is exact. The largest suitable number of batches is taken.
         let count_of = (1..=most).rev().find(|&batches| count(batches) * LENGTH * time <= count(fine.len()));
         let Some(batches) = count_of.filter(|batches| *batches >= least) else {
             let share = 1.0 / count(fine.len());
             return Err(TooFew::LongMemory { memory: time * share, allowed: 1.0 / (LENGTH * count(least)) });
         };
+        // T/L in units of fine batches: T = (τ − 1)/2, and a batch has `fine.len()`/`batches` fine batches. A series that allows 30 batches gets no correction.
         let left = if batches < MOST { (time - 1.0).max(0.0) / 2.0 * count(batches) / count(fine.len()) } else { 0.0 };
         Ok(Self { count: batches, correction: 1.0 / (1.0 - left) })
     }
 }
 
-/// 1 + 2·Σ rₖ, not below a half: what chance and negative correlation take off must not make batches shorter than they are for independent values.
+/// Returns 1 + 2·Σ rₖ, at least a half: chance and negative correlation must not make batches shorter than for independent values.
 fn integrated_time(deviations: &[f64]) -> f64 {
     let power: f64 = deviations.iter().map(|deviation| deviation * deviation).sum();
     let mut time = 1.0;
@@ -85,18 +88,18 @@ fn integrated_time(deviations: &[f64]) -> f64 {
     time.max(0.5)
 }
 
-/// The quantile of Student's law with a number of degrees of freedom, at least one.
+/// Returns a quantile of Student's law. The degrees of freedom are at least one.
 pub(crate) fn student(probability: f64, freedom: usize) -> f64 {
-    // The scale and the degrees of freedom are positive, which is all that can be refused.
+    // `StudentsT::new` refuses only a scale or degrees of freedom that are not positive.
     StudentsT::new(0.0, 1.0, count(freedom.max(1))).map_or(f64::INFINITY, |law| law.inverse_cdf(probability))
 }
 
-/// The standard error of the mean of a correlated series by batch means: the series is cut into 30 batches of equal length, and their means, which
-/// are nearly independent where the correlation is shorter than a batch, give sd/√30 (Law & Kelton 2000, section 9.5.3).
+/// Returns the standard error of the mean of a correlated series by batch means: sd/√30 of the means of 30 batches of equal length, nearly independent if a
+/// batch is longer than the correlation (Law & Kelton 2000, section 9.5.3).
 ///
-/// A series with a long memory is cut into fewer, see [`Batches`]. What they give is then widened by the ratio of Student's 0.975 quantiles, so that the true
-/// mean lies within 2.045 of these errors with confidence 0.95 (Student, 29 degrees of freedom) whatever the number of batches. `None` of fewer than 300
-/// numbers, and where there are fewer than 10 batches.
+/// A series with a long memory gets fewer batches, see [`Batches`]. The result is then widened by the ratio of Student's 0.975 quantiles, so that for any
+/// number of batches the true mean lies within 2.045 standard errors with confidence 0.95 (Student, 29 degrees of freedom). Returns `None` for fewer than
+/// 300 numbers or fewer than 10 batches.
 pub(crate) fn batch_standard_error(values: &[f64]) -> Option<f64> {
     if values.len() < LEAST_NUMBERS {
         return None;
@@ -110,9 +113,9 @@ pub(crate) fn batch_standard_error(values: &[f64]) -> Option<f64> {
     variance(&means).map(|variance| widening * (variance * correction / count(number)).sqrt())
 }
 
-/// Wilson's interval at confidence 0.95 for the share of ones in a series of ones and zeros that may depend on each other: n events count as fewer independent
-/// ones as have the variance that batch means give the share, and with Student's quantile instead of the normal one where these tell of more variance than
-/// independent events have. `None` of nothing, and where the memory is too long for batches.
+/// Returns Wilson's interval at confidence 0.95 for the share of ones in a series of ones and zeros, whose events may depend on each other. The n events
+/// count as fewer independent events, as many as give the variance found by batch means. If batch means show more variance than independent events have,
+/// Student's quantile replaces the normal quantile. Returns `None` for an empty series, or if the memory is too long for batches.
 pub(crate) fn share_interval(indicator: &[f64]) -> Option<[f64; 2]> {
     let happened = u64::try_from(indicator.iter().filter(|happened| **happened > 0.5).count()).unwrap_or(u64::MAX);
     let of = u64::try_from(indicator.len()).unwrap_or(u64::MAX);
@@ -123,8 +126,8 @@ pub(crate) fn share_interval(indicator: &[f64]) -> Option<[f64; 2]> {
     wilson_of_effective(happened, of, as_one, if as_one > 1.0 { STUDENT_975 } else { NORMAL_975 })
 }
 
-/// How many events of a series of ones and zeros say as much about their share as one independent event, at least 1; 1 of fewer than 300. `None` where the
-/// memory is too long for batches.
+/// Returns the number of events in a series of ones and zeros worth one independent event, at least 1, and 1 for fewer than 300 events. Returns `None` if
+/// the memory is too long for batches.
 fn events_as_one(indicator: &[f64]) -> Option<f64> {
     if indicator.len() < LEAST_NUMBERS {
         return Some(1.0);
@@ -134,10 +137,10 @@ fn events_as_one(indicator: &[f64]) -> Option<f64> {
     Some(if independent > 0.0 { (error * error / independent).max(1.0) } else { 1.0 })
 }
 
-/// The order statistics that enclose the quantile with confidence of about 0.95, whatever the law (Conover 1999, section 3.2): those at
-/// np ± 1.96·√(np(1−p)), both rounded up. `series` are the same numbers in the order in which they came: where they hang together, so that the share of them
-/// that is not above the quantile has more variance by batch means than that of independent ones, the order statistics lie as much farther apart. `None`
-/// where the sample does not reach that far, or remembers too long.
+/// Returns the two order statistics enclosing a quantile with confidence of about 0.95, under any law (Conover 1999, section 3.2): numbers np ±
+/// 1.96·√(np(1−p)), both rounded up. `series` has the numbers of `sorted` in order of time. If batch means show more variance of the share below the
+/// quantile than independent numbers have, the order statistics lie farther apart by the same factor. Returns `None` if the interval reaches beyond the
+/// sample, or if the memory is too long.
 pub(crate) fn quantile_interval(sorted: &[u64], series: &[u64], probability: f64) -> Option<[u64; 2]> {
     let n = count(sorted.len());
     let reaches = |half: f64| {
@@ -145,7 +148,7 @@ pub(crate) fn quantile_interval(sorted: &[u64], series: &[u64], probability: f64
         (low >= 1.0 && high <= n).then_some([low, high])
     };
     let half = (n * probability * (1.0 - probability)).sqrt();
-    // Most of those that do not reach far enough need no batches.
+    // Checked first without correlation, because most quantiles beyond the sample fail here and need no batches.
     reaches(NORMAL_975 * half)?;
     let middle = sorted[floor((n * probability).ceil()) - 1];
     let as_one = events_as_one(&series.iter().map(|number| f64::from(u8::from(*number <= middle))).collect::<Vec<_>>())?;

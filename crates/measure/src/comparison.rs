@@ -1,11 +1,11 @@
-//! The figures achieved, compared with those asked for.
+//! Compares achieved figures of a link with asked figures.
 //!
-//! Each stage is judged by the packets that reached it, not counting copies: the loss model by packets that no outage took, damage by those that were
-//! not lost. So a figure is near the one asked for whatever the other stages do. A delay is compared only where nothing but its law makes it (no queue,
-//! no slots, no reordering, no order that makes packets wait).
+//! Each stage is judged by the packets that reached the stage, without copies: the loss model by packets that passed all outages, damage by packets that
+//! were not lost. So the other stages do not move a figure away from its law. Delays are compared only if the delay's law alone decides them: no queue, no
+//! slots, no reordering, and no waiting for the order.
 //!
-//! Standard errors are those of 30 batch means, or of fewer where packets remember for long, which take correlation into account, but not below those of
-//! independent packets. A quantile is judged by the share of packets that are not above the one asked for.
+//! Standard errors are those of 30 batch means, which take correlation into account, or of fewer batches if packets have a long memory. A standard error is
+//! never below that of independent packets. A quantile is judged by the share of packets at or below the asked quantile.
 
 use cohaptic_wan::{Distribution, DropCause, Fate, PacketRecord};
 use serde::Serialize;
@@ -14,30 +14,32 @@ use crate::asked::{Asked, QUANTILES};
 use crate::batches;
 use crate::series::{self, count};
 
-/// One figure.
+/// Comparison of a single figure.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Figure {
-    /// Its name: `mean_s`, `sd_s`, `quantile_0.95_s`, `autocorrelation_1`, `loss`, `duplicated`, `damaged`.
+    /// Name of the figure: `mean_s`, `sd_s`, `quantile_0.95_s`, `autocorrelation_1`, `loss`, `duplicated`, `damaged`.
     pub name: String,
-    /// What was asked for.
+    /// Value asked for.
     pub asked: f64,
-    /// What was achieved; `None` if no packet can tell.
+    /// Value achieved; `None` if no packet tells the figure.
     pub achieved: Option<f64>,
-    /// The standard error of what was achieved; `None` where packets are too few or remember for too long, or where the law has no such error (the deviation
-    /// and the autocorrelation of Pareto's laws, whose fourth moment is infinite); zero where nothing varies.
+    /// Standard error of the achieved value; zero if nothing varies. `None` if packets are too few or have a too long memory, or if the law has no such
+    /// error: deviation and autocorrelation of Pareto laws, with an infinite fourth moment.
     pub standard_error: Option<f64>,
-    /// Whether what was asked for lies more than four standard errors away.
+    /// Whether the asked value is more than four standard errors away.
     pub outside: bool,
 }
 
-/// How many standard errors are too many: 1 in 2500 with 29 degrees of freedom (Student), 1 in 600 where there are only 10 batches.
+/// Limit of the difference in standard errors. Chance exceeds the limit once in 2500 comparisons with 29 degrees of freedom (Student), and once in 600 with
+/// 10 batches.
 const TOO_MANY: f64 = 4.0;
-/// Delays count whole nanoseconds.
+/// Rounding of delays to whole nanoseconds \[s\].
 const ROUNDING_S: f64 = 1e-9;
 
-/// What became of one packet, not of its copies.
+/// History of a packet, without its copies.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
+    /// Final fate; `None` while the packet is on the way.
     end: Option<Fate>,
     delay_s: f64,
     copied: bool,
@@ -45,14 +47,15 @@ struct Seen {
     damaged: bool,
 }
 
-/// Takes the records of one link in any order and compares figures with those asked for. It holds 48 bytes a packet.
+/// Collects the records of a link, in any order, and compares figures with asked figures. Needs 48 bytes per packet.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
+    /// Packets, indexed by sequence number.
     packets: Vec<Seen>,
 }
 
 impl Comparison {
-    /// Takes one record. Packets are numbered from 0 without gaps.
+    /// Adds a record. Packets are numbered from 0 without gaps.
     pub fn record(&mut self, record: &PacketRecord) {
         let Ok(number) = usize::try_from(record.sequence) else { return };
         if number >= self.packets.len() {
@@ -69,7 +72,7 @@ impl Comparison {
         }
     }
 
-    /// Every figure that was asked for and can be compared. Delays first.
+    /// Compares all asked figures with an achieved counterpart, delays first.
     #[must_use]
     pub fn figures(&self, asked: &Asked) -> Vec<Figure> {
         let mut figures = Vec::new();
@@ -92,7 +95,7 @@ impl Comparison {
 
     fn delays(&self, asked: &Asked, figures: &mut Vec<Figure>) {
         let Some(delay) = &asked.stages.delay else { return };
-        // A damaged packet has travelled as long as a whole one.
+        // A damaged packet has the delay of an undamaged packet, even if its checksum leads to a drop at the end.
         let travelled = |seen: &Seen| matches!(seen.end, Some(Fate::Delivered(_) | Fate::Dropped(DropCause::Checksum))).then_some(seen.delay_s);
         let by_packet: Vec<Option<f64>> = self.packets.iter().map(travelled).collect();
         let delays: Vec<f64> = by_packet.iter().filter_map(|delay| *delay).collect();
@@ -103,7 +106,7 @@ impl Comparison {
             figures.push(figure("mean_s", wanted, mean, mean_error, ROUNDING_S));
         }
         let sd = variance.map(f64::sqrt);
-        // Of Pareto's tail the fourth moment is infinite, and so is the variance of squares.
+        // Pareto laws have an infinite fourth moment, so the variance of the squares is infinite.
         let squares_vary = !delay.law().is_some_and(|law| matches!(law.distribution(), Distribution::Pareto | Distribution::ParetoNormal));
         if let (Some(wanted), Some(mean)) = (asked.sd_s, mean) {
             let squares: Vec<f64> = delays.iter().map(|delay| (delay - mean).powi(2)).collect();
@@ -115,12 +118,12 @@ impl Comparison {
         sorted.sort_by(f64::total_cmp);
         for (name, p) in QUANTILES {
             let Some(&wanted) = asked.quantiles_s.get(name) else { continue };
-            // Half a nanosecond above, since delays are rounded.
+            // Half a nanosecond above the quantile, because delays are rounded to nanoseconds.
             let share = law.cdf(wanted * 1e9 + 0.5);
             let below: Vec<f64> = delays.iter().map(|delay| f64::from(u8::from(*delay <= wanted + 0.5 * ROUNDING_S))).collect();
             let judged = of_share("", share, wanted, &below, quantile(&sorted, p));
-            // The error of a quantile is that of the share over the density, here from the distance over which the share changes by one error, to the side on
-            // which that is farther.
+            // The error of a quantile is the error of the share divided by the density. The density is taken from the distance over which the share changes
+            // by one error, on the side with the longer distance.
             let error = judged.standard_error.and_then(|error| {
                 let [low, middle, high] = [p - error, p, p + error].map(|p| law.quantile(p.clamp(0.0, 1.0)));
                 (p > error && p + error < 1.0).then_some((high - middle).max(middle - low) / 1e9)
@@ -129,14 +132,14 @@ impl Comparison {
         }
         let unbroken = self.packets.iter().all(|seen| !seen.copied);
         if let (Some(&wanted), true) = (asked.autocorrelation.first(), unbroken) {
-            // Of the pairs alone: where packets are lost, the variance over all delays is another one than theirs.
+            // Means over pairs only: if packets are lost, the variance over all delays differs from the variance over pairs.
             let achieved = mean.and_then(|mean| {
                 let pairs = by_packet.windows(2).filter_map(|pair| Some((pair[0]? - mean, pair[1]? - mean)));
                 let (products, squares) = pairs.fold((0.0, 0.0), |(products, squares), (x, y)| (products + x * y, squares + (x * x + y * y) / 2.0));
                 (squares > 0.0).then_some(products / squares)
             });
             let error = achieved.zip(mean).zip(variance).and_then(|((r, mean), variance)| {
-                // The influence of each pair on the autocorrelation.
+                // Influence of each pair on the autocorrelation: the derivative of the ratio of sums.
                 let influence = |pair: &[Option<f64>]| {
                     let (x, y) = (pair[0]? - mean, pair[1]? - mean);
                     Some((x * y - r * (x * x + y * y) / 2.0) / variance)
@@ -150,27 +153,28 @@ impl Comparison {
     }
 }
 
-/// A share that is judged against the probability `share`, and shown as `asked` and `shown`.
+/// Judges a share against the probability `share`. The result shows `asked` and `shown`, or the achieved share for `shown` of `None`.
 fn of_share(name: &str, share: f64, asked: f64, happened: &[f64], shown: Option<f64>) -> Figure {
     let achieved = series::mean(happened);
-    // Of what was asked for: of nothing that happened one cannot tell.
+    // The variance of the asked probability, because an achieved share of zero would have no variance.
     let independent = (share * (1.0 - share) / count(happened.len().max(1))).sqrt();
     let error = worst(batches::batch_standard_error(happened), Some(independent));
     let judged = figure(name, share, achieved, error, 1e-12);
     Figure { asked, achieved: shown.or(achieved), ..judged }
 }
 
+/// Makes a figure. Differences up to `tolerance` count as rounding.
 fn figure(name: &str, asked: f64, achieved: Option<f64>, standard_error: Option<f64>, tolerance: f64) -> Figure {
     let outside = achieved.zip(standard_error).is_some_and(|(achieved, error)| (achieved - asked).abs() > TOO_MANY * error + tolerance);
     Figure { name: name.to_owned(), asked, achieved, standard_error, outside }
 }
 
-/// The larger of the two, if there is the first.
+/// Returns the larger of two errors; `None` without an error by batches.
 fn worst(batches: Option<f64>, independent: Option<f64>) -> Option<f64> {
     batches.map(|batches| independent.map_or(batches, |independent| batches.max(independent)))
 }
 
-/// The order statistic at that share; `None` of nothing.
+/// Returns the order statistic nearest to a probability; `None` for an empty list.
 fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and no longer than the list")]
     let place = (p * count(sorted.len().saturating_sub(1))).round() as usize;
@@ -192,7 +196,7 @@ mod tests {
         Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap()
     }
 
-    /// What a link that was asked for one thing looks like beside another.
+    /// Returns the comparison of a link configured by `done` with the figures asked by `asked`.
     fn figures(asked: &str, done: &str) -> Vec<Figure> {
         let info = PacketInfo { size: Bytes::new(64), ecn_capable: true };
         let stream = SteadyStream { packets: 60_000, every: Duration::from_millis(1), info };
@@ -241,7 +245,7 @@ mod tests {
         assert!(law.contains(&"quantile_0.99_s".to_owned()) && !law.contains(&"mean_s".to_owned()) && !law.contains(&"sd_s".to_owned()), "{law:?}");
     }
 
-    /// Pareto's law of tail index 3 has no fourth moment: the variance of its squares, from which the error of a deviation comes, is infinite.
+    /// Pareto's law with tail index 3 has no fourth moment. The error of the deviation would need the variance of squares, which is infinite.
     #[test]
     fn an_error_that_does_not_exist_is_not_stated() {
         let words = "delay 40ms 4ms distribution pareto";

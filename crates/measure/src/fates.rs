@@ -1,6 +1,6 @@
-//! The fate log as a file: what became of every packet, in a form that [`FateLog`] reads back exactly and a link can replay.
+//! Fate logs as files, read back exactly by [`FateLog`] and replayed by a link.
 //!
-//! The columns are those of [`FateRow`]. The writer holds nothing in memory; the reader holds the log, and a line of its text.
+//! The columns are those of [`FateRow`]. The writer keeps no rows in memory. The reader keeps the log, and a single line of text.
 
 use std::io::{self, BufRead as _, BufReader, Read, Write};
 
@@ -8,75 +8,75 @@ use cohaptic_wan::{FateLog, FateLogError, FateLogReader, FateRow, PacketRecord};
 
 /// Writes a fate log row by row, in the order of the calls.
 ///
-/// Rows are written one by one: give it a [`std::io::BufWriter`]. Call [`FateWriter::finish`] to hear of errors of the last rows.
+/// Pass a [`std::io::BufWriter`], because each row is a write of its own. Call [`FateWriter::finish`] to learn of errors of the last rows.
 #[derive(Debug)]
 pub struct FateWriter<W> {
     to: W,
 }
 
 impl<W: Write> FateWriter<W> {
-    /// Begins a log: writes the header.
+    /// Begins a log with the header line.
     ///
     /// # Errors
     ///
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn new(mut to: W) -> io::Result<Self> {
         writeln!(to, "{}", FateRow::HEADER)?;
         Ok(Self { to })
     }
 
-    /// Writes one row.
+    /// Writes a row.
     ///
     /// # Errors
     ///
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn write(&mut self, record: &PacketRecord) -> io::Result<()> {
         writeln!(self.to, "{}", FateRow(*record))
     }
 
-    /// Ends the log: flushes the writer and gives it back.
+    /// Ends the log: flushes the writer and returns the writer.
     ///
     /// # Errors
     ///
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn finish(mut self) -> io::Result<W> {
         self.to.flush()?;
         Ok(self.to)
     }
 }
 
-/// Why a file is not read as a fate log.
+/// Error of reading a fate log.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Io(#[from] io::Error),
-    /// A line is not UTF-8. Lines are counted from 1.
+    /// A line is not UTF-8.
     #[error("line {line}: not UTF-8: expected a text file")]
     NotText {
-        /// The line.
+        /// Number of the line, from 1.
         line: u64,
     },
-    /// It is no complete fate log.
+    /// The text is not a complete fate log.
     #[error(transparent)]
     Log(#[from] FateLogError),
 }
 
-/// The most bytes of a line; a row of a log has at most 110. A longer line is refused as one that is no row.
+/// Length of the longest line read \[byte\]. A row has at most 110 bytes, so the first part of a longer line is refused as no row.
 const LONGEST_LINE: u64 = 4096;
 
 /// Reads a fate log.
 ///
 /// # Errors
 ///
-/// [`ReadError`] if the file cannot be read, is not UTF-8, or is no complete fate log; the error names line, column and what was expected.
+/// [`ReadError`] if the file cannot be read, is not UTF-8, or is not a complete fate log. The error names line, column and what was expected.
 pub fn read(from: impl Read) -> Result<FateLog, ReadError> {
     let mut from = BufReader::with_capacity(1 << 16, from);
     let mut log = FateLogReader::default();
     let mut bytes = Vec::new();
     for line in 1.. {
         bytes.clear();
-        // A file without line breaks must not fill the memory.
+        // The limit keeps a file without line breaks from filling the memory.
         if from.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes)? == 0 {
             break;
         }

@@ -1,19 +1,19 @@
-//! What a link did, in figures and files, and what link would have done it.
+//! Figures of a link from its packets, files of its packets, and estimates of a link from measurements.
 //!
-//! You need it if you compare a link with its configuration, or estimate a link from measured delays.
+//! Use this crate if you compare a link with its configuration, or estimate a link from measured delays.
 //!
-//! | module | is |
+//! | module | content |
 //! | --- | --- |
 //! | [`fates`] | the fate log as a file: a streaming writer and a reader |
-//! | [`pcapng`] | the fates as a capture file that packet analysers open: the crate `cohaptic-capture` |
-//! | [`achieved`] | figures of a link's delays, losses and order, each with its uncertainty, to be compared with those asked for |
-//! | [`steady`] | a steady stream of packets over one link |
-//! | [`asked`] | the figures that follow from the laws of a link |
-//! | [`comparison`] | the achieved figures compared with the configured ones, and whether they are too far off |
-//! | [`fit`](mod@fit) | an estimate of a link from measured one-way delays and losses, with its goodness |
+//! | [`pcapng`] | fates as capture files for packet analysers: the crate `cohaptic-capture` |
+//! | [`achieved`] | achieved figures of delay, loss and order, each with its uncertainty |
+//! | [`steady`] | a steady stream of packets over a link |
+//! | [`asked`] | figures that follow from the laws of a link |
+//! | [`comparison`] | comparison of achieved and asked figures, with a judgement of the difference |
+//! | [`fit`](mod@fit) | estimate of a link from measured one-way delays and losses, with its goodness |
 //!
-//! It knows packets ([`PacketRecord`]) and nothing of what they carry. Figures are computed with the
-//! platform's mathematics, so that their last digits may differ between platforms; what a link does never does.
+//! The crate knows packets ([`PacketRecord`]) and nothing of their contents. Figures use the mathematical functions of the platform, so last digits may
+//! differ between platforms. The fates of packets never differ.
 //!
 //! ```
 //! use cohaptic_measure::achieved::Achieved;

@@ -1,6 +1,6 @@
-//! Figures of a series of numbers, and how certain they are.
+//! Figures of a series of numbers, with standard errors and intervals for independent numbers.
 
-/// The 0.975 quantile of the standard normal law.
+/// Quantile 0.975 of the standard normal law.
 pub(crate) const NORMAL_975: f64 = 1.959_963_984_540_054;
 #[expect(clippy::cast_precision_loss, reason = "counts below 2^53 are exact, and none is larger")]
 pub(crate) const fn count(n: usize) -> f64 {
@@ -12,27 +12,26 @@ pub(crate) const fn count_u64(n: u64) -> f64 {
     n as f64
 }
 
-/// A span or an instant counted in nanoseconds, in seconds.
+/// Converts nanoseconds to seconds.
 pub(crate) const fn seconds(nanos: u64) -> f64 {
     count_u64(nanos) / 1e9
 }
 
-/// The arithmetic mean; `None` of nothing.
+/// Returns the arithmetic mean; `None` for an empty list.
 pub(crate) fn mean(values: &[f64]) -> Option<f64> {
-    // About the first value, so that a large common part costs no digits.
+    // Sums differences from the first value, so that a large common part costs no digits.
     let &first = values.first()?;
     Some(first + values.iter().map(|value| value - first).sum::<f64>() / count(values.len()))
 }
 
-/// The variance Σ(x − x̄)²/(n − 1); `None` of fewer than two.
+/// Returns the variance Σ(x − x̄)²/(n − 1); `None` for fewer than two values.
 pub(crate) fn variance(values: &[f64]) -> Option<f64> {
     let mean = mean(values)?;
     (values.len() > 1).then(|| values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count(values.len() - 1))
 }
 
-/// The autocorrelation at lags 1 to `lags` of a series in which some values are missing: the mean product of deviations over the pairs of which both
-/// are there, divided by the variance over all (Parzen 1963, Sankhyā A 25(4)). Empty if the series does not vary; shorter if no pair is that far
-/// apart.
+/// Returns the autocorrelation at lags 1 to `lags` of a series with missing values: the mean product of deviations over pairs with both values, divided by
+/// the variance over all values (Parzen 1963, Sankhyā A 25(4)). Empty for a constant series; shorter than `lags` if no pair is that far apart.
 pub(crate) fn autocorrelation(series: &[Option<f64>], lags: usize) -> Vec<f64> {
     let present: Vec<f64> = series.iter().filter_map(|value| *value).collect();
     let Some(mean) = mean(&present) else { return Vec::new() };
@@ -48,13 +47,13 @@ pub(crate) fn autocorrelation(series: &[Option<f64>], lags: usize) -> Vec<f64> {
     (1..=lags).map_while(at_lag).collect()
 }
 
-/// Wilson's interval for a proportion at confidence 0.95 (Wilson 1927, JASA 22(158)): the probabilities p for which the share found is within 1.96
-/// standard deviations √(p(1−p)/n) of p. It holds for independent events. `None` of no trials.
+/// Returns Wilson's interval at confidence 0.95 for a proportion of independent events (Wilson 1927, JASA 22(158)): all probabilities p such that the found
+/// share is within 1.96 standard deviations √(p(1−p)/n) of p. `None` for no trials.
 pub(crate) fn wilson(happened: u64, of: u64) -> Option<[f64; 2]> {
     wilson_of_effective(happened, of, 1.0, NORMAL_975)
 }
 
-/// Wilson's interval for dependent events, a number of which say as much as one independent event, with the quantile that fits how that number was found.
+/// Returns Wilson's interval for dependent events. `as_one` events are worth one independent event; `quantile` fits the way of finding `as_one`.
 pub(crate) fn wilson_of_effective(happened: u64, of: u64, as_one: f64, quantile: f64) -> Option<[f64; 2]> {
     if of == 0 {
         return None;
@@ -63,20 +62,20 @@ pub(crate) fn wilson_of_effective(happened: u64, of: u64, as_one: f64, quantile:
     let share = count_u64(happened) / count_u64(of);
     let middle = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = quantile / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
-    // At the ends the exact bound is 0 or 1, which rounding misses.
+    // At the ends the exact bound is 0 or 1, which rounding would miss.
     Some([if happened == 0 { 0.0 } else { middle - half }, if happened == of { 1.0 } else { middle + half }])
 }
 
-/// How far Wilson's interval reaches from the share found to its farther end, in units of 1.96: an error that covers it also where little happened, or all.
-/// Zero of no trials.
+/// Returns the distance from the found share to the farther end of Wilson's interval, divided by 1.96. As a standard error, the result covers the interval
+/// even if nearly no or nearly all events happened. Zero for no trials.
 pub(crate) fn share_error(happened: u64, of: u64) -> f64 {
     let share = count_u64(happened) / count_u64(of);
     wilson(happened, of).map_or(0.0, |[low, high]| (share - low).max(high - share) / NORMAL_975)
 }
 
-/// The quantile by linear interpolation between order statistics, type 7 of Hyndman & Fan (1996, The American Statistician 50(4)).
+/// Returns a quantile by linear interpolation between order statistics, type 7 of Hyndman & Fan (1996, The American Statistician 50(4)).
 ///
-/// `sorted` is not empty and `probability` lies in 0..=1.
+/// `sorted` must not be empty; `probability` must be from 0 to 1.
 pub(crate) fn quantile(sorted: &[u64], probability: f64) -> f64 {
     let place = probability * count(sorted.len() - 1);
     let below = floor(place);
@@ -85,7 +84,7 @@ pub(crate) fn quantile(sorted: &[u64], probability: f64) -> f64 {
     count_u64(low) + (place - count(below)) * count_u64(high - low)
 }
 
-/// A place in a list: not negative, and far below 2⁵³.
+/// Rounds a position in a list down. The position is not negative and far below 2⁵³.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and no longer than a list")]
 pub(crate) const fn floor(place: f64) -> usize {
     place as usize
@@ -98,8 +97,8 @@ mod tests {
 
     #[test]
     fn autocorrelation_is_found_through_gaps() {
-        // 40 % of the values are missing. The variance of r_k of an AR(1) process is ((1+φ²)(1−φ²ᵏ)/(1−φ²) − 2kφ²ᵏ)/n (Bartlett 1946) with all values;
-        // with a share 0.36 of the pairs the standard error is at most 1/0.6 of that. Tolerance 4 of these.
+        // 40 % of the values are missing. With all values, the variance of r_k of an AR(1) process is ((1+φ²)(1−φ²ᵏ)/(1−φ²) − 2kφ²ᵏ)/n (Bartlett 1946).
+        // With a share of 0.36 of the pairs, the standard error is at most 1/0.6 times as large. The tolerance is four standard errors.
         let mut rng = TestRng::new(9);
         let series: Vec<_> = autoregressive(4, 0.8, 20_000).into_iter().map(|value| (rng.unit() > 0.4).then_some(value)).collect();
         let found = autocorrelation(&series, 3);

@@ -1,31 +1,31 @@
-//! One link, driven by a steady stream of packets.
+//! A steady stream of packets over a single link.
 
 use std::time::Duration;
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{Link, PacketInfo, PacketRecord};
 
-/// Packets of one size, one every so often, from instant zero on.
+/// Packets of equal size, sent at equal intervals from instant zero on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SteadyStream {
-    /// How many.
+    /// Number of packets.
     pub packets: u64,
-    /// The time from one to the next.
+    /// Interval between two packets.
     pub every: Duration,
-    /// What each is.
+    /// Size and headers of each packet.
     pub info: PacketInfo,
 }
 
 impl SteadyStream {
-    /// When the packet of that number is sent; the last instant there is, where it cannot be counted.
+    /// Returns the instant of sending packet `number`, or the last countable instant for a later one.
     #[must_use]
     pub fn sent(&self, number: u64) -> Instant {
         let nanos = self.every.as_nanos().saturating_mul(number.into());
         Instant::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
     }
 
-    /// Sends the stream over a link that is new, and lets everything arrive. `on_record` hears of every fate, in the order in which they happen;
-    /// `keep_going` is asked before every 1024th packet with the number sent, and ends the stream with `false`. Gives the number of packets sent.
+    /// Sends the stream over a new link and waits for all arrivals. Calls `on_record` with each fate in order of time. Calls `keep_going` before every
+    /// 1024th packet with the number of packets sent so far; `false` ends the stream. Returns the number of packets sent.
     ///
     /// # Errors
     ///
@@ -44,11 +44,12 @@ impl SteadyStream {
         };
         let mut sent = 0;
         while sent < self.packets && (!sent.is_multiple_of(1024) || keep_going(sent)) {
-            // Instants grow with the number, and nobody else has the link.
+            // Cannot fail: the instants grow with the number, and no other code uses the link.
             let _ = link.handle_packet(self.sent(sent), self.info, ());
             sent += 1;
             drain(link)?;
         }
+        // Lets the packets still inside the link arrive.
         let _ = link.handle_timeout(Instant::MAX);
         drain(link)?;
         Ok(sent)

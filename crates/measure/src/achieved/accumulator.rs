@@ -1,4 +1,4 @@
-//! From records, one by one, to figures.
+//! Collects records one by one, and computes figures from them.
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{DropCause, Fate, PacketRecord};
@@ -7,76 +7,79 @@ use super::order::OrderOfArrival;
 use super::{Achieved, DelayFigures, FateCounts, LossFigures};
 use crate::series::count_u64;
 
-/// Takes the records of one link as they happen and gives its figures at any time.
+/// Collects the records of a link in order of time, and returns its figures at any time.
 ///
-/// It holds 17 bytes for every packet, and 16 for every place where arrivals do not follow the order of sending; [`Accumulator::finish`] needs about 48
-/// bytes a packet more while it runs. [`Accumulator::of_first`] bounds the number of packets.
+/// Needs 17 bytes per packet, and 16 bytes for each break in the order of arrivals. [`Accumulator::finish`] needs about 48 bytes per packet more during the
+/// call. [`Accumulator::of_first`] limits the number of packets.
 #[derive(Clone, Debug, Default)]
 pub struct Accumulator {
-    /// The number of packets that figures are of; packets with greater numbers are counted only. `None`: all.
+    /// Number of first packets with figures; later packets are only counted. `None` for all packets.
     most: Option<u64>,
-    /// The number of packets beyond these.
+    /// Number of packets after the first `most`.
     beyond: u64,
-    /// Packets by sequence.
+    /// History of packets, indexed by sequence number.
     packets: Vec<Packet>,
     counts: FateCounts,
     order: OrderOfArrival,
+    /// Instant of the newest record.
     latest: Instant,
     first_arrival: Option<Instant>,
     last_arrival: Instant,
+    /// Bytes of all arrivals after the first arrival.
     bytes_after_first: u128,
+    /// Arrivals of packets with an earlier arrived copy.
     extra_copies: u64,
     jitter: Jitter,
 }
 
-/// The history of one packet. Default: never heard of.
+/// History of a packet. The default is a packet without a record.
 #[derive(Clone, Copy, Debug, Default)]
 struct Packet {
-    /// Delay of the first copy to arrive \[ns\], plus one; 0: none arrived.
+    /// Delay of the first arrived copy \[ns\] plus one; 0 if none arrived. The shift saves the space of an `Option`.
     delay_plus_one: u64,
-    /// Copies made, less ends.
+    /// Number of copies made minus number of ends.
     more_copies_than_ends: i32,
     known: bool,
 }
 
-/// What can be said of a packet in the end.
+/// Final knowledge about a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Outcome {
-    /// It arrived after this delay \[ns\].
+    /// The packet arrived, with the delay of its first arrived copy \[ns\].
     Received(u64),
-    /// No copy arrived, and none can arrive any more.
+    /// No copy arrived, and none is on the way.
     Lost,
-    /// A copy may still arrive.
+    /// No copy arrived, but a copy may still arrive.
     OnTheWay,
 }
 
-/// A record came after one of a later instant. Nothing was changed.
+/// A record was older than a record before. The record was not added.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("a record of {at} came after one of {latest}: expected records in the order in which things happened")]
 pub struct RecordOutOfOrder {
-    /// The instant of the record.
+    /// Instant of the refused record.
     pub at: Instant,
-    /// The latest instant before.
+    /// Instant of the newest record before.
     pub latest: Instant,
 }
 
 impl Accumulator {
-    /// Nothing has happened yet.
+    /// Creates an accumulator without records. All causes of drops are present with a count of zero.
     #[must_use]
     pub fn new() -> Self {
         let dropped = DropCause::ALL.into_iter().map(|cause| (cause.name(), 0)).collect();
         Self { counts: FateCounts { dropped, ..FateCounts::default() }, ..Self::default() }
     }
 
-    /// Nothing has happened yet. Figures will be of the first packets only, that number of them at most, so that memory is bounded; fates are counted of all.
+    /// Creates an accumulator with figures of the first `packets` packets only, which limits the memory. Fates are counted for all packets.
     #[must_use]
     pub fn of_first(packets: u64) -> Self {
         Self { most: Some(packets), ..Self::new() }
     }
 
-    /// Takes one record. The order of the calls is the order of arrival, also at equal instants.
+    /// Adds a record. The order of the calls is the order of arrival, also for equal instants.
     ///
-    /// Packets are numbered from 0 without gaps, as a link numbers them; memory grows with the greatest number.
+    /// Packets are numbered from 0 without gaps, as a link numbers packets. The memory grows with the largest number.
     ///
     /// # Errors
     ///
@@ -84,7 +87,7 @@ impl Accumulator {
     ///
     /// # Panics
     ///
-    /// If the list of packets outgrows the address space.
+    /// If the list of packets does not fit into the address space.
     pub fn record(&mut self, record: &PacketRecord) -> Result<(), RecordOutOfOrder> {
         if record.at < self.latest {
             return Err(RecordOutOfOrder { at: record.at, latest: self.latest });
@@ -117,6 +120,7 @@ impl Accumulator {
         Ok(())
     }
 
+    /// Counts the fate of a record.
     fn count(&mut self, record: &PacketRecord) {
         match record.fate {
             Fate::Duplicated => self.counts.duplicated += 1,
@@ -129,6 +133,7 @@ impl Accumulator {
         }
     }
 
+    /// Adds an arrival to throughput, order and jitter. Only first copies count for order and jitter.
     fn arrives(&mut self, record: &PacketRecord, at: Instant, first_copy: bool) {
         if self.first_arrival.is_some() {
             self.bytes_after_first += u128::from(record.size.get());
@@ -144,7 +149,7 @@ impl Accumulator {
         }
     }
 
-    /// The figures of all that was recorded so far.
+    /// Computes the figures of all records so far.
     #[must_use]
     pub fn finish(&self) -> Achieved {
         let outcomes: Vec<Outcome> = self.packets.iter().map(|packet| packet.outcome()).collect();
@@ -161,7 +166,7 @@ impl Accumulator {
     }
 
     fn counts(&self) -> FateCounts {
-        // A packet beyond the first ones is taken for known if a later one is: they are numbered without gaps.
+        // Packets after the first ones count as offered up to the largest number seen, because numbers have no gaps.
         let offered = self.packets.iter().map(|packet| u64::from(packet.known)).sum::<u64>() + self.beyond;
         let dropped: u64 = self.counts.dropped.values().sum();
         let in_flight = (offered + self.counts.duplicated).saturating_sub(self.counts.delivered + dropped);
@@ -179,7 +184,7 @@ impl Accumulator {
 impl Packet {
     const fn outcome(self) -> Outcome {
         match self.delay_plus_one {
-            // The packet itself has one end beyond those of its copies.
+            // A packet with all its copies has one end more than copies. So a negative difference means that all have ended, none by arrival.
             0 if self.known && self.more_copies_than_ends < 0 => Outcome::Lost,
             0 => Outcome::OnTheWay,
             delay_plus_one => Outcome::Received(delay_plus_one - 1),
@@ -187,9 +192,11 @@ impl Packet {
     }
 }
 
-/// The estimator of RFC 3550 in `f64`; the RFC's integer form only saves cycles.
+/// Jitter estimator of RFC 3550, in `f64` instead of the integers of the RFC.
 #[derive(Clone, Copy, Debug, Default)]
+/// Instants of sending and arrival of the packet that arrived last.
 struct Jitter {
+    /// Smoothed difference J \[ns\].
     last: Option<(Instant, Instant)>,
     nanos: f64,
     differences: u64,
@@ -198,7 +205,8 @@ struct Jitter {
 impl Jitter {
     fn arrives(&mut self, offered: Instant, at: Instant) {
         if let Some((last_offered, last_at)) = self.last {
-            // D = (Rj − Sj) − (Ri − Si), as (Rj − Ri) − (Sj − Si): arrivals do not go back, sendings may.
+            // D = (Rj − Sj) − (Ri − Si), computed as (Rj − Ri) − (Sj − Si): arrivals never go back in time, but the order of sending may. All terms stay
+            // unsigned.
             let between_arrivals = at.saturating_duration_since(last_at).as_nanos();
             let later = offered.saturating_duration_since(last_offered).as_nanos();
             let earlier = last_offered.saturating_duration_since(offered).as_nanos();

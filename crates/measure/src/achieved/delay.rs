@@ -8,40 +8,40 @@ use super::accumulator::Outcome;
 use crate::batches;
 use crate::series::{self, NORMAL_975, count, seconds};
 
-/// Figures of the delays of the packets that arrived, the first copy of each.
+/// Figures of the delays of arrived packets. The first arrived copy of a packet counts.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct DelayFigures {
-    /// The mean \[s\].
+    /// Mean delay \[s\].
     pub mean_s: f64,
-    /// The standard error of the mean \[s\] by 30 batch means, which takes correlation into account; the mean asked for lies within 2.05 of these with
-    /// confidence 0.95 (Student, 29 degrees of freedom). `None` of fewer than 300 packets, and of delays that remember for a fortieth of them or longer.
+    /// Standard error of the mean \[s\] by batch means, which take correlation into account. The true mean lies within 2.05 standard errors with confidence
+    /// 0.95 (Student, 29 degrees of freedom). `None` for fewer than 300 packets, or for a memory of the delays longer than a fortieth of the stream.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_se_s: Option<f64>,
-    /// The standard deviation \[s\], with n − 1; `None` of one packet.
+    /// Standard deviation \[s\] with the divisor n − 1; `None` for a single packet.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sd_s: Option<f64>,
-    /// The standard error of the standard deviation \[s\]: that of the variance by batch means of the squared deviations, over 2·sd (the delta
-    /// method). It holds for every law with four moments, which Pareto's does not have. `None` of fewer than 300 packets or of equal delays.
+    /// Standard error of the standard deviation \[s\]: the error of the variance, by batch means of squared deviations, divided by 2·sd (delta method).
+    /// Valid for laws with a fourth moment, which Pareto laws lack. `None` for fewer than 300 packets or equal delays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sd_se_s: Option<f64>,
-    /// The least \[s\].
+    /// Least delay \[s\].
     pub least_s: f64,
-    /// The greatest \[s\].
+    /// Greatest delay \[s\].
     pub greatest_s: f64,
-    /// Quantiles \[s\] by probability, from `"0.01"` to `"0.9999"`, interpolated between order statistics (type 7 of Hyndman & Fan 1996). Those
-    /// beyond 1 − 1/n are hardly more than the greatest.
+    /// Quantiles \[s\] by probability, from `"0.01"` to `"0.9999"`, interpolated between order statistics (type 7 of Hyndman & Fan 1996). Quantiles beyond
+    /// 1 − 1/n are close to the greatest delay.
     pub quantiles_s: BTreeMap<&'static str, f64>,
-    /// For each quantile that the sample is large enough for, the order statistics that enclose it with confidence 0.95 \[s\]; batch means take correlation
-    /// into account, from 300 packets on.
+    /// Order statistics enclosing each quantile with confidence 0.95 \[s\]. Only quantiles inside the sample are present. From 300 packets on, batch means
+    /// take correlation into account.
     pub quantile_intervals_95_s: BTreeMap<&'static str, [f64; 2]>,
-    /// The autocorrelation at lags of 1 to 10 packets, over the pairs of which both arrived. Empty if all delays are equal.
+    /// Autocorrelation at lags of 1 to 10 packets, over pairs with both packets arrived. Empty for equal delays.
     pub autocorrelation: Vec<f64>,
-    /// Of independent packets, each autocorrelation lies within ± this with probability 0.95: 1.96/√n (Bartlett 1946) with n the number of pairs of which
-    /// both arrived, at the lag that has the fewest. Beyond 1 where there are fewer than four.
+    /// Bound of the autocorrelation of independent packets: within ± this value with probability 0.95. The bound is 1.96/√n (Bartlett 1946), with n the
+    /// number of pairs at the lag with the fewest pairs, and exceeds 1 for fewer than four pairs.
     pub autocorrelation_bound_95: f64,
 }
 
-/// The quantiles that are reported.
+/// Names and probabilities of the reported quantiles.
 const QUANTILES: [(&str, f64); 9] = [
     ("0.01", 0.01),
     ("0.05", 0.05),
@@ -54,7 +54,7 @@ const QUANTILES: [(&str, f64); 9] = [
     ("0.9999", 0.9999),
 ];
 
-/// How far autocorrelation is reported \[packets\].
+/// Largest reported lag of an autocorrelation \[packet\].
 pub(super) const LAGS: usize = 10;
 
 impl DelayFigures {
@@ -86,7 +86,7 @@ impl DelayFigures {
     }
 }
 
-/// At the lag that has the fewest pairs.
+/// Returns the number of pairs with both packets arrived, at the lag with the fewest pairs.
 fn fewest_pairs(by_packet: &[Option<f64>]) -> usize {
     let at_lag = |lag: usize| by_packet.iter().zip(by_packet.iter().skip(lag)).filter(|(one, other)| one.is_some() && other.is_some()).count();
     (1..=LAGS).map(at_lag).min().unwrap_or(0)

@@ -9,41 +9,41 @@ use super::delay::LAGS;
 use crate::batches;
 use crate::series::{self, NORMAL_975, count_u64, wilson};
 
-/// Figures of which packets arrived, in the order of sending.
+/// Figures of arrived and lost packets, in the order of sending.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct LossFigures {
-    /// Packets of which a copy arrived.
+    /// Packets with at least one arrived copy.
     pub received: u64,
-    /// Packets of which no copy arrived.
+    /// Packets without an arrived copy, and without a copy on the way.
     pub lost: u64,
-    /// The share of packets lost; `None` if none has ended.
+    /// Share of packets lost; `None` if no packet has ended.
     #[serde(rename = "loss", skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Wilson's interval for it at confidence 0.95; from 300 packets on, batch means take bursts into account.
+    /// Wilson's interval of the share at confidence 0.95. From 300 packets on, batch means take bursts into account.
     #[serde(rename = "loss_interval_95", skip_serializing_if = "Option::is_none")]
     pub interval_95: Option<[f64; 2]>,
-    /// The standard error of the share by 30 batch means, which takes bursts into account. `None` of fewer than 300 packets.
+    /// Standard error of the share by batch means, which take bursts into account. `None` for fewer than 300 packets.
     #[serde(rename = "loss_se", skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
-    /// The mean number of packets lost one after another.
+    /// Mean number of packets lost in a row.
     #[serde(rename = "loss_run_mean", skip_serializing_if = "Option::is_none")]
     pub run_mean: Option<f64>,
-    /// The standard error of that mean: sd/√(number of runs), as runs of a Markov chain are independent, and not less than what Wilson's interval of the
-    /// share of lost packets that end a run says, which matters where runs are few or all are equal.
+    /// Standard error of the mean run of losses: sd/√(number of runs), because runs of a Markov chain are independent. At least the error implied by
+    /// Wilson's interval of the share of lost packets that end a run, which matters for few or equal runs.
     #[serde(rename = "loss_run_mean_se", skip_serializing_if = "Option::is_none")]
     pub run_mean_se: Option<f64>,
-    /// How many runs of each length. Runs at the ends of the measurement are cut off by it and counted as they are.
+    /// Number of runs of losses, by length. Runs cut off by the ends of the measurement count with their visible length.
     #[serde(rename = "loss_runs")]
     pub runs: BTreeMap<u64, u64>,
-    /// The mean number of packets received between two losses that are not adjacent, and at the ends.
+    /// Mean number of packets received in a row, between losses and at the ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap_mean: Option<f64>,
-    /// The standard error of that mean.
+    /// Standard error of the mean gap, computed as for runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap_mean_se: Option<f64>,
-    /// How many gaps of each length.
+    /// Number of gaps, by length.
     pub gaps: BTreeMap<u64, u64>,
-    /// The autocorrelation of the loss indicator (1 lost, 0 received) at lags of 1 to 10 packets. Empty if nothing or everything was lost.
+    /// Autocorrelation of the loss indicator (1 lost, 0 received) at lags of 1 to 10 packets. Empty if no packet or every packet was lost.
     #[serde(rename = "loss_autocorrelation")]
     pub autocorrelation: Vec<f64>,
 }
@@ -90,11 +90,11 @@ impl Outcome {
     }
 }
 
-/// How many runs of each length, of received and of lost packets.
+/// Counts runs by length, first of received packets, then of lost packets.
 fn runs(lost: impl Iterator<Item = bool>) -> [BTreeMap<u64, u64>; 2] {
     let mut runs = [BTreeMap::new(), BTreeMap::new()];
     let mut current: Option<(bool, u64)> = None;
-    // One step beyond the end closes the last run.
+    // The extra `None` at the end closes the last run.
     for lost in lost.map(Some).chain([None]) {
         match (current, lost) {
             (Some((kind, length)), Some(lost)) if kind == lost => current = Some((kind, length + 1)),
@@ -119,7 +119,7 @@ fn standard_error_of_lengths(runs: &BTreeMap<u64, u64>) -> Option<f64> {
     let times: u64 = runs.values().sum();
     let squares: f64 = runs.iter().map(|(&length, &times)| count_u64(times) * (count_u64(length) - mean).powi(2)).sum();
     let packets: u64 = runs.iter().map(|(length, times)| length * times).sum();
-    // 1/mean is the share of packets that end a run.
+    // 1/mean is the share of lost packets that end a run, so Wilson's interval of the share gives an interval of the mean.
     let reach = wilson(times, packets).map_or(0.0, |[low, high]| (1.0 / low - mean).max(mean - 1.0 / high) / NORMAL_975);
     (times > 1).then(|| (squares / count_u64(times - 1) / count_u64(times)).sqrt().max(reach))
 }

@@ -1,20 +1,20 @@
-//! The figures that a link achieved, to be compared with those asked for.
+//! Figures achieved by a link, with their uncertainty.
 //!
-//! Every figure is one that the literature defines, and has a standard error or an interval wherever there is a textbook one. Those of means, *proportions*
-//! (Wilson) and *quantiles* (order statistics) take from batch means how much packets hang together.
+//! All figures are defined in the literature, and have a standard error or an interval if a textbook gives one. The errors of means, proportions (Wilson)
+//! and quantiles (order statistics) take the correlation between packets from batch means.
 //!
-//! | what | definition |
+//! | figure | definition |
 //! | --- | --- |
-//! | delay | arrival of the first copy − sending (RFC 7679); a damaged packet counts as arrived, unlike there, for it takes up the link |
-//! | loss | the share of packets of which no copy arrived (RFC 7680) |
-//! | loss run, gap | packets lost, or received, one after another in the order of sending (RFC 3357: loss period) |
-//! | reordered | the share of received packets that arrive after one that was sent later (RFC 4737, Type-P-Reordered by `NextExp`) |
-//! | extent | how many arrivals after the first such packet a reordered one comes (RFC 4737, section 4.2) |
-//! | duplicated | extra copies that arrived, over packets received (RFC 5560) |
-//! | jitter | the smoothed difference of successive transit times (RFC 3550, section 6.4.1) |
-//! | throughput | the bits that arrived after the first arrival, over the time from the first to the last |
+//! | delay | arrival of the first copy − sending (RFC 7679). A damaged packet counts as arrived, unlike in the RFC, because the packet occupies the link |
+//! | loss | share of packets without an arrived copy (RFC 7680) |
+//! | loss run, gap | packets lost, or received, in a row in the order of sending (RFC 3357: loss period) |
+//! | reordered | share of received packets that arrive after a packet sent later (RFC 4737, Type-P-Reordered by `NextExp`) |
+//! | extent | number of arrivals from the first packet sent later to the reordered packet (RFC 4737, section 4.2) |
+//! | duplicated | arrived extra copies divided by packets received (RFC 5560) |
+//! | jitter | smoothed difference of successive transit times (RFC 3550, section 6.4.1) |
+//! | throughput | bits of all arrivals after the first, divided by the time from the first to the last arrival |
 //!
-//! Packets that are still on the way count as offered and are left out of every other figure.
+//! Packets on the way count as offered, and are left out of all other figures.
 
 mod accumulator;
 mod delay;
@@ -31,49 +31,49 @@ pub use delay::DelayFigures;
 pub use loss::LossFigures;
 pub use order::OrderFigures;
 
-/// The figures of one link.
+/// Figures of a link.
 ///
-/// Serialised, it is one flat object in SI units: `mean_s`, `sd_s`, `loss`, `reordered` and so on; [`FateCounts`] is serialised on its own. A figure
-/// that is not defined (a mean of nothing) is left out.
+/// Serialises to a flat object in SI units: `mean_s`, `sd_s`, `loss`, `reordered` and so on. [`FateCounts`] is serialised separately. Undefined figures,
+/// such as a mean of no values, are left out.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Achieved {
-    /// How often each fate befell.
+    /// Number of packets by fate.
     #[serde(skip)]
     pub fates: FateCounts,
-    /// Delays; `None` if no packet arrived.
+    /// Figures of delays; `None` if no packet arrived.
     #[serde(flatten)]
     pub delay: Option<DelayFigures>,
-    /// Losses.
+    /// Figures of losses.
     #[serde(flatten)]
     pub loss: LossFigures,
-    /// The order of arrivals.
+    /// Figures of the order of arrivals.
     #[serde(flatten)]
     pub order: OrderFigures,
-    /// Extra copies that arrived, over packets received.
+    /// Arrived extra copies divided by packets received; `None` if no packet arrived.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub duplicated: Option<f64>,
-    /// Throughput \[bit/s\]: the bits of all copies that arrived after the first, over the time since the first. The first marks the beginning, so that
-    /// its bits do not count. `None` unless there are two instants of arrival.
+    /// Throughput \[bit/s\]: bits of all arrivals after the first, divided by the time since the first arrival. The first arrival only marks the beginning
+    /// of that time. `None` if all arrivals have the same instant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub throughput_bit_s: Option<f64>,
-    /// Jitter after the last arrival \[s\]: J ← J + (|D| − J)/16 with D the difference of transit between a packet and the one that arrived before it
-    /// (RFC 3550, section 6.4.1). Extra copies are passed over.
+    /// Jitter after the last arrival \[s\]: J ← J + (|D| − J)/16, with D the difference of transit times between a packet and the arrival before (RFC 3550,
+    /// section 6.4.1). Extra copies are ignored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jitter_rfc3550_s: Option<f64>,
 }
 
-/// How often each fate befell: `offered + duplicated = delivered + dropped + in flight`.
+/// Number of packets by fate: `offered + duplicated = delivered + dropped + in_flight`.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct FateCounts {
     /// Packets handed to the link.
     pub offered: u64,
-    /// Copies made.
+    /// Copies made by the link.
     pub duplicated: u64,
     /// Arrivals, copies included.
     pub delivered: u64,
-    /// Drops by the name of their cause, copies included. Every cause is there.
+    /// Drops by the name of their cause, copies included. All causes are present.
     pub dropped: BTreeMap<&'static str, u64>,
-    /// Packets and copies without an end.
+    /// Packets and copies without a final fate.
     pub in_flight: u64,
     /// Arrivals marked with "congestion experienced".
     pub marked: u64,
@@ -82,14 +82,14 @@ pub struct FateCounts {
 }
 
 impl Achieved {
-    /// The figures of these records, given in any order. Records of one instant are taken in the order in which they stand.
+    /// Computes the figures of records in any order. Records of the same instant count in the given order.
     #[must_use]
     pub fn of<'a>(records: impl IntoIterator<Item = &'a PacketRecord>) -> Self {
         let mut records: Vec<&PacketRecord> = records.into_iter().collect();
         records.sort_by_key(|record| record.at);
         let mut accumulator = Accumulator::new();
         for record in records {
-            // They are sorted, so that none is refused.
+            // The records are sorted by time, so none is refused.
             let _ = accumulator.record(record);
         }
         accumulator.finish()

@@ -1,46 +1,46 @@
-//! The order of arrivals (RFC 4737).
+//! Figures of the order of arrivals (RFC 4737).
 
 use serde::Serialize;
 
 use crate::batches::share_interval;
 use crate::series::count_u64;
 
-/// Figures of the order in which packets arrived; extra copies are passed over.
+/// Figures of the order of arrivals. Extra copies are ignored.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OrderFigures {
-    /// The share of packets received that are reordered: their number is below `NextExp`, the greatest number that has arrived plus one (RFC 4737,
-    /// section 3.3). `None` if nothing arrived.
+    /// Share of received packets with a number below `NextExp`, the largest number arrived before plus one (RFC 4737, section 3.3). `None` if no packet
+    /// arrived.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordered: Option<f64>,
-    /// Wilson's interval for it at confidence 0.95; from 300 packets on, batch means take into account that reordered packets come together.
+    /// Wilson's interval of the share at confidence 0.95. From 300 packets on, batch means take into account that reordered packets come in groups.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordered_interval_95: Option<[f64; 2]>,
-    /// The mean extent of the reordered packets \[arrivals\]: i − j for the i-th arrival, where j is the first arrival of a packet sent later (RFC 4737,
-    /// section 4.2.2).
+    /// Mean extent of reordered packets \[arrivals\]: i − j for arrival i, with j the first arrival of a packet sent later (RFC 4737, section 4.2.2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordering_extent_mean: Option<f64>,
-    /// The greatest extent \[arrivals\]: a buffer of this number of packets restores the order.
+    /// Largest extent \[arrivals\]: a buffer of that many packets restores the order.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordering_extent_max: Option<u64>,
 }
 
-/// Follows arrivals.
+/// Collects arrivals.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OrderOfArrival {
     received: u64,
+    /// Largest number arrived so far plus one.
     next_expected: u64,
     reordered: u64,
-    /// Whether each arrival was.
+    /// Whether each arrival was reordered, indexed by arrival.
     was_reordered: Vec<bool>,
     extent_sum: u64,
     extent_max: u64,
-    /// The arrivals (place, number) that exceeded all numbers before, but only those that left numbers out or came after a reordered one: in between,
-    /// both go up by one, and no packet that arrives later can have a number of theirs. Both components increase.
+    /// Arrivals (index of the arrival, number of the packet) with a number above all numbers before. An entry is left out if index and number both follow
+    /// the entry before by steps of one: no later packet can have a number in between. Both components increase.
     records: Vec<(u64, u64)>,
 }
 
 impl OrderOfArrival {
-    /// The first copy of a packet arrives.
+    /// Adds the arrival of the first copy of a packet.
     pub(super) fn arrives(&mut self, sequence: u64) {
         let place = self.received;
         self.received += 1;
@@ -53,7 +53,7 @@ impl OrderOfArrival {
             self.next_expected = sequence.saturating_add(1);
             return;
         }
-        // The first of the records that is greater: it is the first arrival of all that is.
+        // The first entry with a larger number is the first arrival of any packet sent later.
         let first_later = self.records.partition_point(|&(_, number)| number < sequence);
         let extent = self.records.get(first_later).map_or(0, |(at, _)| place - at);
         self.reordered += 1;
@@ -84,7 +84,7 @@ mod tests {
         order.figures()
     }
 
-    /// Straight from the RFC: i − j with the least j < i of which s\[j\] > s\[i\].
+    /// Extents by the definition of the RFC: i − j with the least j < i such that s\[j\] > s\[i\].
     fn extents(arrivals: &[u64]) -> Vec<u64> {
         let extent = |i: usize| arrivals[..i].iter().position(|&earlier| earlier > arrivals[i]).map(|j| (i - j) as u64);
         (0..arrivals.len()).filter_map(extent).collect()
@@ -92,13 +92,13 @@ mod tests {
 
     #[test]
     fn the_examples_of_the_rfc() {
-        // RFC 4737, section 4.2.3 and 7: packet 4 arrives after 5 and 6; extent 2 (numbers here from 0).
+        // RFC 4737, sections 4.2.3 and 7: packet 4 arrives after 5 and 6, with extent 2 (numbers here from 0).
         let late_by_two = figures(&[0, 1, 2, 4, 5, 3, 6, 7, 8, 9]);
         assert_eq!((late_by_two.reordered, late_by_two.reordering_extent_max), (Some(0.1), Some(2)));
-        // Section 7.2: 7, 8, 9, 10 arrive before 4, 5, 6: three reordered packets with extents 4, 5, 6.
+        // Section 7.2: packets 7, 8, 9, 10 arrive before 4, 5, 6, which gives three reordered packets with extents 4, 5, 6.
         let early = figures(&[0, 1, 2, 3, 7, 8, 9, 10, 4, 5, 6, 11]);
         assert_eq!((early.reordered, early.reordering_extent_mean, early.reordering_extent_max), (Some(0.25), Some(5.0), Some(6)));
-        // Losses are no reordering.
+        // Lost packets alone cause no reordering.
         assert_eq!(figures(&[0, 2, 5, 6]).reordered, Some(0.0));
         assert_eq!(figures(&[]).reordered, None);
     }

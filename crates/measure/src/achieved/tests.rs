@@ -21,7 +21,7 @@ fn lost(sequence: u64, offered_ms: u64) -> PacketRecord {
     row(sequence, 0, offered_ms, offered_ms, Fate::Dropped(DropCause::Loss))
 }
 
-/// A packet every 10 ms: delays 20, lost, lost, 40 (with a copy after 30), 10 ms, one on the way.
+/// Packets every 10 ms: delay 20 ms, lost, lost, 40 ms (with a copy after 30 ms), 10 ms, and on the way.
 fn example() -> Vec<PacketRecord> {
     vec![
         arrives(0, 0, 0, 20),
@@ -94,11 +94,11 @@ fn a_packet_is_lost_only_when_its_last_copy_is() {
     assert_eq!(figures(&[copied, lost(0, 0)]), (0, 0));
     assert_eq!(figures(&[copied, lost(0, 0), arrives(0, 1, 0, 5)]), (1, 0));
     assert_eq!(figures(&[copied, lost(0, 0), PacketRecord { copy: 1, ..lost(0, 0) }]), (0, 1));
-    // A packet of which nothing was heard is on the way.
+    // A packet without a record counts as on the way.
     assert_eq!(figures(&[lost(1, 0)]), (0, 1));
 }
 
-/// Figures of the first two packets, and fates of all.
+/// Figures cover the first two packets only, and fates cover all packets.
 #[test]
 fn figures_of_the_first_packets_are_those_of_a_shorter_stream() {
     let mut accumulator = Accumulator::of_first(2);
@@ -119,7 +119,7 @@ fn records_that_go_back_in_time_are_refused() {
     assert_eq!(accumulator.finish().fates.offered, 1);
 }
 
-/// 100 000 packets, a fifth of them lost independently, with gamma delays of mean 24 ms and deviation 2 ms above a floor of 20 ms.
+/// Returns figures of 100 000 packets, a fifth lost independently, with gamma delays of mean 24 ms and deviation 2 ms above a floor of 20 ms.
 fn gamma_link(seed: u64) -> Achieved {
     let mut rng = TestRng::new(seed);
     // Mean 4 ms, deviation 2 ms: shape 4, scale 1 ms.
@@ -143,10 +143,10 @@ fn gamma_link(seed: u64) -> Achieved {
 fn figures_of_a_known_law_lie_within_their_own_standard_errors() {
     let achieved = gamma_link(11);
     let delay = achieved.delay.unwrap();
-    // Four standard errors: a false alarm in 16 000 with a normal law, in 2 500 with 29 degrees of freedom.
+    // Four standard errors: exceeded once in 16 000 seeds with a normal law, and once in 2500 with 29 degrees of freedom.
     assert!((delay.mean_s - 0.024).abs() < 4.0 * delay.mean_se_s.unwrap());
     assert!((delay.sd_s.unwrap() - 0.002).abs() < 4.0 * delay.sd_se_s.unwrap());
-    // The errors are those of theory within 40 % (χ² with 29 degrees of freedom, 0.999): sd/√n, and sd·√((κ − 1)/4n) with kurtosis κ = 3 + 6/4.
+    // The errors agree with theory within 40 % (χ² with 29 degrees of freedom, 0.999): sd/√n, and sd·√((κ − 1)/4n) with kurtosis κ = 3 + 6/4.
     let n = 80_000.0_f64;
     assert!((0.6..1.45).contains(&(delay.mean_se_s.unwrap() / (0.002 / n.sqrt()))));
     assert!((0.6..1.45).contains(&(delay.sd_se_s.unwrap() / (0.002 * (3.5_f64 / 4.0 / n).sqrt()))));
@@ -161,7 +161,7 @@ fn figures_of_a_known_law_lie_within_their_own_standard_errors() {
 
     let loss = achieved.loss;
     assert!((loss.value.unwrap() - 0.2).abs() < 4.0 * loss.standard_error.unwrap());
-    // Independent losses: runs are geometric with mean 1/0.8.
+    // Runs of independent losses are geometric, with mean 1/0.8.
     assert!((loss.run_mean.unwrap() - 1.25).abs() < 4.0 * loss.run_mean_se.unwrap());
     assert!((loss.gap_mean.unwrap() - 5.0).abs() < 4.0 * loss.gap_mean_se.unwrap());
 }

@@ -1,65 +1,66 @@
-//! Delays as their clock shows them: each is an interval.
+//! Sorted delays as intervals (cells), because a clock of finite resolution shows a delay only as an interval.
 //!
-//! A clock of resolution r shows the delay x for all true delays between x − r/2 and x + r/2. The probability of that interval is what a law can be asked for;
-//! a density at x has no bound, and the most probable law would be one that is infinite at the least delay.
+//! A clock of resolution r shows the delay x for all true delays between x − r/2 and x + r/2. A law has a probability for this interval. A density at x
+//! would have no bound, and the most probable law would be infinite at the least delay.
 
 use super::Measurements;
 use crate::series::{self, count, count_u64};
 
-/// An interval, and the delays in it.
+/// An interval of delays, and the number of measured delays in it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Cell {
-    /// The lower end \[s\].
+    /// Lower end \[s\].
     pub(super) low: f64,
-    /// The upper end \[s\].
+    /// Upper end \[s\].
     pub(super) high: f64,
-    /// The number of delays.
+    /// Number of delays in the interval.
     pub(super) count: f64,
 }
 
-/// A sorted sample as cells in increasing order that do not overlap.
+/// A sorted sample as cells, in increasing order and without overlap.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Cells {
+    /// Cells in increasing order.
     pub(super) cells: Vec<Cell>,
-    /// The number of all delays.
+    /// Number of all delays.
     pub(super) n: f64,
 }
 
-/// A nanosecond \[s\], the finest step of a link.
+/// A nanosecond \[s\], the finest step of a link's delay.
 const NANO: f64 = 1e-9;
-/// Numbers that differ by less than this part of them may be equal but for rounding.
+/// Relative difference of two numbers up to which rounding may be the only difference.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
-/// A cell is no narrower than this part of the mean deviation from the median: the difference of two probabilities then keeps six digits, and a law cannot
-/// gain from a single delay.
+/// Least width of a cell, as a share of the mean deviation from the median. With this width the difference of two probabilities keeps six digits, and a law
+/// cannot gain likelihood from a single delay.
 const NARROWEST: f64 = 1e-6;
-/// Samples of at most this number of cells need no coarser ones.
+/// Number of cells up to which no coarser cells are needed.
 const FEW: usize = 200;
-/// The share of the delays beyond a cell, on its shorter side, that are put into one cell while a law is looked for.
+/// Largest share of the delays beyond a cell, on the side with fewer delays, that is merged into the cell for the search of a law.
 const COARSE: f64 = 1.0 / 12.0;
-/// The most cells in which a law is judged.
+/// Largest number of cells in the judgement of a law.
 const JUDGED: f64 = 50_000.0;
 
-/// The resolution of the clock \[s\]: the greatest step of which all differences of delays are whole multiples, in nanoseconds. A drift that was taken off
-/// is put on again first. `None` if all delays are equal.
+/// Returns the resolution of the clock \[s\]: the greatest step such that all differences of delays are whole multiples, in nanoseconds. A removed drift is
+/// added again first, because the clock showed the delays with the drift. Returns `None` for equal delays.
 pub(super) fn resolution(measurements: &Measurements) -> Option<f64> {
     let first_s = measurements.packets().first()?.sent_s;
     let drift = measurements.removed().map_or(0.0, |skew| skew.seconds_per_second);
     let mut shown: Vec<f64> = measurements.arrivals().map(|(sent_s, delay_s)| delay_s + drift * (sent_s - first_s)).collect();
     shown.sort_by(f64::total_cmp);
     let least = *shown.first()?;
-    // Nanoseconds, or what floating point leaves of them: a delay of some months is known to several.
+    // The unit is a nanosecond, or more where floating point cannot hold nanoseconds, as for a delay of some months.
     let unit = NANO.max(ROUNDING * shown.last()?.abs().max(least.abs()));
     let mut differences: Vec<f64> = shown.iter().map(|delay| (delay - least) / unit).collect();
-    // Closer than half of one is equal: a drift that was put on again leaves rounding errors.
+    // Differences below half a unit count as equal, because adding the drift leaves rounding errors.
     differences.dedup_by(|later, earlier| *later - *earlier < 0.5);
     (differences.len() > 1).then(|| step(&differences) * unit)
 }
 
-/// The greatest common step of increasing differences from zero, of which there are at least two, known to a unit each.
+/// Returns the greatest common step of increasing differences. The first difference is zero, at least one more follows, and each is known to one unit.
 fn step(differences: &[f64]) -> f64 {
     let least_gap = differences.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
-    // A clock whose tick is no whole number of nanoseconds (1/90 000 s, 1/64 s) shows rounded multiples. The tick becomes known better with each multiple
-    // that it explains: `known` times it is right to a unit.
+    // A clock with a tick of no whole number of nanoseconds (1/90 000 s, 1/64 s) shows rounded multiples. Each multiple that fits makes the estimate of the
+    // tick more accurate: `known` ticks are right to one unit.
     let (mut tick, mut known) = (least_gap, 1.0_f64);
     let explains = |&difference: &f64| {
         let times = (difference / tick).round();
@@ -72,7 +73,7 @@ fn step(differences: &[f64]) -> f64 {
     if differences.iter().all(explains) {
         return tick;
     }
-    // Two neighbouring ticks need not both occur: Euclid's algorithm finds the tick all the same, in whole units.
+    // Two neighbouring multiples need not both occur. Euclid's algorithm then finds the tick, but in whole units only.
     count_u64(differences.iter().fold(0_u64, |common, difference| greatest_common_divisor(whole(*difference), common)).max(1))
 }
 
@@ -89,12 +90,12 @@ const fn greatest_common_divisor(mut one: u64, mut other: u64) -> u64 {
 }
 
 impl Cells {
-    /// The cells of sorted delays, which are not all equal, of a clock of that resolution: one for each value that it shows.
+    /// Divides sorted delays, not all equal, of a clock of the given resolution: a cell for each value shown by the clock.
     pub(super) fn new(sorted: &[f64], resolution: f64) -> Self {
         let median = sorted[sorted.len() / 2];
         let deviation = series::mean(&sorted.iter().map(|delay| (delay - median).abs()).collect::<Vec<_>>()).unwrap_or(0.0);
         let width = resolution.max(NARROWEST * deviation).max(ROUNDING * sorted[sorted.len() - 1].abs());
-        // The least and the greatest value of each cell. Values nearer than half a cell, as those of a finer clock are, share one.
+        // Least value, greatest value and count of each cell. Values less than half a width apart share a cell, as with a fine clock.
         let mut shared: Vec<(f64, f64, usize)> = Vec::new();
         for &delay in sorted {
             match shared.last_mut() {
@@ -103,7 +104,7 @@ impl Cells {
             }
         }
         let cell = |(place, &(first, last, held)): (usize, &(f64, f64, usize))| {
-            // Half a cell around the values, but not beyond the middle between neighbours.
+            // Half a width around the values, but not beyond the middle between two neighbours.
             let before = place.checked_sub(1).map_or(f64::NEG_INFINITY, |before| f64::midpoint(shared[before].1, first));
             let after = shared.get(place + 1).map_or(f64::INFINITY, |after| f64::midpoint(last, after.0));
             Cell { low: before.max(first - width / 2.0), high: after.min(last + width / 2.0), count: count(held) }
@@ -112,17 +113,17 @@ impl Cells {
         Self { cells, n: count(sorted.len()) }
     }
 
-    /// Few cells that say nearly as much, for the many laws that are tried: single ones at both ends, wider ones in the middle.
+    /// Returns few cells with nearly the same information, for the many laws of a search: single cells at both ends, wide cells in the middle.
     pub(super) fn coarse(&self) -> Self {
         if self.cells.len() <= FEW { self.clone() } else { self.merged(|before, after| COARSE * before.min(after)) }
     }
 
-    /// As many cells as are worth their time for the judgement of a law.
+    /// Returns at most about [`JUDGED`] cells, for the judgement of a law.
     pub(super) fn judged(&self) -> Self {
         self.merged(|_, _| self.n / JUDGED)
     }
 
-    /// Puts neighbours together as long as they hold at most as many delays as `most` says, given the numbers before and after.
+    /// Merges neighbouring cells as long as a merged cell has at most `most(before, after)` delays, given the numbers of delays before and after the cell.
     fn merged(&self, most: impl Fn(f64, f64) -> f64) -> Self {
         let mut before = 0.0;
         let mut parts: Vec<(usize, usize, f64)> = Vec::new();
@@ -138,7 +139,7 @@ impl Cells {
             }
         }
         let of_part = |&(first, last, held): &(usize, usize, f64)| {
-            // The gap between two cells belongs to both, by halves: k delays stand for k of the spacings between delays.
+            // The gap between two cells is divided in halves, so that k delays of a merged cell stand for k spacings between delays.
             let low =
                 if first < last && first > 0 { f64::midpoint(self.cells[first - 1].high, self.cells[first].low) } else { self.cells[first].low };
             let next = self.cells.get(last + 1).filter(|_| first < last);
@@ -159,13 +160,13 @@ mod tests {
 
     #[test]
     fn the_resolution_is_the_greatest_common_step() {
-        // Rounded to a tick; the least one is any number, as with clocks that are apart.
+        // Rounded to a tick. The least value is arbitrary, as with two clocks apart.
         let ticks = |tick: f64, shown: &dyn Fn(f64) -> f64| (0..60).map(|i| 0.012_345 + shown(f64::from(i * i % 37) * tick)).collect::<Vec<_>>();
         let nanos = |x: f64| (x * 1e9).round() / 1e9;
         for (delays, expected) in [
             (ticks(1e-3, &|x| x), 1e-3),
             (ticks(15.625e-3, &|x| x), 15.625e-3),
-            // The clock of RTP for pictures, 90 kHz, is no whole number of nanoseconds.
+            // The 90 kHz clock of RTP for pictures has a tick of no whole number of nanoseconds.
             (ticks(1.0 / 90_000.0, &nanos), 1.0 / 90_000.0),
             (vec![0.020, 0.022, 0.025, 0.025], 1e-3),
             (vec![0.020, 0.024, 0.028], 4e-3),
@@ -175,7 +176,7 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
         }
         assert_eq!(resolution(&of(&[0.02; 5])), None);
-        // Clocks that are three centuries apart: rounding to two microseconds hides no step of a second.
+        // Clocks three centuries apart: rounding to two microseconds does not hide steps of a second.
         assert!((resolution(&of(&ticks(1.0, &|x| x + 1e10))).unwrap() - 1.0).abs() < 1e-4);
     }
 
@@ -192,7 +193,7 @@ mod tests {
         }
         let coarse = Cells::new(&fine, 1e-12).coarse().cells;
         assert!((100..400).contains(&coarse.len()) && coarse[0].count < 1.5 && coarse[coarse.len() - 1].count < 1.5, "{}", coarse.len());
-        // A wide cell holds as large a share of this law as of its delays.
+        // A wide cell has the same share of the law as of the delays.
         assert!(coarse.iter().filter(|cell| cell.count > 1.5).all(|cell| ((cell.high - cell.low) / 1e-3 / cell.count - 1.0).abs() < 1e-6));
     }
 }

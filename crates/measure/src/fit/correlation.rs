@@ -1,9 +1,9 @@
-//! How long do delays remember?
+//! Correlation time of the delays.
 //!
-//! The model is an Ornstein–Uhlenbeck process z of unit variance under the delays, which gives every delay its place in its law (a Gaussian copula):
-//! over a gap Δ between two packets the correlation of z is φ = e^{−Δ/τ}. It is fitted to normal scores, Φ⁻¹((rank − ½)/n), so that the estimate does not
-//! depend on the law (Genest, Ghoudi & Rivest 1995, Biometrika 82(3)); and with the true gaps, over packets that were lost. τ has the greatest
-//! likelihood
+//! Input is the arrivals (sending, delay); output is the correlation time, or `None` for delays that may be independent. The model is a Gaussian copula: an
+//! Ornstein–Uhlenbeck process z of unit variance gives each delay its place in the delay's law. Over a gap Δ between two packets the correlation of z is φ
+//! = e^{−Δ/τ}. The model is fitted to normal scores, Φ⁻¹((rank − ½)/n), so the estimate does not depend on the law (Genest, Ghoudi & Rivest 1995,
+//! Biometrika 82(3)). The true gaps are used, also over lost packets. The estimate is the τ of greatest likelihood:
 //!
 //! ```text
 //! ln L(τ) = Σ −½·ln(1 − φ²) − (z' − φz)²/(2(1 − φ²)) + z'²/2      (0 for independent delays)
@@ -15,31 +15,32 @@ use super::law::normal_quantile;
 use super::search::{maximise, standard_error};
 use crate::series::{NORMAL_975, count};
 
-/// The correlation of delays in time.
+/// Correlation of delays in time.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct CorrelationFit {
-    /// The correlation time τ \[s\].
+    /// Correlation time τ \[s\].
     pub time_s: f64,
-    /// Its standard error \[s\], from the curvature of the likelihood of ln τ with the variance estimated too: large enough that 1.96 of it reach the farther
-    /// end of the interval of ln τ. `None` where the likelihood is flat.
+    /// Standard error of τ \[s\], from the curvature of the likelihood of ln τ with the variance estimated too. Large enough that 1.96 standard errors
+    /// reach the farther end of the interval of ln τ. `None` if the likelihood is flat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_se_s: Option<f64>,
-    /// The correlation of the normal scores over the typical spacing Δ of packets: e^{−Δ/τ}.
+    /// Correlation of the normal scores over the typical spacing Δ of packets: e^{−Δ/τ}.
     pub lag_one: f64,
-    /// Its standard error.
+    /// Standard error of `lag_one`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lag_one_se: Option<f64>,
-    /// 2·(ln L(τ) − ln L of independent delays): beyond 6.63 with probability 0.01 if they were independent (χ², one degree of freedom).
+    /// 2·(ln L(τ) − ln L of independent delays). Independent delays exceed 6.63 with probability 0.01 (χ², one degree of freedom).
     pub likelihood_ratio: f64,
 }
 
-/// The 0.99 quantile of χ² with one degree of freedom.
+/// Quantile 0.99 of χ² with one degree of freedom.
 const SIGNIFICANT: f64 = 6.634_896_601_021_213;
 
-/// `arrivals` are (sending, delay) in the order of sending, `spacing` the typical gap, not zero. `None` if delays are as good as independent.
+/// Fits the correlation time. `arrivals` are (sending, delay) \[s\] in the order of sending; `spacing` is the typical gap \[s\], not zero. Returns `None`
+/// if the delays do not differ significantly from independent delays.
 pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<CorrelationFit> {
     let scores = normal_scores(&arrivals.iter().map(|arrival| arrival.1).collect::<Vec<_>>());
-    // Packets sent at one instant say nothing about time.
+    // Packets sent at the same instant tell nothing about time.
     let steps: Vec<[f64; 3]> = arrivals
         .windows(2)
         .zip(scores.windows(2))
@@ -55,6 +56,7 @@ pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<CorrelationFi
         };
         steps.iter().map(one).sum::<f64>()
     };
+    // The search covers times from a twentieth of the least gap, where φ is practically zero, to ten times the measurement.
     let least = steps.iter().map(|step| step[0]).fold(f64::INFINITY, f64::min);
     let span: f64 = steps.iter().map(|step| step[0]).sum();
     if steps.is_empty() {
@@ -72,14 +74,14 @@ pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<CorrelationFi
         time_s,
         time_se_s: relative_error.map(|error| (NORMAL_975 * error).exp_m1() / NORMAL_975 * time_s),
         lag_one,
-        // dφ/d ln τ = φ·Δ/τ.
+        // By dφ/d ln τ = φ·Δ/τ.
         lag_one_se: relative_error.map(|error| error * lag_one * spacing / time_s),
         likelihood_ratio,
     })
 }
 
-/// ln L where the variance of z, too, is estimated, up to a constant. Its curvature is what the scores, whose scale is that of the sample, really tell:
-/// for even gaps it gives the error √((1 − φ²)/n) of an autoregression, while the likelihood of unit variance promises more.
+/// Returns ln L with an estimated variance of z, up to a constant. Only this curvature tells the real error, because normal scores have the scale of the
+/// sample. For even gaps the error is √((1 − φ²)/n), as for an autoregression; the likelihood with unit variance would give a smaller error.
 fn profile(steps: &[[f64; 3]], time: f64) -> f64 {
     let (logs, squares) = steps.iter().fold((0.0, 0.0), |(logs, squares), &[gap, z, next]| {
         let rest = -(-2.0 * gap / time).exp_m1();
@@ -88,14 +90,14 @@ fn profile(steps: &[[f64; 3]], time: f64) -> f64 {
     -0.5 * (logs + count(steps.len()) * squares.ln())
 }
 
-/// Φ⁻¹((rank − ½)/n), equal values sharing the mean of their ranks.
+/// Returns the normal scores Φ⁻¹((rank − ½)/n). Equal values share the mean of their ranks.
 fn normal_scores(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&one, &other| values[one].total_cmp(&values[other]));
     let mut scores = vec![0.0; values.len()];
     let mut before = 0;
     for equal in order.chunk_by(|&one, &other| values[one].total_cmp(&values[other]).is_eq()) {
-        // Ranks before + 1 to before + m: their mean less a half is before + m/2.
+        // The ranks run from before + 1 to before + m. Their mean minus a half is before + m/2.
         let score = normal_quantile((count(before) + count(equal.len()) / 2.0) / count(values.len()));
         equal.iter().for_each(|&place| scores[place] = score);
         before += equal.len();
@@ -110,7 +112,8 @@ mod tests {
     use super::*;
     use crate::tests::TestRng;
 
-    /// An Ornstein–Uhlenbeck process of correlation time `time` at random or even gaps of mean 8 ms, a tenth of it lost; seen through a skewed law.
+    /// Simulates an Ornstein–Uhlenbeck process of correlation time `time`, at random or even gaps of mean 8 ms, through a skewed law and with a tenth of
+    /// the packets lost.
     fn arrivals(seed: u64, time: f64, even: bool) -> Vec<(f64, f64)> {
         let mut rng = TestRng::new(seed);
         let (mut now, mut z): (f64, f64) = (0.0, StandardNormal.sample(&mut rng));
@@ -133,12 +136,12 @@ mod tests {
         for (seed, time, even) in [(1, 0.02, true), (2, 0.2, true), (3, 0.02, false), (4, 0.2, false)] {
             let fit = fit(&arrivals(seed, time, even), 0.008).unwrap();
             let se = fit.time_se_s.unwrap();
-            // In the logarithm, where the error does not depend on the estimate.
+            // Compared in the logarithm, because the error of the logarithm does not depend on the estimate.
             assert!((fit.time_s / time).ln().abs() < 4.0 * se / fit.time_s, "{fit:?}");
             assert!(se < 0.1 * time, "{fit:?}");
             let rho = (-0.008 / time).exp();
             assert!((fit.lag_one - rho).abs() < 4.0 * fit.lag_one_se.unwrap(), "{fit:?}");
-            // Even gaps and few losses: the standard error is that of an autoregression, √((1 − φ²)/n), of 18 000 to 20 000 packets.
+            // With even gaps and few losses the standard error is that of an autoregression, √((1 − φ²)/n), of 18 000 to 20 000 packets.
             if even {
                 let theory = ((1.0 - rho * rho) / 19_000.0).sqrt();
                 assert!((0.9..1.1).contains(&(fit.lag_one_se.unwrap() / theory)), "{fit:?} {theory}");

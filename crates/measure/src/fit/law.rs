@@ -1,31 +1,31 @@
-//! The laws of delay that are compared, by name, and the normal law. What each law is stands in [`cohaptic_wan::law`].
+//! Names of the compared laws of delay, and the normal law. The laws are defined in [`cohaptic_wan::law`].
 
 use serde::Serialize;
 use statrs::function::erf;
 
-/// A family of laws by the name that scenes give it.
+/// Family of laws, by its name in scenes.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DelayLaw {
-    /// Normal.
+    /// Normal law.
     Normal,
-    /// Uniform between two ends.
+    /// Uniform law between two ends.
     Uniform,
-    /// Laplace: two exponentials back to back.
+    /// Laplace law: exponential on both sides of the mean.
     Laplace,
-    /// A floor and a lognormal law above it.
+    /// Lognormal law above a floor.
     Lognormal,
-    /// A floor and a gamma law above it.
+    /// Gamma law above a floor.
     Gamma,
-    /// A floor and a Weibull law above it.
+    /// Weibull law above a floor.
     Weibull,
 }
 
 impl DelayLaw {
-    /// Every law.
+    /// All families.
     pub const ALL: [Self; 6] = [Self::Normal, Self::Uniform, Self::Laplace, Self::Lognormal, Self::Gamma, Self::Weibull];
 
-    /// The name in scenes and JSON.
+    /// Returns the name in scenes and JSON.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -52,13 +52,13 @@ impl From<DelayLaw> for cohaptic_wan::Distribution {
     }
 }
 
-/// The standard normal distribution function.
+/// Returns the standard normal distribution function at z.
 #[cfg(test)]
 pub(super) fn normal_below(z: f64) -> f64 {
     0.5 * libm::erfc(-z / std::f64::consts::SQRT_2)
 }
 
-/// The standard normal quantile of a probability in (0, 1).
+/// Returns the standard normal quantile of a probability between 0 and 1, both excluded.
 pub(super) fn normal_quantile(p: f64) -> f64 {
     -std::f64::consts::SQRT_2 * erf::erfc_inv(2.0 * p)
 }

@@ -1,4 +1,4 @@
-//! The link that was estimated, and the same as the text of a scene.
+//! The estimated link, and its text for a scene.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -9,24 +9,24 @@ use serde::Serialize;
 use super::law::DelayLaw;
 use super::loss::LossModel;
 
-/// A link as it can be written into a scene.
+/// A link with the parameters of a scene.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct FittedLink {
-    /// The mean one-way delay \[s\].
+    /// Mean one-way delay \[s\].
     pub delay_s: f64,
-    /// The jitter around it.
+    /// Jitter around the mean.
     pub jitter: FittedJitter,
-    /// Which packets are lost.
+    /// Model of losses.
     pub loss: LossModel,
 }
 
-/// The law of jitter.
+/// Law of the jitter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(into = "&'static str")]
 pub enum FittedLaw {
-    /// A law that fits.
+    /// A fitting law.
     Law(DelayLaw),
-    /// The measured delays themselves, because no law fits them: `empirical`.
+    /// The measured delays themselves, because no law fits: `empirical`.
     Empirical,
 }
 
@@ -39,28 +39,29 @@ impl From<FittedLaw> for &'static str {
     }
 }
 
-/// Jitter as it can be written into a scene.
+/// Jitter with the parameters of a scene.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct FittedJitter {
-    /// The standard deviation \[s\].
+    /// Standard deviation \[s\].
     pub sd_s: f64,
-    /// The law.
+    /// Law of the delays.
     pub distribution: FittedLaw,
-    /// The least delay, from which the lognormal, gamma and Weibull laws begin \[s\]; `None`: zero, or the law has none.
+    /// Least delay of a lognormal, gamma or Weibull law \[s\]; `None` for zero or for another law.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub floor_s: Option<f64>,
-    /// The autocorrelation of the delays at lag one, as a scene means it: that of the chosen law whose normal scores have the correlation of
-    /// [`Goodness::correlation`](super::Goodness::correlation). Where packets are evenly spaced.
+    /// Autocorrelation of the delays at lag one, as defined in scenes: of the chosen law, with normal scores correlated as in
+    /// [`Goodness::correlation`](super::Goodness::correlation). Present only for evenly spaced packets.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<f64>,
-    /// The time after which it has fallen to 1/e \[s\]; where packets are not evenly spaced.
+    /// Time in which the autocorrelation falls to 1/e \[s\]. Present only for packets that are not evenly spaced.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation_time_s: Option<f64>,
 }
 
 impl FittedLink {
-    /// The `[link]` table of a scene, with a line break at the end. Durations are rounded to nanoseconds, other numbers to six digits. `delays` is the name
-    /// of the file with the measured delays ([`Fitted::delays_csv`](super::Fitted::delays_csv)), relative to the folder of the scene, where they are the law.
+    /// Returns the `[link]` table of a scene, with a line break at the end. Durations are rounded to nanoseconds, other numbers to six digits. `delays` is
+    /// the path of the file of measured delays ([`Fitted::delays_csv`](super::Fitted::delays_csv)), relative to the folder of the scene, and is used only
+    /// if no law fits.
     #[must_use]
     pub fn to_scene_toml(&self, delays: &str) -> String {
         let mut text = format!("[link]\ndelay = \"{}\"\n", duration(self.delay_s));
@@ -80,7 +81,7 @@ impl FittedLink {
             LossModel::None => None,
             LossModel::Independent { probability } => Some(number(probability)),
             LossModel::GilbertElliott { p, r, h, k } => {
-                // Zero and one are what a scene assumes.
+                // A scene takes h = 0 and k = 1 for missing keys.
                 let h = if h > 0.0 { format!(", h = {}", number(h)) } else { String::new() };
                 let k = if k < 1.0 { format!(", k = {}", number(k)) } else { String::new() };
                 Some(format!("{{ gilbert-elliott = {{ p = {}, r = {}{h}{k} }} }}", number(p), number(r)))
@@ -96,13 +97,13 @@ impl FittedLink {
     }
 }
 
-/// Rounded to nanoseconds; what cannot be counted is as long as can be.
+/// Rounds to nanoseconds. Negative spans become zero, and spans too long for a scene the longest span.
 fn duration(seconds: f64) -> Span {
     let nanos = Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(Duration::from_nanos(i64::MAX.unsigned_abs()));
     Span(nanos.min(Duration::from_nanos(i64::MAX.unsigned_abs())))
 }
 
-/// A TOML string. The names of files may hold quotes and backslashes.
+/// Returns a TOML string. Names of files may contain quotes, backslashes and control characters.
 fn text_of(text: &str) -> String {
     let escaped = |character: char| match character {
         '"' | '\\' => format!("\\{character}"),
@@ -112,7 +113,7 @@ fn text_of(text: &str) -> String {
     format!("\"{}\"", text.chars().map(escaped).collect::<String>())
 }
 
-/// Six digits, as a TOML float.
+/// Writes a number as a TOML float with six digits.
 fn number(value: f64) -> String {
     let rounded = format!("{value:.5e}").parse().unwrap_or(value);
     format!("{rounded:?}")

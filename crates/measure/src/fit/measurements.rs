@@ -1,55 +1,55 @@
-//! One-way measurements, checked once.
+//! One-way measurements, checked once when made.
 
 use cohaptic_wan::{Fate, FateLog};
 
 use super::skew::{Skew, SkewError};
 
-/// One packet: when it was sent, and how long it took.
+/// A measured packet.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Measurement {
-    /// When it was sent, from any origin \[s\].
+    /// Instant of sending \[s\], from any origin.
     pub sent_s: f64,
-    /// Its one-way delay \[s\]; `None`: it was lost. Negative if the two clocks are offset, see [`Measurements::shifted`].
+    /// One-way delay \[s\]; `None` for a lost packet. Can be negative if the two clocks are offset, see [`Measurements::shifted`].
     pub delay_s: Option<f64>,
 }
 
-/// Packets in the order of sending, all numbers finite.
+/// Measured packets in the order of sending, with finite numbers only.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Measurements {
     pub(super) packets: Vec<Measurement>,
-    /// The drift that was taken off.
+    /// Removed drift; `None` if no drift was removed.
     pub(super) removed: Option<Skew>,
 }
 
-/// Why measurements are refused. Packets are counted from 1.
+/// Error of making measurements. Packets are counted from 1.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum MeasurementsError {
-    /// A time or delay is NaN or infinite.
+    /// An instant or a delay is NaN or infinite.
     #[error("packet {packet}: found {value}, expected a finite time and a finite delay (a lost packet has none)")]
     NotFinite {
-        /// Which packet.
+        /// Number of the packet.
         packet: usize,
-        /// The number.
+        /// Value found.
         value: f64,
     },
-    /// A packet was sent before the one before it.
+    /// A packet was sent earlier than the packet before.
     #[error("packet {packet} was sent at {sent_s} s, the one before it at {before_s} s: expected packets in the order of sending")]
     TimeGoesBack {
-        /// Which packet.
+        /// Number of the packet.
         packet: usize,
-        /// When it was sent \[s\].
+        /// Instant of sending \[s\].
         sent_s: f64,
-        /// When the one before it was \[s\].
+        /// Instant of sending of the packet before \[s\].
         before_s: f64,
     },
 }
 
 impl Measurements {
-    /// Checks that all numbers are finite and that packets stand in the order of sending; equal instants are allowed.
+    /// Checks that all numbers are finite and that packets are in the order of sending. Equal instants are allowed.
     ///
     /// # Errors
     ///
-    /// [`MeasurementsError`] with the packet that is wrong.
+    /// [`MeasurementsError`] for the first wrong packet.
     pub fn new(packets: Vec<Measurement>) -> Result<Self, MeasurementsError> {
         let mut before_s = f64::NEG_INFINITY;
         for (packet, &Measurement { sent_s, delay_s }) in (1..).zip(&packets) {
@@ -64,7 +64,7 @@ impl Measurements {
         Ok(Self { packets, removed: None })
     }
 
-    /// The packets of a fate log: each was sent when it was offered and took as long as the first of its copies to arrive.
+    /// Takes the packets of a fate log. A packet is sent when offered, and has the delay of its first arrived copy.
     #[must_use]
     pub fn from_fates(log: &FateLog) -> Self {
         let mut packets: Vec<Measurement> = Vec::with_capacity(log.packets());
@@ -79,51 +79,51 @@ impl Measurements {
                 packet.delay_s = Some(packet.delay_s.map_or(delay_s, |earlier| earlier.min(delay_s)));
             }
         }
-        // A log stands in the order of sending, and its instants are finite.
+        // A log is in the order of sending, and its instants are finite.
         Self::in_order(packets)
     }
 
-    /// Packets that are known to be finite and in the order of sending.
+    /// Makes measurements of packets known to be finite and in the order of sending.
     pub(super) const fn in_order(packets: Vec<Measurement>) -> Self {
         Self { packets, removed: None }
     }
 
-    /// The packets, in the order of sending.
+    /// Returns the packets, in the order of sending.
     #[must_use]
     pub fn packets(&self) -> &[Measurement] {
         &self.packets
     }
 
-    /// Instants at which packets were sent. Fewer than packets if these are sent in bursts.
+    /// Returns the number of different instants of sending, below the number of packets for bursts.
     #[must_use]
     pub fn instants(&self) -> usize {
         self.packets.chunk_by(|one, other| one.sent_s.total_cmp(&other.sent_s).is_eq()).count()
     }
 
-    /// The least delay \[s\]; `None` if nothing arrived.
+    /// Returns the least delay \[s\]; `None` if no packet arrived.
     #[must_use]
     pub fn least_s(&self) -> Option<f64> {
         self.arrivals().map(|arrival| arrival.1).reduce(f64::min)
     }
 
-    /// The mean delay \[s\]; `None` if nothing arrived.
+    /// Returns the mean delay \[s\]; `None` if no packet arrived.
     #[must_use]
     pub fn mean_s(&self) -> Option<f64> {
         crate::series::mean(&self.arrivals().map(|arrival| arrival.1).collect::<Vec<_>>())
     }
 
-    /// The drift that was taken off, which the mean of the delays is no more certain than.
+    /// Returns the removed drift. The error of the drift adds to the error of the mean delay.
     pub(super) const fn removed(&self) -> Option<&Skew> {
         self.removed.as_ref()
     }
 
-    /// The packets that arrived: (sending, delay) \[s\].
+    /// Returns (sending, delay) \[s\] of all arrived packets.
     pub(super) fn arrivals(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         self.packets.iter().filter_map(|packet| Some((packet.sent_s, packet.delay_s?)))
     }
 
-    /// The same with every delay longer by `by_s` \[s\], for two clocks whose offset is known or assumed. From one-way measurements alone the offset
-    /// cannot be told from the delay.
+    /// Returns the measurements with all delays longer by `by_s` \[s\], for two clocks with a known or assumed offset. One-way measurements alone cannot
+    /// separate the offset from the delay.
     ///
     /// # Errors
     ///
@@ -133,14 +133,14 @@ impl Measurements {
         Ok(Self { removed: self.removed, ..Self::new(self.packets.iter().map(later).collect())? })
     }
 
-    /// The linear drift of one clock against the other, and these measurements without it where it is significant: a drift that may be chance stays in
-    /// ([`Skew::significant`]). The delay of the first packet stays as it is.
+    /// Estimates the linear drift of a clock against the other. Returns the measurements without the drift if the drift is significant
+    /// ([`Skew::significant`]), and unchanged otherwise, with the estimate. The delay of the first packet stays the same.
     ///
-    /// See [`Skew`] for what else looks like drift.
+    /// See [`Skew`] for other causes with the look of a drift.
     ///
     /// # Errors
     ///
-    /// [`SkewError`] if fewer than 50 packets arrived, all of these were sent at one instant, or the delays hang together for too long.
+    /// [`SkewError`] if fewer than 50 packets arrived, if all of them were sent at the same instant, or if the delays have a too long memory.
     pub fn without_skew(&self) -> Result<(Self, Skew), SkewError> {
         let arrivals: Vec<(f64, f64)> = self.arrivals().collect();
         let skew = Skew::of(&arrivals)?;

@@ -1,4 +1,4 @@
-//! An estimate of a link from measured one-way delays and losses.
+//! Estimates a link from measured one-way delays and losses.
 //!
 //! ```text
 //! CSV ─────────┐                       ┌─► law of the delay: six families, floor, AIC, Kolmogorov's distance, or the delays themselves
@@ -6,16 +6,16 @@
 //! captures ────┘   (offset, skew)      └─► loss: independent or in bursts, BIC
 //! ```
 //!
-//! What comes out is a [`Fitted`]: a link that can be written into a scene, and how good it is. The methods are described, with their sources, on
-//! [`LawFit`], [`CorrelationFit`] and [`LossFit`].
+//! The result is a [`Fitted`]: a link for a scene, and the goodness of the estimate. The methods and their sources are described at [`LawFit`],
+//! [`CorrelationFit`] and [`LossFit`].
 //!
-//! One-way delays need synchronised clocks. A constant offset cannot be told from the delay and is part of the estimate (unless it is known:
-//! [`Measurements::shifted`]); a linear drift can be removed on request where it is significant ([`Measurements::without_skew`]).
+//! One-way delays need synchronised clocks. A constant offset looks like delay and becomes part of the estimate, unless the offset is known
+//! ([`Measurements::shifted`]). A significant linear drift can be removed on request ([`Measurements::without_skew`]).
 //!
 //! # Files of measurements
 //!
-//! [`Measurements::from_csv`] reads the columns `t,delay[,lost]` or `sent,arrived` ([`cohaptic_wan::delay_table`]). [`captures::between`] reads a pair of captures of
-//! the two ends.
+//! [`Measurements::from_csv`] reads the columns `t,delay[,lost]` or `sent,arrived` ([`cohaptic_wan::delay_table`]). [`captures::between`] reads a pair of
+//! captures, made at the two ends.
 
 pub mod captures;
 mod cells;
@@ -55,20 +55,20 @@ use link_delay::LinkDelay;
 use crate::batches::{self, student};
 use crate::series::{self, count};
 
-/// A link and how good the estimate is. Serialised: `link{…}, goodness{…}`.
+/// An estimated link with the goodness of the estimate. Serialised: `link{…}, goodness{…}`.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Fitted {
-    /// The link.
+    /// Estimated link.
     pub link: FittedLink,
-    /// How good it is.
+    /// Goodness of the estimate.
     pub goodness: Goodness,
-    /// The measured delays \[s\], where they are the law of the link.
+    /// Measured delays \[s\]; `None` if a law fits.
     #[serde(skip)]
     delays: Option<Arc<Empirical>>,
 }
 
 impl Fitted {
-    /// The file of delays that the link names where no law fits: CSV with the column `delay`, in seconds, sorted. `None` where a law fits.
+    /// Returns the file of delays for a link without a fitting law: CSV with the column `delay`, in seconds, sorted. `None` if a law fits.
     #[must_use]
     pub fn delays_csv(&self) -> Option<String> {
         let mut text = "delay\n".to_owned();
@@ -80,56 +80,57 @@ impl Fitted {
     }
 }
 
-/// What the estimate rests on, and the models that were not chosen.
+/// Data of the estimate, and all models with their goodness.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Goodness {
     /// Packets sent.
     pub packets: usize,
-    /// Packets that arrived.
+    /// Packets arrived.
     pub received: usize,
-    /// The number of independent delays that would say as much about their mean, n·(1 − r₁)/(1 + r₁) with the autocorrelation r₁ at lag one.
+    /// Number of independent delays with the same information about the mean: n·(1 − r₁)/(1 + r₁), with the autocorrelation r₁ at lag one.
     pub effective: f64,
-    /// The median gap between packets sent \[s\]; where most gaps are zero, because packets are sent in bursts, the median gap between bursts.
+    /// Median gap between packets sent \[s\]. For packets sent in bursts, with most gaps zero, the median gap between bursts.
     pub spacing_s: f64,
     /// Whether at least 95 % of the gaps are within a fifth of the median. If so, correlation and loss are per packet, otherwise in time.
     pub evenly_spaced: bool,
-    /// The mean of the measured delays \[s\].
+    /// Mean of the measured delays \[s\].
     pub mean_s: f64,
-    /// Its standard error by batch means \[s\], that of a drift that was taken off included; the mean of the link lies within 2.05 of these with confidence
-    /// 0.95. `None` of fewer than 300, and where the delays hang together for too long.
+    /// Standard error of the mean by batch means \[s\], including the error of a removed drift. The true mean lies within 2.05 standard errors with
+    /// confidence 0.95. `None` for fewer than 300 delays or a too long memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_se_s: Option<f64>,
-    /// The standard deviation of the measured delays \[s\].
+    /// Standard deviation of the measured delays \[s\].
     pub sd_s: f64,
-    /// Standard error of the standard deviation \[s\], sd·√((κ − 1)/4m) with the kurtosis κ of the delays and m = `effective`, at most half of it.
+    /// Standard error of the standard deviation \[s\]: sd·√((κ − 1)/4m), with the kurtosis κ of the delays and m = `effective`, and at most half of the
+    /// standard deviation.
     pub sd_se_s: f64,
-    /// The least delay \[s\].
+    /// Least delay \[s\].
     pub least_s: f64,
-    /// The resolution of the clock \[s\]: the greatest step of which all differences of delays are whole multiples, in nanoseconds. A delay stands for all within
-    /// half a step.
+    /// Resolution of the clock \[s\]: the greatest step such that all differences of delays are whole multiples, in nanoseconds. A shown delay stands for
+    /// all delays within half a step.
     pub resolution_s: f64,
-    /// The least delay corrected for its bias without a law, 2x₁ − x₂ of the two least *different* delays (Robson & Whitlock 1964, Biometrika 51(1/2)),
-    /// not below zero \[s\]. It is right for laws that are dense at their floor, and too high for others, whose own floors stand in `laws`.
+    /// Least delay, corrected for its bias without a law and not below zero \[s\]: 2x₁ − x₂ of the two least *different* delays (Robson & Whitlock 1964,
+    /// Biometrika 51(1/2)). Right for laws with a density at their floor, and too high for other laws, whose own floors are in `laws`.
     pub floor_robson_whitlock_s: f64,
-    /// The largest distance of distribution functions at which a law fits, 0.02 + 1.63/√m with m = `effective`, at least 50.
+    /// Largest distance of distribution functions of a fitting law: 0.02 + 1.63/√m, with m = `effective`, at least 50.
     pub kolmogorov_limit: f64,
-    /// Every law that has the moments of the delays: those that fit first, of which the first one is the law of the link.
+    /// All laws able to have the moments of the delays. Fitting laws come first, and the first fitting law is the law of the link.
     pub laws: Vec<LawFit>,
-    /// The memory of the delays; `None` if they are as good as independent.
+    /// Correlation of the delays; `None` if the delays may be independent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<CorrelationFit>,
-    /// Wilson's interval for the share lost at confidence 0.95; from 300 packets on, batch means take bursts into account. `None` where they hang together
-    /// for too long.
+    /// Wilson's interval of the share lost at confidence 0.95. From 300 packets on, batch means take bursts into account. `None` for losses with a too long
+    /// memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_interval_95: Option<[f64; 2]>,
-    /// Every model of loss that applies, the chosen one first.
+    /// All applicable models of loss, the chosen model first.
     pub losses: Vec<LossFit>,
 }
 
-/// Why no link can be estimated.
+/// Error of an estimate.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum FitError {
-    /// No packet arrived, or there is none.
+    /// No packet arrived, or no packet was sent.
     #[error("none of {} arrived: expected at least {LEAST_RECEIVED} delays", Counted(*packets, "packet"))]
     NothingArrived {
         /// Packets sent.
@@ -138,47 +139,47 @@ pub enum FitError {
     /// Too few packets arrived.
     #[error("only {} arrived: expected at least {LEAST_RECEIVED} delays", Counted(*received, "packet"))]
     TooFew {
-        /// Packets that arrived.
+        /// Packets arrived.
         received: usize,
     },
-    /// A delay is negative: the clocks are offset.
+    /// A delay is negative, because the clocks are offset.
     #[error("the packet sent at {sent_s} s has a delay of {delay_s} s: expected none below zero (are the two clocks apart?)")]
     NegativeDelay {
-        /// When it was sent \[s\].
+        /// Instant of sending \[s\].
         sent_s: f64,
-        /// Its delay \[s\].
+        /// Delay \[s\].
         delay_s: f64,
     },
     /// All delays are equal.
     #[error("all {received} delays are {delay_s} s: there is no jitter to estimate, the link is this constant delay")]
     ConstantDelay {
-        /// Packets that arrived.
+        /// Packets arrived.
         received: usize,
-        /// Their delay \[s\].
+        /// Delay of all packets \[s\].
         delay_s: f64,
     },
-    /// All packets were sent at the same time.
+    /// All packets were sent at the same instant.
     #[error("all packets were sent at one instant, {sent_s} s: expected packets of several instants")]
     OneInstant {
-        /// That time \[s\].
+        /// Instant of sending of all packets \[s\].
         sent_s: f64,
     },
 }
 
-/// A link counts nanoseconds: delays that are closer are equal.
+/// Difference \[s\] below which delays are equal for a link, which counts nanoseconds.
 const HALF_A_NANOSECOND: f64 = 0.5e-9;
-/// Fewer delays than this tell laws apart by chance.
+/// Fewest delays for an estimate. With fewer delays, chance decides between laws.
 const LEAST_RECEIVED: usize = 50;
 
-/// Estimates the link.
+/// Estimates a link.
 ///
 /// # Errors
 ///
-/// [`FitError`] if fewer than 50 packets arrived, a delay is negative, all delays are equal in nanoseconds, or all packets were sent at one instant.
+/// [`FitError`] if fewer than 50 packets arrived, a delay is negative, all delays are equal in nanoseconds, or all packets were sent at the same instant.
 ///
 /// # Panics
 ///
-/// Never: the expectations inside state what the checks before have shown.
+/// Never: the checks at the beginning establish what the code expects later.
 pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     let packets = measurements.packets();
     let arrivals: Vec<(f64, f64)> = measurements.arrivals().collect();
@@ -244,27 +245,28 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     Ok(Fitted { link, goodness, delays: delay.delays })
 }
 
-/// What the error of a drift that was taken off, so that the first packet stayed as it is, makes of the mean \[s\].
+/// Returns the error of the mean caused by the error of a removed drift \[s\]. The removal kept the delay of the first packet, so the error grows with the
+/// mean time since then.
 fn error_of_drift(measurements: &Measurements, arrivals: &[(f64, f64)]) -> f64 {
     let Some((skew, first)) = measurements.removed().zip(measurements.packets().first()) else { return 0.0 };
     let since = series::mean(&arrivals.iter().map(|arrival| arrival.0 - first.sent_s).collect::<Vec<_>>()).unwrap_or(0.0);
     since * skew.standard_error * student(0.975, skew.blocks - 2) / student(0.975, batches::MOST - 1)
 }
 
-/// The median gap, and whether nearly all gaps are like it. Of packets that are sent in bursts, each at one instant, the median gap between bursts, which is
-/// zero only if there is one burst.
+/// Returns the median gap \[s\], and whether nearly all gaps are close to the median. For bursts (most gaps zero) returns the median gap between bursts,
+/// which is zero only for a single burst.
 fn spacing(packets: &[Measurement]) -> (f64, bool) {
     let mut gaps: Vec<f64> = packets.windows(2).map(|pair| pair[1].sent_s - pair[0].sent_s).collect();
     gaps.sort_by(f64::total_cmp);
     let median = |gaps: &[f64]| gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
     let all = median(&gaps);
-    // Gaps are not negative.
+    // The gaps are sorted and not negative, so the slice has the positive gaps.
     let spacing = if all > 0.0 { all } else { median(&gaps[gaps.partition_point(|gap| *gap <= 0.0)..]) };
     let like = gaps.iter().filter(|gap| (*gap - spacing).abs() <= 0.2 * spacing).count();
     (spacing, count(like) >= 0.95 * count(gaps.len()))
 }
 
-/// At least 2, at most the number of delays.
+/// Returns the effective number of delays, see [`Goodness::effective`]: at least 2, at most the number of delays.
 fn effective(packets: &[Measurement]) -> f64 {
     let delays: Vec<Option<f64>> = packets.iter().map(|packet| packet.delay_s).collect();
     let received = count(delays.iter().flatten().count());
@@ -272,6 +274,7 @@ fn effective(packets: &[Measurement]) -> f64 {
     (received * (1.0 - lag_one) / (1.0 + lag_one)).max(2.0)
 }
 
+/// Returns the bias-corrected least delay, see [`Goodness::floor_robson_whitlock_s`].
 fn robson_whitlock(sorted: &[f64]) -> f64 {
     let least = sorted[0];
     let second = sorted.iter().copied().find(|&delay| delay > least).unwrap_or(least);

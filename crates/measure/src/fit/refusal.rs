@@ -1,4 +1,4 @@
-//! Delays that have no law, and what a link is told of them.
+//! Tests with delays that follow no law.
 
 use proptest::prelude::*;
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
@@ -8,7 +8,7 @@ use cohaptic_wan::law::Law;
 use super::*;
 use crate::tests::TestRng;
 
-/// Delays in the order of sending, one each 10 ms, as a clock of that resolution shows them.
+/// Returns delays as shown by a clock of the given resolution.
 fn shown(delays: impl IntoIterator<Item = f64>, resolution_s: f64) -> Vec<f64> {
     delays.into_iter().map(|delay| (delay / resolution_s).round() * resolution_s).collect()
 }
@@ -17,7 +17,7 @@ fn fit_of(delays: &[f64]) -> Result<Fitted, FitError> {
     fit(&Measurements::new((0..).zip(delays).map(|(i, &delay)| Measurement { sent_s: f64::from(i) * 0.01, delay_s: Some(delay) }).collect()).unwrap())
 }
 
-/// Mean and deviation of a sample and their standard errors, those of the mean and the second moment of independent numbers.
+/// Returns mean and standard deviation of a sample, and their standard errors for independent numbers.
 fn moments(delays: &[f64]) -> [f64; 4] {
     let n = delays.len() as f64;
     let mean = delays.iter().sum::<f64>() / n;
@@ -26,13 +26,13 @@ fn moments(delays: &[f64]) -> [f64; 4] {
     [mean, sd, sd / n.sqrt(), ((power(4) - sd.powi(4)).max(0.0) / n).sqrt() / (2.0 * sd)]
 }
 
-/// Moments of the delays of a link that is written into a scene: whole nanoseconds.
+/// Returns the law of the link as written into a scene, with whole nanoseconds \[ns\].
 fn delivered(link: &FittedLink, law: DelayLaw) -> Law {
     let nanos = |seconds: f64| (seconds * 1e9).round();
     Law::new(&law.into(), nanos(link.delay_s), nanos(link.jitter.sd_s), link.jitter.floor_s.map(nanos)).unwrap()
 }
 
-/// 2000 delays of each kind: a normal law around 20 ms with what the issue of coarse clocks, modes and outliers is about.
+/// Returns 2000 delays of a kind: a normal law around 20 ms, with a coarse clock, modes or outliers.
 fn case(kind: usize, seed: u64) -> Vec<f64> {
     let mut rng = TestRng::new(seed);
     let mut spike = 0.0;
@@ -43,9 +43,9 @@ fn case(kind: usize, seed: u64) -> Vec<f64> {
                 0 => 0.02 + 1e-3 * z.abs(),
                 // Two routes.
                 1 => (if rng.unit() < 0.5 { 0.02 } else { 0.04 }) + 5e-4 * z,
-                // A packet in two hundred takes a second.
+                // Each packet takes a second with probability 0.005.
                 2 => (if rng.unit() < 0.005 { 1.0 } else { 0.02 }) + 1e-3 * z,
-                // Spikes of 100 ms once a second, which decay in 20 ms, and packets each 10 ms.
+                // Spikes of 100 ms, once a second on average, with a decay time of 20 ms, and packets every 10 ms.
                 _ => {
                     spike = spike * (-0.5_f64).exp() + if rng.unit() < 0.01 { 0.1 } else { 0.0 };
                     0.02 + 2e-4 * z.abs() + spike
@@ -66,7 +66,7 @@ fn a_law_that_does_not_fit_is_refused() {
         for law in &goodness.laws {
             assert!(!law.fits && law.kolmogorov > goodness.kolmogorov_limit && law.p_value < 0.01, "{kind} {law:?}");
         }
-        // The delays themselves are the law, and the link says so.
+        // The delays themselves are the law, and the text of the link names their file.
         let csv = fitted.delays_csv().unwrap();
         let mut sorted = delays.clone();
         sorted.sort_by(f64::total_cmp);
@@ -80,7 +80,8 @@ fn a_law_that_does_not_fit_is_refused() {
 
 #[test]
 fn a_coarse_clock_alone_is_no_reason_to_refuse() {
-    // Half a normal law of deviation 1 ms, seen by clocks of 1 ns to half a millisecond: the figures of the construction, 20 ms + 1 ms·√(2/π) and 1 ms·√(1 − 2/π).
+    // Half a normal law of deviation 1 ms, shown by clocks of 1 ns to half a millisecond. By construction the mean is 20 ms + 1 ms·√(2/π) and the deviation
+    // 1 ms·√(1 − 2/π).
     for resolution_s in [1e-9, 1e-5, 2.5e-4, 5e-4] {
         let delays = shown(case(0, 11), resolution_s);
         let fitted = fit_of(&delays).unwrap();
@@ -88,7 +89,7 @@ fn a_coarse_clock_alone_is_no_reason_to_refuse() {
         assert_eq!(fitted.delays_csv(), None);
         let law = delivered(&fitted.link, law);
         assert!((law.mean() - 20e6 - 797_885.0).abs() < 4.0 * 602_810.0 / 2000_f64.sqrt(), "{law:?}");
-        // Kurtosis 3.869: the deviation is known to √(2.869/8000).
+        // With the kurtosis 3.869 the relative error of the deviation is √(2.869/8000).
         assert!((law.sd() / 602_810.0 - 1.0).abs() < 4.0 * (2.869_f64 / 8000.0).sqrt(), "{} {resolution_s}", law.sd());
     }
 }
@@ -113,11 +114,11 @@ fn more_delays_than_a_link_takes_are_quantiles() {
     let found = LinkDelay::of_delays(&sorted);
     let delays = found.delays.unwrap();
     assert_eq!((delays.knots().len(), delays.knots()[0], delays.knots()[Empirical::MOST - 1]), (Empirical::MOST, 0.0, sorted[2_999_999]));
-    // Uniform from 0 to 3 ms.
+    // A uniform law from 0 to 3 ms.
     assert!((found.mean_s - 1.5e-3).abs() < 2e-9 && (found.sd_s - 3e-3 / 12_f64.sqrt()).abs() < 2e-9);
 }
 
-/// Lists of delays of many forms: mixtures of narrow and wide laws, of points, with outliers, of 50 to 400 delays between 0 and some seconds.
+/// Lists of 50 to 400 delays between 0 and some seconds, of many forms: mixtures of narrow and wide laws and of points, and with outliers.
 fn lists() -> impl Strategy<Value = Vec<f64>> {
     let part = (0.0..0.2_f64, -6.0..-1.0_f64, 0..4_u8, 1..20_u32);
     (prop::collection::vec(part, 1..4), any::<u64>(), 50..400_usize).prop_map(|(parts, seed, n)| {
@@ -141,7 +142,8 @@ fn lists() -> impl Strategy<Value = Vec<f64>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// For any list of delays and any resolution of the clock, mean and deviation of the link lie within the standard errors of the sample, or no law is given.
+    /// For any list of delays and any resolution of the clock, the mean and the deviation of the link lie within the standard errors of the sample, or the
+    /// link has no law.
     #[test]
     fn a_link_has_the_moments_of_the_delays_or_no_law(delays in lists(), log_resolution in -9.0..-1.5_f64) {
         let delays = shown(delays, 10_f64.powf(log_resolution));
@@ -153,7 +155,7 @@ proptest! {
                     return Ok(());
                 };
                 let law = delivered(&fitted.link, law);
-                // Dependent delays, if only by chance, say as much as fewer independent ones; and a scene has whole nanoseconds.
+                // Correlated delays, even if correlated by chance, are worth fewer independent ones. A scene has whole nanoseconds.
                 let fewer = (delays.len() as f64 / fitted.goodness.effective).sqrt();
                 prop_assert!((law.mean() / 1e9 - mean).abs() <= 1.001 * fewer * mean_error + 1e-9, "{} {mean} {mean_error} {:?}", law.mean(), fitted.link);
                 prop_assert!((law.sd() / 1e9 - sd).abs() <= 1.001 * fewer * sd_error + 1e-9, "{} {sd} {sd_error} {:?}", law.sd(), fitted.link);

@@ -1,4 +1,4 @@
-//! Measurements as a CSV file, whose format stands at [`cohaptic_wan::delay_table`].
+//! Reads measurements from CSV, in the format described at [`cohaptic_wan::delay_table`].
 
 pub(super) use cohaptic_wan::delay_table::Attoseconds;
 use cohaptic_wan::delay_table::{self, DelayTableError};
@@ -6,18 +6,18 @@ use cohaptic_wan::delay_table::{self, DelayTableError};
 use super::{Measurement, Measurements};
 
 impl Measurements {
-    /// Reads a CSV file with the columns `t,delay[,lost]` or `sent,arrived[,lost]`, as [`delay_table`] describes it. Times are counted from the first packet.
+    /// Reads a CSV file with the columns `t,delay[,lost]` or `sent,arrived[,lost]`, as described at [`delay_table`]. Times count from the first packet.
     ///
     /// # Errors
     ///
-    /// [`DelayTableError`] with line, column and what was expected.
+    /// [`DelayTableError`] with line, column and expectation.
     pub fn from_csv(text: &str) -> Result<Self, DelayTableError> {
         let rows = delay_table::read(text)?;
         let packets = rows.iter().map(|row| {
             let sent_s = row.sent.seconds_since(rows[0].sent).unwrap_or(f64::MAX);
             Measurement { sent_s, delay_s: row.delay.map(Attoseconds::seconds) }
         });
-        // A table stands in the order of sending, and its times are finite.
+        // A table is in the order of sending, and its times are finite.
         Ok(Self::in_order(packets.collect()))
     }
 }

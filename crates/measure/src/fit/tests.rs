@@ -3,7 +3,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::tests::TestRng;
 
-/// A link with a gamma law through a Gaussian copula of correlation time τ, and Gilbert–Elliott losses, made without the emulator.
+/// Returns measurements of a link made without the emulator: a gamma law through a Gaussian copula of correlation time τ, with Gilbert–Elliott losses.
 fn measured(seed: u64, n: usize, gap: impl Fn(&mut TestRng) -> f64) -> Measurements {
     let mut rng = TestRng::new(seed);
     let (mut sent_s, mut z): (f64, f64) = (0.0, StandardNormal.sample(&mut rng));
@@ -21,7 +21,7 @@ fn measured(seed: u64, n: usize, gap: impl Fn(&mut TestRng) -> f64) -> Measureme
     Measurements::new(packets).unwrap()
 }
 
-/// The number of the gamma law of shape 2 and scale 1 at the place of a standard normal number: 1 − (1 + x)e^{−x} = Φ(z), by bisection.
+/// Returns the value of the gamma law of shape 2 and scale 1 at the place of a standard normal number: the solution of 1 − (1 + x)e^{−x} = Φ(z), by bisection.
 fn gamma_of_shape_2(z: f64) -> f64 {
     let above = law::normal_below(-z);
     let (mut low, mut high) = (0.0_f64, 60.0_f64);
@@ -38,16 +38,16 @@ fn a_link_is_found_from_its_measurements() {
     let Fitted { link, goodness, .. } = &fitted;
     assert!(goodness.evenly_spaced && goodness.packets == 40_000);
     assert_eq!(link.jitter.distribution, FittedLaw::Law(DelayLaw::Gamma), "{goodness:#?}");
-    // Mean 24 ms, deviation 2.83 ms, 37 500 arrivals, φ = 0.852: as many as 3 000 independent ones. Five standard errors of mean, and of deviation with
-    // kurtosis 6.
+    // Mean 24 ms, deviation 2.83 ms, 37 500 arrivals and φ = 0.852, worth 3 000 independent delays. The tolerance is five standard errors of the mean, and
+    // of the deviation with kurtosis 6.
     assert!((link.delay_s - 0.024).abs() < 5.0 * 0.00283 / 3_000_f64.sqrt(), "{link:?}");
     assert!((link.jitter.sd_s - 0.002_828).abs() < 5.0 * 0.00283 * (5.0 / 4.0 / 3_000_f64).sqrt(), "{link:?}");
-    // F(x) = x²/2 near zero, in units of 2 ms; the least of 3 000.
+    // Near zero F(x) = x²/2 in units of 2 ms, for the least of 3 000 delays.
     assert!((link.jitter.floor_s.unwrap() - 0.02).abs() < 0.002 * (2.0 * 7.0 / 3_000_f64).sqrt(), "{link:?}");
     let correlation = goodness.correlation.unwrap();
     let phi = (-0.008_f64 / 0.05).exp();
     assert!((correlation.lag_one - phi).abs() < 4.0 * correlation.lag_one_se.unwrap(), "{link:?}");
-    // The correlation of the delays themselves, of the law that they have. It grows hardly faster than φ.
+    // The correlation of delays of this law; the function grows hardly faster than φ.
     let rho = cohaptic_wan::law::Law::new(&cohaptic_wan::Distribution::Gamma, 24.0, 8_f64.sqrt(), Some(20.0)).unwrap().correlation(phi);
     assert!((link.jitter.correlation.unwrap() - rho).abs() < 4.0 * 1.1 * correlation.lag_one_se.unwrap(), "{rho} {link:?}");
     let LossModel::GilbertElliott { p, r, .. } = link.loss else { panic!("{link:?}") };
@@ -79,13 +79,13 @@ fn uneven_gaps_give_figures_in_time() {
 #[test]
 fn drift_between_clocks_can_be_removed_first() {
     let clean = measured(3, 20_000, |_| 0.008);
-    // 160 s at 100 ppm: 16 ms.
+    // A drift of 100 ppm over 160 s is 16 ms.
     let drifted = Measurements::new(
         clean.packets().iter().map(|packet| Measurement { delay_s: packet.delay_s.map(|delay| delay + 1e-4 * packet.sent_s), ..*packet }).collect(),
     )
     .unwrap();
     let (corrected, skew) = drifted.without_skew().unwrap();
-    // The lower ends of the two halves are known to F⁻¹(7/n) of 800 effective delays, 0.26 ms, 80 s apart.
+    // The lower ends of the two halves are known to F⁻¹(7/n) of 800 effective delays, 0.26 ms, and are 80 s apart.
     assert!((skew.seconds_per_second - 1e-4).abs() < 0.000_26 / 80.0, "{skew:?}");
     let [before, after] = [&drifted, &corrected].map(|measurements| fit(measurements).unwrap().link.jitter.sd_s);
     assert!(before > 0.005 && (after - 0.002_83).abs() < 0.000_6, "{before} {after}");

@@ -1,11 +1,11 @@
-//! Packets that are sent in bursts, each at one instant.
+//! Packets sent in bursts, all packets of a burst at the same instant.
 
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::fit::{DelayLaw, FittedLaw, LossModel, Measurement, Measurements, fit};
 use crate::tests::TestRng;
 
-/// Bursts each 10 ms of that number of packets, with normal delays of 30 ± 2 ms; each packet is lost with probability 0.1, whichever others are.
+/// Makes bursts of `of` packets every 10 ms, with normal delays of 30 ± 2 ms. Each packet is lost with probability 0.1, independently of others.
 fn bursts(of: u32) -> Measurements {
     let mut rng = TestRng::new(u64::from(of));
     let packet = |number: u32| {
@@ -15,7 +15,8 @@ fn bursts(of: u32) -> Measurements {
     Measurements::new((0..20_000).map(packet).collect()).unwrap()
 }
 
-/// 18 000 delays: the mean has the standard error 2 ms/√18 000 = 15 µs, the deviation 11 µs, the loss √(0.09/20 000) = 0.0021. Five of each.
+/// With 18 000 delays the mean has the standard error 2 ms/√18 000 = 15 µs, the deviation 11 µs, and the loss √(0.09/20 000) = 0.0021. The tolerance is
+/// five standard errors.
 #[test]
 fn a_link_is_found_from_bursts() {
     for of in [2, 3, 5, 40] {

@@ -1,4 +1,4 @@
-//! Tests of what the figures of several modules state, and the random numbers of all tests.
+//! Tests of statements of several modules, and random numbers for all tests.
 
 mod bursts;
 mod calibration;

@@ -1,4 +1,4 @@
-//! Random numbers for tests, drawn independently of the emulator's: SplitMix64 (Steele, Lea & Flood 2014).
+//! Random numbers for tests, independent of the emulator's generator: SplitMix64 (Steele, Lea & Flood 2014).
 
 use core::convert::Infallible;
 
@@ -20,14 +20,14 @@ impl TestRng {
         z ^ (z >> 31)
     }
 
-    /// Uniform over 0..1.
+    /// Returns a uniform number in 0..1.
     pub(crate) fn unit(&mut self) -> f64 {
         (self.word() >> 11) as f64 / 9_007_199_254_740_992.0
     }
 }
 
 impl TestRng {
-    /// One of these, each as likely as another.
+    /// Returns an element of a list, each with the same probability.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and below the length of a list")]
     pub(crate) fn pick<'a, T>(&mut self, of: &'a [T]) -> &'a T {
         &of[(self.unit() * of.len() as f64) as usize]
@@ -53,7 +53,7 @@ impl TryRng for TestRng {
     }
 }
 
-/// A normal series of mean 0 and deviation 1 with the autocorrelation φ at lag one.
+/// Returns a normal series of mean 0 and deviation 1, with the autocorrelation φ at lag one.
 pub(crate) fn autoregressive(seed: u64, phi: f64, n: usize) -> Vec<f64> {
     let mut rng = TestRng::new(seed);
     let mut last: f64 = StandardNormal.sample(&mut rng);

@@ -1,4 +1,4 @@
-//! The content of a capture: the datagrams that are matched, and counts of everything else.
+//! Content of a capture: the datagrams for the matching, and counts of all other frames.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -17,17 +17,17 @@ use super::{CaptureError, End, frame, reader, views};
 pub struct Contents {
     /// Frames in the file.
     pub frames: usize,
-    /// Number of frames of each kind. `UDP` counts the datagrams that were read; every other name is that of frames that were not.
+    /// Number of frames by kind. `UDP` counts the datagrams used; all other names count frames that were not used.
     pub kinds: BTreeMap<Cow<'static, str>, usize>,
-    /// Frames that show a packet which an earlier frame of the same capture had shown, at another interface for example.
+    /// Frames showing a packet already shown by an earlier frame of the same capture, for example at another interface.
     pub seen_again: usize,
-    /// Datagrams that hold several packets, because the network card cuts or joins them.
+    /// Datagrams with several packets, cut or joined by the network card.
     pub super_packets: usize,
-    /// `true` if the file ends within a block. It was read up to there.
+    /// Whether the file ends within a block. All blocks before were read.
     pub cut_off: bool,
 }
 
-/// Most kinds that a text names.
+/// Largest number of kinds named in a text.
 const MOST_NAMED: usize = 8;
 
 impl fmt::Display for Contents {
@@ -46,47 +46,47 @@ impl fmt::Display for Contents {
 /// A datagram of a capture.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Datagram {
-    /// Time of capture, in nanoseconds since 1970.
+    /// Time of capture \[ns since 1970\].
     pub(super) nanos: i128,
     pub(super) destination_port: u16,
-    /// The IPv4 identification.
+    /// Identification of the IPv4 header; `None` for IPv6.
     pub(super) identification: Option<u16>,
     /// Length of the payload as sent \[byte\].
     pub(super) length: usize,
-    /// Hash of the payload that was captured.
+    /// Hash of the captured part of the payload.
     pub(super) hash: u64,
-    /// Hash of where the frame was seen.
+    /// Hash of the place of capture: interface and headers before IP.
     pub(super) place: u64,
-    /// Place in [`Capture::bytes`] of the payload that was captured.
+    /// Range of the captured payload in [`Capture::bytes`].
     range: Range<usize>,
 }
 
 impl Datagram {
-    /// Octets of the payload that were captured.
+    /// Returns the number of captured octets of the payload.
     pub(super) const fn captured(&self) -> usize {
         self.range.end - self.range.start
     }
 
-    /// The identification, if the sender gives each packet one. Zero stands for none: the sender forbids fragments.
+    /// Returns the identification, if the sender gives each packet a different one. Zero counts as none, because senders that forbid fragments send zero.
     pub(super) fn own_identification(&self) -> Option<u16> {
         self.identification.filter(|number| *number != 0)
     }
 }
 
-/// A capture that was read.
+/// Datagrams and counts of a capture.
 #[derive(Debug)]
 pub(super) struct Capture {
-    /// The datagrams in the order of their times.
+    /// Datagrams in the order of their times.
     pub(super) datagrams: Vec<Datagram>,
-    /// Payloads of all datagrams, one after the other.
+    /// Captured payloads of all datagrams, one after the other.
     bytes: Vec<u8>,
-    /// Times of the first and the last frame of any kind, in nanoseconds since 1970: in between the capture ran.
+    /// Times of the first and the last frame of any kind \[ns since 1970\]. The capture ran in between.
     pub(super) ran: (i128, i128),
     pub(super) contents: Contents,
 }
 
 impl Capture {
-    /// Reads a file. `port`: only datagrams to that UDP port count.
+    /// Reads a file. With a `port`, only datagrams to this UDP port are used.
     pub(super) fn read(end: End, from: impl Read, port: Option<u16>) -> Result<Self, CaptureError> {
         let mut capture = Self { datagrams: Vec::new(), bytes: Vec::new(), ran: (i128::MAX, i128::MIN), contents: Contents::default() };
         let ending = reader::for_each_frame(from, |frame| capture.add(&frame, port));
@@ -101,6 +101,7 @@ impl Capture {
         Ok(capture)
     }
 
+    /// Adds a frame: a datagram to the list, and any frame to the counts.
     fn add(&mut self, frame: &reader::Frame<'_>, port: Option<u16>) {
         self.contents.frames += 1;
         if let Some(nanos) = frame.nanos {
@@ -128,13 +129,13 @@ impl Capture {
         *self.contents.kinds.entry(kind).or_default() += 1;
     }
 
-    /// The payload, as far as it was captured.
+    /// Returns the captured part of a payload.
     pub(super) fn payload(&self, datagram: &Datagram) -> &[u8] {
         &self.bytes[datagram.range.clone()]
     }
 
-    /// The packets that the network card makes of a datagram: each has that number of octets, the last at most as many. Identifications count on, as
-    /// where Linux cuts packets.
+    /// Divides a datagram into the packets made by the network card: `octets` octets each, and at most as many in the last. Identifications count up from
+    /// the first, as in Linux.
     pub(super) fn pieces(&self, datagram: &Datagram, octets: usize) -> Vec<Datagram> {
         let piece = |(number, begin): (u16, usize)| {
             let range = begin..datagram.range.end.min(begin + octets);
@@ -150,7 +151,7 @@ impl Capture {
     }
 }
 
-/// Hash of octets. Of 10⁶ datagrams, two different ones have the same hash with probability 3·10⁻⁸; payloads are compared before they are matched.
+/// Returns a hash of octets. Of 10⁶ datagrams, two different ones have the same hash with probability 3·10⁻⁸. Payloads are compared before a match.
 pub(super) fn hash(octets: &[u8]) -> u64 {
     let mut hasher = DefaultHasher::new();
     octets.hash(&mut hasher);

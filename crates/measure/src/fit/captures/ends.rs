@@ -1,15 +1,15 @@
-//! The part of the sender's datagrams that is judged: both captures ran.
+//! Finds the sender's datagrams that can be judged, because both captures ran.
 
 use std::ops::Range;
 
 use super::contents::Capture;
 use super::matching::Pairs;
 
-/// Numbers of the sender's datagrams that the receiver's capture would have shown if they had arrived. `None` if nothing arrived.
+/// Returns the numbers of the sender's datagrams that the receiver's capture would have shown on arrival. Returns `None` if no datagram arrived.
 ///
-/// A datagram without a counterpart that was sent before the first one that arrived was lost only if, with the least delay of all, it would have
-/// arrived after the first frame of the receiver's capture. One that was sent after the last that arrived was lost only if, with the greatest delay of
-/// all, it would have arrived before the last frame. Whatever was sent earlier or later may have arrived while the receiver did not capture.
+/// A datagram without a counterpart, sent before the first arrived datagram, counts as lost only if it would have arrived after the first frame of the
+/// receiver's capture even with the least delay. A datagram sent after the last arrived datagram counts as lost only if it would have arrived before the
+/// last frame even with the greatest delay. All other datagrams at the ends may have arrived while the receiver's capture did not run.
 pub(super) fn judged(sent: &Capture, arrived: &Capture, pairs: &Pairs) -> Option<Range<usize>> {
     let delays =
         || pairs.arrival_of.iter().zip(&sent.datagrams).filter_map(|(arrival, sent)| Some(arrived.datagrams[(*arrival)?].nanos - sent.nanos));

@@ -1,16 +1,17 @@
-//! Super-packets that were cut by the capture: only their first packet can be seen.
+//! Pairs super-packets cut by the capture, of which only the first packet is visible.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use super::contents::{Capture, hash};
 use super::matching::Pairs;
 
-/// Fewer common octets do not tell packets apart \[byte\].
+/// Fewest common octets that distinguish packets.
 const SHORTEST: usize = 8;
 
-/// Pairs long datagrams that were cut with the packet of the other capture that is their first one, by identification and the octets that both files hold.
-/// Packets of the sender that a long datagram of the receiver holds after its first one are marked as hidden: whether they arrived cannot be seen.
+/// Pairs cut long datagrams with their first packet in the other capture, by identification and by the octets in both files. If the receiver's capture has
+/// a long datagram, the sender's further packets of this datagram are marked as hidden, because their arrival cannot be seen.
 pub(super) fn pair(sent: &mut Capture, arrived: &mut Capture, pairs: &mut Pairs) {
+    // Only datagrams without a counterpart take part.
     let free_sent: Vec<usize> = (0..sent.datagrams.len()).filter(|number| pairs.arrival_of[*number].is_none() && !pairs.is_again[*number]).collect();
     let free_arrived: Vec<usize> = (0..arrived.datagrams.len()).filter(|number| !pairs.taken[*number]).collect();
     for (first, number) in first_packets((sent, &free_sent), (arrived, &free_arrived)) {
@@ -25,6 +26,7 @@ pub(super) fn pair(sent: &mut Capture, arrived: &mut Capture, pairs: &mut Pairs)
         }
         (pairs.arrival_of[first], pairs.taken[number]) = (Some(number), true);
         arrived.contents.super_packets += 1;
+        // The number of packets follows from the lengths; the next free packets to the same port are taken for the others.
         let packet = &sent.datagrams[first];
         let others = arrived.datagrams[number].length.div_ceil(packet.length.max(1)) - 1;
         let follows = |other: &&usize| **other > first && sent.datagrams[**other].destination_port == packet.destination_port;
@@ -39,9 +41,10 @@ pub(super) fn pair(sent: &mut Capture, arrived: &mut Capture, pairs: &mut Pairs)
     }
 }
 
-/// Long datagrams that were cut, each with the first of its packets: (number of the packet in the other capture, number of the long datagram).
+/// Finds cut long datagrams with their first packets. Returns pairs (number of the packet in the other capture, number of the long datagram).
 fn first_packets((capture, long): (&Capture, &[usize]), (other, packets): (&Capture, &[usize])) -> Vec<(usize, usize)> {
     let is_cut = |number: &&usize| capture.datagrams[**number].captured() < capture.datagrams[**number].length;
+    // All comparisons use the octets that every compared datagram has.
     let captured = long.iter().filter(is_cut).map(|number| capture.datagrams[*number].captured());
     let octets =
         captured.chain(packets.iter().map(|number| other.datagrams[*number].captured()).filter(|octets| *octets >= SHORTEST)).min().unwrap_or(0);
@@ -55,7 +58,7 @@ fn first_packets((capture, long): (&Capture, &[usize]), (other, packets): (&Capt
             waiting.entry((packet.own_identification(), hash(prefix))).or_default().push_back(*number);
         }
     }
-    // Without an identification, a beginning that several long datagrams share tells nothing.
+    // Without an identification, a beginning shared by several long datagrams is ambiguous.
     let mut times: BTreeMap<u64, usize> = BTreeMap::new();
     let beginning = |number: usize| hash(&capture.payload(&capture.datagrams[number])[..octets]);
     long.iter().filter(is_cut).for_each(|number| *times.entry(beginning(*number)).or_default() += 1);

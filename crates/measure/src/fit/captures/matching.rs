@@ -1,31 +1,32 @@
-//! Pairs of datagrams: a datagram of one capture, and the same datagram in the other.
+//! Matches datagrams of the sender's capture with datagrams of the receiver's capture.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use super::contents::{Capture, Datagram, hash};
 use super::views;
 
-/// Datagrams of the sender with the datagrams of the receiver that they are.
+/// Matched datagrams of both captures.
 #[derive(Debug)]
 pub(super) struct Pairs {
-    /// Number of the receiver's datagram, indexed by that of the sender.
+    /// Number of the receiver's datagram, indexed by the sender's datagram; `None` without a counterpart.
     pub(super) arrival_of: Vec<Option<usize>>,
-    /// `true` if a datagram of the sender shows a packet that another one shows already; such a datagram is no packet of its own.
+    /// Whether a datagram of the sender shows a packet already shown by another. Such a datagram does not count as a packet.
     pub(super) is_again: Vec<bool>,
-    /// `true` if a datagram of the sender may have arrived within a long datagram of which the receiver's capture shows the first packet alone.
+    /// Whether a datagram of the sender may have arrived inside a long datagram of which the receiver's capture shows only the first packet.
     pub(super) is_hidden: Vec<bool>,
-    /// `true` if a datagram of the receiver has a counterpart.
+    /// Whether a datagram of the receiver has a counterpart.
     pub(super) taken: Vec<bool>,
-    /// Datagrams of the receiver that show a packet again and are matched with nothing.
+    /// Whether a datagram of the receiver shows a packet again and must not be matched.
     is_copy: Vec<bool>,
-    /// `true` if a datagram of the sender equals another one in everything that matching looks at.
+    /// Whether a datagram of the sender equals another in everything compared.
     pub(super) is_ambiguous: Vec<bool>,
 }
 
-/// Datagrams of one content that are compared for each arrival, where captures hold different parts of them.
+/// Largest number of datagrams of equal content compared per arrival, for captures with different parts of the payloads.
 const MOST_COMPARED: usize = 64;
 
 impl Pairs {
+    /// Matches datagrams in four rounds, from strict to loose: whole payload and identification, beginning and identification, whole payload, beginning.
     pub(super) fn of(sent: &Capture, arrived: &Capture) -> Self {
         let (sent_count, arrived_count) = (sent.datagrams.len(), arrived.datagrams.len());
         let mut pairs = Self {
@@ -43,17 +44,17 @@ impl Pairs {
             Some((datagram.length, hash(&capture.payload(datagram)[..octets.min(datagram.captured())])))
         };
         pairs.pair(sent, arrived, true, |capture, datagram| Some((prefix(capture, datagram)?, datagram.identification)));
-        // A second view of a packet must not take the place of a lost packet of the same content.
+        // Marked before the loose rounds, because a second view of a packet could take the place of a lost packet of the same content.
         let is_again = views::again(sent, |number| pairs.arrival_of[number].is_some());
         let is_copy = views::again(arrived, |number| pairs.taken[number]);
         (pairs.is_again, pairs.is_copy) = (is_again, is_copy);
-        // Identifications are rewritten on some paths.
+        // Some paths rewrite identifications, so the last rounds ignore them.
         pairs.pair(sent, arrived, false, |_, datagram| Some((datagram.length, datagram.captured(), datagram.hash)));
         pairs.pair(sent, arrived, false, prefix);
         pairs
     }
 
-    /// Pairs datagrams that are not paired yet by equal keys, in the order of occurrence. `tells`: a key of the sender that is not the only one is ambiguous.
+    /// Matches free datagrams with equal keys, in the order of occurrence. With `tells`, sender's datagrams with equal keys are marked as ambiguous.
     fn pair<K: Ord>(&mut self, sent: &Capture, arrived: &Capture, tells: bool, key: impl Fn(&Capture, &Datagram) -> Option<K>) {
         let mut waiting: BTreeMap<K, VecDeque<usize>> = BTreeMap::new();
         for (number, datagram) in sent.datagrams.iter().enumerate().filter(|(number, _)| self.arrival_of[*number].is_none()) {
@@ -77,8 +78,8 @@ impl Pairs {
         }
     }
 
-    /// The octets that both captures hold of each datagram without a counterpart, by length of the payload. Lengths of which every datagram was captured
-    /// as a whole are left out.
+    /// Returns, by length of the payload, the number of octets captured of every free datagram in both captures. Lengths with all datagrams captured whole
+    /// are left out.
     fn prefixes(&self, sent: &Capture, arrived: &Capture) -> BTreeMap<usize, usize> {
         let mut octets: BTreeMap<usize, usize> = BTreeMap::new();
         let of_sent = sent.datagrams.iter().enumerate().filter(|(number, _)| self.arrival_of[*number].is_none());
@@ -92,7 +93,7 @@ impl Pairs {
     }
 }
 
-/// Returns whether two datagrams have one length, and payloads that agree as far as both were captured.
+/// Returns whether two datagrams have the same length, and equal payloads as far as both were captured.
 pub(super) fn agree(one: &Capture, number: usize, other: &Capture, other_number: usize) -> bool {
     let (first, second) = (&one.datagrams[number], &other.datagrams[other_number]);
     let octets = first.captured().min(second.captured());

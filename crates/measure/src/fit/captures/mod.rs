@@ -1,21 +1,21 @@
-//! Measurements from a pair of captures, one of each end.
+//! Measurements from a pair of captures, made at the two ends of a link.
 //!
-//! UDP datagrams are read from both files. A datagram of the sender's file is matched with one of the receiver's that has the same payload and the same IP
-//! identification, the first with the first, the second with the second, and so on; the rest is then matched by payload alone, for paths that rewrite
-//! identifications. Addresses and ports do not count: they may be translated. A datagram of the sender that has no match is lost.
+//! UDP datagrams are read from both files. A datagram of the sender's file is matched with a datagram of the receiver's file of the same payload and the
+//! same IP identification: the first with the first, the second with the second, and so on. The rest is then matched by payload alone, for paths that
+//! rewrite identifications. Addresses and ports do not count, because paths may translate them. A sender's datagram without a match is lost.
 //!
-//! So payloads should differ, by a sequence number say; where several datagrams are equal and one of them is lost, the wrong ones may be matched:
-//! [`Matched::ambiguous`] counts them. The clocks of the two ends are taken as they are: see [`Measurements::shifted`], [`Measurements::without_skew`]
-//! and [`Measurements::steps`].
+//! Payloads should therefore differ, for example by a sequence number. If one of several equal datagrams is lost, the wrong datagrams may be matched:
+//! [`Matched::ambiguous`] counts such datagrams. The clocks of the two ends are not corrected: see [`Measurements::shifted`],
+//! [`Measurements::without_skew`] and [`Measurements::steps`].
 //!
 //! | captures | treatment |
 //! | --- | --- |
-//! | One was begun later, or ended earlier | Datagrams at either end that the receiver's capture could not show are left out: [`Matched::left_out`]. |
-//! | Frames are cut | Datagrams are matched by their length and the octets that both files hold. |
+//! | A capture began later or ended earlier | Datagrams at the ends that the receiver's capture could not show are left out: [`Matched::left_out`]. |
+//! | Frames are cut | Datagrams are matched by their length and by the octets in both files. |
 //! | A packet is shown several times | The first view counts: [`Contents::seen_again`]. |
-//! | A network card cuts or joins packets | Long datagrams are matched as the packets that they hold: [`Contents::super_packets`]. Of a long datagram whose frame was cut, only the first packet is judged. |
-//! | Frames hold something else | They are counted by name: [`Contents::kinds`]. Fragments are such frames, so that a datagram that the path cut counts as lost. |
-//! | The file ends within a block | It is read up to there: [`Contents::cut_off`]. |
+//! | A network card cuts or joins packets | Long datagrams are matched as their packets: [`Contents::super_packets`]. Of a long datagram with a cut frame, only the first packet is judged. |
+//! | Frames without UDP | Frames are counted by name: [`Contents::kinds`]. Fragments are such frames, so a datagram cut by the path counts as lost. |
+//! | The file ends within a block | All blocks before are read: [`Contents::cut_off`]. |
 //!
 //! # Formats
 //!
@@ -23,7 +23,7 @@
 //! obsolete packet blocks; a simple packet has no time and is only counted).
 //!
 //! Frames of Ethernet, IEEE 802.11 (also with radiotap), PPP, PPPoE, Cisco HDLC, Linux "cooked" captures, loopback and raw IP; tags of VLANs, labels of
-//! MPLS, 802.2; IPv4, and IPv6 with extension headers. A frame check sequence that the file tells of is no part of a frame.
+//! MPLS, 802.2; IPv4, and IPv6 with extension headers. A frame check sequence announced by the file is removed from the frame.
 
 mod contents;
 mod ends;
@@ -44,19 +44,19 @@ use self::matching::Pairs;
 use super::table::Attoseconds;
 use super::{Measurement, Measurements, MeasurementsError};
 
-/// What two captures say together.
+/// Result of matching two captures.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Matched {
-    /// The packets of the sender that are judged, in the order of sending; times from the first of them.
+    /// Judged packets of the sender, in the order of sending. Times count from the first judged packet.
     pub measurements: Measurements,
-    /// Packets of [`Matched::measurements`] that only the sender has: counted as lost.
+    /// Packets of [`Matched::measurements`] without a counterpart, counted as lost.
     pub unmatched_sent: usize,
-    /// Packets that only the receiver has: copies, or other traffic. They are left out.
+    /// Packets of the receiver without a counterpart: copies, or other traffic. Not part of the measurements.
     pub unmatched_arrived: usize,
-    /// Packets of [`Matched::measurements`] that equal another one in payload and identification.
+    /// Packets of [`Matched::measurements`] with the payload and identification of another packet.
     pub ambiguous: usize,
-    /// Packets of the sender before the first and after the last one that is judged. The capture of the receiver may not have run when they arrived, so
-    /// that they are neither lost nor delivered.
+    /// Packets of the sender before the first and after the last judged packet. The receiver's capture may not have run at their arrival, so such packets
+    /// count neither as lost nor as delivered.
     pub left_out: [usize; 2],
     /// Frames of the sender's capture, by kind.
     pub sender: Contents,
@@ -64,34 +64,34 @@ pub struct Matched {
     pub receiver: Contents,
 }
 
-/// Which of the two files.
+/// End of the link at which a capture was made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum End {
-    /// That of the sender.
+    /// Sender.
     Sender,
-    /// That of the receiver.
+    /// Receiver.
     Receiver,
 }
 
-/// Why two captures are not read.
+/// Error of reading and matching two captures.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum CaptureError {
-    /// A file is no capture, or damaged.
+    /// A file is no capture, or is damaged.
     #[error("the capture of the {}: {problem} after {}", end.name(), Counted(*frames, "frame"))]
     Unreadable {
-        /// Which file.
+        /// End of the file.
         end: End,
-        /// How many frames were read before.
+        /// Number of frames read before the fault.
         frames: usize,
-        /// The fault.
+        /// Fault of the file.
         problem: CaptureProblem,
     },
-    /// A file has no UDP datagrams that were asked for.
+    /// A file has no wanted UDP datagrams.
     #[error("the capture of the {} {}", end.name(), without_datagrams(*port, contents))]
     NoDatagrams {
-        /// Which file.
+        /// End of the file.
         end: End,
-        /// The port that was asked for.
+        /// Wanted UDP port; `None` for all ports.
         port: Option<u16>,
         /// Frames of the file, by kind.
         contents: Box<Contents>,
@@ -102,23 +102,23 @@ pub enum CaptureError {
         Counted(*sent, "datagram")
     )]
     NoneMatched {
-        /// Datagrams of the sender.
+        /// Number of the sender's datagrams.
         sent: usize,
-        /// Datagrams of the receiver.
+        /// Number of the receiver's datagrams.
         arrived: usize,
     },
-    /// The times make no measurements.
+    /// The times do not make valid measurements.
     #[error(transparent)]
     Measurements(#[from] MeasurementsError),
 }
 
-/// The fault of a capture.
+/// Fault of a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum CaptureProblem {
-    /// It does not begin as a capture does.
+    /// The beginning of the file is not that of a capture.
     #[error("found no pcap or pcapng header, expected one of the two formats")]
     Format,
-    /// A block contradicts the format.
+    /// A block violates the format.
     #[error("found a malformed block")]
     Malformed,
     /// The file ends before the first block or frame.
@@ -127,7 +127,7 @@ pub enum CaptureProblem {
     /// The file cannot be read.
     #[error("the file cannot be read")]
     Io,
-    /// The resolution of timestamps makes no sense, or a frame names an interface that was not described.
+    /// The resolution of timestamps has no meaning, or a frame names an unknown interface.
     #[error("found a timestamp without a meaning")]
     Timestamp,
 }
@@ -150,24 +150,24 @@ fn without_datagrams(port: Option<u16>, contents: &Contents) -> String {
     format!("has no UDP datagrams{wanted} that can be read: expected those of the link, found {contents}{cut}")
 }
 
-/// Returns whether a file that begins like this is a capture: pcap of either order of octets, with microseconds or nanoseconds, also in its "modified" form, or
-/// pcapng.
+/// Returns whether a file with this beginning is a capture: pcap in both byte orders, with microseconds or nanoseconds, also in its "modified" form, or pcapng.
 #[must_use]
 pub fn is_capture(beginning: &[u8]) -> bool {
     reader::is_capture(beginning)
 }
 
-/// Reads the captures of both ends. `port`: only datagrams to that UDP port count, which keeps other traffic from being taken for losses.
+/// Reads and matches the captures of both ends. With a `port`, only datagrams to this UDP port are used, so that other traffic does not count as lost.
 ///
-/// Takes as much memory as the payloads of both captures and some hundred octets for each datagram.
+/// Needs memory for the payloads of both captures, and some hundred octets per datagram.
 ///
 /// # Errors
 ///
-/// [`CaptureError`] if a file cannot be read or has no such datagrams, or if no datagram of one file is in the other.
+/// [`CaptureError`] if a file cannot be read or has no wanted datagrams, or if no datagram of one file is in the other.
 pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Result<Matched, CaptureError> {
     let mut sent = Capture::read(End::Sender, sender, port)?;
     let mut arrived = Capture::read(End::Receiver, receiver, port)?;
     let mut pairs = Pairs::of(&sent, &arrived);
+    // Splitting and merging change the datagrams, so the matching begins again after each.
     if segments::split(&mut sent, &mut arrived, &pairs) {
         pairs = Pairs::of(&sent, &arrived);
     }
@@ -180,11 +180,12 @@ pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Res
     matched(sent, arrived, &pairs)
 }
 
+/// Makes the measurements from matched captures.
 fn matched(mut sent: Capture, arrived: Capture, pairs: &Pairs) -> Result<Matched, CaptureError> {
     let none_matched = || CaptureError::NoneMatched { sent: sent.datagrams.len(), arrived: arrived.datagrams.len() };
     let judged = ends::judged(&sent, &arrived, pairs).ok_or_else(none_matched)?;
     let instant = |datagram: &Datagram| Attoseconds::from_nanos(datagram.nanos);
-    // Nanoseconds of 64 bits are far below what attoseconds of 128 bits hold.
+    // Times of 64-bit nanoseconds are far inside the range of 128-bit attoseconds.
     let since = |later: &Datagram, earlier: &Datagram| instant(later).zip(instant(earlier)).and_then(|(later, earlier)| later.seconds_since(earlier));
     let own = |range: std::ops::Range<usize>| range.filter(|number| !pairs.is_again[*number] && !pairs.is_hidden[*number]);
     let first = &sent.datagrams[own(judged.clone()).next().unwrap_or(judged.start)];

@@ -1,28 +1,28 @@
-//! Packets that one capture shows several times.
+//! Finds packets shown several times by a capture.
 //!
-//! A capture of all interfaces of a computer shows a packet at each interface that it passes, and a mirrored port of a switch shows it as it comes and as it
-//! goes. Without care every second view is a packet that never arrived.
+//! A capture of all interfaces of a computer shows a packet at each interface on its way, and a mirrored port of a switch shows incoming and outgoing
+//! frames. Uncorrected, every second view would be a packet that never arrived.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use super::contents::Capture;
 use super::matching::{Pairs, agree};
 
-/// A packet is not seen again after a longer time than this \[ns\].
+/// Longest time between two views of a packet \[ns\].
 const WINDOW: i128 = 100_000_000;
-/// Open packets of one content that are looked at for each frame.
+/// Largest number of open packets of equal content compared per frame.
 const MOST_OPEN: usize = 64;
-/// Octets of the payload that group packets. A view may hold fewer octets than another one, but hardly fewer than these.
+/// Number of octets of the payload in the grouping key. A view may have fewer octets than another, but rarely fewer than this number.
 const PREFIX: usize = 16;
 
-/// Length, identification and beginning of a payload.
+/// Grouping key: length, identification and beginning of a payload.
 type Content<'a> = (usize, Option<u16>, &'a [u8]);
-/// Packets that further frames may show: the number of the first view, and the places at which the packet was seen.
+/// Packets with possible further views: number of the first view, and hashes of the places seen.
 type Open = VecDeque<(usize, Vec<u64>)>;
 
-/// Keeps the first view of each packet that was seen at several places, and gives the number of views that were dropped.
+/// Keeps the first view of each packet seen at several places. Returns the number of views dropped.
 ///
-/// Two frames show one packet if payload and IP identification are the same, the places differ, and the time between them is below a tenth of a second.
+/// Two frames show the same packet if payload and IP identification are equal, the places differ, and the time between the frames is below a tenth of a second.
 pub(super) fn merge(capture: &mut Capture) -> usize {
     let mut open: BTreeMap<Content<'_>, Open> = BTreeMap::new();
     let mut keep = vec![true; capture.datagrams.len()];
@@ -32,7 +32,7 @@ pub(super) fn merge(capture: &mut Capture) -> usize {
         while packets.len() >= MOST_OPEN || packets.front().is_some_and(|first| datagram.nanos - capture.datagrams[first.0].nanos > WINDOW) {
             packets.pop_front();
         }
-        // The oldest packet that this place has not shown: equal packets pass the places in the same order.
+        // The oldest packet not yet seen at this place, because equal packets pass the places in the same order.
         let same = packets.iter_mut().find(|(first, places)| !places.contains(&datagram.place) && agree(capture, *first, capture, number));
         match same {
             Some((_, places)) => {
@@ -45,12 +45,12 @@ pub(super) fn merge(capture: &mut Capture) -> usize {
     retain(capture, &keep)
 }
 
-/// Keeps one of each group of equal datagrams without an identification of their own, if the other capture shows that the capture doubles packets: nearly
-/// all packets that arrived have an equal one within a tenth of a second that did not. Gives the number of datagrams that were dropped.
+/// Keeps the first of each group of equal datagrams without an identification, if the other capture proves that this capture doubles packets: for nearly
+/// all arrived packets, an equal datagram within a tenth of a second did not arrive. Returns the number of datagrams dropped.
 pub(super) fn merge_doubled(capture: &mut Capture, pairs: &Pairs) -> usize {
     const FEWEST: usize = 20;
     const SHARE: f64 = 0.9;
-    // A payload that comes more often is one that the sender repeats.
+    // A payload in more datagrams than this is repeated by the sender.
     const MOST_VIEWS: usize = 4;
     let mut groups: BTreeMap<(usize, u64), Vec<usize>> = BTreeMap::new();
     for (number, datagram) in capture.datagrams.iter().enumerate().filter(|(_, datagram)| datagram.own_identification().is_none()) {
@@ -71,15 +71,15 @@ pub(super) fn merge_doubled(capture: &mut Capture, pairs: &Pairs) -> usize {
     if is_rule { retain(capture, &keep) } else { 0 }
 }
 
-/// Keeps the marked datagrams, and gives the number of the others.
+/// Keeps the marked datagrams, and returns the number of the dropped ones.
 fn retain(capture: &mut Capture, keep: &[bool]) -> usize {
     let mut marks = keep.iter();
     capture.datagrams.retain(|_| marks.next().copied().unwrap_or(true));
     keep.len() - capture.datagrams.len()
 }
 
-/// Marks datagrams which show a packet that has been seen: an equal one with the same identification of its own was captured within a tenth of a second,
-/// and was matched or stands before it. `is_matched` says which were.
+/// Marks datagrams that show a packet again: a datagram with the same payload and own identification was captured within a tenth of a second, and is
+/// matched or earlier. `is_matched` tells whether a datagram is matched.
 pub(super) fn again(capture: &Capture, is_matched: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut groups: BTreeMap<(u16, usize, u64), Vec<usize>> = BTreeMap::new();
     for (number, datagram) in capture.datagrams.iter().enumerate() {

@@ -8,7 +8,7 @@ use crate::tests::TestRng;
 const N: usize = 20_000;
 const FLOOR: f64 = 20.0;
 
-/// Sorted samples in milliseconds, as if they were seconds: no law knows the unit.
+/// Sorted samples in milliseconds, treated as seconds, because no law depends on the unit.
 fn sample(seed: u64, draw: impl Fn(&mut TestRng) -> f64) -> Vec<f64> {
     let mut rng = TestRng::new(seed);
     let mut delays: Vec<f64> = (0..N).map(|_| draw(&mut rng)).collect();
@@ -16,14 +16,14 @@ fn sample(seed: u64, draw: impl Fn(&mut TestRng) -> f64) -> Vec<f64> {
     delays
 }
 
-/// Every law, for independent delays of a clock of that resolution.
+/// Fits all laws to independent delays of a clock of the given resolution.
 fn all(delays: &[f64], resolution: f64) -> Vec<LawFit> {
     let n = count(delays.len());
     fit_all(&Cells::new(delays, resolution), &Moments::of(delays, n).unwrap(), n).iter().map(|candidate| candidate.fit).collect()
 }
 
-/// The best law must be the one drawn from. Its mean and deviation must lie within 5 standard errors, sd/√n and sd·√((κ−1)/4n) of a law with kurtosis κ
-/// (an estimate of greatest likelihood is no worse than the moments).
+/// Checks that the best law is the law drawn from. Mean and deviation must lie within 5 standard errors, sd/√n and sd·√((κ−1)/4n) for kurtosis κ; maximum
+/// likelihood is no worse than the moments.
 fn recovers(name: DelayLaw, delays: &[f64], mean: f64, sd: f64, kurtosis: f64) -> LawFit {
     let fits = all(delays, 1e-9);
     let best = fits[0];
@@ -32,12 +32,12 @@ fn recovers(name: DelayLaw, delays: &[f64], mean: f64, sd: f64, kurtosis: f64) -
     let n = (N as f64).sqrt();
     assert!((best.mean_s - mean).abs() < 5.0 * sd / n, "{best:?}");
     assert!((best.sd_s - sd).abs() < 5.0 * sd * ((kurtosis - 1.0) / 4.0).sqrt() / n, "{best:?}");
-    // The distance of a fitted law is smaller than that of the true one, of which the 0.999 quantile is 1.95/√n.
+    // A fitted law is nearer to the data than the true law, whose distance has the 0.999 quantile 1.95/√n.
     assert!(best.kolmogorov < 1.95 / n, "{best:?}");
     best
 }
 
-/// The least delay lies below F⁻¹(7/n) with probability 1 − e⁻⁷, and so does its correction: no further may the floor be off.
+/// The least delay is below F⁻¹(7/n) with probability 1 − e⁻⁷, and so is the corrected one. The floor may be off by as much.
 fn floor_is_found(best: &LawFit, quantile_of_7_in_n: f64) {
     assert!((best.floor_s.unwrap() - FLOOR).abs() < quantile_of_7_in_n, "{best:?}");
 }
@@ -65,7 +65,8 @@ fn a_laplace_law_is_found() {
 
 #[test]
 fn a_lognormal_law_and_its_floor_are_found() {
-    // ln of the delay above the floor: mean 0.5, deviation 0.6. Mean e^0.68, variance e^1.36·(e^0.36 − 1); kurtosis e^{4s²}+2e^{3s²}+3e^{2s²}−3.
+    // The logarithm of the delay above the floor has mean 0.5 and deviation 0.6. The law has mean e^0.68, variance e^1.36·(e^0.36 − 1) and kurtosis
+    // e^{4s²}+2e^{3s²}+3e^{2s²}−3.
     let law = LogNormal::new(0.5, 0.6).unwrap();
     let mean = 0.68_f64.exp();
     let sd = mean * 0.36_f64.exp_m1().sqrt();
@@ -122,7 +123,7 @@ fn odd_samples_give_finite_figures() {
     }
 }
 
-/// Samples on coarse clocks with what SciPy finds: `tests/reference/fits.py`.
+/// Samples on coarse clocks, with SciPy's results: `tests/reference/fits.py`.
 fn reference() -> Value {
     serde_json::from_str(include_str!("../../../tests/reference/fits.json")).unwrap()
 }
@@ -146,7 +147,8 @@ fn laws_on_a_coarse_clock_are_those_of_scipy() {
         for fit in &fits {
             let Some(expected) = sample["laws"].get(fit.distribution.name()) else { continue };
             let context = format!("{} {fit:?} {expected}", sample["name"]);
-            // Ours may be the higher one, at a top that SciPy missed, or a hair lower: a link cuts a normal law at zero, and the moments are those of what is left.
+            // Our likelihood may be higher, at a maximum missed by SciPy, or slightly lower, because a link cuts a normal law at zero and takes the moments
+            // of the rest.
             let less = figure(&expected["log_likelihood"]) - fit.log_likelihood;
             assert!((-0.5..0.02).contains(&less), "{less} {context}");
             if less > -1e-4 && fit.fits {
@@ -161,7 +163,7 @@ fn laws_on_a_coarse_clock_are_those_of_scipy() {
     }
     let best: Vec<_> = best.iter().map(|(name, law)| (name.as_str(), *law)).collect();
     let expected = [
-        // Of gamma and Weibull by 0.17 in ln L, with 200 delays.
+        // Gamma and Weibull differ by 0.17 in ln L, with 200 delays.
         ("a clock of 1 ms", Some(DelayLaw::Weibull)),
         ("a clock of 1 ms, many", Some(DelayLaw::Gamma)),
         ("a clock of 2 ms", Some(DelayLaw::Gamma)),
@@ -177,7 +179,7 @@ fn probabilities_of_a_distance_are_those_of_kolmogorov() {
     for row in reference()["kolmogorov"].as_array().unwrap() {
         assert!((farther(figure(&row[0])) - figure(&row[1])).abs() < 1e-9, "{row}");
     }
-    // For 0.02 and the 1 % point with 10 000 and with 50 delays; fewer say no more.
+    // 0.02 plus the 1 % point for 10 000 and for 50 delays; fewer delays count as 50.
     for (effective, expected) in [(1e4, 0.036_28), (50.0, 0.250_18), (3.0, 0.250_18)] {
         assert!((limit(effective) - expected).abs() < 1e-5);
     }
@@ -187,7 +189,7 @@ fn probabilities_of_a_distance_are_those_of_kolmogorov() {
 fn a_law_that_could_not_fail_is_left_out() {
     let cells = |delays: &[f64]| all(delays, 1.0).iter().map(|fit| fit.distribution).collect::<Vec<_>>();
     assert_eq!(cells(&[1.0, 1.0, 2.0, 2.0, 2.0, 3.0]), []);
-    // Four values: laws with two parameters.
+    // Four values allow laws with two parameters.
     let two = cells(&[1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0]);
     assert!(two.contains(&DelayLaw::Normal) && two.len() > 2, "{two:?}");
 }

@@ -1,14 +1,16 @@
-//! How are packets lost: one by one, or in bursts?
+//! Fits models of losses: independent losses, or losses in bursts.
+//!
+//! Input is the packets (instant of sending, whether lost); output is all applicable models, the best first.
 //!
 //! | model | parameters | estimate |
 //! | --- | --- | --- |
 //! | independent | 1 | the share lost |
 //! | Gilbert–Elliott with h = 0, k = 1 | 2 | p = n₀₁/n₀, r = n₁₀/n₁ from counted transitions (greatest likelihood; Gilbert 1960 calls the lossy state bad) |
-//! | the same in continuous time | 2 | greatest likelihood with the true gaps: P(bad, bad) = π + (1 − π)·e^{−λΔ}; used where packets are not evenly spaced |
+//! | Gilbert–Elliott in continuous time, h = 0, k = 1 | 2 | greatest likelihood with the true gaps: P(bad, bad) = π + (1 − π)·e^{−λΔ}; for packets that are not evenly spaced |
 //! | general Gilbert–Elliott | 4 | Baum–Welch (see `hidden_markov`); only where packets are evenly spaced |
 //!
-//! Chosen is the model of least Bayesian criterion, k·ln n − 2·ln L; the general one only if it is better by 10 ("very strong", Kass & Raftery 1995,
-//! JASA 90(430)), as its likelihood is flat and a bad fit is easily taken for a good one.
+//! The model of the least Bayesian criterion, k·ln n − 2·ln L, is chosen. The general model must be better by 10 ("very strong", Kass & Raftery 1995, JASA
+//! 90(430)), because its likelihood is flat and a bad fit easily looks good.
 
 use serde::Serialize;
 
@@ -16,33 +18,33 @@ use super::hidden_markov;
 use super::search::maximise;
 use crate::series::{count, share_error};
 
-/// A model of which packets are lost.
+/// Model of losses.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LossModel {
-    /// Nothing was lost.
+    /// No packet was lost.
     None,
-    /// Every packet is lost with the same probability, whatever became of others.
+    /// Each packet is lost with the same probability, independently of other packets.
     Independent {
-        /// That probability.
+        /// Probability of a loss.
         probability: f64,
     },
-    /// The Gilbert–Elliott chain, one step a packet; parameters as in [`cohaptic_wan::GilbertElliott`].
+    /// Gilbert–Elliott chain with a step per packet. Parameters as in [`cohaptic_wan::GilbertElliott`].
     GilbertElliott {
-        /// From good to bad, per packet.
+        /// Probability of the transition from good to bad, per packet.
         p: f64,
-        /// From bad to good, per packet.
+        /// Probability of the transition from bad to good, per packet.
         r: f64,
-        /// The probability that a packet gets through in the bad state.
+        /// Probability of no loss in the bad state.
         h: f64,
-        /// The probability that a packet gets through in the good state.
+        /// Probability of no loss in the good state.
         k: f64,
     },
-    /// The same chain in time, with nothing lost in the good state and everything in the bad one.
+    /// Gilbert–Elliott chain in continuous time: no losses in the good state, only losses in the bad state.
     GilbertElliottInTime {
-        /// The mean stay in the good state \[s\].
+        /// Mean time in the good state \[s\].
         mean_good_s: f64,
-        /// The mean stay in the bad state \[s\].
+        /// Mean time in the bad state \[s\].
         mean_bad_s: f64,
     },
 }
@@ -50,24 +52,24 @@ pub enum LossModel {
 /// A model fitted to the losses.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct LossFit {
-    /// The model.
+    /// Fitted model.
     pub model: LossModel,
-    /// Standard errors of the first and second parameter of the model, where there is a closed form: of a share p of n, √(p(1−p)/n), or enough more that
-    /// 1.96 of them reach the farther end of Wilson's interval, which matters where little happened.
+    /// Standard errors of the first and the second parameter; `None` for models without a closed form. For a share p of n packets, √(p(1−p)/n), or more if
+    /// needed for 1.96 standard errors to reach the farther end of Wilson's interval, which matters for few losses. Zero for a missing second parameter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_errors: Option<[f64; 2]>,
-    /// The share of packets lost that the model has in the long run.
+    /// Share of packets lost by the model in the long run.
     pub mean_loss: f64,
     /// ln L of the losses.
     pub log_likelihood: f64,
-    /// The Bayesian criterion; less is better.
+    /// Bayesian criterion; the least value is best.
     pub bic: f64,
 }
 
-/// By how much the general model must be better to be chosen.
+/// Advantage needed by the general model over the others.
 const CLEARLY: f64 = 10.0;
 
-/// Every model that applies, the chosen one first. `packets` are (sending, lost), not all lost.
+/// Fits all applicable models, and returns the chosen model first. `packets` are (instant of sending \[s\], whether lost); at least one packet is not lost.
 pub(super) fn fit_all(packets: &[(f64, bool)], evenly_spaced: bool) -> Vec<LossFit> {
     let lost: Vec<bool> = packets.iter().map(|packet| packet.1).collect();
     let n = count(lost.len());
@@ -107,19 +109,20 @@ pub(super) fn fit_all(packets: &[(f64, bool)], evenly_spaced: bool) -> Vec<LossF
     fits
 }
 
-/// `happened`·ln(`happened`/`of`), 0 where nothing happened.
+/// Returns `happened`·ln(`happened`/`of`), and 0 for no events.
 fn log_share(happened: f64, of: f64) -> f64 {
     if happened > 0.0 { happened * (happened / of).ln() } else { 0.0 }
 }
 
-/// The standard error of a share, both numbers being counts.
+/// Returns the standard error of a share; both arguments are counts.
 fn error_of_share(happened: f64, of: f64) -> f64 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts")]
     let [happened, of] = [happened as u64, of as u64];
     share_error(happened, of)
 }
 
-/// p, r, their standard errors and ln L, the first packet by the share of its state in the long run. `None` if the chain never left one of its states.
+/// Returns p, r, their standard errors and ln L of the simple chain. The first packet counts with the long-run share of its state. Returns `None` if the
+/// chain never left one of its states.
 fn simple_gilbert(lost: &[bool]) -> Option<(f64, f64, [f64; 2], f64)> {
     let mut counts = [[0_usize; 2]; 2];
     for step in lost.windows(2) {
@@ -137,9 +140,9 @@ fn simple_gilbert(lost: &[bool]) -> Option<(f64, f64, [f64; 2], f64)> {
     Some((p, r, [error_of_share(turns_bad, good), error_of_share(turns_good, bad)], log_likelihood))
 }
 
-/// The share π of time that is bad, the rate λ = 1/(mean good) + 1/(mean bad) at which the chain forgets \[1/s\], and ln L. `None` if it never changed.
+/// Returns the share π of bad time, the rate λ = 1/(mean good) + 1/(mean bad) of forgetting \[1/s\], and ln L. Returns `None` if the state never changed.
 fn in_time(packets: &[(f64, bool)], share: f64) -> Option<(f64, f64, f64)> {
-    // Equal steps are counted once: measurements have few different gaps, or as many as packets.
+    // Equal steps are counted once, which is faster for measurements with few different gaps.
     let mut steps: Vec<(f64, bool, bool)> = packets.windows(2).map(|step| (step[1].0 - step[0].0, step[0].1, step[1].1)).collect();
     if !steps.iter().any(|step| step.1 != step.2 && step.0 > 0.0) {
         return None;
@@ -153,7 +156,7 @@ fn in_time(packets: &[(f64, bool)], share: f64) -> Option<(f64, f64, f64)> {
             let to_same = if after { share } else { 1.0 - share };
             let forgotten = -(-rate * gap).exp_m1();
             let probability = if before == after { 1.0 - forgotten * (1.0 - to_same) } else { forgotten * to_same };
-            // Two packets of one instant with different fates have probability zero in this model; they are given a small one.
+            // In this model two packets of the same instant cannot have different fates. A small probability keeps ln L finite.
             times * probability.max(1e-12).ln()
         };
         (if first_lost { share } else { 1.0 - share }).ln() + steps.iter().map(of_step).sum::<f64>()
@@ -162,7 +165,7 @@ fn in_time(packets: &[(f64, bool)], share: f64) -> Option<(f64, f64, f64)> {
     let least_gap = steps.iter().map(|step| step.0).find(|gap| *gap > 0.0)?;
     let mut share = share;
     let mut log_rate = 0.0;
-    // The two are nearly uncorrelated, so that a few turns settle them.
+    // The two parameters are nearly uncorrelated, so maximising in turn converges in a few rounds.
     for _ in 0..4 {
         log_rate = maximise((0.1 / span).ln(), (20.0 / least_gap).ln(), 40, |log_rate| log_likelihood(share, log_rate.exp()));
         let logit = (share / (1.0 - share)).ln();

@@ -5,7 +5,7 @@ use crate::tests::TestRng;
 
 const N: usize = 50_000;
 
-/// The chain of Gilbert and Elliott, loss by the state before the transition.
+/// Simulates the chain of Gilbert and Elliott. The state before the transition decides the loss.
 fn chain(seed: u64, [p, r, h, k]: [f64; 4]) -> Vec<(f64, bool)> {
     let mut rng = TestRng::new(seed);
     let mut bad = rng.unit() < p / (p + r);
@@ -36,7 +36,7 @@ fn bursts_are_found_within_their_standard_errors() {
         let LossModel::GilbertElliott { p: found_p, r: found_r, h: 0.0, k: 1.0 } = best.model else { panic!("{best:?}") };
         let [se_p, se_r] = best.standard_errors.unwrap();
         assert!((found_p - p).abs() < 4.0 * se_p && (found_r - r).abs() < 4.0 * se_r, "{best:?}");
-        // Of p: n·r/(p + r) packets are good.
+        // Standard error of p: the chain is in the good state for n·r/(p + r) packets.
         let theory = (p * (1.0 - p) / (N as f64 * r / (p + r))).sqrt();
         assert!((0.8..1.25).contains(&(se_p / theory)), "{best:?}");
     }
@@ -48,16 +48,16 @@ fn losses_that_are_sure_in_neither_state_are_found() {
     let packets = chain(6, true_values);
     let best = fit_all(&packets, true)[0];
     let LossModel::GilbertElliott { p, r, h, k } = best.model else { panic!("{best:?}") };
-    // There is no closed form for the standard error, but a bound from counting: the chain enters the bad state about 227 times (n·p·r/(p + r)), so that p and r are known to no better than 1/√227 = 6.6 %; states that must be guessed cost a factor of at
-    // most 2 at this contrast. Four of these.
+    // The standard error has no closed form, but a bound from counting: the chain enters the bad state about 227 times (n·p·r/(p + r)), so p and r are
+    // known to 1/√227 = 6.6 % at best. Guessing the states costs a factor of at most 2 at this contrast. The tolerance is four standard errors.
     assert!((p / 0.005 - 1.0).abs() < 0.53 && (r / 0.05 - 1.0).abs() < 0.53, "{best:?}");
-    // 4 500 packets in the bad state: √(0.3·0.7/4 500) = 0.0068, doubled, four of these. 45 500 in the good one: √(0.001/45 500) = 0.000 15.
+    // 4 500 packets in the bad state give √(0.3·0.7/4 500) = 0.0068, doubled, times four. 45 500 packets in the good state give √(0.001/45 500) = 0.000 15.
     assert!((h - 0.3).abs() < 0.055 && (k - 0.999).abs() < 0.0012, "{best:?}");
     // The maximum is at least as likely as the truth.
     let truth = hidden_markov::log_likelihood(&packets.iter().map(|packet| packet.1).collect::<Vec<_>>(), true_values);
     assert!(best.log_likelihood >= truth - 1e-6, "{best:?} {truth}");
-    // The share lost, (0.001·0.05 + 0.7·0.005)/0.055: the time in the bad state has variance π(1−π)·(1+c)/(1−c)/n with c = 0.945, a standard error of
-    // 0.0076, of which 0.7 is lost; four of these.
+    // The share lost is (0.001·0.05 + 0.7·0.005)/0.055. The time in the bad state has the variance π(1−π)·(1+c)/(1−c)/n with c = 0.945, a standard error of
+    // 0.0076, and 0.7 of the packets in this time are lost. The tolerance is four standard errors.
     assert!((best.mean_loss - 0.064_55).abs() < 0.022, "{best:?}");
 }
 
@@ -81,7 +81,7 @@ fn bursts_in_time_are_found_at_uneven_gaps() {
         .collect();
     let best = fit_all(&packets, false)[0];
     let LossModel::GilbertElliottInTime { mean_good_s, mean_bad_s } = best.model else { panic!("{best:?}") };
-    // The mean of 190 exponential stays is known to 1/√190 = 7.3 %; allowed: four times that.
+    // The mean of 190 exponential times is known to 1/√190 = 7.3 %. The tolerance is four times as large.
     assert!((mean_good_s / mean_good - 1.0).abs() < 0.29 && (mean_bad_s / mean_bad - 1.0).abs() < 0.29, "{best:?}");
 }
 

@@ -1,37 +1,40 @@
-//! Blocks of arrivals, and the slope of a location of their delays.
+//! Blocks of arrivals, and the slope in time of a location of their delays.
 
 use super::Location;
 use crate::series::{count, mean};
 
-/// Arrivals (sending, delay) in blocks of equal numbers, one more or less, in the order of sending.
+/// Arrivals (sending, delay) \[s\] in the order of sending, divided into blocks of equal size up to one arrival.
 pub(super) struct Blocks<'a> {
+    /// Arrivals of each block.
     blocks: Vec<&'a [(f64, f64)]>,
-    /// How far the mean time of sending of each is from the mean of all.
+    /// Mean instant of sending of each block, relative to `middle` \[s\].
     times: Vec<f64>,
+    /// Mean over all blocks of the mean instant of sending \[s\].
     middle: f64,
 }
 
-/// A slope and its standard error, for Student's law with two degrees of freedom fewer than blocks.
+/// A slope with its standard error, for Student's law with two degrees of freedom fewer than blocks.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Slope {
     pub(super) value: f64,
     pub(super) error: f64,
 }
 
-/// What a trial drift leaves.
+/// Statistics of the blocks after the removal of a trial drift.
 struct Left {
-    /// Σ c·T with the times c and the locations T of the blocks: zero at the slope.
+    /// Σ c·T with the times c and the locations T of the blocks. Zero at the slope.
     moment: f64,
-    /// By how much that falls for each unit of drift.
+    /// Decrease of `moment` per unit of drift.
     fall: f64,
     /// Σ (T − mean)².
     squares: f64,
 }
 
-/// Each step closes in from one side or halves, so that the last digit is reached before.
+/// Limit of the steps. Each step narrows the interval of the root or halves it, so the last digit is reached earlier.
 const MOST_STEPS: usize = 200;
 
 impl<'a> Blocks<'a> {
+    /// Divides arrivals into `number` blocks.
     pub(super) fn cut(points: &'a [(f64, f64)], number: usize) -> Self {
         let blocks: Vec<&[(f64, f64)]> =
             (0..number).map(|block| &points[block * points.len() / number..(block + 1) * points.len() / number]).collect();
@@ -40,11 +43,12 @@ impl<'a> Blocks<'a> {
         Self { times: means.iter().map(|time| time - middle).collect(), middle, blocks }
     }
 
-    /// The drift without which the locations of the blocks have no slope, to the tolerance. `None` where all that decides was sent at one instant.
+    /// Returns the drift whose removal leaves the locations of the blocks without a slope, to the tolerance. Returns `None` if all deciding arrivals were
+    /// sent at the same instant.
     ///
-    /// A location of d − s·t falls with s as fast as the time at which it is found is late; blocks follow each other in time, so the moment of the locations
-    /// falls all the way and crosses zero once. It is made of straight pieces: Newton's method, which halves instead where it would leave the interval known to
-    /// enclose the root.
+    /// With growing drift s, a location of d − s·t falls at the rate of its own time. Blocks follow each other in time, so the moment of the locations
+    /// falls monotonically and has exactly one root. The moment is piecewise linear, so Newton's method is used; a step that would leave the interval
+    /// enclosing the root is replaced by halving.
     pub(super) fn slope(&self, location: Location, tolerance: f64) -> Option<Slope> {
         let spread: f64 = self.times.iter().map(|time| time * time).sum();
         let mut room = Vec::new();
@@ -66,11 +70,13 @@ impl<'a> Blocks<'a> {
                 high = drift;
             }
             let next = drift + step;
+            // Both bounds are infinite at first, so a step is halved only after the root is enclosed.
             drift = if (low..=high).contains(&next) { next } else { f64::midpoint(low, high) };
         }
         None
     }
 
+    /// Computes the statistics after the removal of a drift. `room` is a buffer.
     fn left(&self, location: Location, drift: f64, room: &mut Vec<(f64, f64)>) -> Left {
         let found: Vec<(f64, f64)> = self.blocks.iter().map(|block| self.locate(location, block, drift, room)).collect();
         let middle = mean_of(&found, |found| found.1);
@@ -82,7 +88,7 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// When the location of a block without that drift is found, and what it is. Times count from the middle of all.
+    /// Returns the time and the value of a block's location after the removal of a drift \[s\]. Times are relative to the middle of all blocks.
     fn locate(&self, location: Location, block: &[(f64, f64)], drift: f64, room: &mut Vec<(f64, f64)>) -> (f64, f64) {
         let without = block.iter().map(|&(time, delay)| (time - self.middle, delay - drift * (time - self.middle)));
         let place = match location {
@@ -101,7 +107,7 @@ impl<'a> Blocks<'a> {
     }
 }
 
-/// What least squares leave of the delays.
+/// Returns the residuals of the delays from a straight line by least squares \[s\].
 pub(super) fn residuals(points: &[(f64, f64)]) -> Vec<f64> {
     let (time, delay) = (mean_of(points, |point| point.0), mean_of(points, |point| point.1));
     let (product, square) = points.iter().fold((0.0, 0.0), |(product, square), point| {
@@ -111,9 +117,9 @@ pub(super) fn residuals(points: &[(f64, f64)]) -> Vec<f64> {
     points.iter().map(|point| point.1 - delay - product / square * (point.0 - time)).collect()
 }
 
-/// Of nothing, zero.
+/// Returns the mean of `of` over the points, and zero for no points.
 fn mean_of(points: &[(f64, f64)], of: impl Fn(&(f64, f64)) -> f64) -> f64 {
-    // About the first value, so that a large common part costs no digits.
+    // Sums differences from the first value, so that a large common part costs no digits.
     let Some(first) = points.first().map(&of) else { return 0.0 };
     first + points.iter().map(|point| of(point) - first).sum::<f64>() / count(points.len())
 }

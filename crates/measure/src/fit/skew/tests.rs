@@ -12,20 +12,20 @@ const SEEDS: u64 = 200;
 /// Packets of a measurement, one each 4 ms.
 const PACKETS: u32 = 600;
 const SPACING_S: f64 = 0.004;
-/// Correlations of the Gaussian numbers behind neighbours: none, and e^(−1/τ) with a correlation time of 4.5 packets.
+/// Correlations of neighbouring Gaussian numbers: none, and e^(−1/τ) with a correlation time of 4.5 packets.
 const MEMORIES: [f64; 2] = [0.0, 0.8];
 
-/// A law of 40 ms ± 4 ms.
+/// Returns a law of 40 ms ± 4 ms.
 fn law(distribution: &Distribution) -> Law {
     Law::new(distribution, 0.04, 0.004, None).unwrap()
 }
 
-/// A law that begins at 36 ms, with the mean 40 ms.
+/// Returns a law with the least delay 36 ms and the mean 40 ms.
 fn above_a_floor(distribution: &Distribution, sd: f64) -> Law {
     Law::new(distribution, 0.04, sd, Some(0.036)).unwrap()
 }
 
-/// Delays of a law, in which each hangs together with the one before; apart for each law, memory, drift and seed.
+/// Draws delays of a law, correlated by `memory`. Different seeds for each law, memory and drift.
 fn delays(law: &Law, memory: f64, mut rng: TestRng) -> impl Iterator<Item = (f64, f64)> {
     let mut z: f64 = StandardNormal.sample(&mut rng);
     (0..PACKETS).map(move |i| {
@@ -35,7 +35,7 @@ fn delays(law: &Law, memory: f64, mut rng: TestRng) -> impl Iterator<Item = (f64
     })
 }
 
-/// As a clock that gains so much sees them, in whole nanoseconds.
+/// Shows delays by a clock with a drift, in whole nanoseconds.
 fn seen(delays: impl Iterator<Item = (f64, f64)>, drift: f64) -> Vec<(f64, f64)> {
     delays.map(|(sent, delay)| (sent, ((delay + drift * sent) * 1e9).round() / 1e9)).collect()
 }
@@ -44,21 +44,21 @@ fn excludes(skew: &Skew, drift: f64) -> bool {
     !(skew.interval_99[0]..=skew.interval_99[1]).contains(&drift)
 }
 
-/// What 200 measurements of each drift say of one law.
+/// Results of 200 measurements of each drift, for a law and a memory.
 #[derive(Clone, Copy, Debug, Default)]
 struct Said {
     told: u64,
     outside: [u64; DRIFTS.len()],
     significant: [u64; DRIFTS.len()],
-    /// Sums, for the mean standard error and the mean squared error \[µs/s\].
+    /// Sums of standard errors and of squared errors \[µs/s\].
     error: f64,
     square: f64,
 }
 
-/// No interval is left by the truth more often than in 1 % of all measurements, whatever the drift; without drift that is how often one is found.
+/// Checks that in at most 1 % of measurements the interval misses the true drift, for every drift. Without drift, a miss is a drift found by mistake.
 ///
-/// At 1 % more than 10 of 200 are outside with probability 6.9·10⁻⁶ (binomial), more than 32 of 1400 with 9.4·10⁻⁶: over all 175 counts of this kind and
-/// the 25 of the other, a false alarm in 700 choices of the seeds.
+/// At 1 %, more than 10 of 200 miss with probability 6.9·10⁻⁶ (binomial), and more than 32 of 1400 with 9.4·10⁻⁶. For 175 counts of the first kind and 25
+/// of the second, a false alarm occurs in one of 700 choices of the seeds.
 fn is_calibrated(name: &str, law: &Law) -> [Said; MEMORIES.len()] {
     MEMORIES.map(|memory| {
         let mut said = Said::default();
@@ -80,9 +80,9 @@ fn is_calibrated(name: &str, law: &Law) -> [Said; MEMORIES.len()] {
         }
         assert!(said.outside.iter().all(|outside| *outside <= 10) && said.outside.iter().sum::<u64>() <= 32, "{name} {memory}: {said:?}");
         assert_eq!(said.outside[0], said.significant[0], "{name} {memory}");
-        // 66 integrated autocorrelation times are seldom taken for fewer than the 20 that it takes.
+        // 66 integrated autocorrelation times are rarely estimated as fewer than the 20 needed.
         assert!(said.told >= 1_330, "{name} {memory}: {said:?}");
-        // Without memory, the stated error is the error made: as the least of four it comes out a little low, which the level makes good.
+        // Without memory the stated error agrees with the real error. As the least of four it is slightly too low, which the level makes up for.
         let told = said.told as f64;
         let ratio = said.error / told / (said.square / told).sqrt();
         assert!(memory > 0.0 || (0.8..1.1).contains(&ratio), "{name}: {ratio}");
@@ -93,7 +93,7 @@ fn is_calibrated(name: &str, law: &Law) -> [Said; MEMORIES.len()] {
 #[test]
 fn of_symmetric_laws_drift_is_found_as_often_as_stated() {
     let [normal, _] = is_calibrated("normal", &law(&Distribution::Normal));
-    // Least squares have the standard error 4 ms·√(12/600)/2.4 s = 236 µs/s, which no unbiased estimate of normal delays is below (Gauß and Markov).
+    // Least squares have the standard error 4 ms·√(12/600)/2.4 s = 236 µs/s, the least possible for an unbiased estimate from normal delays (Gauss and Markov).
     let error = normal.error / normal.told as f64;
     assert!((0.8..1.1).contains(&(error / 235.7)), "{error}");
     is_calibrated("laplace", &law(&Distribution::Laplace));
@@ -111,13 +111,13 @@ fn of_laws_that_begin_gently_drift_is_found_as_often_as_stated() {
 #[test]
 fn of_laws_with_an_edge_drift_is_found_as_often_as_stated() {
     let [exponential, _] = is_calibrated("exponential", &above_a_floor(&Distribution::Gamma, 0.004));
-    // The least of 20 has the deviation 4 ms/20; 30 of them give a slope with the standard error 0.2 ms·√(12/30)/2.4 s = 53 µs/s.
+    // The least of 20 delays has the deviation 4 ms/20. Thirty of these give a slope with the standard error 0.2 ms·√(12/30)/2.4 s = 53 µs/s.
     let error = exponential.error / exponential.told as f64;
     assert!((0.8..1.1).contains(&(error / 52.7)), "{error}");
     assert_eq!(exponential.significant[5..], [200, 200]);
     let [pareto, _] = is_calibrated("pareto", &law(&Distribution::Pareto));
     assert_eq!(pareto.significant[5..], [200, 200]);
-    // Infinitely dense at its edge.
+    // A law with infinite density at its edge.
     is_calibrated("dense", &above_a_floor(&Distribution::Weibull, 0.0089));
 }
 
@@ -139,8 +139,8 @@ fn of_a_constant_delay_drift_is_known_to_a_nanosecond_over_the_measurement() {
     }
 }
 
-/// 20 000 packets in 40 s of 40 ms ± 4 ms, normal: the standard error is 4 ms·√(12/20 000)/40 s = 2.4 µs/s, so that 20 µs/s are found but for chances of
-/// 10⁻⁵.
+/// 20 000 packets in 40 s with 40 ms ± 4 ms, normal: the standard error is 4 ms·√(12/20 000)/40 s = 2.4 µs/s, so that 20 µs/s are missed with probability
+/// 10⁻⁵ only.
 #[test]
 fn twenty_microseconds_a_second_are_found_in_forty_seconds() {
     for (seed, ppm) in (1..).zip(&DRIFTS[1..]) {
@@ -157,7 +157,7 @@ fn twenty_microseconds_a_second_are_found_in_forty_seconds() {
 
 #[test]
 fn a_change_of_route_is_no_drift() {
-    // 5 ms more from the middle on: all that changes with time and is no line.
+    // 5 ms more from the middle on: a change in time that is no line.
     let mut rng = TestRng::new(4);
     let points: Vec<(f64, f64)> = (0..4_000_u32)
         .map(|i| {
@@ -176,13 +176,13 @@ fn clocks_that_count_from_different_years_are_no_obstacle() {
     let near = Skew::of(&seen(delays(&law, 0.0, TestRng::new(1)), 1e-3)).unwrap();
     let far: Vec<(f64, f64)> = seen(delays(&law, 0.0, TestRng::new(1)), 1e-3).into_iter().map(|(sent, delay)| (sent, delay - 1.7e9)).collect();
     let far = Skew::of(&far).unwrap();
-    // There, numbers are 0.24 µs apart.
+    // Numbers at this distance from zero are 0.24 µs apart.
     assert!((far.seconds_per_second - near.seconds_per_second).abs() < 2e-6, "{far:?} {near:?}");
 }
 
 #[test]
 fn the_estimate_follows_the_drift() {
-    // Each location is taken without the drift, so that more drift changes the estimate by as much, and the error not at all.
+    // Each location is taken without the drift, so more drift changes the estimate by the same amount and leaves the error.
     for distribution in [Distribution::Normal, Distribution::Laplace, Distribution::Pareto, Distribution::ParetoNormal] {
         let law = law(&distribution);
         let [still, drifts] = [0.0, 5e-4].map(|drift| Skew::of(&seen(delays(&law, 0.8, TestRng::new(2)), drift)).unwrap());
@@ -197,14 +197,14 @@ fn what_tells_no_drift_says_why() {
     assert_eq!(refused(&[]), SkewError::TooFew { received: 0 });
     assert_eq!(refused(&[(1.0, 0.3); 49]), SkewError::TooFew { received: 49 });
     assert_eq!(refused(&[(1.0, 0.3); 50]), SkewError::OneInstant { sent_s: 1.0 });
-    // All but one were sent at one instant: the mean tells something, the least nothing.
+    // All packets but one were sent at the same instant. The mean tells the slope, the least delay does not.
     let points: Vec<(f64, f64)> = (0..60).map(|i| (f64::from(u8::from(i == 59)), 0.1 + 0.001 * f64::from(i % 7))).collect();
     assert_eq!(Skew::of(&points).unwrap().location, Location::Mean);
 }
 
 #[test]
 fn drift_is_found_below_the_queueing() {
-    // 20 000 packets in 160 s, exponential queueing of mean 2 ms, drift 50 ppm (8 ms in all, four times the jitter).
+    // 20 000 packets in 160 s with exponential queueing of mean 2 ms, and a drift of 50 ppm (8 ms in all, four times the jitter).
     let mut rng = TestRng::new(3);
     let points: Vec<(f64, f64)> = (0..20_000_u32)
         .map(|i| {
@@ -214,8 +214,8 @@ fn drift_is_found_below_the_queueing() {
         })
         .collect();
     let skew = Skew::of(&points).unwrap();
-    // The least of a block of 20 000/30 is exponential with mean and deviation 3 µs; 30 of them over 160 s give a slope with the standard error
-    // 3 µs·√(12/30)/160 s = 1.2e-8. Allowed: four times that.
+    // The least delay of a block of 20 000/30 is exponential with mean and deviation 3 µs. Thirty of these over 160 s give a slope with the standard error
+    // 3 µs·√(12/30)/160 s = 1.2e-8. The tolerance is four standard errors.
     assert!(skew.location == Location::Least && skew.significant, "{skew:?}");
     assert!((skew.seconds_per_second - 50e-6).abs() < 4.8e-8, "{skew:?}");
 }

@@ -1,17 +1,17 @@
-//! Steps of a clock: the least delay changes at one instant, and stays so.
+//! Finds steps of a clock: lasting changes of the least delay at one instant.
 //!
-//! A clock that is set (by NTP, for example) moves every later delay by the same amount. The least of many delays in a row hardly varies, so that it shows
-//! such a step among delays that do. The arrivals are cut into up to 100 blocks of equal numbers, in the order of sending, each with its least delay, from
-//! which the common drift is taken off. Between two blocks there is a step if
+//! Input is measurements; output is a list of steps. Setting a clock, for example by NTP, moves all later delays by the same amount. The least of many
+//! delays in a row hardly varies, and so shows such a step among varying delays. The arrivals are divided into up to 100 blocks of equal numbers in the
+//! order of sending. Each block has a least delay, without the common drift. Between two blocks lies a step if all of these hold:
 //!
-//! - the least delays of the five blocks before and of the five blocks after lie apart, by more than twice what either five spread over;
-//! - the least delay changes by a tenth or more of what the median delay of a block lies above its least: a smaller step does not show in a fit;
-//! - nine of ten blocks up to the neighbouring steps lie on the side of their five: a single burst of long delays is no step;
-//! - the next step does not take it back: a queue that filled and emptied is no clock.
+//! - The least delays of the five blocks before and of the five blocks after are apart by more than twice the spread of either five.
+//! - The least delay changes by at least a tenth of the typical distance between median and least delay of a block. A smaller step does not show in a fit.
+//! - At least nine of ten blocks up to the neighbouring steps lie on the side of their five. A single burst of long delays is no step.
+//! - The next step does not reverse this step. A queue that fills and empties is no clock.
 //!
-//! Of delays that remember for an eighth of the measurement, at most one in a hundred has a step by chance; of others none.
+//! Delays with a memory of an eighth of the measurement have a step by chance in at most one of a hundred measurements; delays with shorter memory have none.
 //!
-//! A path that changes to another route looks the same: from one direction the two cannot be told apart.
+//! A change of the path to another route looks the same, and cannot be distinguished from one direction.
 
 use std::ops::Range;
 
@@ -22,53 +22,54 @@ use super::{Measurement, Measurements};
 /// A step of the least delay.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Step {
-    /// Instant at which the first packet with the new least delay was sent \[s\].
+    /// Instant of sending of the first packet with the new least delay \[s\].
     pub at_s: f64,
-    /// By how much the least delay grew; negative if it fell \[s\].
+    /// Change of the least delay \[s\]; negative for a decrease.
     pub by_s: f64,
     /// Number of the first packet with the new least delay, counted from 0, lost packets included.
     pub packet: usize,
 }
 
+/// Largest number of blocks.
 const MOST_BLOCKS: usize = 100;
-/// With fewer blocks, the order of their least delays is too easily chance.
+/// Fewest blocks. With fewer, chance often orders their least delays like a step.
 const FEWEST_BLOCKS: usize = 20;
-/// The fewest arrivals of a block.
+/// Fewest arrivals in a block.
 const SHORTEST_BLOCK: usize = 10;
-/// Blocks on either side that are compared.
+/// Number of blocks compared on each side of a step.
 const SIDE: usize = 5;
-/// Blocks must lie apart by this multiple of their spread.
+/// Least distance between the two sides, in units of their spread.
 const APART: f64 = 2.0;
-/// The smallest step that matters, in parts of the distance of the median delay from the least.
+/// Smallest step that matters, as a share of the distance between median and least delay.
 const SMALLEST: f64 = 0.1;
-/// Delays are told to whole nanoseconds at best; a smaller step is rounding.
+/// Change of delay that rounding may cause \[s\], ten times the resolution of a nanosecond.
 const RESOLUTION_S: f64 = 1e-8;
 
 /// A block of arrivals.
 struct Block {
     /// Mean instant of sending \[s\].
     sent_s: f64,
-    /// Least delay without the drift \[s\].
+    /// Least delay of the block without the drift \[s\].
     least_s: f64,
     /// Distance of the median delay from the least \[s\].
     median_above_s: f64,
 }
 
-/// A step between two blocks.
+/// A candidate for a step, between two blocks.
 struct Found {
-    /// Number of the first block after it.
+    /// Index of the first block after the step.
     block: usize,
-    /// The delay between those before and those after \[s\], the drift taken off.
+    /// Delay halfway between the blocks before and after the step \[s\], without the drift.
     middle_s: f64,
-    /// \[s\]
+    /// Change of the least delay \[s\].
     by_s: f64,
-    /// Distance between blocks \[s\].
+    /// Distance between the five blocks before and the five blocks after \[s\].
     gap_s: f64,
 }
 
 impl Measurements {
-    /// The instants at which the least delay changes and stays so, in the order of sending. None is found in fewer than 200 delays, or within a twentieth
-    /// of the measurement from either end.
+    /// Finds lasting changes of the least delay, in the order of sending. Finds none in fewer than 200 delays, or within a twentieth of the measurement
+    /// from either end.
     #[must_use]
     pub fn steps(&self) -> Vec<Step> {
         let arrivals: Vec<(usize, Measurement, f64)> =
@@ -92,7 +93,8 @@ impl Measurements {
         blocks.iter_mut().for_each(|block| block.least_s -= drift * (block.sent_s - origin));
 
         let step = |found: &Found| {
-            // Within the last block before and the first after it, the delays tell where the step is: before a rise the last short delay, at a fall the first.
+            // The delays of the last block before and the first block after show the exact place: after the last short delay for a rise, at the first short
+            // delay for a fall.
             let near = &arrivals[range(found.block - 1).start..range(found.block).end];
             let is_short = |arrival: &(usize, Measurement, f64)| arrival.2 - drift * (arrival.1.sent_s - origin) < found.middle_s;
             let place = if found.by_s > 0.0 { near.iter().rposition(is_short).map(|place| place + 1) } else { near.iter().position(is_short) };
@@ -107,17 +109,17 @@ impl Measurements {
         lasting(&blocks, found).iter().map(step).collect()
     }
 
-    /// The packets from one number to another, the latter left out; times count as before.
+    /// Returns the packets with numbers in `range`. Times keep their origin.
     ///
     /// # Panics
     ///
-    /// Panics if there are no such packets.
+    /// If `range` reaches beyond the packets.
     #[must_use]
     pub fn part(&self, range: Range<usize>) -> Self {
         Self { packets: self.packets[range].to_vec(), removed: self.removed }
     }
 
-    /// The numbers of the packets of the longest stretch without a step; everything if there is no step.
+    /// Returns the numbers of the packets of the longest part without a step, or of all packets without steps.
     #[must_use]
     pub fn longest_part(&self, steps: &[Step]) -> Range<usize> {
         let borders: Vec<usize> = [0].into_iter().chain(steps.iter().map(|step| step.packet)).chain([self.packets.len()]).collect();
@@ -125,7 +127,7 @@ impl Measurements {
     }
 }
 
-/// The common slope of the least delays \[s/s\]: the median over blocks a fifth of all apart, which few steps move little.
+/// Returns the common slope of the least delays \[s/s\]: the median slope between blocks a fifth of all blocks apart, which a few steps move little.
 fn drift(blocks: &[Block]) -> f64 {
     let far = blocks.len() / 5;
     let mut slopes: Vec<f64> = blocks
@@ -138,14 +140,15 @@ fn drift(blocks: &[Block]) -> f64 {
     slopes.get(slopes.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Least and greatest.
+/// Returns the smallest and the largest of the least delays \[s\].
 fn extent(blocks: &[Block]) -> (f64, f64) {
     blocks.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, greatest), block| (least.min(block.least_s), greatest.max(block.least_s)))
 }
 
-/// Steps between groups of five blocks, in the order of time, of neighbouring ones the clearest.
+/// Returns candidates for steps between groups of five blocks, in order of time. Of candidates closer than five blocks, only the clearest is kept.
 fn candidates(blocks: &[Block]) -> Vec<Found> {
     let mut found: Vec<Found> = (SIDE..=blocks.len() - SIDE).filter_map(|block| between(blocks, block)).collect();
+    // The clearest candidate first, so that it suppresses its neighbours.
     found.sort_by(|one, other| other.gap_s.total_cmp(&one.gap_s));
     let mut clearest: Vec<Found> = Vec::new();
     for step in found {
@@ -157,6 +160,7 @@ fn candidates(blocks: &[Block]) -> Vec<Found> {
     clearest
 }
 
+/// Returns the step before block number `block`, if the two groups of five are clearly apart.
 fn between(blocks: &[Block], block: usize) -> Option<Found> {
     let [before, after] = [&blocks[block - SIDE..block], &blocks[block..block + SIDE]].map(extent);
     let spread = (before.1 - before.0).max(after.1 - after.0);
@@ -165,12 +169,12 @@ fn between(blocks: &[Block], block: usize) -> Option<Found> {
     } else {
         (before.0 - after.1, f64::midpoint(before.0, after.1))
     };
-    // The least of all is the surest value of each side.
+    // The smallest of the five least delays is the most certain value of each side.
     let by_s = after.0 - before.0;
     (gap_s > APART * spread + RESOLUTION_S).then_some(Found { block, middle_s, by_s, gap_s })
 }
 
-/// The steps that stay.
+/// Keeps the lasting steps: nine of ten blocks on their side, and not reversed by the next step.
 fn lasting(blocks: &[Block], found: Vec<Found>) -> Vec<Found> {
     let borders: Vec<usize> = [0].into_iter().chain(found.iter().map(|step| step.block)).chain([blocks.len()]).collect();
     let mut lasting: Vec<Found> = Vec::new();

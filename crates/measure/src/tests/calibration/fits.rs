@@ -1,4 +1,4 @@
-//! What `cohaptic fit` states.
+//! Calibration of the statements of `cohaptic fit`.
 
 use cohaptic_wan::law::{Distribution, Law};
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
@@ -10,10 +10,10 @@ use crate::tests::TestRng;
 const MEASUREMENTS: u64 = 250;
 const PACKETS: usize = 1_200;
 
-/// A link whose delays are images of an Ornstein–Uhlenbeck process, and whose losses are a Gilbert–Elliott chain or independent.
+/// A link with delays from an Ornstein–Uhlenbeck process, and losses from a Gilbert–Elliott chain or independent.
 struct Truth {
     law: Law,
-    /// The correlation time \[s\]; 0 if delays are independent.
+    /// Correlation time \[s\]; 0 for independent delays.
     time_s: f64,
     p: f64,
     r: f64,
@@ -30,7 +30,7 @@ impl Truth {
             law: Law::new(&law, 0.04, 0.001 + 0.003 * rng.unit(), Some(0.03)).unwrap(),
             time_s: if rng.unit() < 0.25 { 0.0 } else { 0.002 + 0.02 * rng.unit() },
             p,
-            // Half of all: whether a packet is lost does not depend on the one before.
+            // Half of the links have independent losses.
             r: if rng.unit() < 0.5 { 1.0 - p } else { 0.1 + 0.6 * rng.unit() },
             drift: if rng.unit() < 0.5 { 0.0 } else { 5e-3 },
             evenly: rng.unit() < 0.5,
@@ -68,11 +68,11 @@ fn the_truth_lies_within_what_a_fit_states_as_often_as_it_says() {
             untold += 1;
             continue;
         };
-        // Confidence 0.99: counted with the others, it is within theirs.
+        // An interval with confidence 0.99 may be counted among intervals with 0.95.
         tally.count("drift", !(skew.interval_99[0]..=skew.interval_99[1]).contains(&truth.drift));
         let fitted = fit(&measurements).unwrap();
         let goodness = &fitted.goodness;
-        // A drift that is there and not significant moves the mean, as the estimate says.
+        // A drift that is not significant moves the mean, as the estimate documents.
         if truth.drift == 0.0 || skew.significant {
             let name = if truth.drift == 0.0 { "mean" } else { "mean after drift" };
             match goodness.mean_se_s {
@@ -80,7 +80,7 @@ fn the_truth_lies_within_what_a_fit_states_as_often_as_it_says() {
                 None => untold += 1,
             }
         }
-        // Delays that are taken for independent have no correlation that could be wrong.
+        // Delays taken for independent have no stated correlation to check.
         let phi = if truth.time_s > 0.0 { (-goodness.spacing_s / truth.time_s).exp() } else { 0.0 };
         let outside = |found: f64, truth: f64, error: Option<f64>| error.is_none_or(|error| (found - truth).abs() > OF_LIKELIHOOD * error);
         let even = if truth.evenly { "even" } else { "uneven" };

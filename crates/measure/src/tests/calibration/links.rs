@@ -1,4 +1,4 @@
-//! What `cohaptic link` states.
+//! Calibration of the statements of `cohaptic link`.
 
 use std::time::Duration;
 
@@ -50,7 +50,7 @@ fn random_link(rng: &mut TestRng) -> LinkConfig {
     }
 }
 
-/// The configured link, its comparison with the measured one, and the measured link.
+/// The configured link, its comparison with the measured link, and the measured link.
 fn measured(seed: u64, config: LinkConfig) -> (Asked, Vec<Figure>, Achieved) {
     let asked = Asked::of_config(&config, STREAM.every, STREAM.info.size);
     let mut link = Link::new(seed, &LinkName::between("a", "b"), config);
@@ -69,7 +69,7 @@ fn measured(seed: u64, config: LinkConfig) -> (Asked, Vec<Figure>, Achieved) {
     (asked, figures, accumulator.finish())
 }
 
-/// Configured and measured are one link: the configuration is the truth.
+/// Checks a comparison of a link with its own configuration, which is the truth.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn the_truth_lies_within_what_a_link_states_as_often_as_it_says() {
@@ -78,7 +78,7 @@ fn the_truth_lies_within_what_a_link_states_as_often_as_it_says() {
     for seed in 0..LINKS {
         let mut rng = TestRng::new(seed * 7 + 1);
         let mut config = random_link(&mut rng);
-        // The other half of all has copies, the first of which to arrive has another law of delay.
+        // The other half of the links makes copies. The first arrived copy of a packet follows another law of delay.
         let copies = seed % 4 == 0;
         if !copies {
             config.duplication = Chance::default();
@@ -130,7 +130,7 @@ fn of_losses(tally: &mut Tally, asked: &Asked, achieved: &Achieved) {
     if let Some(error) = loss.run_mean_se {
         tally.count("achieved run", (loss.run_mean.unwrap() - run).abs() > OF_LIKELIHOOD * error);
     }
-    // In the long run, runs and gaps take turns, and the share of packets in runs is that of losses.
+    // In the long run, runs and gaps alternate, and the share of packets in runs is the share of losses.
     if let Some(error) = loss.gap_mean_se {
         tally.count("achieved gap", (loss.gap_mean.unwrap() - run * (1.0 - wanted) / wanted).abs() > OF_LIKELIHOOD * error);
     }
@@ -139,12 +139,12 @@ fn of_losses(tally: &mut Tally, asked: &Asked, achieved: &Achieved) {
 fn of_delays(tally: &mut Tally, config: &LinkConfig, achieved: &Achieved) {
     let (delay, law) = (achieved.delay.as_ref().unwrap(), config.delay.law().unwrap());
     let independent = config.delay.jitter().unwrap().correlation == Correlation::None;
-    // One quantile of each link, by turns, as those of one link hang together.
+    // A single quantile of each link, in turn, because quantiles of the same link are correlated.
     let place = usize::try_from(achieved.loss.received).unwrap() % delay.quantile_intervals_95_s.len();
     if let Some((name, [low, high])) = delay.quantile_intervals_95_s.iter().nth(place) {
         let truth = law.quantile(name.parse().unwrap()) / 1e9;
         let kind = if independent { "independent" } else { "correlated" };
-        // Delays count whole nanoseconds.
+        // Delays are whole nanoseconds.
         tally.count(format!("achieved quantile, {kind}"), truth < low - 1e-9 || truth > high + 1e-9);
     }
     if independent {
@@ -154,9 +154,9 @@ fn of_delays(tally: &mut Tally, config: &LinkConfig, achieved: &Achieved) {
     }
 }
 
-/// One packet each 1 ms with delays uniform over a span of 8 ms. Of a packet that was delayed by u of these, the one sent k ms later overtakes it if it is
-/// delayed by less than u − k: the share that is not overtaken is ∫∏ₖ(1 − (u − k)₊/8) du/8, by Simpson's rule between the kinks, which is exact for polynomials
-/// of degree 3 and errs by 10⁻⁹ here.
+/// A packet per millisecond, with delays uniform over a span of 8 ms. A packet delayed by u (in ms above the least delay) is overtaken by the packet sent k
+/// ms later if the later packet is delayed by less than u − k. The share not overtaken is ∫∏ₖ(1 − (u − k)₊/8) du/8, computed by Simpson's rule between the
+/// kinks, which is exact for polynomials of degree 3 and here right to 10⁻⁹.
 #[test]
 fn the_share_that_is_reordered_lies_within_its_interval_as_often_as_it_says() {
     let kept = |u: f64| (1..8).map(|k| 1.0 - (u - f64::from(k)).max(0.0) / 8.0).product::<f64>();

@@ -1,7 +1,8 @@
-//! How often does the truth lie outside of a stated interval? Every figure with an error or an interval, over random links.
+//! Calibration: counts how often the truth lies outside a stated interval, for all figures with an error or an interval, over random links.
 //!
-//! A standard error is judged at 2.045 of it, Student's 0.975 quantile with 29 degrees of freedom, where it comes from 30 batches, and at 1.96 elsewhere:
-//! then 5 % are outside if it is right. More than that is refused where it happens in one of 10 000 right ones (binomial); there are about 50 figures.
+//! A standard error from 30 batches is judged at 2.045 standard errors, Student's 0.975 quantile with 29 degrees of freedom, and any other at 1.96. With
+//! right errors 5 % of the truths lie outside. A figure fails if it has more outside than right errors would give once in 10 000 cases (binomial). There
+//! are about 50 figures.
 
 mod fits;
 mod links;
@@ -10,12 +11,12 @@ use std::collections::BTreeMap;
 
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
-/// Student, 29 degrees of freedom.
+/// Quantile 0.975 of Student's law with 29 degrees of freedom.
 const OF_BATCHES: f64 = 2.045;
-/// Normal.
+/// Quantile 0.975 of the normal law.
 const OF_LIKELIHOOD: f64 = 1.96;
 
-/// How often the truth was outside, and how often it could have been, by figure.
+/// Number of truths outside, and number of all checks, by figure.
 #[derive(Default, Debug)]
 struct Tally(BTreeMap<String, [u64; 2]>);
 
@@ -26,7 +27,7 @@ impl Tally {
         *of += 1;
     }
 
-    /// No figure is outside more often than in 5 %, and each was looked at so often at least.
+    /// Checks that no figure is outside in more than 5 %, and that each figure was checked at least the given number of times.
     fn is_calibrated(&self, figures: &[&str], at_least: u64) {
         assert_eq!(self.0.keys().map(String::as_str).collect::<Vec<_>>(), figures);
         for (figure, &[times, of]) in &self.0 {

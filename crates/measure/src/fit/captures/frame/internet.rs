@@ -1,17 +1,18 @@
-//! IPv4 (RFC 791), and IPv6 with its extension headers (RFC 8200).
+//! Headers of IPv4 (RFC 791), and of IPv6 with extension headers (RFC 8200).
 
 use super::{CUT, Kind, half};
 
-/// A UDP datagram in a packet.
+/// A UDP datagram inside a packet.
 pub(super) struct Carried<'a> {
-    /// The IPv4 identification.
+    /// Identification of the IPv4 header; `None` for IPv6.
     pub(super) identification: Option<u16>,
-    /// The datagram from its header on, as far as it was captured.
+    /// Captured part of the datagram, from its header on.
     pub(super) udp: &'a [u8],
-    /// Length of the datagram as IP tells it \[byte\]; `None` where IP says zero.
+    /// Length of the datagram according to IP \[byte\]; `None` if IP says zero.
     pub(super) length: Option<usize>,
 }
 
+/// Finds the UDP datagram in an IP packet.
 pub(super) fn carried(packet: &[u8]) -> Result<Carried<'_>, Kind> {
     match packet.first().ok_or(CUT)? >> 4 {
         4 => ipv4(packet),
@@ -31,7 +32,7 @@ fn ipv4(packet: &[u8]) -> Result<Carried<'_>, Kind> {
     if octets < 20 {
         return Err("malformed IPv4".into());
     }
-    // More fragments, or not the first.
+    // Refuses the first of several fragments (flag "more fragments") and later fragments (offset).
     if half(header, 6).is_none_or(|fragment| fragment & 0x3FFF != 0) {
         return Err("fragments of IPv4".into());
     }
@@ -40,22 +41,22 @@ fn ipv4(packet: &[u8]) -> Result<Carried<'_>, Kind> {
     Ok(Carried { identification: half(header, 4), udp, length: total.checked_sub(octets + passed).filter(|length| *length > 0) })
 }
 
-/// Passes over extension headers to UDP. Gives also the number of octets that were passed.
+/// Skips extension headers up to UDP. Returns the datagram and the number of skipped octets.
 fn upper_layer(mut next: u8, all: &[u8], has_extensions: bool) -> Result<(&[u8], usize), Kind> {
     let mut rest = all;
     loop {
         let octets = match next {
             17 => return Ok((rest, all.len() - rest.len())),
-            // Hop by hop, routing, destination, mobility, host identity, shim: the second octet counts 8 octets beyond the first 8.
+            // Hop by hop, routing, destination, mobility, host identity, shim: the second octet counts units of 8 octets after the first 8.
             0 | 43 | 60 | 135 | 139 | 140 if has_extensions => (usize::from(*rest.get(1).ok_or(CUT)?) + 1) * 8,
             44 if has_extensions => {
-                // Of a fragment that is a whole packet, offset and "more" are zero (RFC 6946).
+                // A whole packet with a fragment header has offset and "more" zero (RFC 6946).
                 if half(rest, 2).ok_or(CUT)? & 0xFFF9 != 0 {
                     return Err("fragments of IPv6".into());
                 }
                 8
             }
-            // Authentication: the second octet counts 4 octets beyond the first 8.
+            // Authentication: the second octet counts units of 4 octets after the first 8.
             51 => (usize::from(*rest.get(1).ok_or(CUT)?) + 2) * 4,
             other => return Err(protocol_name(other)),
         };

@@ -5,26 +5,26 @@ use super::{CUT, Kind, half, wireless};
 const IPV4: u16 = 0x0800;
 const IPV6: u16 = 0x86DD;
 
-/// The IP packet of a frame: the end of the frame, from the first octet of IP on.
+/// Returns the IP packet of a frame: the end of the frame from the first octet of IP on.
 pub(super) fn packet(link_type: u16, data: &[u8]) -> Result<&[u8], Kind> {
     let after = |octets: usize| data.get(octets..).ok_or(CUT);
     match link_type {
-        // The family of addresses, in an order of octets that the file does not tell. The version of IP says the same.
+        // The address family, in a byte order unknown from the file. The IP version has the same information.
         0 | 108 => after(4),
         1 => by_type(half(data, 12).ok_or(CUT)?, after(14)?),
         9 => ppp(data),
-        // PPP or Cisco's framing, which begins with 0x0F or 0x8F.
+        // PPP or Cisco's framing, recognised by the first octet 0x0F or 0x8F.
         50 if matches!(data.first(), Some(0x0F | 0x8F)) => by_type(half(data, 2).ok_or(CUT)?, after(4)?),
         50 => ppp(data),
         51 => pppoe(data),
-        // Raw IP, and the numbers of BSD for the same.
+        // Raw IP, and the numbers of BSD systems for raw IP.
         12 | 14 | 101 | 228 | 229 => Ok(data),
         104 => by_type(half(data, 2).ok_or(CUT)?, after(4)?),
         105 => wireless::packet(data, false),
-        // "Cooked" captures: the type stands at the end of the first form of the header, and at the start of the second.
+        // "Cooked" captures have the type at the end of the header in the first form, and at the beginning in the second (276).
         113 => by_type(half(data, 14).ok_or(CUT)?, after(16)?),
         127 => wireless::with_radiotap(data),
-        // The direction stands in the place of the address of PPP, or before it.
+        // The direction replaces the address of PPP, or stands before the address.
         166 => ppp(after(2)?),
         204 => ppp(after(1)?),
         276 => by_type(half(data, 0).ok_or(CUT)?, after(20)?),
@@ -32,7 +32,7 @@ pub(super) fn packet(link_type: u16, data: &[u8]) -> Result<&[u8], Kind> {
     }
 }
 
-/// Returns the octets after an Ethernet type. Tags of VLANs and labels of MPLS are passed over.
+/// Returns the octets after an Ethernet type. Skips tags of VLANs and labels of MPLS.
 fn by_type(mut ether_type: u16, mut rest: &[u8]) -> Result<&[u8], Kind> {
     loop {
         match ether_type {
@@ -57,7 +57,7 @@ pub(super) fn llc(rest: &[u8]) -> Result<&[u8], Kind> {
     by_type(ether_type, rest)
 }
 
-/// The Ethernet type in a header of 802.2 (RFC 1042), and what follows the header.
+/// Returns the Ethernet type in a header of 802.2 (RFC 1042), and the octets after the header.
 fn type_of_llc(rest: &[u8]) -> Result<(u16, &[u8]), Kind> {
     match rest {
         [0xAA, 0xAA, 3, 0, 0, 0 | 0xF8, high, low, rest @ ..] => Ok((u16::from_be_bytes([*high, *low]), rest)),
@@ -67,28 +67,28 @@ fn type_of_llc(rest: &[u8]) -> Result<(u16, &[u8]), Kind> {
     }
 }
 
-/// Labels of MPLS (RFC 3032), the last of which has the bit "bottom of stack".
+/// Skips labels of MPLS (RFC 3032). The last label has the bit "bottom of stack".
 fn mpls(mut rest: &[u8]) -> Result<&[u8], Kind> {
     loop {
         let (label, after) = rest.split_first_chunk::<4>().ok_or(CUT)?;
         rest = after;
         if label[2] & 1 != 0 {
-            // The labels do not tell what they carry.
+            // Labels do not name their content; the first octet shows IPv4 or IPv6.
             return if matches!(rest.first(), Some(0x40..=0x6F)) { Ok(rest) } else { Err("MPLS without IP".into()) };
         }
     }
 }
 
-/// A session of PPPoE (RFC 2516): 6 octets of header, then PPP.
+/// Skips the header of a PPPoE session (RFC 2516), 6 octets, and then PPP.
 fn pppoe(rest: &[u8]) -> Result<&[u8], Kind> {
     if *rest.get(1).ok_or(CUT)? != 0 { Err("PPPoE discovery".into()) } else { ppp(rest.get(6..).ok_or(CUT)?) }
 }
 
-/// A frame of PPP (RFC 1661), with or without the address and control field of HDLC (RFC 1662).
+/// Skips the header of PPP (RFC 1661), with or without the address and control field of HDLC (RFC 1662).
 fn ppp(frame: &[u8]) -> Result<&[u8], Kind> {
     let frame = frame.strip_prefix(&[0xFF, 0x03]).unwrap_or(frame);
     let (protocol, rest) = match frame {
-        // The last octet of a number is odd and the others are even, so that a compressed number is known.
+        // The last octet of a protocol number is odd and the others are even, which shows a compressed number.
         [low, rest @ ..] if low & 1 != 0 => (u16::from(*low), rest),
         [high, low, rest @ ..] => (u16::from_be_bytes([*high, *low]), rest),
         _ => return Err(CUT),

@@ -1,18 +1,18 @@
-//! Frames of IEEE 802.11, with or without the header of radiotap.
+//! Frames of IEEE 802.11, with or without the radiotap header.
 
 use super::{CUT, Kind, link};
 
-/// Returns whether frames of that link type begin with a header that differs from frame to frame.
+/// Returns whether frames of a link type begin with a header that differs from frame to frame.
 pub(super) const fn is_wireless(link_type: u16) -> bool {
     link_type == 105 || link_type == 127
 }
 
-/// The IP packet after a header of radiotap (<https://www.radiotap.org>), whose numbers have the lowest octet first.
+/// Returns the IP packet after a radiotap header (<https://www.radiotap.org>), whose numbers are little-endian.
 pub(super) fn with_radiotap(data: &[u8]) -> Result<&[u8], Kind> {
     const PAD: u8 = 0x20;
     let [_, _, low, high, ..] = *data else { return Err(CUT) };
     let frame = data.get(usize::from(u16::from_le_bytes([low, high]))..).ok_or(CUT)?;
-    // Words that tell which fields follow; the top bit says that one more word follows.
+    // Words of flags for the fields present. The top bit announces another word.
     let mut at = 4;
     let mut first = None;
     loop {
@@ -24,13 +24,13 @@ pub(super) fn with_radiotap(data: &[u8]) -> Result<&[u8], Kind> {
         }
     }
     let present = first.unwrap_or(0);
-    // Field 0 is a time of 8 octets at a multiple of 8, field 1 the flags.
+    // Field 0 is a time of 8 octets, aligned to 8 octets. Field 1 has the flags.
     let at = if present & 1 == 0 { at } else { at.next_multiple_of(8) + 8 };
     let flags = if present & 2 == 0 { 0 } else { *data.get(at).ok_or(CUT)? };
     packet(frame, flags & PAD != 0)
 }
 
-/// The IP packet of a frame of data. `padded`: the header is padded to a multiple of four octets.
+/// Returns the IP packet of a data frame. `padded` tells whether the header is padded to a multiple of four octets.
 pub(super) fn packet(frame: &[u8], padded: bool) -> Result<&[u8], Kind> {
     let [control, flags, ..] = *frame else { return Err(CUT) };
     let (is_quality, has_no_data) = (control & 0x80 != 0, control & 0x40 != 0);
@@ -46,7 +46,7 @@ pub(super) fn packet(frame: &[u8], padded: bool) -> Result<&[u8], Kind> {
     if flags & 0x40 != 0 {
         return Err("802.11 encrypted".into());
     }
-    // Four addresses between two access points, three otherwise.
+    // Frames between two access points have four addresses, other frames three.
     let addresses = if flags & 3 == 3 { 30 } else { 24 };
     if is_quality && frame.get(addresses).ok_or(CUT)? & 0x80 != 0 {
         return Err("802.11 aggregates (A-MSDU)".into());

@@ -1,4 +1,4 @@
-//! The frames of a capture file: pcap and pcapng, in every form that libpcap reads.
+//! Reads frames of capture files: pcap and pcapng, in all forms read by libpcap.
 
 mod pcap;
 mod pcapng;
@@ -7,33 +7,33 @@ use std::io::Read;
 
 use super::CaptureProblem;
 
-/// A frame as captured.
+/// A captured frame.
 pub(super) struct Frame<'a> {
-    /// Instant of the capture, in nanoseconds since 1970. `None` in a block without a timestamp (a simple packet of pcapng).
+    /// Time of capture \[ns since 1970\]; `None` for a block without a timestamp (simple packet of pcapng).
     pub(super) nanos: Option<i128>,
     /// `LINKTYPE_` number of the first header.
     pub(super) link_type: u16,
-    /// Index of the interface within its section of the file; 0 in pcap.
+    /// Index of the interface in its section of the file; 0 in pcap.
     pub(super) interface: u32,
-    /// The octets that were captured, without a frame check sequence.
+    /// Captured octets, without a frame check sequence.
     pub(super) data: &'a [u8],
     /// Length of the frame on the wire \[byte\], without a frame check sequence.
     pub(super) length: usize,
 }
 
-/// The end of a file.
+/// Place of the end of a file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Ending {
-    /// After a block.
+    /// After a complete block.
     Whole,
-    /// Within a block, of which nothing was read.
+    /// Within a block, which is ignored.
     CutOff,
 }
 
-/// No block is longer than this \[byte\]; a file that says so is damaged.
+/// Length of the longest accepted block \[byte\]. A file with a longer block is damaged.
 const LONGEST_BLOCK: u32 = 1 << 26;
 
-/// Reads to the end.
+/// Reads a file to its end and calls `each` for every frame.
 pub(super) fn for_each_frame(from: impl Read, each: impl FnMut(Frame<'_>)) -> Result<Ending, CaptureProblem> {
     let mut source = Source { from };
     let Some(magic) = source.array()? else { return Err(CaptureProblem::CutOff) };
@@ -46,31 +46,31 @@ pub(super) fn for_each_frame(from: impl Read, each: impl FnMut(Frame<'_>)) -> Re
     }
 }
 
-/// Returns whether a file that begins like this is a capture.
+/// Returns whether a file with this beginning is a capture.
 pub(super) fn is_capture(beginning: &[u8]) -> bool {
     beginning.first_chunk().is_some_and(|magic| *magic == pcapng::SECTION_HEADER || pcap::Format::of(*magic).is_some())
 }
 
-/// A file that is read piece by piece.
+/// A file read piece by piece.
 struct Source<R> {
     from: R,
 }
 
 impl<R: Read> Source<R> {
-    /// Reads that number of octets into the buffer, whose former content goes. `false` if the file ends before.
+    /// Replaces the content of `buffer` by the next `octets` octets. Returns `false` if the file ends earlier.
     fn fill(&mut self, buffer: &mut Vec<u8>, octets: usize) -> Result<bool, CaptureProblem> {
         buffer.clear();
-        // The number comes from the file. `take` keeps a damaged one from reserving memory that the file does not fill.
+        // The number comes from the file. `take` and `read_to_end` keep a damaged number from reserving more memory than the file fills.
         self.from.by_ref().take(octets as u64).read_to_end(buffer).map_err(|_| CaptureProblem::Io)?;
         Ok(buffer.len() == octets)
     }
 
-    /// Reads `N` octets. `None` if the file ends before.
+    /// Reads `N` octets; `None` if the file ends earlier.
     fn array<const N: usize>(&mut self) -> Result<Option<[u8; N]>, CaptureProblem> {
         Ok(self.array_or_end()?.ok())
     }
 
-    /// Reads `N` octets, or gives the number of octets that were left: none if the file ends exactly here.
+    /// Reads `N` octets, or returns the number of octets left as an inner error: 0 if the file ends exactly here.
     fn array_or_end<const N: usize>(&mut self) -> Result<Result<[u8; N], usize>, CaptureProblem> {
         let mut buffer = Vec::new();
         self.fill(&mut buffer, N)?;
@@ -78,7 +78,7 @@ impl<R: Read> Source<R> {
     }
 }
 
-/// The order of the octets of numbers.
+/// Byte order of numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Order {
     Big,
@@ -86,21 +86,21 @@ enum Order {
 }
 
 impl Order {
-    /// The 32-bit number at a place; `None` beyond the end.
+    /// Returns the 32-bit number at an offset; `None` beyond the end.
     fn word(self, bytes: &[u8], at: usize) -> Option<u32> {
         let octets = *bytes.get(at..)?.first_chunk()?;
         Some(if self == Self::Big { u32::from_be_bytes(octets) } else { u32::from_le_bytes(octets) })
     }
 
-    /// The 16-bit number at a place; `None` beyond the end.
+    /// Returns the 16-bit number at an offset; `None` beyond the end.
     fn half(self, bytes: &[u8], at: usize) -> Option<u16> {
         let octets = *bytes.get(at..)?.first_chunk()?;
         Some(if self == Self::Big { u16::from_be_bytes(octets) } else { u16::from_le_bytes(octets) })
     }
 }
 
-/// Returns the octets of a frame and its length on the wire without the frame check sequence, which has `check` octets. A capture that was cut may hold a part
-/// of the sequence, or none of it.
+/// Returns the octets of a frame and its length on the wire, both without the frame check sequence of `check` octets. A cut frame may have a part of the
+/// sequence, or nothing.
 fn without_check(data: &[u8], length: u32, check: usize) -> (&[u8], usize) {
     let length = usize::try_from(length).unwrap_or(usize::MAX).max(data.len()).saturating_sub(check);
     (&data[..data.len().min(length)], length)

@@ -1,21 +1,21 @@
-//! Files of pcap (draft-ietf-opsawg-pcap), and the older forms that libpcap reads.
+//! Reads pcap files (draft-ietf-opsawg-pcap), also in the older forms read by libpcap.
 
 use std::io::Read;
 
 use super::{CaptureProblem, Ending, Frame, LONGEST_BLOCK, Order, Source, without_check};
 
-/// Form of the file, as its first four octets tell.
+/// Form of a file, recognised by its first four octets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Format {
     order: Order,
-    /// Nanoseconds in a unit of the second number of a timestamp.
+    /// Nanoseconds per unit of the second number of a timestamp.
     unit_nanos: i128,
-    /// Octets of the header of a frame.
+    /// Length of a frame's header \[byte\].
     header: usize,
 }
 
 impl Format {
-    /// The form of a file by its first octets; `None` for another kind of file.
+    /// Recognises the form of a file by its first four octets; `None` for another kind of file.
     pub(super) const fn of(magic: [u8; 4]) -> Option<Self> {
         let big = u32::from_be_bytes(magic);
         let order = match big {
@@ -25,20 +25,20 @@ impl Format {
         match if matches!(order, Order::Big) { big } else { big.swap_bytes() } {
             0xA1B2_C3D4 => Some(Self { order, unit_nanos: 1_000, header: 16 }),
             0xA1B2_3C4D => Some(Self { order, unit_nanos: 1, header: 16 }),
-            // The "modified" format of an old patch of libpcap: index, protocol and type of the packet follow the lengths.
+            // The "modified" format of an old libpcap patch: the lengths are followed by index, protocol and type of the packet.
             0xA1B2_CD34 => Some(Self { order, unit_nanos: 1_000, header: 24 }),
             _ => None,
         }
     }
 }
 
-/// Reads what follows the first four octets.
+/// Reads the file after its first four octets.
 pub(super) fn read(mut source: Source<impl Read>, format: Format, mut each: impl FnMut(Frame<'_>)) -> Result<Ending, CaptureProblem> {
     let order = format.order;
     let Some(rest) = source.array::<20>()? else { return Err(CaptureProblem::CutOff) };
     let (major, minor) = (order.half(&rest, 0).unwrap_or(0), order.half(&rest, 2).unwrap_or(0));
     let network = order.word(&rest, 16).unwrap_or(0);
-    // The type has 16 bits. Above it stand the length of a frame check sequence, in units of 16 bits, and whether that length is given.
+    // The link type has 16 bits. The upper bits have a flag for a frame check sequence, and its length in units of 16 bits.
     let check = if network & 0x0400_0000 == 0 { 0 } else { 2 * usize::try_from(network >> 28).unwrap_or(0) };
     let link_type = u16::try_from(network & 0xFFFF).unwrap_or(0);
     let (mut header, mut data) = (Vec::new(), Vec::new());
@@ -48,7 +48,7 @@ pub(super) fn read(mut source: Source<impl Read>, format: Format, mut each: impl
         }
         let number = |at| order.word(&header, at).unwrap_or(0);
         let (mut captured, mut length) = (number(8), number(12));
-        // As in libpcap: before version 2.3 the two lengths stood in the other order, and in that version some programs wrote them so.
+        // As in libpcap: before version 2.3 the two lengths had the other order, and some programs kept that order in version 2.3.
         if (major, minor) < (2, 3) || major == 543 || ((major, minor) == (2, 3) && captured > length) {
             (captured, length) = (length, captured);
         }

@@ -1,14 +1,14 @@
-//! Files of pcapng (draft-ietf-opsawg-pcapng).
+//! Reads pcapng files (draft-ietf-opsawg-pcapng).
 
 use std::io::Read;
 
 use super::{CaptureProblem, Ending, Frame, LONGEST_BLOCK, Order, Source, without_check};
 
-/// The type of a section header, which is the same in both orders of octets.
+/// Type of a section header, a palindrome and so the same in both byte orders.
 pub(super) const SECTION_HEADER: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
 const ORDER_MAGIC: u32 = 0x1A2B_3C4D;
 const INTERFACE_DESCRIPTION: u32 = 1;
-/// The obsolete packet block, which Wireshark wrote before 2010.
+/// The obsolete packet block, written by Wireshark before 2010.
 const PACKET: u32 = 2;
 const SIMPLE_PACKET: u32 = 3;
 const ENHANCED_PACKET: u32 = 6;
@@ -17,20 +17,20 @@ const ENHANCED_PACKET: u32 = 6;
 #[derive(Clone, Copy)]
 struct Interface {
     link_type: u16,
-    /// The most octets of a frame that are captured; 0 for all.
+    /// Largest number of octets captured per frame; 0 for no limit.
     snap_length: u32,
     units_per_second: u128,
     offset_seconds: i64,
-    /// Octets of the frame check sequence.
+    /// Length of the frame check sequence \[byte\].
     check: usize,
 }
 
-/// Reads what follows the type of the first section header.
+/// Reads the file after the type of its first section header.
 pub(super) fn read(mut source: Source<impl Read>, mut each: impl FnMut(Frame<'_>)) -> Result<Ending, CaptureProblem> {
     let (mut kind, mut order) = (SECTION_HEADER, Order::Little);
     let mut interfaces = Vec::new();
     let (mut body, mut is_first) = (Vec::new(), true);
-    // A file that holds no whole section header is refused.
+    // A file without a complete section header is refused.
     let cut_off = |is_first| if is_first { Err(CaptureProblem::CutOff) } else { Ok(Ending::CutOff) };
     loop {
         let Some(length) = source.array::<4>()? else { return cut_off(is_first) };
@@ -40,7 +40,7 @@ pub(super) fn read(mut source: Source<impl Read>, mut each: impl FnMut(Frame<'_>
             order =
                 [Order::Big, Order::Little].into_iter().find(|order| order.word(&magic, 0) == Some(ORDER_MAGIC)).ok_or(CaptureProblem::Malformed)?;
             taken = 12;
-            // Numbers of interfaces begin anew.
+            // Interfaces are numbered anew in each section.
             interfaces.clear();
         }
         let length = order.word(&length, 0).unwrap_or(0);
@@ -51,7 +51,7 @@ pub(super) fn read(mut source: Source<impl Read>, mut each: impl FnMut(Frame<'_>
         if !source.fill(&mut body, rest + 4)? {
             return cut_off(is_first);
         }
-        // The length stands at both ends of a block.
+        // The length is stored at both ends of a block.
         if order.word(&body, rest) != Some(length) {
             return Err(CaptureProblem::Malformed);
         }
@@ -68,6 +68,7 @@ pub(super) fn read(mut source: Source<impl Read>, mut each: impl FnMut(Frame<'_>
     }
 }
 
+/// Handles the body of a block: remembers an interface, or passes a frame to `each`.
 fn block(order: Order, kind: u32, body: &[u8], interfaces: &mut Vec<Interface>, each: &mut impl FnMut(Frame<'_>)) -> Result<(), CaptureProblem> {
     let word = |at| order.word(body, at).ok_or(CaptureProblem::Malformed);
     let half = |at| order.half(body, at).ok_or(CaptureProblem::Malformed);
@@ -81,7 +82,7 @@ fn block(order: Order, kind: u32, body: &[u8], interfaces: &mut Vec<Interface>, 
             let units = u128::from(word(4)?) << 32 | u128::from(word(8)?);
             let nanos = units.checked_mul(1_000_000_000).ok_or(CaptureProblem::Timestamp)? / interface.units_per_second;
             let nanos = i128::try_from(nanos).map_err(|_| CaptureProblem::Timestamp)? + i128::from(interface.offset_seconds) * 1_000_000_000;
-            // Flags of a packet may tell the length of its own frame check sequence (bits 5 to 8).
+            // Bits 5 to 8 of a packet's flags can give the length of its own frame check sequence.
             let flags = options(order, body.get(20 + captured.next_multiple_of(4)..).unwrap_or_default()).find(|(code, _)| *code == 2);
             let own = flags.and_then(|(_, value)| order.word(value, 0)).map_or(0, |flags| flags >> 5 & 0xF);
             let check = if own == 0 { interface.check } else { usize::try_from(own).unwrap_or(0) };
@@ -97,14 +98,15 @@ fn block(order: Order, kind: u32, body: &[u8], interfaces: &mut Vec<Interface>, 
             let (data, length) = without_check(data, length, interface.check);
             each(Frame { nanos: None, link_type: interface.link_type, interface: 0, data, length });
         }
-        // Statistics, names, secrets, journals and blocks of makers hold no frames.
+        // Blocks with statistics, names, secrets, journals, and private blocks have no frames.
         _ => {}
     }
     Ok(())
 }
 
+/// Reads the description of an interface.
 fn interface(order: Order, link_type: u16, snap_length: u32, rest: &[u8]) -> Result<Interface, CaptureProblem> {
-    // Microseconds, unless an option says otherwise.
+    // Timestamps count microseconds, unless an option says otherwise.
     let mut found = Interface { link_type, snap_length, units_per_second: 1_000_000, offset_seconds: 0, check: 0 };
     for (code, value) in options(order, rest) {
         match (code, value) {
@@ -121,7 +123,7 @@ fn interface(order: Order, link_type: u16, snap_length: u32, rest: &[u8]) -> Res
     Ok(found)
 }
 
-/// The options of a block, each with its code; up to the end of options, or to one that is longer than the block.
+/// Iterates over the options of a block, as (code, value), up to the end of options or to an option longer than the block.
 fn options(order: Order, mut bytes: &[u8]) -> impl Iterator<Item = (u16, &[u8])> {
     std::iter::from_fn(move || {
         let (code, length) = (order.half(bytes, 0).filter(|code| *code != 0)?, usize::from(order.half(bytes, 2)?));
@@ -131,7 +133,7 @@ fn options(order: Order, mut bytes: &[u8]) -> impl Iterator<Item = (u16, &[u8])>
     })
 }
 
-/// `if_tsresol`: a negative power of ten, or of two if the top bit is set.
+/// Decodes `if_tsresol`: a negative power of ten, or of two if the top bit is set. Returns `None` for a power too large.
 fn units_per_second(resolution: u8) -> Option<u128> {
     let exponent = u32::from(resolution & 0x7f);
     if resolution & 0x80 == 0 { 10_u128.checked_pow(exponent) } else { 1_u128.checked_shl(exponent) }

@@ -1,6 +1,6 @@
-//! Captures octet by octet, as the documents of the formats say: draft-ietf-opsawg-pcap, draft-ietf-opsawg-pcapng, RFC 768, 791, 894, 8200.
+//! Builds captures octet by octet by the specifications: draft-ietf-opsawg-pcap, draft-ietf-opsawg-pcapng, RFC 768, 791, 894, 8200.
 
-/// A frame: instant of the capture \[ns since 1970\], its octets as captured, and its length on the wire \[byte\].
+/// A frame: time of capture \[ns since 1970\], captured octets, and length on the wire \[byte\].
 #[derive(Clone)]
 pub(super) struct Shot {
     pub(super) nanos: u64,
@@ -8,12 +8,12 @@ pub(super) struct Shot {
     pub(super) length: usize,
 }
 
-/// A frame that was captured as a whole.
+/// Makes a frame captured whole.
 pub(super) fn shot(nanos: u64, octets: Vec<u8>) -> Shot {
     Shot { nanos, length: octets.len(), octets }
 }
 
-/// The same frame, cut after that number of octets.
+/// Cuts a frame after a number of octets.
 pub(super) fn cut(shot: &Shot, octets: usize) -> Shot {
     Shot { octets: shot.octets[..octets.min(shot.octets.len())].to_vec(), ..shot.clone() }
 }
@@ -38,12 +38,12 @@ pub(super) fn ethernet(ether_type: u16, carried: &[u8]) -> Vec<u8> {
     [&[2, 0, 0, 0, 0, 1, 2, 0, 0, 0, 0, 2][..], &ether_type.to_be_bytes(), carried].concat()
 }
 
-/// A datagram to port 5000 in a frame of Ethernet.
+/// Makes an Ethernet frame with a datagram to port 5000.
 pub(super) fn packet(nanos: u64, identification: u16, payload: &[u8]) -> Shot {
     shot(nanos, ethernet(0x0800, &ipv4(identification, 17, &udp(5000, payload))))
 }
 
-/// Writes numbers in one order of octets.
+/// Writer of numbers in a byte order.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Octets {
     Big,
@@ -64,7 +64,7 @@ fn word(number: usize) -> u32 {
     u32::try_from(number).unwrap()
 }
 
-/// A file of pcap. `magic` decides whether fractions of a second are nanoseconds, and whether the header of a frame has 8 octets more.
+/// Makes a pcap file. `magic` decides whether fractions of a second are nanoseconds, and whether the header of a frame has 8 octets more.
 pub(super) fn pcap(order: Octets, magic: u32, network: u32, shots: &[Shot]) -> Vec<u8> {
     let mut file = [&order.word(magic)[..], &order.half(2), &order.half(4), &[0; 8], &order.word(65_535), &order.word(network)].concat();
     for shot in shots {
@@ -78,12 +78,12 @@ pub(super) fn pcap(order: Octets, magic: u32, network: u32, shots: &[Shot]) -> V
     file
 }
 
-/// A pcap of Ethernet with nanoseconds.
+/// Makes a pcap file of Ethernet frames with nanoseconds.
 pub(super) fn file(shots: &[Shot]) -> Vec<u8> {
     pcap(Octets::Little, 0xA1B2_3C4D, 1, shots)
 }
 
-/// A block of pcapng.
+/// Makes a pcapng block.
 pub(super) fn block(order: Octets, kind: u32, body: &[u8]) -> Vec<u8> {
     let padded = [body, &vec![0; body.len().next_multiple_of(4) - body.len()]].concat();
     let length = order.word(word(12 + padded.len()));
@@ -94,7 +94,7 @@ pub(super) fn section(order: Octets) -> Vec<u8> {
     block(order, 0x0A0D_0D0A, &[&order.word(0x1A2B_3C4D)[..], &order.half(1), &order.half(0), &[0xFF; 8]].concat())
 }
 
-/// Options of a block, with their end.
+/// Makes the options of a block, with their end.
 pub(super) fn options(order: Octets, options: &[(u16, &[u8])]) -> Vec<u8> {
     let one = |&(code, value): &(u16, &[u8])| {
         let padding = vec![0; value.len().next_multiple_of(4) - value.len()];
@@ -107,14 +107,14 @@ pub(super) fn interface(order: Octets, link_type: u16, snap_length: u32, list: &
     block(order, 1, &[&order.half(link_type)[..], &[0, 0], &order.word(snap_length), &options(order, list)].concat())
 }
 
-/// An enhanced packet block, whose instant is counted in the units of its interface.
+/// Makes an enhanced packet block, with the time in units of its interface.
 pub(super) fn enhanced(order: Octets, interface: u32, units: u64, shot: &Shot, list: &[(u16, &[u8])]) -> Vec<u8> {
     let numbers = [interface, high(units), low(units), word(shot.octets.len()), word(shot.length)].map(|number| order.word(number)).concat();
     let padding = vec![0; shot.octets.len().next_multiple_of(4) - shot.octets.len()];
     block(order, 6, &[numbers, shot.octets.clone(), padding, options(order, list)].concat())
 }
 
-/// The obsolete packet block: 16 bits of interface, 16 of lost packets.
+/// Makes an obsolete packet block: 16 bits of interface, 16 bits of lost packets.
 pub(super) fn obsolete(order: Octets, interface: u16, units: u64, shot: &Shot) -> Vec<u8> {
     let numbers = [high(units), low(units), word(shot.octets.len()), word(shot.length)].map(|number| order.word(number)).concat();
     block(order, 2, &[&order.half(interface)[..], &order.half(0xFFFF), &numbers, &shot.octets].concat())

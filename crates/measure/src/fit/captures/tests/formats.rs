@@ -1,4 +1,4 @@
-//! Files of pcap and pcapng in every form.
+//! Files of pcap and pcapng in all forms.
 
 use super::super::contents::Capture;
 use super::super::{CaptureError, CaptureProblem, End, is_capture};
@@ -28,7 +28,7 @@ fn pcap_of_either_order_and_of_each_magic_is_read() {
     }
 }
 
-/// In files of version 2.2 and before the two lengths of a frame stand in the other order.
+/// Files of version 2.2 and before have the two lengths of a frame in the other order.
 #[test]
 fn old_versions_have_their_lengths_the_other_way_round() {
     let mut old = pcap(Octets::Little, 0xA1B2_C3D4, 1, &[cut(&packet(0, 1, b"hello"), 45), packet(SECOND, 2, b"you")]);
@@ -42,18 +42,18 @@ fn old_versions_have_their_lengths_the_other_way_round() {
     assert_eq!(instants(&capture), [0, 1_000_000_000]);
 }
 
-/// The upper half of the link type tells of a frame check sequence of two words of 16 bits, which is no part of the frame.
+/// The upper half of the link type announces a frame check sequence of two 16-bit words, which is not part of the frame.
 #[test]
 fn bits_of_the_frame_check_sequence_are_no_link_type() {
     let mut with_check = packet(7, 1, b"hi");
-    // A length of zero in UDP and IP leaves the length to the capture.
+    // With lengths of zero in UDP and IP, the length comes from the capture.
     (with_check.octets[16], with_check.octets[17]) = (0, 0);
     (with_check.octets[38], with_check.octets[39]) = (0, 0);
     with_check.octets.extend([1, 2, 3, 4]);
     with_check.length += 4;
     let capture = read(&pcap(Octets::Big, 0xA1B2_3C4D, 0x2400_0001, &[with_check.clone()]));
     assert_eq!((capture.datagrams[0].length, capture.payload(&capture.datagrams[0])), (2, &b"hi"[..]));
-    // In pcapng an option of the interface says it, or the flags of a packet: bits 5 to 8.
+    // In pcapng an option of the interface gives the length, or bits 5 to 8 of a packet's flags.
     let order = Octets::Little;
     for (list, flags) in [(&[(13_u16, &[4_u8][..])][..], &[][..]), (&[], &[(2_u16, &[0x80_u8, 0, 0, 0][..])])] {
         let file = [section(order), interface(order, 1, 0, list), enhanced(order, 0, 7, &with_check, flags)].concat();
@@ -65,7 +65,7 @@ fn bits_of_the_frame_check_sequence_are_no_link_type() {
 #[test]
 fn each_block_of_pcapng_is_read() {
     for order in [Octets::Big, Octets::Little] {
-        // Units of 2^-10 s, 100 s later, and nanoseconds; between them blocks without frames: statistics, a custom one, an unknown one.
+        // Units of 2^-10 s, 100 s later, and nanoseconds. Blocks without frames come between: statistics, a custom block, an unknown block.
         let offset = match order {
             Octets::Big => 100_i64.to_be_bytes(),
             Octets::Little => 100_i64.to_le_bytes(),
@@ -87,14 +87,14 @@ fn each_block_of_pcapng_is_read() {
         // A simple packet has no time.
         assert_eq!(instants(&capture), [3, 5_000_000_000, 101_000_000_000]);
         assert_eq!(capture.contents.kinds, [("UDP".into(), 3), ("UDP without a time".into(), 1)].into());
-        // A later section may have the other order, and numbers its interfaces anew; without an option they count microseconds.
+        // A later section may have another byte order, and numbers its interfaces anew. Without an option, timestamps count microseconds.
         let other = if order == Octets::Big { Octets::Little } else { Octets::Big };
         let second = [section(other), interface(other, 1, 0, &[]), enhanced(other, 0, 9, &packet(0, 5, b"five"), &[])].concat();
         assert_eq!(instants(&read(&[first, second].concat())), [3, 9_000, 5_000_000_000, 101_000_000_000]);
     }
 }
 
-/// A frame that was being written when the program was stopped.
+/// The last frame was being written when the program stopped.
 #[test]
 fn a_file_that_ends_within_a_block_is_read_up_to_there() {
     let order = Octets::Big;

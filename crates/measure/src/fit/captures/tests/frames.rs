@@ -1,10 +1,10 @@
-//! Frames of each link type, headers on the way to UDP, and what is counted instead.
+//! Frames of each link type, headers before UDP, and counts of other frames.
 
 use super::super::End;
 use super::super::contents::Capture;
 use super::build::{Octets, Shot, cut, ethernet, file, ipv4, ipv6, packet, pcap, shot, udp};
 
-/// Kinds of the frames of a capture that holds one datagram besides them, which goes first.
+/// Returns the kinds of frames in a capture with these frames after a single datagram.
 fn kinds(link_type: u32, frames: &[Vec<u8>]) -> Vec<(String, usize)> {
     let shots: Vec<Shot> = frames.iter().map(|octets| shot(0, octets.clone())).collect();
     let error = Capture::read(End::Receiver, pcap(Octets::Little, 0xA1B2_C3D4, link_type, &shots).as_slice(), None).unwrap_err();
@@ -59,9 +59,9 @@ fn frames_of_each_link_type_are_read() {
         (105, of(&[&[0x88, 0x02, 0, 0][..], &address(20), &[0, 0]].concat(), &snap(&v4))),
         (105, of(&[&[0x08, 0x03, 0, 0][..], &address(26)].concat(), &snap(&v4))),
         (105, of(&[&[0x88, 0x82, 0, 0][..], &address(20), &[0, 0, 1, 1, 1, 1]].concat(), &snap(&v4))),
-        // Radiotap: 8 octets and no field.
+        // Radiotap with 8 octets and no field.
         (127, of(&[&[0, 0, 8, 0, 0, 0, 0, 0, 0x08, 0x01, 0, 0][..], &address(20)].concat(), &snap(&v4))),
-        // Two words of fields, a time at octet 16, then flags with "padded": the header of 26 octets takes 28.
+        // Two words of flags, a time at octet 16, then flags with "padded": the header of 26 octets takes 28.
         (
             127,
             of(
@@ -75,18 +75,18 @@ fn frames_of_each_link_type_are_read() {
     }
 }
 
-/// RFC 8200, section 4: every header tells the next one and, but for fragments, its length.
+/// RFC 8200, section 4: each header names the next header and, except for fragments, its own length.
 #[test]
 fn extension_headers_of_ipv6_are_passed() {
     let header = |next: u8, octets: usize| [&[next, u8::try_from(octets / 8 - 1).unwrap()][..], &vec![1; octets - 2]].concat();
     let datagram = udp(5000, b"hi");
-    // Hop by hop, destination, routing, authentication (whose length counts four octets), mobility, and a fragment that is the whole packet.
+    // Hop by hop, destination, routing, authentication (with a length in units of four octets), mobility, and a fragment header of a whole packet.
     let authentication = [&[135_u8, 4][..], &[1; 22]].concat();
     let whole_fragment = [17, 0, 0, 0, 0, 0, 0, 9];
     let all = [header(60, 8), header(43, 24), header(51, 16), authentication, header(44, 8), whole_fragment.to_vec(), datagram.clone()].concat();
     reads(101, &ipv6(0, &all));
     reads(101, &ipv4(1, 51, &[&[17_u8, 4][..], &[1; 22], &datagram].concat()));
-    // The first fragment of several, and a later one.
+    // The first fragment of several, and a later fragment.
     for field in [[0, 1], [0, 8]] {
         let fragment = [&[17, 0, field[0], field[1], 0, 0, 0, 9][..], &datagram].concat();
         assert_eq!(kinds(101, &[ipv6(0, &[header(44, 8), fragment].concat())]), [("fragments of IPv6".into(), 1)]);
@@ -165,7 +165,7 @@ fn a_capture_without_datagrams_says_what_it_holds() {
         said(&file(&[arp.clone(), arp.clone()])[..40], None),
         "the capture of the receiver holds no frame, then the file ends within a block: expected UDP datagrams of the link"
     );
-    // A datagram without an identification, of whose payload nothing was captured, cannot be told from another.
+    // A datagram without an identification and without captured payload cannot be distinguished from others.
     let short = cut(&packet(0, 0, b"hi"), 42);
     assert_eq!(
         said(&file(&[arp, short]), None),

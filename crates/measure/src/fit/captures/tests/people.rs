@@ -1,11 +1,11 @@
-//! Captures as they come from computers: begun at different times, with frames that are cut, doubled, or joined.
+//! Captures as made in practice: begun at different times, with cut, doubled or joined frames.
 
 use super::super::{CaptureError, Matched, between};
 use super::build::{Octets, Shot, cut, enhanced, ethernet, file, interface, ipv4, ipv6, packet, section, shot, udp};
 
 const MS: u64 = 1_000_000;
 
-/// The payload of a packet: its number, and what follows from it.
+/// Payload of a packet: its number, and octets that follow from the number.
 fn payload(number: u32, length: usize) -> Vec<u8> {
     let mut state = number;
     let more = std::iter::repeat_with(|| {
@@ -19,12 +19,12 @@ fn id(number: u32) -> u16 {
     u16::try_from(number + 1).unwrap()
 }
 
-/// A packet each millisecond.
+/// A sent packet, one per millisecond.
 fn sent(number: u32) -> Shot {
     packet(u64::from(number) * MS, id(number), &payload(number, 64))
 }
 
-/// The same, 20 ms later.
+/// The arrival of a packet, 20 ms later.
 fn arrived(number: u32) -> Shot {
     Shot { nanos: (u64::from(number) + 20) * MS, ..sent(number) }
 }
@@ -33,13 +33,13 @@ fn read(sender: &[Shot], receiver: &[Shot]) -> Matched {
     between(file(sender).as_slice(), file(receiver).as_slice(), None).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Lost, and the delays of all others \[ms\].
+/// Number of lost packets, and the delays of the others \[ms\].
 fn summary(matched: &Matched) -> (usize, Vec<u32>) {
     let delays = matched.measurements.packets().iter().filter_map(|packet| packet.delay_s);
     (matched.unmatched_sent, delays.map(|delay| (0..100).find(|ms| (delay - f64::from(*ms) * 1e-3).abs() < 1e-9).unwrap()).collect())
 }
 
-/// Of 100 packets, 10 are lost and 90 delivered; the receiver's capture misses the first 30 and the last 20 packets.
+/// Of 100 packets, 10 are lost and 90 delivered. The receiver's capture misses the first 30 and the last 20 packets.
 #[test]
 fn loss_is_judged_where_both_captures_ran() {
     let all: Vec<Shot> = (0..100).map(sent).collect();
@@ -48,7 +48,7 @@ fn loss_is_judged_where_both_captures_ran() {
     assert_eq!(matched.left_out, [30, 20]);
     assert_eq!((summary(&matched), matched.measurements.packets().len()), ((5, vec![20; 45]), 50));
     assert_eq!(matched.measurements.packets()[0].sent_s, 0.0);
-    // Frames of another kind show that the capture ran: then packets at both ends were lost. The first 10 would have arrived before the first frame.
+    // Other frames show that the capture ran, so packets at both ends were lost. The first 10 would have arrived before the first frame.
     let other = |nanos| shot(nanos, ethernet(0x0806, &[0; 28]));
     let busy: Vec<Shot> = [vec![other(30 * MS)], received, vec![other(300 * MS)]].concat();
     let matched = read(&all, &busy);
@@ -62,12 +62,12 @@ fn captures_of_other_packets_are_refused() {
     assert!(error.to_string().starts_with("none of 2 datagrams of the sender is among the 1 of the receiver"), "{error}");
 }
 
-/// A capture of a bridge and of the port behind it: two interfaces of one file, each of which shows each packet.
+/// A capture of a bridge and of a port of the bridge: two interfaces in a file, each showing every packet.
 #[test]
 fn a_packet_that_two_interfaces_show_is_one_packet() {
     for with_identification in [true, false] {
         let order = Octets::Little;
-        // Without an identification: IPv6.
+        // IPv6 has no identification.
         let frame = |number: u32| {
             let datagram = udp(5000, &payload(number, 64));
             if with_identification { sent(number) } else { shot(0, ethernet(0x86DD, &ipv6(17, &datagram))) }
@@ -82,13 +82,13 @@ fn a_packet_that_two_interfaces_show_is_one_packet() {
             (0..100).filter(|number| number % 10 != 3).map(|number| Shot { nanos: arrived(number).nanos, ..frame(number) }).collect();
         let matched = between(doubled.as_slice(), file(&received).as_slice(), None).unwrap();
         assert_eq!((summary(&matched), matched.sender.seen_again), ((10, vec![20; 90]), 100), "{with_identification}");
-        // The other way round the second views are no copies.
+        // In the other direction, the second views do not count as copies.
         let matched = between(file(&received).as_slice(), doubled.as_slice(), None).unwrap();
         assert_eq!((matched.unmatched_sent, matched.unmatched_arrived, matched.receiver.seen_again), (0, 10, 100));
     }
 }
 
-/// A mirrored port: two frames, one like the other. Twenty of a hundred packets are lost.
+/// A mirrored port shows each frame twice. Twenty of a hundred packets are lost.
 #[test]
 fn a_frame_that_is_shown_twice_is_one_packet() {
     for with_identification in [true, false] {
@@ -100,7 +100,7 @@ fn a_frame_that_is_shown_twice_is_one_packet() {
     }
 }
 
-/// A second view at the receiver has the same payload as the lost packet after it, and is not taken for it.
+/// A second view at the receiver has the payload of the lost packet after it, and must not be taken for that packet.
 #[test]
 fn a_second_view_does_not_hide_a_loss() {
     let state = |nanos, number| packet(nanos, number, b"the same state");
@@ -110,7 +110,7 @@ fn a_second_view_does_not_hide_a_loss() {
     assert_eq!((summary(&matched), matched.unmatched_arrived), ((1, vec![20, 20]), 1));
 }
 
-/// A program that sends each packet twice has two packets, of which both, one or none arrive.
+/// A program that sends each packet twice sends two packets. Both, one or neither can arrive.
 #[test]
 fn a_packet_that_is_sent_twice_is_two_packets() {
     let sent: Vec<Shot> =
@@ -120,7 +120,7 @@ fn a_packet_that_is_sent_twice_is_two_packets() {
     assert_eq!(summary(&read(&sent, &received)), (14, vec![20; 86]));
 }
 
-/// The sender's frames are cut at 96 octets, the receiver's at 60 and at 68: 18 octets of payload are common to all.
+/// Frames are cut at 96 octets by the sender, and at 60 and 68 by the receiver: 18 octets of payload are common to all.
 #[test]
 fn frames_that_were_cut_are_matched_by_what_both_hold() {
     let long = |number: u32, nanos: u64, identification: u16| packet(nanos, identification, &payload(number, 800));
@@ -134,25 +134,25 @@ fn frames_that_were_cut_are_matched_by_what_both_hold() {
         let matched = read(&sent, &received.collect::<Vec<_>>());
         assert_eq!((summary(&matched), matched.ambiguous), ((10, vec![20; 90]), 0), "{lengths:?}");
     }
-    // The same beginning, but other lengths: not the same datagram.
+    // Datagrams with the same beginning and other lengths are different datagrams.
     let [short, longer] = [700, 900].map(|length| cut(&packet(0, 0, &payload(1, length)), 70));
     let twice = |shot: &Shot| file(&[shot.clone(), shot.clone()]);
     assert!(between(twice(&short).as_slice(), twice(&longer).as_slice(), None).is_err());
 }
 
-/// Whole frames of which only the first octets agree are different datagrams, also where others were cut.
+/// Whole frames with only the first octets in common are different datagrams, even if other frames were cut.
 #[test]
 fn a_common_beginning_is_not_enough_where_more_is_held() {
     let with_end = |end: u8| [&payload(1, 300)[..], &[end]].concat();
     let cut_one = |nanos| cut(&packet(nanos, 0, &payload(2, 301)), 62);
     let sent = [packet(0, 0, &with_end(1)), cut_one(MS)];
-    // A frame of another kind, so that the first datagram is judged.
+    // Begins with a frame of another kind, so that the first datagram is judged.
     let arrived = [shot(0, ethernet(0x0806, &[0; 28])), cut_one(2 * MS), packet(20 * MS, 0, &with_end(2)), cut_one(60 * MS)];
     let matched = read(&sent, &arrived);
     assert_eq!((matched.left_out, matched.unmatched_sent), ([0, 0], 1));
 }
 
-/// Packets of 100 octets, in groups; a group is one datagram with the identification of its first packet. The last of 60 packets has 40 octets.
+/// Makes packets of 100 octets in groups. A group is a datagram with the identification of its first packet. The last of 60 packets has 40 octets.
 fn groups(sizes: &[usize], nanos: impl Fn(u32) -> u64, is_lost: impl Fn(u32) -> bool, identified: bool) -> Vec<Shot> {
     let mut number = 0;
     let mut shots = Vec::new();
@@ -170,13 +170,13 @@ fn groups(sizes: &[usize], nanos: impl Fn(u32) -> u64, is_lost: impl Fn(u32) -> 
     shots
 }
 
-/// The sender hands five packets at once to the network card. The receiver shows single packets, or joins two.
+/// The sender passes five packets at once to the network card. The receiver shows single packets, or joins two.
 #[test]
 fn super_packets_are_matched_with_the_packets_that_they_become() {
     for identified in [true, false] {
         for (ours, theirs) in [(&[5][..], &[1][..]), (&[5], &[2]), (&[1], &[3]), (&[4, 1], &[1, 2])] {
             let is_lost = |number: u32| number % 15 == 7;
-            // A datagram that both ends show as one arrives as one.
+            // A datagram shown as one by both ends arrives as one.
             let sent = groups(ours, |number| u64::from(number / 5 * 5) * MS, |_| false, identified);
             let received = groups(theirs, |number| u64::from(number / 5 * 5 + 20) * MS, is_lost, identified);
             let matched = read(&sent, &received);
@@ -187,7 +187,7 @@ fn super_packets_are_matched_with_the_packets_that_they_become() {
     }
 }
 
-/// Frames that were cut show the first packet of a long datagram alone: 12 datagrams of 5 packets, of which every fourth datagram is lost at the first packet.
+/// Cut frames show only the first packet of a long datagram. Of 12 datagrams with 5 packets each, every fourth is lost at the first packet.
 #[test]
 fn of_super_packets_that_were_cut_the_first_packet_is_judged() {
     for identified in [true, false] {
@@ -197,7 +197,7 @@ fn of_super_packets_that_were_cut_the_first_packet_is_judged() {
         let received = short(groups(&[1], |number| u64::from(number / 5 * 5 + 20) * MS, is_lost, identified));
         let matched = read(&sent, &received);
         assert_eq!((summary(&matched), matched.sender.super_packets), ((3, vec![20; 9]), 9));
-        // The receiver joins packets: those after the first are neither lost nor delivered.
+        // The receiver joins packets. Packets after the first count neither as lost nor as delivered.
         let sent = short(groups(&[1], |number| u64::from(number) * MS, |_| false, identified));
         let received = short(groups(&[5], |number| u64::from(number + 20) * MS, |_| false, identified));
         let matched = read(&sent, &received);
@@ -205,7 +205,7 @@ fn of_super_packets_that_were_cut_the_first_packet_is_judged() {
     }
 }
 
-/// Large lost packets whose ends are zeros, beside foreign ones with the same ends, and small packets of zeros: nothing is split.
+/// Large lost packets ending in zeros, foreign packets with the same ends, and small packets of zeros: no datagram is split.
 #[test]
 fn padding_makes_no_super_packets() {
     let padded = |number: u32, length: usize| [&payload(number, 16)[..], &vec![0; length - 16]].concat();
