@@ -1,10 +1,10 @@
-//! An axis: its name, symbol and unit, its scale and range.
+//! Axes: name, symbol, unit, scale and range.
 
 use crate::extent::{Extent, Scale, count};
 use crate::text::Text;
 use crate::ticks::Ticks;
 
-/// One axis of a panel.
+/// An axis of a panel.
 ///
 /// ```
 /// use cohaptic_picture::Axis;
@@ -19,16 +19,21 @@ pub struct Axis {
     symbol: Text,
     unit: String,
     pub(crate) scale: Scale,
+    /// Range set by the caller; `None` for the range of the content.
     range: Option<(f64, f64)>,
+    /// Values that must lie in the range.
     includes: Vec<f64>,
+    /// Number whose multiples are the only ticks; `None` for free ticks.
     multiples: Option<u32>,
     ends_at_ticks: bool,
+    /// Whether the axis ends at the content, without a margin.
     tight: bool,
+    /// Names at 0, 1, 2 and so on; empty for a numeric axis.
     categories: Vec<Text>,
 }
 
 impl Axis {
-    /// A linear axis over all of the content, with a margin.
+    /// Creates a linear axis that covers all content, with a margin.
     #[must_use]
     pub fn new(name: impl Into<Text>) -> Self {
         Self {
@@ -45,32 +50,32 @@ impl Axis {
         }
     }
 
-    /// With a symbol, as [`Text::math`]: `K_T`.
+    /// Sets the symbol, in the notation of [`Text::math`]: `K_T`.
     #[must_use]
     pub fn symbol(self, symbol: &str) -> Self {
         Self { symbol: Text::math(symbol), ..self }
     }
 
-    /// With a unit, which is shown in brackets.
+    /// Sets the unit, shown in brackets.
     #[must_use]
     pub fn unit(self, unit: impl Into<String>) -> Self {
         Self { unit: unit.into(), ..self }
     }
 
-    /// With a logarithmic scale.
+    /// Makes the scale logarithmic.
     #[must_use]
     pub fn logarithmic(self) -> Self {
         Self { scale: Scale::Logarithmic, ..self }
     }
 
-    /// From one value to another, whatever the content; lines are cut at the ends. Ends that are equal or not finite are made different.
+    /// Sets the range, whatever the content. Lines are cut at the ends. Equal or infinite ends are replaced by usable ones.
     #[must_use]
     pub fn range(self, low: f64, high: f64) -> Self {
         Self { range: Some((low.min(high), low.max(high))), ..self }
     }
 
-    /// Of names: the first at 0, the next at 1, and so on, from half a step before the first to half a step behind the last. Made for axes that run upwards, where
-    /// names are beneath each other.
+    /// Labels the axis with names: the first at 0, the second at 1, and so on. The range reaches half a step beyond the first and the last name. Meant for
+    /// vertical axes, where names stand above each other.
     #[must_use]
     pub fn categories<T: Into<Text>>(self, names: impl IntoIterator<Item = T>) -> Self {
         let categories: Vec<Text> = names.into_iter().map(Into::into).collect();
@@ -78,32 +83,32 @@ impl Axis {
         Self { categories, ..axis }
     }
 
-    /// Reaches this value at least: 0 for quantities that are compared by length.
+    /// Extends the range to a value, for example to 0 for quantities compared by length.
     #[must_use]
     pub fn include(mut self, value: f64) -> Self {
         self.includes.push(value);
         self
     }
 
-    /// Ends where the content ends, without a margin.
+    /// Ends the axis at the content, without a margin.
     #[must_use]
     pub fn tight(self) -> Self {
         Self { tight: true, ..self }
     }
 
-    /// Has ticks at multiples of this number only: 20 for decibels, 45 for degrees, 1 for counts.
+    /// Restricts ticks to multiples of a number, at least 1: 20 for decibels, 45 for degrees, 1 for counts.
     #[must_use]
     pub fn multiples_of(self, step: u32) -> Self {
         Self { multiples: Some(step.max(1)), ..self }
     }
 
-    /// Ends at ticks.
+    /// Extends the range to the next ticks.
     #[must_use]
     pub fn ends_at_ticks(self) -> Self {
         Self { ends_at_ticks: true, ..self }
     }
 
-    /// Name, symbol and unit, the unit with a power of ten that the numbers at the ticks are to be multiplied by.
+    /// Returns the title: name, symbol and unit, with the power of ten by which the tick labels must be multiplied.
     pub(crate) fn title(&self, exponent: i32) -> Text {
         let mut title = self.name.clone();
         if !self.symbol.is_empty() {
@@ -122,9 +127,10 @@ impl Axis {
         title.then(self.unit.as_str()).then("]")
     }
 
-    /// From where to where it shows, if the content reaches over these values.
+    /// Returns the range shown for content between two values; `None` for no content.
     pub(crate) fn shown(&self, content: Option<(f64, f64)>) -> Extent {
         let usable = |value: &f64| value.is_finite() && (self.scale == Scale::Linear || *value > 0.0);
+        // Larger values would overflow in the computation of places.
         let limit = |value: f64| value.clamp(-1e300, 1e300);
         let (low, high) = match self.range {
             Some((low, high)) if usable(&low) && usable(&high) => (limit(low), limit(high)),
@@ -139,13 +145,14 @@ impl Axis {
             }
         };
         let margin = if self.tight || self.range.is_some() { 0.0 } else { 0.05 };
+        // A value set by `include` is an intended end, such as 0, and gets no margin.
         let held = |end: f64| self.includes.iter().any(|value| value.to_bits() == end.to_bits());
         let margins = (if held(low) { 0.0 } else { margin }, if held(high) { 0.0 } else { margin });
         let extent = Extent::new(self.scale, low, high, margins);
         if self.ends_at_ticks { extent.widened_to_ticks(self.multiples) } else { extent }
     }
 
-    /// Ticks, of which there are about `most` at most.
+    /// Returns ticks, about `most` at most.
     pub(crate) fn ticks(&self, extent: Extent, most: usize) -> Ticks {
         if self.categories.is_empty() { Ticks::of(extent, most, self.multiples) } else { Ticks::named(&self.categories) }
     }
@@ -165,7 +172,7 @@ mod tests {
         }
     }
 
-    /// Decimal logarithms lie between −300 and 300; half way between them is 1.
+    /// The decimal logarithms run from −300 to 300, so 1 lies halfway.
     #[test]
     fn hundreds_of_decades_are_an_axis_too() {
         let extent = Axis::new("").logarithmic().range(1e-300, 1e300).shown(None);

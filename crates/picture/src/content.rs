@@ -1,27 +1,28 @@
-//! What a panel shows: lines, bands, regions, heat maps, marks.
+//! Contents of a panel: lines, bands, regions, heat maps and marks.
 
 use crate::extent::{Extent, Scale, count};
 use crate::look::{Fill, Look, Marker};
 use crate::text::Text;
 
-/// Points joined by a line, marked, or both. A point that is not finite parts the line.
+/// Points joined by a line, marked, or both. The line is interrupted at a point that is not finite.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Line {
     pub(crate) name: Text,
     pub(crate) look: Look,
+    /// Parts of the line, each with at least one point. All points are finite.
     pub(crate) runs: Vec<Vec<(f64, f64)>>,
     pub(crate) joined: bool,
     pub(crate) marker: Option<Marker>,
 }
 
 impl Line {
-    /// A line through these points.
+    /// Creates a line through points.
     #[must_use]
     pub fn new(points: impl IntoIterator<Item = (f64, f64)>, look: Look) -> Self {
         Self::runs([points], look)
     }
 
-    /// A line in parts that are not joined.
+    /// Creates a line of several parts, not joined to each other.
     #[must_use]
     pub fn runs<P: IntoIterator<Item = (f64, f64)>>(runs: impl IntoIterator<Item = P>, look: Look) -> Self {
         let mut parted: Vec<Vec<(f64, f64)>> = Vec::new();
@@ -38,7 +39,7 @@ impl Line {
         Self { name: Text::default(), look, runs: parted, joined: true, marker: None }
     }
 
-    /// Stairs: each value holds until the next x.
+    /// Creates a step line: each value holds until the next x.
     #[must_use]
     pub fn steps(points: impl IntoIterator<Item = (f64, f64)>, look: Look) -> Self {
         let mut stairs: Vec<(f64, f64)> = Vec::new();
@@ -51,7 +52,7 @@ impl Line {
         Self::new(stairs, look)
     }
 
-    /// The empirical distribution function of these values: the share of them that is no larger. Values that are not finite are left out.
+    /// Creates the empirical distribution function of values: at x, the share of values at or below x. Ignores values that are not finite.
     #[must_use]
     pub fn distribution(values: impl IntoIterator<Item = f64>, look: Look) -> Self {
         let mut values: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
@@ -62,54 +63,54 @@ impl Line {
         Self::steps(first.into_iter().chain(shares), look)
     }
 
-    /// A level line at this y over the whole panel.
+    /// Creates a horizontal reference line over the whole panel.
     #[must_use]
     pub fn level(y: f64) -> Self {
         Self::new([(f64::MIN, y), (f64::MAX, y)], Look::reference())
     }
 
-    /// An upright line at this x over the whole panel.
+    /// Creates a vertical reference line over the whole panel.
     #[must_use]
     pub fn upright(x: f64) -> Self {
         Self::new([(x, f64::MIN), (x, f64::MAX)], Look::reference())
     }
 
-    /// With a name, for the legend.
+    /// Sets the name for the legend.
     #[must_use]
     pub fn named(self, name: impl Into<Text>) -> Self {
         Self { name: name.into(), ..self }
     }
 
-    /// With another look.
+    /// Sets the look.
     #[must_use]
     pub fn look(self, look: Look) -> Self {
         Self { look, ..self }
     }
 
-    /// With each point marked. Points that lie on each other are marked once.
+    /// Marks each point. Points at the same place are marked once.
     #[must_use]
     pub fn marked(self, marker: Marker) -> Self {
         Self { marker: Some(marker), ..self }
     }
 
-    /// Marks alone, without the line.
+    /// Marks each point, and leaves out the line.
     #[must_use]
     pub fn marks_only(self, marker: Marker) -> Self {
         Self { joined: false, ..self.marked(marker) }
     }
 }
 
-/// The area between two curves, such as two quantiles, or the lowest and highest value.
+/// The area between two curves, such as two quantiles, or minimum and maximum.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Band {
     pub(crate) name: Text,
     pub(crate) fill: Fill,
-    /// (x, low, high)
+    /// Parts of the band as (x, low, high), each with at least two points. All numbers are finite.
     pub(crate) runs: Vec<Vec<(f64, f64, f64)>>,
 }
 
 impl Band {
-    /// Between low and high over x; (x, low, high) that is not finite parts it.
+    /// Creates a band of (x, low, high). The band is interrupted at a point that is not finite.
     #[must_use]
     pub fn new(points: impl IntoIterator<Item = (f64, f64, f64)>, fill: Fill) -> Self {
         let mut runs = vec![Vec::new()];
@@ -123,14 +124,14 @@ impl Band {
         Self { name: Text::default(), fill, runs }
     }
 
-    /// With a name, for the legend.
+    /// Sets the name for the legend.
     #[must_use]
     pub fn named(self, name: impl Into<Text>) -> Self {
         Self { name: name.into(), ..self }
     }
 }
 
-/// An area within closed outlines. What lies within an even number of them is outside: a hole is one more outline.
+/// An area inside closed outlines. A place inside an even number of outlines is outside, so an inner outline is a hole.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Region {
     pub(crate) name: Text,
@@ -139,27 +140,28 @@ pub struct Region {
 }
 
 impl Region {
-    /// Within these outlines; an outline ends where it begins without saying so.
+    /// Creates a region from outlines, closed automatically. Ignores outlines of fewer than three points, or with a point that is not finite.
     #[must_use]
     pub fn new(outlines: impl IntoIterator<Item = Vec<(f64, f64)>>, fill: Fill) -> Self {
         let finite = |outline: &Vec<(f64, f64)>| outline.len() > 2 && outline.iter().all(|(x, y)| x.is_finite() && y.is_finite());
         Self { name: Text::default(), fill, outlines: outlines.into_iter().filter(finite).collect() }
     }
 
-    /// The cells (column, row) of a grid for which `shown` holds. Values are those at the middles of columns and rows, rising; a cell reaches half way to the
-    /// next, and the outermost end at their values.
+    /// Creates a region of the grid cells (column, row) with `shown` true. `xs` and `ys` are values at the centres of columns and rows, ascending. A cell
+    /// reaches halfway to the next centre, and an outermost cell ends at its centre.
     #[must_use]
     pub fn cells(xs: &[f64], ys: &[f64], fill: Fill, shown: impl Fn(usize, usize) -> bool) -> Self {
         Self::between(&edges(xs), &edges(ys), fill, shown)
     }
 
-    /// The cells (column, row) of a grid for which `shown` holds, between those edges, rising: one more than there are columns, and rows.
+    /// Creates a region of the grid cells (column, row) with `shown` true. `columns` and `rows` are the edges of the cells, ascending, one more than cells.
     #[must_use]
     pub fn between(columns: &[f64], rows: &[f64], fill: Fill, shown: impl Fn(usize, usize) -> bool) -> Self {
         let (across, up) = (columns.len().saturating_sub(1), rows.len().saturating_sub(1));
         let mut outlines = Vec::new();
         for row in 0..up {
             let mut column = 0;
+            // Neighbouring cells of a row become one rectangle, which keeps the document small.
             while column < across {
                 let begin = column;
                 while column < across && shown(column, row) {
@@ -176,49 +178,50 @@ impl Region {
         Self { name: Text::default(), fill, outlines }
     }
 
-    /// With a name, for the legend.
+    /// Sets the name for the legend.
     #[must_use]
     pub fn named(self, name: impl Into<Text>) -> Self {
         Self { name: name.into(), ..self }
     }
 }
 
-/// A value for each cell of a grid as a colour, with a colour bar at the right of the panel. The colours are cividis: their lightness rises evenly, and they are
-/// seen alike with and without colour blindness (Nuñez, Anderton & Renslow 2018).
+/// A grid of values shown as colours, with a colour bar to the right of the panel. The colours are cividis: their lightness rises evenly, and they look
+/// alike with and without colour blindness (Nuñez, Anderton & Renslow 2018).
 #[derive(Clone, PartialEq, Debug)]
 pub struct HeatMap {
-    /// Where columns and rows begin and end: one more than there are of them.
+    /// Edges of the columns and of the rows, one more than columns and rows.
     pub(crate) columns: Vec<f64>,
     pub(crate) rows: Vec<f64>,
-    /// By row, then column.
+    /// Values, indexed by row, then by column.
     pub(crate) values: Vec<Vec<f64>>,
     pub(crate) axis: crate::Axis,
 }
 
 impl HeatMap {
-    /// Values by row (y), then column (x), at these places, rising; those that are not finite have no colour. The axis is that of the colours.
+    /// Creates a map of values, indexed by row (y), then by column (x), at ascending centres. Values that are not finite have no colour. `axis` is the axis
+    /// of the colour bar.
     ///
     /// # Panics
     ///
-    /// If there are not as many rows and columns of values as places.
+    /// If the numbers of rows and columns of values differ from the numbers of centres.
     #[must_use]
     pub fn new(xs: &[f64], ys: &[f64], values: Vec<Vec<f64>>, axis: crate::Axis) -> Self {
         assert!(values.len() == ys.len() && values.iter().all(|row| row.len() == xs.len()), "a value for each cell");
         Self { columns: edges(xs), rows: edges(ys), values, axis }
     }
 
-    /// Values by row (y), then column (x), of cells between those edges, rising: one more than there are columns, and rows.
+    /// Creates a map of values, indexed by row (y), then by column (x), of cells between ascending edges, one more than cells.
     ///
     /// # Panics
     ///
-    /// If there are not as many rows and columns of values as the edges hold.
+    /// If the numbers of rows and columns of values do not fit the numbers of edges.
     #[must_use]
     pub fn between(columns: Vec<f64>, rows: Vec<f64>, values: Vec<Vec<f64>>, axis: crate::Axis) -> Self {
         assert!(values.len() + 1 == rows.len() && values.iter().all(|row| row.len() + 1 == columns.len()), "a value for each cell");
         Self { columns, rows, values, axis }
     }
 
-    /// The lowest and highest value.
+    /// Returns the range of the colours, from the lowest to the highest value.
     pub(crate) fn extent(&self) -> Extent {
         let logarithmic = self.axis.scale == Scale::Logarithmic;
         let finite = self.values.iter().flatten().copied().filter(|value| value.is_finite() && (!logarithmic || *value > 0.0));
@@ -226,7 +229,7 @@ impl HeatMap {
     }
 }
 
-/// Short marks at the foot of the panel, such as the instants of losses.
+/// Short marks at the foot of the panel, such as instants of losses.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Rug {
     pub(crate) name: Text,
@@ -235,27 +238,27 @@ pub struct Rug {
 }
 
 impl Rug {
-    /// A mark at each x.
+    /// Creates a mark at each x. Ignores values that are not finite.
     #[must_use]
     pub fn new(xs: impl IntoIterator<Item = f64>, look: Look) -> Self {
         Self { name: Text::default(), look, xs: xs.into_iter().filter(|x| x.is_finite()).collect() }
     }
 
-    /// With a name, for the legend.
+    /// Sets the name for the legend.
     #[must_use]
     pub fn named(self, name: impl Into<Text>) -> Self {
         Self { name: name.into(), ..self }
     }
 }
 
-/// Anything that a panel can show.
+/// Content of a panel, of any kind.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Content {
-    /// A line or marks.
+    /// A line, marks, or both.
     Line(Line),
     /// An area between two curves.
     Band(Band),
-    /// An area within outlines.
+    /// An area inside outlines.
     Region(Region),
     /// A grid of colours.
     HeatMap(HeatMap),
@@ -274,12 +277,13 @@ macro_rules! content_from {
 }
 content_from!(Line, Band, Region, HeatMap, Rug);
 
-/// Lowest and highest x, and y; `None` where there is no value.
+/// Ranges of x and of y, each from lowest to highest; `None` without a value.
 pub(crate) type Reach = (Option<(f64, f64)>, Option<(f64, f64)>);
 
 impl Content {
-    /// Lowest and highest x, and y, of all content but endless lines and values without a place on axes of these scales.
+    /// Returns the ranges of x and y of the content. Ignores reference lines, which have no end, and values without a place on axes of the given scales.
     pub(crate) fn extents(&self, x: Scale, y: Scale) -> Reach {
+        // Reference lines reach to ±f64::MAX and must not widen the axes.
         let placed = |scale: Scale| move |value: &f64| value.abs() < f64::MAX && (scale == Scale::Linear || *value > 0.0);
         let of = |points: &mut dyn Iterator<Item = (f64, f64)>| {
             let points: Vec<(f64, f64)> = points.collect();
@@ -295,7 +299,7 @@ impl Content {
     }
 }
 
-/// What two contents reach over together.
+/// Returns the ranges that cover two contents.
 pub(crate) fn together((one_x, one_y): Reach, (other_x, other_y): Reach) -> Reach {
     let join = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
         (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
@@ -308,7 +312,7 @@ fn span(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.fold(None, |found, value| Some(found.map_or((value, value), |(low, high): (f64, f64)| (low.min(value), high.max(value)))))
 }
 
-/// Where cells begin and end whose values are those: half way between them; the outermost end at their values if there is more than one.
+/// Returns the edges of cells with given centres: halfway between centres, and the centre itself at both ends. A single centre gets half a unit on each side.
 pub(crate) fn edges(values: &[f64]) -> Vec<f64> {
     let (Some(first), Some(last)) = (values.first(), values.last()) else { return vec![0.0] };
     if values.len() == 1 {
@@ -318,8 +322,8 @@ pub(crate) fn edges(values: &[f64]) -> Vec<f64> {
     std::iter::once(*first).chain(between).chain([*last]).collect()
 }
 
-/// The edges of cells whose values, rising, are at their middles, for [`HeatMap::between`] and [`Region::between`]: half way to the next along a linear or a
-/// logarithmic axis; the outermost end at their values, so that no axis reaches where no value is.
+/// Returns the edges of cells with given ascending centres, for [`HeatMap::between`] and [`Region::between`]: halfway between centres on a linear or
+/// logarithmic axis, and the centre itself at both ends, so that no axis reaches beyond the values.
 #[must_use]
 pub fn cell_edges(values: &[f64], logarithmic: bool) -> Vec<f64> {
     match values {

@@ -1,4 +1,6 @@
-//! The layout as a document.
+//! Draws a laid out picture as an SVG document.
+//!
+//! Input is a [`Picture`] and its [`Layout`] with all positions; output is text. No position of a text is decided here.
 
 use crate::content::{Band, Content, HeatMap, Line, Region, Rug};
 use crate::extent::{Extent, Scale, count, whole};
@@ -12,11 +14,11 @@ use crate::size::MILLIMETRE;
 use crate::text::{ASCENT, LEADING, Text};
 use crate::xml::{Anchor, Xml, coordinate, escape};
 
-/// From the middle of letters to the line they stand on \[sizes of the font\].
+/// Distance from the middle of letters to the base line \[font sizes\].
 const MIDDLE: f64 = 0.35;
 
 impl Picture {
-    /// The document: valid as a file and as a part of a page of HTML.
+    /// Returns the picture as an SVG document, valid as a file and as a part of an HTML page.
     #[must_use]
     pub fn svg(&self) -> String {
         document(self, &Layout::of(self))
@@ -54,7 +56,7 @@ fn document(picture: &Picture, layout: &Layout) -> String {
     xml.text
 }
 
-/// One panel that is being drawn.
+/// A panel being drawn.
 struct Sheet<'a> {
     xml: &'a mut Xml,
     placed: &'a PanelLayout,
@@ -66,9 +68,10 @@ impl Sheet<'_> {
         self.placed.frame
     }
 
+    /// Returns the pixel position of an x value.
     fn x(&self, value: f64) -> f64 {
         let frame = self.frame();
-        // Far beyond the frame nothing is seen; numbers stay small enough to compute with.
+        // Positions far outside are invisible; the limit keeps later computations finite.
         frame.left + frame.width() * self.placed.extents.x.place(value).clamp(-1e6, 1e6)
     }
 
@@ -77,7 +80,8 @@ impl Sheet<'_> {
         frame.bottom - frame.height() * self.placed.extents.y.place(value).clamp(-1e6, 1e6)
     }
 
-    /// Where a corner of an area is. One at zero or below on a logarithmic axis lies beyond its low end: there the area has no border that could be seen.
+    /// Returns the pixel position of a corner of an area. A value of zero or below on a logarithmic axis is placed below the low end, where the border of
+    /// the area is invisible.
     fn corner(&self, x: f64, y: f64) -> (f64, f64) {
         let reaching = |extent: Extent, value: f64| if extent.scale == Scale::Logarithmic { value.max(f64::MIN_POSITIVE) } else { value };
         let Extents { x: along, y: up } = self.placed.extents;
@@ -85,6 +89,7 @@ impl Sheet<'_> {
     }
 
     fn draw(&mut self, panel: &Panel) {
+        // Areas first, then the grid, then lines, so that neither the grid nor lines are covered.
         for content in &panel.contents {
             match content {
                 Content::HeatMap(map) => self.heat_map(map),
@@ -162,7 +167,7 @@ impl Sheet<'_> {
                 self.xml.line_of_text(label, (frame.left - (TICK + AFTER_TICK) * font, y), font, "ink", Anchor::End);
             }
         }
-        // The last line of a title that runs upwards is next to the axis.
+        // The last line of a rotated title is nearest to the axis, so lines are drawn from the last to the first.
         let mut x = frame.left - placed.y_title_at - (LEADING - ASCENT) * font;
         for line in placed.y.title.iter().rev() {
             self.xml.text_upwards(line, (x, frame.top + 0.5 * frame.height()), font, "ink");
@@ -175,7 +180,7 @@ impl Sheet<'_> {
         let mut seen: Vec<Vec<(f64, f64)>> = Vec::new();
         for run in &line.runs {
             let points: Vec<(f64, f64)> = run.iter().map(|(x, y)| (self.x(*x), self.y(*y))).collect();
-            // A value without a place, such as zero on a logarithmic axis, parts the line.
+            // The line is interrupted at a value without a place, such as zero on a logarithmic axis.
             for part in points.split(|(x, y)| !x.is_finite() || !y.is_finite()).filter(|part| !part.is_empty()) {
                 seen.extend(frame.cut_line(part));
             }
@@ -192,6 +197,7 @@ impl Sheet<'_> {
         if !line.joined {
             return;
         }
+        // A run of a single point has no length and would be invisible as a path; it becomes a dot.
         let (alone, runs): (Vec<_>, Vec<_>) = seen.iter().map(|run| reduced(run)).partition(|run| run.len() == 1);
         if !runs.is_empty() {
             stroke(self.xml, line.look, &data(&runs, false));
@@ -234,7 +240,7 @@ impl Sheet<'_> {
         let mut path = String::new();
         let mut places: Vec<f64> = rug.xs.iter().map(|x| self.x(*x)).filter(|x| frame.contains((*x, frame.bottom))).collect();
         places.sort_by(f64::total_cmp);
-        // Closer than a quarter of a pixel two marks are one.
+        // Two marks closer than a quarter of a pixel look like one.
         places.dedup_by(|one, other| (*one - *other).abs() < 0.25);
         for x in places {
             path.push_str(&format!("M{0},{1}L{0},{2}", coordinate(x), coordinate(frame.bottom), coordinate(frame.bottom - 0.8 * self.font)));
@@ -246,9 +252,10 @@ impl Sheet<'_> {
 
     fn heat_map(&mut self, map: &HeatMap) {
         let extent = map.extent();
+        // Any value inside both scales will do for the coordinate that is ignored; 1 has a place on a logarithmic axis too.
         let (xs, ys): (Vec<f64>, Vec<f64>) =
             (map.columns.iter().map(|x| self.corner(*x, 1.0).0).collect(), map.rows.iter().map(|y| self.corner(1.0, *y).1).collect());
-        // Cells of one colour beside each other are one rectangle; all rectangles of one colour are one path.
+        // Neighbouring cells of the same colour form a rectangle, and all rectangles of a colour form a path, which keeps the document small.
         let mut by_colour: Vec<Vec<Vec<(f64, f64)>>> = vec![Vec::new(); SHADES];
         for (row, values) in map.values.iter().enumerate() {
             let shades: Vec<Option<usize>> = values.iter().map(|value| shade(extent, *value)).collect();
@@ -323,7 +330,7 @@ fn values(axis: &AxisLayout) -> impl Iterator<Item = f64> {
     marks(axis).iter().map(|(value, _)| *value)
 }
 
-/// How many colours a heat map has.
+/// Number of colours of a heat map.
 const SHADES: usize = 64;
 
 fn shade(extent: Extent, value: f64) -> Option<usize> {

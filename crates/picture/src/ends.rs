@@ -1,4 +1,4 @@
-//! Names of lines where they end at the right, moved apart so that none lies on another.
+//! Names of lines at their right ends, moved apart so that no name overlaps another.
 
 use crate::content::{Content, Line};
 use crate::extent::count;
@@ -6,19 +6,20 @@ use crate::look::Look;
 use crate::panel::{Extents, Panel};
 use crate::text::{LEADING, Text};
 
-/// The name of a line beside its end.
+/// Name of a line at the line's end.
 #[derive(Debug)]
 pub(crate) struct EndLabel {
     pub(crate) look: Look,
     pub(crate) lines: Vec<Text>,
-    /// Where the line ends, and the middle of the name: shares of the height of the plot, from its top.
+    /// Position of the line's end, as a share of the plot's height from the top.
     pub(crate) end: f64,
+    /// Position of the middle of the name, as a share of the plot's height from the top.
     pub(crate) middle: f64,
     font: f64,
 }
 
 impl EndLabel {
-    /// Whether a content has its name at its end.
+    /// Returns whether a content can have its name at its end.
     pub(crate) fn is_labelled(content: &Content) -> bool {
         matches!(content, Content::Line(line) if line.joined && line.look.colour.is_some() && !line.name.is_empty() && !line.runs.is_empty())
     }
@@ -28,15 +29,16 @@ impl EndLabel {
         labelled.filter_map(|content| if let Content::Line(line) = content { Some(line) } else { None }).collect()
     }
 
-    /// Whether all names have room above each other, each in up to two lines.
+    /// Returns whether all names fit above each other, with up to two lines each.
     pub(crate) fn fit(panel: &Panel, font: f64, plot_height: f64) -> bool {
-        // The place of a colour bar is taken.
+        // A colour bar occupies the same place.
         panel.heat_map().is_none() && count(2 * Self::labelled(panel).len()) * LEADING * font <= plot_height
     }
 
-    /// The names, moved apart.
+    /// Places the names beside their lines' ends, without overlaps.
     pub(crate) fn of(panel: &Panel, extents: Extents, font: f64, width: f64, plot_height: f64) -> Vec<Self> {
         let label = |line: &Line| {
+            // The last visible point of the line, not the last point.
             let seen = line.runs.iter().flatten().rfind(|(x, _)| (0.0..=1.0).contains(&extents.x.place(*x)));
             let place = seen.map(|(_, y)| extents.y.place(*y)).filter(|place| place.is_finite());
             let end = 1.0 - place.unwrap_or(0.5).clamp(0.0, 1.0);
@@ -57,14 +59,15 @@ impl EndLabel {
     }
 }
 
-/// Moves names that lie on each other apart by as little as it takes: names that touch become a block whose middle is that of where they want to be.
+/// Moves overlapping names apart by the least distance: touching names form a block, placed at the mean of the wanted positions.
 fn spread(labels: &mut [EndLabel], plot_height: f64) {
-    // Blocks of names: (top, height, how many).
+    // Blocks of touching names: top \[px\], height \[px\], number of names.
     let mut blocks: Vec<(f64, f64, usize)> = Vec::new();
     for label in labels.iter() {
         let height = label.height();
         let within = |top: f64, height: f64| top.clamp(0.0, (plot_height - height).max(0.0));
         let mut block = (within(label.end * plot_height - 0.5 * height, height), height, 1);
+        // A merged block can overlap the block before, so merging repeats.
         while let Some(before) = blocks.last().copied().filter(|before| before.0 + before.1 > block.0) {
             blocks.pop();
             let (many, height) = (before.2 + block.2, before.1 + block.1);

@@ -1,41 +1,41 @@
-//! A small bar without text, for a cell of a table: an allowed range and a measured value.
+//! A small bar without text for a table cell: an allowed range with a measured value.
 
 use crate::legend::draw_marker;
 use crate::look::{Look, Marker};
 use crate::xml::{Xml, coordinate};
 
-/// A measured value beside its limits, on an axis that is common to all gauges: the lower limit lies at 0 and the upper one at 1.
+/// A measured value with its limits, on an axis common to all gauges: the lower limit is at 0 and the upper limit at 1.
 ///
-/// With one limit the unit of the axis is the size of that limit, so that zero, or twice the limit, lies at the other end of the allowed range. Values beyond the
-/// axis are drawn at its end, as a triangle that points outwards. What passed is a disc, what failed is a cross.
+/// With a single limit, the unit of the axis is the size of the limit, so the other end of the allowed range is at zero or at twice the limit. A value
+/// beyond the axis is drawn at the end of the axis, as a triangle pointing outwards. A value that passed is a disc, and a value that failed is a cross.
 ///
-/// A gauge has no style sheet of its own: a [`page::Page`](crate::page::Page) shows it.
+/// A gauge has no style sheet of its own, and is shown on a [`page::Page`](crate::page::Page).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Gauge {
-    /// The least value that is allowed.
+    /// Least allowed value; `None` for no lower limit.
     pub low: Option<f64>,
-    /// The greatest value that is allowed.
+    /// Greatest allowed value; `None` for no upper limit.
     pub high: Option<f64>,
-    /// What was measured; `None`: nothing.
+    /// Measured value; `None` for no measurement.
     pub measured: Option<f64>,
-    /// Whether the measured value is as expected.
+    /// Whether the measured value is within the limits.
     pub passed: bool,
 }
 
 const WIDTH: f64 = 160.0;
 const HEIGHT: f64 = 16.0;
-/// The axis reaches this far beyond 0 and 1.
+/// Length of the axis before 0 and after 1.
 const BEYOND: f64 = 0.5;
 
 impl Gauge {
-    /// Where a value lies on the common axis; `None` for NaN.
+    /// Returns the position of a value on the common axis; `None` for NaN.
     #[must_use]
     pub fn place(&self, value: f64) -> Option<f64> {
         let size = |limit: f64| if limit == 0.0 { (value - limit).abs() } else { limit.abs() };
         let share = |distance: f64, unit: f64| if distance == 0.0 { 0.0 } else { distance / unit };
         let place = match (self.low, self.high) {
             (Some(low), Some(high)) if high > low => (value - low) / (high - low),
-            // Both limits are one value, which lies in the middle.
+            // Equal limits are drawn in the middle of the axis.
             (Some(low), Some(_)) => 0.5 + share(value - low, size(low)),
             (Some(low), None) => share(value - low, size(low)),
             (None, Some(high)) => 1.0 + share(value - high, size(high)),
@@ -44,7 +44,7 @@ impl Gauge {
         (!place.is_nan() && !value.is_nan()).then_some(place)
     }
 
-    /// The bar as a part of a page of HTML, which has the style sheet.
+    /// Returns the bar as a part of an HTML page with the style sheet.
     pub(crate) fn svg(&self) -> String {
         let mut xml = Xml::default();
         let x = |place: f64| (0.05 + 0.9 * (place + BEYOND) / (1.0 + 2.0 * BEYOND)) * WIDTH;
@@ -57,6 +57,7 @@ impl Gauge {
         xml.text.push_str(&format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"cohaptic-picture gauge\" role=\"img\" width=\"{WIDTH}\" height=\"{HEIGHT}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\"><title>{said}</title>\n"
         ));
+        // Equal limits leave no range to fill, and are drawn as a single line.
         let single = matches!((self.low, self.high), (Some(low), Some(high)) if high <= low);
         let (from, to) = match (self.low, self.high) {
             (None, None) => (-BEYOND, 1.0 + BEYOND),
@@ -77,7 +78,7 @@ impl Gauge {
             let look = Look::of(if self.passed { 2 } else { 1 });
             let shown = place.clamp(-BEYOND, 1.0 + BEYOND);
             if (place - shown).abs() > 0.0 {
-                // The wide end of the triangle is on the axis, the tip beyond.
+                // The triangle has its base on the end of the axis and its tip outside.
                 let (end, out) = (x(shown), if place > shown { 6.0 } else { -6.0 });
                 let data = format!(
                     "M{0},{1}L{0},{2}L{3},{4}Z",
@@ -124,7 +125,7 @@ mod tests {
         let svg = |measured: f64, passed: bool| Gauge { measured: Some(measured), passed, ..gauge(Some(0.0), Some(1.0)) }.svg();
         assert!(svg(0.5, true).contains("<circle class=\"f2\" cx=\"80\""), "{}", svg(0.5, true));
         assert!(svg(1.25, false).contains("class=\"line s1\"") && !svg(1.25, false).contains("<circle"));
-        // Far beyond the axis a triangle points outwards from its end, at 95 % of the width.
+        // A value far beyond the axis is a triangle at the end, at 95 % of the width.
         assert!(svg(99.0, false).contains("M152,3L152,13L158,8Z") && svg(-99.0, false).contains("M8,3L8,13L2,8Z"), "{}", svg(99.0, false));
         for value in [0.5, 99.0, f64::NAN, f64::INFINITY] {
             assert_eq!(crate::testing::faults(&svg(value, false)), [""; 0]);

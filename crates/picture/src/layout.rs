@@ -1,7 +1,7 @@
-//! Where everything is: texts first, since the room for texts cannot be changed, then the plots in the rest.
+//! Computes the positions of all parts of a picture. Texts have fixed sizes and come first; plots get the remaining room.
 //!
-//! Ticks, wrapped titles and labels depend on the size of the plots, and the size of the plots depends on all of these; so a height is assumed, all is measured, and
-//! where a given height of the picture leaves less, all is measured again with less.
+//! The size of the plots depends on ticks, wrapped titles and labels, whose sizes depend on the size of the plots. So the layout assumes a height of the
+//! plots and measures everything. If a given height of the picture is exceeded, the layout is repeated with less.
 
 use crate::content::{Content, HeatMap};
 use crate::ends::EndLabel;
@@ -13,20 +13,22 @@ use crate::picture::Picture;
 use crate::text::{LEADING, Text};
 use crate::ticks::Ticks;
 
-/// The larger letters of the title \[sizes of the font\].
+/// Size of the letters of the title \[font sizes\].
 pub(crate) const TITLE: f64 = 1.15;
-/// The length of a tick, and the distance of its label \[sizes of the font\].
+/// Length of a tick \[font sizes\].
 pub(crate) const TICK: f64 = 0.35;
+/// Distance from a tick to its label \[font sizes\].
 pub(crate) const AFTER_TICK: f64 = 0.25;
-/// The room around the picture, and between panels \[sizes of the font\].
+/// Margin around the picture and between panels \[font sizes\].
 const MARGIN: f64 = 0.8;
-/// The width of a colour bar \[sizes of the font\].
+/// Width of a colour bar \[font sizes\].
 pub(crate) const BAR: f64 = 0.9;
-/// No plot is smaller than this, whatever size is asked for \[sizes of the font\].
+/// Least width of a plot, whatever the size of the picture \[font sizes\].
 const LEAST_WIDTH: f64 = 7.0;
+/// Least height of a plot, whatever the size of the picture \[font sizes\].
 const LEAST_HEIGHT: f64 = 5.0;
 
-/// The picture with all places \[px\].
+/// Positions of a picture's parts \[px\].
 #[derive(Debug)]
 pub(crate) struct Layout {
     pub(crate) width: f64,
@@ -39,7 +41,7 @@ pub(crate) struct Layout {
     pub(crate) legend_at: (f64, f64),
 }
 
-/// A panel with all places.
+/// Positions of a panel's parts \[px\].
 #[derive(Debug)]
 pub(crate) struct PanelLayout {
     pub(crate) frame: Frame,
@@ -47,13 +49,13 @@ pub(crate) struct PanelLayout {
     pub(crate) title: Vec<Text>,
     pub(crate) x: AxisLayout,
     pub(crate) y: AxisLayout,
-    /// From the left edge of the frame to the middle of its rotated title is this plus half a line.
+    /// Distance from the frame's left edge to the rotated title of the y axis: to its middle, minus half a line.
     pub(crate) y_title_at: f64,
     pub(crate) ends: Vec<EndLabel>,
     pub(crate) bar: Option<AxisLayout>,
 }
 
-/// An axis with its labels: none where another panel shows them.
+/// An axis with ticks, title and labels. Labels are missing if another panel shows them.
 #[derive(Debug, Default)]
 pub(crate) struct AxisLayout {
     pub(crate) ticks: Option<Ticks>,
@@ -62,21 +64,21 @@ pub(crate) struct AxisLayout {
 }
 
 impl AxisLayout {
-    /// Leaves ticks out that are not on the axis.
+    /// Removes ticks outside the range.
     fn leave_out_beyond(&mut self, extent: Extent) {
         if let Some(ticks) = &mut self.ticks {
             ticks.marks.retain(|(value, _)| (0.0..=1.0).contains(&extent.place(*value)));
         }
     }
 
-    /// How wide the labels of the ticks are.
+    /// Returns the width of the widest tick label \[px\].
     pub(crate) fn widest(&self, font: f64) -> f64 {
         let labels = self.ticks.iter().flat_map(|ticks| &ticks.marks).filter(|_| self.labelled);
         labels.map(|(_, label)| label.width(font)).fold(0.0, f64::max)
     }
 }
 
-/// The room at both sides of a frame.
+/// Room left and right of a frame, for labels and colour bars \[px\].
 #[derive(Clone, Copy, Debug)]
 struct Room {
     left: f64,
@@ -95,6 +97,7 @@ impl Layout {
         }
         let extents = picture.extents();
         let mut attempt = Attempt::new(picture, height, &extents);
+        // Each round removes the excess height. The limit of rounds ends the rare case of a wrapped text that changes back and forth.
         if let Some(whole) = picture.size.height {
             for _ in 0..12 {
                 let over = attempt.layout.height - whole;
@@ -108,11 +111,12 @@ impl Layout {
         }
         if picture.equal_units {
             let whole = attempt.layout.height;
-            // Other ticks have labels of other widths, which leave another width to the plots; this settles at once.
+            // New ranges have other ticks with labels of other widths, which change the width of the plots. Three rounds settle this.
             for _ in 0..3 {
                 attempt = Attempt::new(picture, height, &equal_units(&attempt.layout.panels, &extents));
             }
             attempt.layout.height = attempt.layout.height.max(whole);
+            // The frames are final now. A last adjustment makes the units exactly equal, and ticks pushed off an axis are dropped.
             let settled = equal_units(&attempt.layout.panels, &extents);
             for (panel, extents) in attempt.layout.panels.iter_mut().zip(settled) {
                 panel.extents = extents;
@@ -124,7 +128,7 @@ impl Layout {
     }
 }
 
-/// The axes of all panels, widened so that a unit has one length everywhere: the largest at which all that is shown fits.
+/// Widens the axes of all panels to a common length of the unit, the largest for which all content fits.
 fn equal_units(panels: &[PanelLayout], shown: &[Extents]) -> Vec<Extents> {
     let sides = |panel: &PanelLayout, shown: &Extents| [(panel.frame.width(), shown.x), (panel.frame.height(), shown.y)];
     let scales = panels.iter().zip(shown).flat_map(|(panel, shown)| sides(panel, shown)).filter_map(|(length, extent)| Some(length / extent.span()?));
@@ -136,6 +140,7 @@ fn equal_units(panels: &[PanelLayout], shown: &[Extents]) -> Vec<Extents> {
     panels.iter().zip(shown).map(widened).collect()
 }
 
+/// A layout for an assumed height of the plots.
 struct Attempt {
     layout: Layout,
 }
@@ -150,19 +155,22 @@ impl Attempt {
             + LEADING * font * (TITLE * count(title.len()) + count(notes.len()))
             + if title.is_empty() && notes.is_empty() { 0.0 } else { 0.3 * font };
 
+        // Decided per panel before the legend, because names that do not fit at the ends go to the legend.
         let at_ends: Vec<bool> = picture.panels.iter().map(|panel| panel.labels_at_ends && EndLabel::fit(panel, font, plot_height)).collect();
         let entries = entries(&picture.panels, &at_ends);
         let narrow = picture.legend == LegendPlace::Right;
+        // A legend at the right must leave most of the width to the plots.
         let legend_width = if narrow { 0.35 * width } else { width - 2.0 * margin };
         let legend = if picture.legend == LegendPlace::Nowhere { Legend::default() } else { Legend::new(&entries, font, legend_width, narrow) };
         let beside = if narrow && legend.width > 0.0 { legend.width + margin } else { 0.0 };
         let for_panels = width - 2.0 * margin - beside;
 
-        // Upright sizes are known now: y ticks, labels at ends, colour bars.
+        // Vertical sizes are known now, so y ticks, labels at ends and colour bars can be laid out.
         let cell = for_panels / count(columns);
         let mut panels: Vec<PanelLayout> = Vec::new();
         let mut rooms: Vec<Room> = Vec::new();
         for (place, panel) in picture.panels.iter().enumerate() {
+            // With a shared y only the first column has labels.
             let y_labelled = !(picture.shared_y && place % columns != 0);
             let y = upright(&panel.y, extents[place].y, font, plot_height, y_labelled);
             let ends = if at_ends[place] { EndLabel::of(panel, extents[place], font, 0.32 * cell, plot_height) } else { Vec::new() };
@@ -181,7 +189,8 @@ impl Attempt {
             panels.push(PanelLayout { frame, extents: extents[place], title: Vec::new(), x: AxisLayout::default(), y, y_title_at, ends, bar });
         }
 
-        // Ticks along x need the width, which their labels reach over at both ends: found with what it is at most.
+        // Ticks on x need the width of the plots, and their labels reach beyond both ends of the axis. The layout begins with the largest possible width
+        // and repeats with the room of the labels.
         let along = |plot_width: f64| -> Vec<AxisLayout> {
             let axis = |(place, panel): (usize, &Panel)| {
                 let labelled = !(picture.shared_x && place + columns < picture.panels.len());
@@ -201,6 +210,7 @@ impl Attempt {
         let mut axes = along(plot_width_of(&rooms));
         for _ in 0..2 {
             for (room, axis) in rooms.iter_mut().zip(&axes) {
+                // Half of the widest label can reach beyond either end of the axis.
                 let half = 0.5 * axis.widest(font) + 0.1 * font;
                 *room = Room { left: room.left.max(half), right: room.right.max(half) };
             }
@@ -208,6 +218,7 @@ impl Attempt {
         }
         let plot_width = plot_width_of(&rooms);
 
+        // Panels of a row share their top and their bottom, so that frames are aligned.
         let mut tops = vec![0.0_f64; rows];
         let mut bottoms = vec![0.0_f64; rows];
         for (place, (panel, axis)) in panels.iter_mut().zip(axes).enumerate() {
@@ -245,7 +256,7 @@ impl Attempt {
     }
 }
 
-/// The names of all contents, each once; those of lines that have their names at their ends are left out.
+/// Returns sample and name of all named contents, each once. Lines named at their ends are left out.
 fn entries(panels: &[Panel], at_ends: &[bool]) -> Vec<(Sample, Text)> {
     let mut entries: Vec<(Sample, Text)> = Vec::new();
     for (panel, at_ends) in panels.iter().zip(at_ends) {
@@ -260,18 +271,18 @@ fn entries(panels: &[Panel], at_ends: &[bool]) -> Vec<(Sample, Text)> {
     entries
 }
 
-/// An axis that runs upwards, with as many ticks as labels do not touch.
+/// Lays out a vertical axis, with as many ticks as possible without overlapping labels.
 fn upright(axis: &crate::Axis, extent: Extent, font: f64, height: f64, labelled: bool) -> AxisLayout {
     let ticks = thinned(axis, extent, whole(height / (2.0 * font)).clamp(2, 7), |ticks| {
         let places: Vec<f64> = ticks.marks.iter().map(|(value, _)| height * extent.place(*value)).collect();
         places.windows(2).any(|pair| (pair[1] - pair[0]).abs() < LEADING * font)
     });
-    // The title may be a little longer than the plot, but never wider than what a page can show.
+    // The title may be slightly longer than the plot, within the margins.
     let title = if labelled { axis.title(ticks.exponent).wrapped(font, height + 0.7 * font, 3) } else { Vec::new() };
     AxisLayout { ticks: Some(ticks), title, labelled }
 }
 
-/// An axis that runs to the right.
+/// Lays out a horizontal axis, with as many ticks as possible without overlapping labels.
 fn level(axis: &crate::Axis, extent: Extent, font: f64, width: f64, labelled: bool) -> AxisLayout {
     let ticks = thinned(axis, extent, whole(width / (3.0 * font)).clamp(2, 9), |ticks| {
         let spans: Vec<(f64, f64)> = ticks.marks.iter().map(|(value, label)| (width * extent.place(*value), 0.5 * label.width(font))).collect();
@@ -281,7 +292,7 @@ fn level(axis: &crate::Axis, extent: Extent, font: f64, width: f64, labelled: bo
     AxisLayout { ticks: Some(ticks), title, labelled }
 }
 
-/// As many ticks as labels do not touch, `most` of them at most; one where even two labels touch.
+/// Returns at most `most` ticks without overlapping labels, and a single tick if even two labels overlap.
 fn thinned(axis: &crate::Axis, extent: Extent, mut most: usize, crowded: impl Fn(&Ticks) -> bool) -> Ticks {
     let mut ticks = axis.ticks(extent, most);
     while most > 1 && crowded(&ticks) {
@@ -295,7 +306,7 @@ fn thinned(axis: &crate::Axis, extent: Extent, mut most: usize, crowded: impl Fn
 }
 
 impl Panel {
-    /// The heat map with the colour bar: the first.
+    /// Returns the first heat map, the one with the colour bar.
     pub(crate) fn heat_map(&self) -> Option<&HeatMap> {
         self.contents.iter().find_map(|content| if let Content::HeatMap(map) = content { Some(map) } else { None })
     }

@@ -1,4 +1,4 @@
-//! The legend: a sample and a name for each line and area, in rows that break like text.
+//! The legend: a sample and a name for each line and area, in rows wrapped like text.
 
 use crate::content::Content;
 use crate::extent::count;
@@ -6,19 +6,19 @@ use crate::look::{Fill, Look, Marker};
 use crate::text::{ASCENT, LEADING, Text};
 use crate::xml::{Anchor, Xml, coordinate};
 
-/// Where the legend is: never over the plot.
+/// Place of the legend, always outside the plots.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum LegendPlace {
     /// Below the panels.
     #[default]
     Below,
-    /// At the right of the panels.
+    /// To the right of the panels.
     Right,
-    /// Nowhere.
+    /// No legend.
     Nowhere,
 }
 
-/// What stands beside a name.
+/// Sample of a content, drawn before its name.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sample {
     Line { look: Look, joined: bool, marker: Option<Marker> },
@@ -26,7 +26,7 @@ pub(crate) enum Sample {
     Tick(Look),
 }
 
-/// The name and sample of a content that has a name.
+/// Returns sample and name of a content; `None` for a content without a name.
 pub(crate) fn entry(content: &Content) -> Option<(Sample, &Text)> {
     let (sample, name) = match content {
         Content::Line(line) => (Sample::Line { look: line.look, joined: line.joined, marker: line.marker }, &line.name),
@@ -38,7 +38,7 @@ pub(crate) fn entry(content: &Content) -> Option<(Sample, &Text)> {
     (!name.is_empty()).then_some((sample, name))
 }
 
-/// A legend with its places, from its own top left corner \[px\].
+/// Entries of a legend, positioned from the legend's top left corner \[px\].
 #[derive(Debug, Default)]
 pub(crate) struct Legend {
     entries: Vec<Placed>,
@@ -55,14 +55,15 @@ struct Placed {
     lines: Vec<Text>,
 }
 
-/// The width of a sample, and the distance to its name \[sizes of the font\].
+/// Width of a sample \[font sizes\].
 const SAMPLE: f64 = 2.6;
+/// Distance from a sample to its name \[font sizes\].
 const DISTANCE: f64 = 0.5;
-/// Between two entries of a row \[sizes of the font\].
+/// Distance between two entries of a row \[font sizes\].
 const BETWEEN: f64 = 1.6;
 
 impl Legend {
-    /// The entries in rows no wider than that; one each row if `narrow`.
+    /// Lays out entries in rows of at most `width` \[px\], or an entry per row if `narrow`.
     pub(crate) fn new(entries: &[(Sample, Text)], font: f64, width: f64, narrow: bool) -> Self {
         let before = (SAMPLE + DISTANCE) * font;
         let mut legend = Self { font, ..Self::default() };
@@ -125,7 +126,7 @@ fn draw_sample(xml: &mut Xml, sample: Sample, x: f64, y: f64, font: f64) {
     }
 }
 
-/// A path with the stroke of a look.
+/// Draws a path with the stroke of a look.
 pub(crate) fn stroke(xml: &mut Xml, look: Look, data: &str) {
     let class = look.stroke_class();
     let mut attributes = vec![("class", class.as_str()), ("stroke-width", look.width())];
@@ -136,7 +137,7 @@ pub(crate) fn stroke(xml: &mut Xml, look: Look, data: &str) {
     xml.element("path", &attributes);
 }
 
-/// Half the width of a marker \[px\].
+/// Half of the width of a marker \[px\].
 const MARKER: f64 = 2.6;
 
 pub(crate) fn draw_marker(xml: &mut Xml, marker: Marker, look: Look, x: f64, y: f64) {

@@ -1,13 +1,13 @@
-//! Pictures of curves, regions and maps as SVG documents that are fit to print, pages of HTML that show them, and pictures that move.
+//! Draws curves, regions and maps as SVG documents fit for print, HTML pages with them, and moving pictures.
 //!
-//! You need it if your program draws curves, maps or bars for print and for pages.
+//! Use this crate if your program draws curves, maps or bars for print and for pages.
 //!
-//! A [`Picture`] has a title, notes and [`Panel`]s in a grid; a panel has two [`Axis`] and contents: [`Line`], [`Band`], [`Region`], [`HeatMap`], [`Rug`].
-//! Texts wrap and never leave the picture or lie on each other, by widths that no common font exceeds; the legend is outside of the plots; lines differ by
-//! colour and by dashes. A picture is light or dark as its reader prefers, in a file, in an `<img>` and within a page. Text stays text. The [`Size`] is one or
-//! two columns of a paper, a page on a screen, or given. A [`Motion`] shows copies that move.
+//! A [`Picture`] has a title, notes and a grid of [`Panel`]s. A panel has two [`Axis`] and contents: [`Line`], [`Band`], [`Region`], [`HeatMap`], [`Rug`].
+//! Texts are wrapped and never leave the picture or overlap, computed with widths that no common font exceeds. The legend is outside the plots. Lines
+//! differ in colour and in dashes. A picture is light or dark by the reader's preference, in a file, in an `<img>` and in a page. Text stays text. The
+//! [`Size`] is a column or two columns of a paper, a page on a screen, or given in numbers. A [`Motion`] shows moving copies.
 //!
-//! This crate reads no file and no clock, and prints nothing: equal pictures are equal bytes. The choice of content is the callers'.
+//! This crate reads no file and no clock, and prints nothing: equal pictures give equal bytes. Callers choose the content.
 //!
 //! ```
 //! use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
@@ -21,10 +21,10 @@
 //!
 //! # Why no plotting crate
 //!
-//! `plotters` drew the pictures before. It was judged by those pictures and by its documentation; no second implementation was made with it. Its SVG backend works in
-//! whole pixels, a title that is too long is cut off, the legend lies over the data, and there are no subscripts, no style sheet for a dark page, no hatching and no
-//! colour bar; its logarithmic axis had been replaced in two places. The rest, mapping a number to a pixel, is a line here. Nearly all of this crate is
-//! about room for text, which it does not know. The colours of heat maps come from `colorous`.
+//! Earlier pictures were drawn with `plotters`. The judgement rests on those pictures and on the documentation; no second implementation was made with it.
+//! Its SVG backend works in whole pixels, cuts titles that are too long, places the legend over the data, and lacks subscripts, a style sheet for dark
+//! pages, hatching and colour bars; its logarithmic axis had to be replaced in two places. Most of this crate is about room for text, which `plotters` does
+//! not handle, and the mapping of numbers to pixels is a line here. The colours of heat maps come from `colorous`.
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact values"))]
 
 mod advance;

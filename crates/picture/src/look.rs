@@ -1,43 +1,45 @@
-//! How lines and areas look: colours that are told apart with any kind of colour vision, and dashes that are told apart without colour and on each other.
+//! Looks of lines and areas: colours distinguishable with any colour vision, and dashes distinguishable without colour and on top of each other.
 
-/// The look of a line: a colour and dashes, by its number.
+/// Look of a line: colour and dashes, chosen by a number.
 ///
-/// The colours are those of Okabe & Ito (2008) without black and yellow, which vanish on one of the two grounds, and grey. They repeat after seven, dashes
-/// after six, so 42 lines differ. Later lines are thinner and have gaps, so that the lines beneath are seen where they lie on each other.
+/// The colours are those of Okabe & Ito (2008), without black and yellow, which are invisible on a dark or light background, and with grey. Colours repeat
+/// after seven numbers and dashes after six, so 42 lines differ. Higher numbers have thinner lines with gaps, so that a line below stays visible.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
+    /// Index of the colour; `None` for the grey of reference lines.
     pub(crate) colour: Option<usize>,
+    /// Index into [`DASHES`].
     pub(crate) dash: usize,
     pub(crate) thin: bool,
 }
 
-/// The colours by number.
+/// Number of colours.
 pub(crate) const COLOURS: usize = 7;
 /// Lengths of dashes and gaps \[px\].
 pub(crate) const DASHES: [&str; 6] = ["", "9 6", "1.8 3.6", "10 3 2 3", "4 2.5", "12 3 2 3 2 3"];
-/// Widths of lines of these dashes \[px\].
+/// Widths of lines \[px\], indexed like [`DASHES`].
 const WIDTHS: [&str; 6] = ["2.4", "1.5", "1.6", "1.5", "1.3", "1.3"];
 
 impl Look {
-    /// The look of the line of that number, counted from 0.
+    /// Returns the look of line number `number`, from 0.
     #[must_use]
     pub const fn of(number: usize) -> Self {
         Self { colour: Some(number % COLOURS), dash: number % DASHES.len(), thin: false }
     }
 
-    /// A thin grey dashed line that others are compared with.
+    /// Returns the look of a reference line: thin, grey and dashed.
     #[must_use]
     pub const fn reference() -> Self {
         Self { colour: None, dash: 4, thin: true }
     }
 
-    /// A thin line, for one of many that have no name.
+    /// Makes the line thin, for one of many lines without a name.
     #[must_use]
     pub const fn thin(self) -> Self {
         Self { thin: true, ..self }
     }
 
-    /// This look without dashes.
+    /// Removes the dashes.
     #[must_use]
     pub const fn solid(self) -> Self {
         Self { dash: 0, ..self }
@@ -60,14 +62,14 @@ impl Look {
     }
 }
 
-/// How an area is filled.
+/// Filling of an area.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Fill {
-    /// A light tint of the colour of the line of that number.
+    /// Light tint of the colour of the line with this number.
     Tint(usize),
-    /// A deeper tint of that colour, for what lies within a light one.
+    /// Deeper tint of the colour, for an area inside a light one.
     Deep(usize),
-    /// A light grey.
+    /// Light grey.
     Grey,
     /// Grey lines from bottom left to top right, for content of another kind.
     Hatch,
@@ -87,33 +89,33 @@ impl Fill {
     }
 }
 
-/// What marks single points.
+/// Mark of single points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Marker {
-    /// A filled disc.
+    /// Filled disc.
     Disc,
-    /// A filled square.
+    /// Filled square.
     Square,
-    /// A triangle that points up.
+    /// Filled triangle pointing up.
     Triangle,
-    /// A triangle that points down, for what lies below the axis.
+    /// Filled triangle pointing down, for a value below the axis.
     TriangleDown,
-    /// A diamond.
+    /// Filled diamond.
     Diamond,
-    /// An upright cross.
+    /// Upright cross.
     Plus,
-    /// A slanted cross.
+    /// Diagonal cross.
     Cross,
 }
 
 impl Marker {
-    /// The marker of the line of that number.
+    /// Returns the marker for the line of this number.
     #[must_use]
     pub const fn of(number: usize) -> Self {
         [Self::Disc, Self::Square, Self::Triangle, Self::Diamond, Self::Cross, Self::Plus, Self::TriangleDown][number % 7]
     }
 
-    /// Corners around (0, 0), and whether they are filled; a disc has none.
+    /// Returns the outlines around (0, 0) in units of half the marker's width, and whether they are filled. A disc has no outlines.
     pub(crate) const fn strokes(self) -> (&'static [&'static [(f64, f64)]], bool) {
         match self {
             Self::Disc => (&[], true),
@@ -127,8 +129,8 @@ impl Marker {
     }
 }
 
-/// The colours of lines by number, then that of reference lines: on a light and on a dark ground. On white, Okabe & Ito's orange and sky blue would be too
-/// faint; they are darker here until their contrast is 3.
+/// Name, colour on a light background and colour on a dark background of each line look, reference lines last. Okabe & Ito's orange and sky blue are
+/// darkened for the light background to a contrast of 3.
 const SERIES: [(&str, &str, &str); COLOURS + 1] = [
     ("0", "#0072b2", "#4aa8e8"),
     ("1", "#d55e00", "#ff8237"),
@@ -140,7 +142,7 @@ const SERIES: [(&str, &str, &str); COLOURS + 1] = [
     ("r", "#6e7781", "#8b949e"),
 ];
 
-/// What has neither a number nor a series.
+/// Style rules that do not depend on the number of a line. The dark rules below replace colours only.
 const LIGHT: &str = r#".cohaptic-picture{font-family:Helvetica,Arial,"Liberation Sans","DejaVu Sans",sans-serif}
 .cohaptic-picture text{white-space:pre}
 .cohaptic-picture .paper{fill:#fff}
@@ -166,7 +168,7 @@ const DARK: &str = "\
 .cohaptic-picture .hatching{stroke:#a3abb4}
 ";
 
-/// The style sheet: one for all pictures, so that several can stand in one page of HTML.
+/// Returns the style sheet, equal for all pictures, so that several pictures can share a page.
 pub(crate) fn style() -> String {
     let series = |dark: bool| -> String {
         let rule = |(name, on_white, on_black): &(&str, &str, &str)| {
@@ -178,7 +180,7 @@ pub(crate) fn style() -> String {
     format!("{LIGHT}{}@media (prefers-color-scheme: dark){{\n{DARK}{}}}\n", series(false), series(true))
 }
 
-/// What areas are hatched with: one set for all pictures, as the style sheet.
+/// Hatch patterns, equal for all pictures like the style sheet.
 pub(crate) const PATTERNS: &str = r#"<defs>
 <pattern id="cohaptic-hatch" width="6" height="6" patternUnits="userSpaceOnUse"><path class="hatching" stroke-width="0.9" d="M-1,1L1,-1M0,6L6,0M5,7L7,5"/></pattern>
 <pattern id="cohaptic-back-hatch" width="6" height="6" patternUnits="userSpaceOnUse"><path class="hatching" stroke-width="0.9" d="M-1,5L1,7M0,0L6,6M5,-1L7,1"/></pattern>

@@ -1,11 +1,11 @@
-//! A panel: two axes and what lies between them.
+//! A panel: two axes and the content between them.
 
 use crate::axis::Axis;
 use crate::content::{Content, Reach, together};
 use crate::extent::Extent;
 use crate::text::Text;
 
-/// One plot of a picture.
+/// A plot of a picture.
 ///
 /// ```
 /// use cohaptic_picture::{Axis, Line, Look, Panel};
@@ -24,45 +24,45 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// An empty panel.
+    /// Creates an empty panel.
     #[must_use]
     pub const fn new(x: Axis, y: Axis) -> Self {
         Self { title: Text { spans: Vec::new() }, x, y, contents: Vec::new(), labels_at_ends: false }
     }
 
-    /// With a title above it.
+    /// Sets the title above the panel.
     #[must_use]
     pub fn titled(self, title: impl Into<Text>) -> Self {
         Self { title: title.into(), ..self }
     }
 
-    /// With one more content, drawn over those before it; but areas are drawn before all lines.
+    /// Appends a content, drawn over earlier contents. All areas are drawn before all lines.
     #[must_use]
     pub fn with(mut self, content: impl Into<Content>) -> Self {
         self.contents.push(content.into());
         self
     }
 
-    /// With more contents.
+    /// Appends several contents.
     #[must_use]
     pub fn with_all<C: Into<Content>>(mut self, contents: impl IntoIterator<Item = C>) -> Self {
         self.contents.extend(contents.into_iter().map(Into::into));
         self
     }
 
-    /// With the names of lines where they end at the right, not in the legend. Where there is not enough room, all are in the legend.
+    /// Names lines at their right ends instead of in the legend. If the room is not enough, all names go to the legend.
     #[must_use]
     pub fn labels_at_ends(self) -> Self {
         Self { labels_at_ends: true, ..self }
     }
 
-    /// What both axes reach over: of this panel alone.
+    /// Returns the ranges of x and y of this panel's content.
     pub(crate) fn content_extents(&self) -> Reach {
         self.contents.iter().map(|content| content.extents(self.x.scale, self.y.scale)).fold((None, None), together)
     }
 }
 
-/// Both axes of a panel as they are shown.
+/// Ranges of a panel's axes, as shown.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Extents {
     pub(crate) x: Extent,

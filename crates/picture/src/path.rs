@@ -1,10 +1,10 @@
-//! Paths in pixels: cut at the edge of a panel, without points that nobody sees, written with two decimals.
+//! Paths in pixels: cut at the edge of a panel, thinned to visible points, and written with two decimals.
 
 use std::fmt::Write as _;
 
 use crate::xml::coordinate;
 
-/// The area of a plot \[px\].
+/// Area of a plot \[px\]. y grows downwards.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Frame {
     pub(crate) left: f64,
@@ -14,7 +14,7 @@ pub(crate) struct Frame {
 }
 
 type Point = (f64, f64);
-/// The coordinate that a side limits, its value, and whether greater (1) or lesser (-1) ones are inside.
+/// A side of a frame: access to the limited coordinate, its value, and the sign of inside (1 for greater, −1 for lesser values).
 type Side = (fn(Point) -> f64, f64, f64);
 
 impl Frame {
@@ -26,11 +26,12 @@ impl Frame {
         self.bottom - self.top
     }
 
+    /// Returns whether a point is inside, up to the rounding of coordinates.
     pub(crate) fn contains(&self, (x, y): Point) -> bool {
         (self.left - 0.01..=self.right + 0.01).contains(&x) && (self.top - 0.01..=self.bottom + 0.01).contains(&y)
     }
 
-    /// The part of a segment that lies inside (Liang & Barsky 1984).
+    /// Returns the part of a segment inside the frame (Liang & Barsky 1984); `None` if no part is inside.
     fn segment(&self, from: Point, to: Point) -> Option<(Point, Point)> {
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
@@ -49,7 +50,7 @@ impl Frame {
         (enter <= leave).then(|| (if enter > 0.0 { at(enter) } else { from }, if leave < 1.0 { at(leave) } else { to }))
     }
 
-    /// The parts of a line that lie inside.
+    /// Returns the parts of a line inside the frame.
     pub(crate) fn cut_line(&self, points: &[Point]) -> Vec<Vec<Point>> {
         if let [alone] = points {
             return if self.contains(*alone) { vec![vec![*alone]] } else { Vec::new() };
@@ -58,6 +59,7 @@ impl Frame {
         for pair in points.windows(2) {
             let Some((from, to)) = self.segment(pair[0], pair[1]) else { continue };
             match runs.last_mut() {
+                // Continues the present part only if the segment begins where the part ended, without a cut.
                 Some(run) if run.last().is_some_and(|last| near(*last, from) && near(pair[0], from)) => run.push(to),
                 _ => runs.push(vec![from, to]),
             }
@@ -65,7 +67,7 @@ impl Frame {
         runs
     }
 
-    /// The part of a closed outline that lies inside (Sutherland & Hodgman 1974).
+    /// Returns the part of a closed outline inside the frame (Sutherland & Hodgman 1974).
     pub(crate) fn cut_outline(&self, outline: &[Point]) -> Vec<Point> {
         let sides: [Side; 4] = [(|p| p.0, self.left, 1.0), (|p| p.0, self.right, -1.0), (|p| p.1, self.top, 1.0), (|p| p.1, self.bottom, -1.0)];
         let mut points = outline.to_vec();
@@ -73,6 +75,7 @@ impl Frame {
             let room = |point: Point| sign * (of(point) - edge);
             let mut kept = Vec::new();
             for (place, to) in points.iter().copied().enumerate() {
+                // Adding the length keeps the index of the point before the first from falling below zero.
                 let from = points[(place + points.len() - 1) % points.len()];
                 if (room(from) < 0.0) != (room(to) < 0.0) {
                     let t = room(from) / (room(from) - room(to));
@@ -92,10 +95,11 @@ fn near(one: Point, other: Point) -> bool {
     (one.0 - other.0).abs() < 1e-6 && (one.1 - other.1).abs() < 1e-6
 }
 
-/// How wide the columns are of which a line keeps only the first, lowest, highest and last point \[px\]. Half a pixel is less than a line is wide.
+/// Width of a column of which only the first, lowest, highest and last point are kept \[px\], narrower than any line.
 const COLUMN: f64 = 0.5;
 
-/// The line without points that change nothing: in each column of half a pixel the first, lowest, highest and last stay (the M4 of Jugel et al. 2014).
+/// Removes invisible points: of each column only the first, lowest, highest and last point stay (M4 of Jugel et al. 2014), and then no points on straight
+/// lines.
 pub(crate) fn reduced(points: &[Point]) -> Vec<Point> {
     let mut kept: Vec<Point> = Vec::new();
     for column in points.chunk_by(|one, other| (one.0 / COLUMN).floor().to_bits() == (other.0 / COLUMN).floor().to_bits()) {
@@ -106,6 +110,7 @@ pub(crate) fn reduced(points: &[Point]) -> Vec<Point> {
         let by_height = |one: &(usize, &Point), other: &(usize, &Point)| one.1.1.total_cmp(&other.1.1);
         let lowest = column.iter().enumerate().min_by(by_height).map_or(0, |(place, _)| place);
         let highest = column.iter().enumerate().max_by(by_height).map_or(0, |(place, _)| place);
+        // In order of the line, and without duplicates, since the lowest point may be the first, for example.
         let mut places = [0, lowest, highest, column.len() - 1];
         places.sort_unstable();
         for (order, place) in places.iter().enumerate() {
@@ -117,13 +122,14 @@ pub(crate) fn reduced(points: &[Point]) -> Vec<Point> {
     straightened(&kept)
 }
 
-/// Without points that lie, to a two hundredth of a pixel, on the straight line between those that stay.
+/// Removes points within 1/200 px of the straight line between the points that stay.
 fn straightened(points: &[Point]) -> Vec<Point> {
-    /// More points than this in a row are not left out: each is looked at again with every one that follows.
+    /// Largest number of points removed in a row. Each of them is checked again for every following point, so the limit bounds the work.
     const MOST: usize = 100;
     let mut kept: Vec<Point> = points.first().copied().into_iter().collect();
     let mut from = 0;
     for to in 2..=points.len() {
+        // Grows the straight piece as long as all points between its ends stay close to it.
         let straight = to < points.len() && to - from < MOST && points[from + 1..to].iter().all(|point| between(points[from], *point, points[to]));
         if !straight && to > from + 1 {
             kept.push(points[to - 1]);
@@ -133,6 +139,7 @@ fn straightened(points: &[Point]) -> Vec<Point> {
     kept
 }
 
+/// Returns whether `point` is on the segment from `from` to `to`, within 1/200 px.
 fn between(from: Point, point: Point, to: Point) -> bool {
     let (ax, ay, bx, by) = (point.0 - from.0, point.1 - from.1, to.0 - from.0, to.1 - from.1);
     let length = libm::hypot(bx, by);
@@ -140,7 +147,7 @@ fn between(from: Point, point: Point, to: Point) -> bool {
     length > 0.0 && (ax * by - ay * bx).abs() < 0.005 * length && (0.0..=length * length).contains(&ahead)
 }
 
-/// The value of `d` of a path.
+/// Returns the attribute `d` of a path through runs of points.
 pub(crate) fn data(runs: &[Vec<Point>], closed: bool) -> String {
     let mut text = String::new();
     for run in runs {
@@ -182,7 +189,7 @@ mod tests {
         let straight: Vec<Point> = (0..1000_u32).map(|n| (f64::from(n), 0.5 * f64::from(n))).collect();
         let kept = reduced(&straight);
         assert!(kept.len() < 20 && kept.first() == straight.first() && kept.last() == straight.last(), "{kept:?}");
-        // An arc of fine steps: each is nearly straight, the whole is not.
+        // An arc of fine steps, each nearly straight although the whole is not.
         let arc: Vec<Point> =
             (0..=2000_u32).map(|n| f64::from(n) / 2000.0 * 3.0).map(|turn| (50.0 * (1.0 - turn.cos()), 50.0 * turn.sin())).collect();
         let kept = straightened(&arc);

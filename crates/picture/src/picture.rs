@@ -1,4 +1,4 @@
-//! A whole picture: title, panels in a grid, legend.
+//! Whole pictures: title, panels in a grid, legend.
 
 use crate::content::{Reach, together};
 use crate::extent::{Scale, whole};
@@ -7,7 +7,7 @@ use crate::panel::{Extents, Panel};
 use crate::size::Size;
 use crate::text::Text;
 
-/// A picture that becomes one SVG document. Equal pictures become equal bytes.
+/// A picture that becomes a single SVG document. Equal pictures become equal bytes.
 ///
 /// See the [crate] for examples.
 #[derive(Clone, PartialEq, Debug)]
@@ -26,7 +26,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// A picture without panels. The title is wrapped, after eight lines it ends in an ellipsis; what must not be lost is a [`note`](Self::note).
+    /// Creates a picture without panels. The title is wrapped and ends in an ellipsis after eight lines; text that must not be lost belongs into a
+    /// [`note`](Self::note).
     #[must_use]
     pub fn new(title: impl Into<Text>) -> Self {
         Self {
@@ -44,82 +45,82 @@ impl Picture {
         }
     }
 
-    /// With one more paragraph below the title: a subtitle, or a warning.
+    /// Appends a paragraph below the title: a subtitle or a warning.
     #[must_use]
     pub fn note(mut self, note: impl Into<Text>) -> Self {
         self.notes.push(note.into());
         self
     }
 
-    /// Whether this note is there already.
+    /// Returns whether the picture has this note.
     #[must_use]
     pub fn has_note(&self, note: &str) -> bool {
         self.notes.iter().any(|known| known.plain() == note)
     }
 
-    /// With a description for screen readers, beside the titles.
+    /// Sets a description for screen readers, added to the titles.
     #[must_use]
     pub fn description(self, description: impl Into<String>) -> Self {
         Self { description: description.into(), ..self }
     }
 
-    /// Of this size. Where texts leave no room for the plots, the picture becomes larger.
+    /// Sets the size. The picture grows beyond the size if texts leave no room for plots.
     #[must_use]
     pub fn size(self, size: Size) -> Self {
         Self { size, ..self }
     }
 
-    /// With one more panel: to the right of the one before, or in the next row.
+    /// Appends a panel, to the right of the last panel or in a new row.
     #[must_use]
     pub fn panel(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
     }
 
-    /// With more panels.
+    /// Appends several panels.
     #[must_use]
     pub fn panels(mut self, panels: impl IntoIterator<Item = Panel>) -> Self {
         self.panels.extend(panels);
         self
     }
 
-    /// With a number of panels beside each other, or fewer where the picture is too narrow. Without it panels are below each other.
+    /// Sets the number of panels per row, reduced if the picture is too narrow. The default is 1.
     #[must_use]
     pub fn columns(self, columns: usize) -> Self {
         Self { columns: columns.max(1), ..self }
     }
 
-    /// With one range of x for all panels, labelled in the last row only.
+    /// Gives all panels the same range of x, with labels in the last row only.
     #[must_use]
     pub fn shared_x(self) -> Self {
         Self { shared_x: true, ..self }
     }
 
-    /// With one range of y for all panels, labelled in the first column only.
+    /// Gives all panels the same range of y, with labels in the first column only.
     #[must_use]
     pub fn shared_y(self) -> Self {
         Self { shared_y: true, ..self }
     }
 
-    /// With the legend at this place.
+    /// Sets the place of the legend.
     #[must_use]
     pub fn legend(self, legend: LegendPlace) -> Self {
         Self { legend, ..self }
     }
 
-    /// With plots about this much as high as wide where the size leaves the height open. Without it, 0.6.
+    /// Sets the ratio of height to width of plots, for sizes without a given height. The default is 0.6; the ratio is limited to 0.1 to 3.
     #[must_use]
     pub fn aspect(self, aspect: f64) -> Self {
         Self { aspect: if aspect.is_finite() { aspect.clamp(0.1, 3.0) } else { self.aspect }, ..self }
     }
 
-    /// With one scale for all linear axes: a unit is as long along x as along y, and in each panel. Axes are widened at both ends for it.
+    /// Gives all linear axes of all panels the same length of a unit. Axes are widened at both ends as needed.
     #[must_use]
     pub fn equal_units(self) -> Self {
         Self { equal_units: true, ..self }
     }
 
-    /// Columns that have room for a plot with its labels.
+    /// Returns the number of columns, limited by the room for a plot with its labels.
     pub(crate) fn columns_shown(&self) -> usize {
         const LEAST: f64 = 13.0;
         self.columns.min(whole(self.size.width / (LEAST * self.size.font))).clamp(1, self.panels.len().max(1))
@@ -129,10 +130,11 @@ impl Picture {
         self.panels.len().div_ceil(self.columns_shown()).max(1)
     }
 
-    /// The axes of each panel as shown.
+    /// Returns the ranges of each panel's axes, as shown.
     pub(crate) fn extents(&self) -> Vec<Extents> {
         let own: Vec<_> = self.panels.iter().map(Panel::content_extents).collect();
         let all = own.iter().copied().fold((None, None), together);
+        // A shared axis is the first panel's, over the content of all panels.
         let first = self.panels.first();
         let of = |(panel, (x, y)): (&Panel, &Reach)| Extents {
             x: if self.shared_x { first.unwrap_or(panel).x.shown(all.0) } else { panel.x.shown(*x) },
@@ -141,7 +143,7 @@ impl Picture {
         self.panels.iter().zip(&own).map(of).collect()
     }
 
-    /// What a screen reader says: all titles and axes.
+    /// Returns the text for screen readers: notes, description, and titles and axes of the panels.
     pub(crate) fn spoken(&self) -> String {
         let mut sentences: Vec<String> = self.notes.iter().map(Text::plain).collect();
         sentences.extend((!self.description.is_empty()).then(|| self.description.clone()));

@@ -1,12 +1,12 @@
-//! How large a picture is, and its letters.
+//! Sizes of pictures and of their letters.
 
 use std::str::FromStr;
 
 use thiserror::Error;
 
-/// The size of a picture. Its letters are 8 points high where it is meant for print, 13 px else.
+/// Size of a picture. Letters have 8 points in print, and 13 px on a screen.
 ///
-/// A command line names it as a word: `one-column`, `two-columns`, `page`, `960x400` \[CSS px\], `85x60mm`.
+/// On a command line a size is a word: `one-column`, `two-columns`, `page`, `960x400` \[CSS px\], `85x60mm`.
 ///
 /// ```
 /// use cohaptic_picture::Size;
@@ -17,43 +17,43 @@ use thiserror::Error;
 /// ```
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Size {
-    /// \[px\], of which 96 are an inch.
+    /// Width \[px\], 96 px per inch.
     pub(crate) width: f64,
-    /// `None`: as high as its content asks for \[px\].
+    /// Height \[px\]; `None` for the height of the content.
     pub(crate) height: Option<f64>,
-    /// The size of letters \[px\].
+    /// Size of letters \[px\].
     pub(crate) font: f64,
-    /// Whether the document gives its size in millimetres.
+    /// Whether the document states its size in millimetres.
     pub(crate) print: bool,
 }
 
-/// A millimetre \[px\].
+/// Length of a millimetre \[px\].
 pub(crate) const MILLIMETRE: f64 = 96.0 / 25.4;
-/// Eight points \[px\].
+/// Size of letters in print, 8 points \[px\].
 const PRINTED: f64 = 8.0 * 96.0 / 72.0;
-/// Letters on a screen \[px\].
+/// Size of letters on a screen \[px\].
 const ON_SCREEN: f64 = 13.0;
 
-/// Why a size is none.
+/// Error of making a size.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
 pub enum SizeError {
-    /// The word is not known.
+    /// The word is not a size.
     #[error("`{0}` is no size of a picture: one-column, two-columns, page, WIDTHxHEIGHT in pixels (960x400), or WIDTHxHEIGHTmm (85x60mm)")]
     Unknown(String),
-    /// Too small to hold text, or too large for any page.
+    /// The size is too small for text, or too large for any page.
     #[error("a picture is 160 px (42 mm) to 10000 px (2645 mm) wide, and 100 px (26 mm) to 10000 px high")]
     OutOfRange,
 }
 
 impl Size {
-    /// One column of a paper: 85 mm wide, as high as the content asks for.
+    /// A column of a paper: 85 mm wide, with the height of the content.
     pub const ONE_COLUMN: Self = Self { width: 85.0 * MILLIMETRE, height: None, font: PRINTED, print: true };
-    /// Two columns of a paper: 175 mm wide, as high as the content asks for.
+    /// Two columns of a paper: 175 mm wide, with the height of the content.
     pub const TWO_COLUMNS: Self = Self { width: 175.0 * MILLIMETRE, height: None, font: PRINTED, print: true };
-    /// A page on a screen: 800 px wide, as high as the content asks for.
+    /// A page on a screen: 800 px wide, with the height of the content.
     pub const PAGE: Self = Self { width: 800.0, height: None, font: ON_SCREEN, print: false };
 
-    /// Width and height on a screen \[CSS px\].
+    /// Returns a size for a screen \[CSS px\].
     ///
     /// # Errors
     ///
@@ -62,7 +62,7 @@ impl Size {
         Self { width, height: Some(height), font: ON_SCREEN, print: false }.checked()
     }
 
-    /// Width and height in print \[mm\].
+    /// Returns a size for print \[mm\].
     ///
     /// # Errors
     ///
@@ -71,7 +71,7 @@ impl Size {
         Self { width: width * MILLIMETRE, height: Some(height * MILLIMETRE), font: PRINTED, print: true }.checked()
     }
 
-    /// Whether it is too narrow for two plots with colour bars beside each other: as one column of a paper is.
+    /// Returns whether the size is too narrow for two plots with colour bars side by side, like a column of a paper.
     #[must_use]
     pub const fn is_narrow(self) -> bool {
         self.width < 45.0 * self.font
@@ -84,7 +84,7 @@ impl Size {
 }
 
 impl Default for Size {
-    /// [`Size::PAGE`].
+    /// Returns [`Size::PAGE`].
     fn default() -> Self {
         Self::PAGE
     }
@@ -103,6 +103,7 @@ impl FromStr for Size {
         let unknown = || SizeError::Unknown(word.chars().take(40).flat_map(char::escape_debug).collect());
         let (numbers, print) = word.strip_suffix("mm").map_or_else(|| (word.strip_suffix("px").unwrap_or(word), false), |numbers| (numbers, true));
         let (width, height) = numbers.split_once('x').ok_or_else(unknown)?;
+        // `85mmx60mm` is accepted as well as `85x60mm`.
         let width = width.strip_suffix("mm").filter(|_| print).unwrap_or(width);
         let number = |text: &str| text.parse::<f64>().ok().filter(|number| number.is_finite()).ok_or_else(unknown);
         let (width, height) = (number(width)?, number(height)?);

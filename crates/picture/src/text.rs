@@ -1,37 +1,38 @@
-//! Text with symbols: subscripts, superscripts and italics within a line, its width, and its lines when it wraps.
+//! Text with symbols: subscripts, superscripts and italics in a line, widths, and wrapping.
 //!
-//! What comes in as `&str` or `String` is plain: an underscore in the name of a scene is an underscore. Only [`Text::math`] reads `K_T` as a symbol.
+//! A `&str` or `String` is plain text: an underscore in the name of a scene stays an underscore. Only [`Text::math`] reads `K_T` as a symbol.
 
 use crate::advance::advance;
 
-/// How a part of a text stands.
+/// Style of a part of a text.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Stand {
     Plain,
-    /// A symbol of a formula: italic.
+    /// Symbol of a formula, in italics.
     Symbol,
     Subscript,
     Superscript,
 }
 
-/// Subscripts and superscripts are this much smaller.
+/// Size of subscripts and superscripts \[font sizes\].
 pub(crate) const SMALL: f64 = 0.7;
-/// How far subscripts are lowered and superscripts are raised \[sizes of the font\].
+/// Distance by which subscripts are lowered \[font sizes\].
 pub(crate) const LOWERED: f64 = 0.16;
+/// Distance by which superscripts are raised \[font sizes\].
 pub(crate) const RAISED: f64 = 0.33;
-/// How far letters reach above the line they stand on, raised ones among them, at most \[sizes of the font\]; 0.33 are below it.
+/// Largest height of letters above the base line, superscripts included \[font sizes\]. Letters reach 0.33 below the base line.
 pub(crate) const ASCENT: f64 = 0.98;
-/// From one line to the next \[sizes of the font\].
+/// Distance between base lines \[font sizes\].
 pub(crate) const LEADING: f64 = 1.34;
 
-/// A part of a text.
+/// A part of a text in a single style.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Span {
     pub(crate) text: String,
     pub(crate) stand: Stand,
 }
 
-/// A line or paragraph of text. Control characters, and characters that turn the direction of writing, become a visible U+FFFD.
+/// A line or a paragraph of text. Control characters, and characters that change the direction of writing, become a visible U+FFFD.
 ///
 /// ```
 /// use cohaptic_picture::Text;
@@ -63,7 +64,7 @@ impl From<&String> for Text {
 }
 
 impl Text {
-    /// A formula: letters are italic, `_x` and `_{text}` are lowered, `^x` and `^{text}` are raised.
+    /// Parses a formula: letters are italic, `_x` and `_{text}` are subscripts, `^x` and `^{text}` are superscripts.
     #[must_use]
     pub fn math(formula: &str) -> Self {
         let mut text = Self::default();
@@ -88,7 +89,7 @@ impl Text {
         text
     }
 
-    /// A power of ten, or a multiple of one: 10⁻³.
+    /// Returns a power of ten or a multiple of a power of ten: 10⁻³.
     #[must_use]
     pub(crate) fn power_of_ten(factor: &str, exponent: i32) -> Self {
         let mut text = Self::from(if factor == "1" { "10".to_owned() } else { format!("{factor}·10") });
@@ -96,7 +97,7 @@ impl Text {
         text
     }
 
-    /// This text with another after it.
+    /// Appends another text.
     #[must_use]
     pub fn then(mut self, other: impl Into<Self>) -> Self {
         for span in other.into().spans {
@@ -105,13 +106,13 @@ impl Text {
         self
     }
 
-    /// The letters alone.
+    /// Returns the letters without styles.
     #[must_use]
     pub fn plain(&self) -> String {
         self.spans.iter().map(|span| span.text.as_str()).collect()
     }
 
-    /// Whether there is nothing to see.
+    /// Returns whether the text has no visible letter.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.spans.iter().all(|span| span.text.trim().is_empty())
@@ -131,12 +132,12 @@ impl Text {
         }
     }
 
-    /// The width with a font of that size, at most.
+    /// Returns an upper bound of the width at a font size, in the unit of `size`.
     pub(crate) fn width(&self, size: f64) -> f64 {
         self.spans.iter().flat_map(|span| span.text.chars().map(|letter| width_of(letter, span.stand))).sum::<f64>() * size
     }
 
-    /// The text in lines that are no wider than that, of which there are at most `most`; more end in an ellipsis. A word that is wider is broken.
+    /// Wraps the text to lines of at most `width`, at most `most` lines. Longer text ends in an ellipsis. A word wider than a line is broken.
     pub(crate) fn wrapped(&self, size: f64, width: f64, most: usize) -> Vec<Self> {
         let mut lines = vec![Self::default()];
         for word in self.words() {
@@ -174,13 +175,13 @@ impl Text {
         }
     }
 
-    /// The words, each with the white space after it.
+    /// Returns the words, each with the following white space.
     fn words(&self) -> Vec<Self> {
         let mut words = vec![Self::default()];
         let mut after_space = false;
         for span in &self.spans {
             for letter in span.text.chars() {
-                // U+00A0 keeps words together.
+                // Only U+0020 ends a word; U+00A0 keeps words together.
                 let space = letter == ' ';
                 if after_space && !space {
                     words.push(Self::default());
@@ -192,7 +193,7 @@ impl Text {
         words
     }
 
-    /// Without white space at both ends.
+    /// Removes white space at both ends.
     fn trimmed(&self) -> Self {
         let mut spans = self.spans.clone();
         while let Some(first) = spans.first_mut() {
@@ -212,7 +213,7 @@ impl Text {
         Self { spans }
     }
 
-    /// As many letters as fit, at least one, and the others.
+    /// Splits the text after as many letters as fit, at least one.
     fn broken(&self, size: f64, width: f64) -> (Self, Self) {
         let (mut head, mut tail, mut so_far) = (Self::default(), Self::default(), 0.0);
         for span in &self.spans {
@@ -228,18 +229,18 @@ impl Text {
 
 fn width_of(letter: char, stand: Stand) -> f64 {
     match stand {
-        // Italic letters lean over their right edge.
+        // Italic letters lean beyond their right edge.
         Stand::Symbol => advance(letter) + 0.05,
         Stand::Plain => advance(letter),
         Stand::Subscript | Stand::Superscript => SMALL * advance(letter),
     }
 }
 
-/// A letter as it is shown: letters that XML cannot hold, that are invisible, or that turn the direction of writing are replaced.
+/// Returns a letter as shown. Replaces letters forbidden in XML, invisible letters, and letters that change the direction of writing.
 pub(crate) fn shown(letter: char) -> char {
     match letter {
         '\t' | '\n' | '\r' => ' ',
-        // Marks, overrides and isolates of direction; line and paragraph separators; zero width; byte order mark.
+        // Marks, overrides and isolates of direction, line and paragraph separators, zero width characters, byte order mark.
         '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{61c}' | '\u{feff}' => char::REPLACEMENT_CHARACTER,
         '\u{fffe}' | '\u{ffff}' => char::REPLACEMENT_CHARACTER,
         control if control.is_control() => char::REPLACEMENT_CHARACTER,
@@ -257,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_line_breaks_between_words_and_a_long_word_anywhere() {
-        // With the widths stored, "aaa" at 10 px is 18.39 px wide, a space 3.18 px.
+        // By the stored widths "aaa" at 10 px is 18.39 px wide, and a space 3.18 px.
         assert_eq!(lines("aaa aaa aaa", 40.0), ["aaa aaa", "aaa"]);
         assert_eq!(lines("aaa aaa", 39.9), ["aaa", "aaa"]);
         assert_eq!(lines("aaaaaaa", 20.0), ["aaa", "aaa", "a"]);

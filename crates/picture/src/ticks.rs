@@ -1,9 +1,9 @@
-//! Where the ticks of an axis are, and what they say: round numbers, with a power of ten for all of them where they would be long.
+//! Positions and labels of ticks: round numbers, with a common power of ten for long labels.
 
 use crate::extent::{Extent, Scale, count};
 use crate::text::Text;
 
-/// The distance of ticks on a linear axis: a whole number times a power of ten.
+/// Distance of ticks on a linear axis: `mantissa`·10^`power`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step {
     mantissa: i32,
@@ -11,12 +11,12 @@ pub(crate) struct Step {
 }
 
 impl Step {
-    /// The least nice step with which there are no more ticks than that.
+    /// Returns the smallest round step with at most `most` ticks.
     pub(crate) fn of(extent: Extent, most: usize, multiples: Option<u32>) -> Self {
         let most = f64::from(u32::try_from(most.max(2)).unwrap_or(u32::MAX));
         let least = (extent.high - extent.low) / most;
         if let Some(multiple) = multiples {
-            // 1, 2, 4 (a turn is 360° = 2·4·45°), then 10 times these.
+            // Factors 1, 2, 4 (a turn of 360° is 2·4·45°), and 10 times these.
             let factors = [1, 2, 4, 10, 20, 40, 100, 200, 400, 1000];
             let wanted = factors.into_iter().map(|factor| i32::try_from(multiple).unwrap_or(1).saturating_mul(factor));
             if let Some(mantissa) = wanted.into_iter().find(|step| f64::from(*step) >= least) {
@@ -25,6 +25,7 @@ impl Step {
         }
         #[expect(clippy::cast_possible_truncation, reason = "a logarithm of a finite number is small")]
         let power = libm::log10(least).floor() as i32;
+        // `least` lies between two powers of ten, so one of 1, 2, 5 and 10 times the lower power is large enough.
         let steps = [(1, power), (2, power), (5, power), (1, power + 1)].map(|(mantissa, power)| Self { mantissa, power });
         steps.into_iter().find(|step| step.size() >= least * (1.0 - 1e-9)).unwrap_or(Self { mantissa: 2, power: power + 1 })
     }
@@ -33,26 +34,26 @@ impl Step {
         decimal(i64::from(self.mantissa), self.power)
     }
 
-    /// Which multiples lie around an extent, and what they are multiples of.
+    /// Returns the first and the last multiple of the step around a range, and the step.
     pub(crate) fn around(self, extent: Extent) -> (f64, f64, f64) {
         let size = self.size();
         ((extent.low / size + 1e-9).floor(), (extent.high / size - 1e-9).ceil(), size)
     }
 }
 
-/// A whole number times a power of ten, to the nearest number there is.
+/// Returns `number`·10^`power`, rounded to the nearest `f64`. Parsing rounds once, and a product would round twice.
 fn decimal(number: i64, power: i32) -> f64 {
     format!("{number}e{power}").parse().unwrap_or(f64::NAN)
 }
 
-/// The ticks of an axis.
+/// Ticks of an axis.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Ticks {
-    /// Value and label.
+    /// Values with their labels.
     pub(crate) marks: Vec<(f64, Text)>,
-    /// Values between them that have a thin line only.
+    /// Values between the labelled ticks, with a thin line only.
     pub(crate) between: Vec<f64>,
-    /// What the labels are to be multiplied by: ten to this power.
+    /// Power of ten by which labels must be multiplied.
     pub(crate) exponent: i32,
 }
 
@@ -64,7 +65,7 @@ impl Ticks {
         }
     }
 
-    /// Each name at its number.
+    /// Returns ticks with names at 0, 1, 2 and so on.
     pub(crate) fn named(names: &[Text]) -> Self {
         let marks = names.iter().enumerate().map(|(place, name)| (count(place), name.clone())).collect();
         Self { marks, between: Vec::new(), exponent: 0 }
@@ -78,7 +79,7 @@ impl Ticks {
         let numbers: Vec<i64> = (first as i64..=last as i64).take(200).map(|count| count.saturating_mul(i64::from(step.mantissa))).collect();
         let largest = numbers.iter().map(|number| number.unsigned_abs()).max().unwrap_or(0);
         let digits = i32::try_from(largest.checked_ilog10().unwrap_or(0)).unwrap_or(0) + step.power;
-        // Five digits before the point, or two zeros after it, are still read at a glance.
+        // Numbers with up to five digits before the point, or up to two zeros after it, are easy to read without a power of ten.
         let exponent = if largest == 0 || (-3..5).contains(&digits) { 0 } else { digits.div_euclid(3) * 3 };
         let mark = |number: i64| (decimal(number, step.power), Text::from(written(number, step.power - exponent)));
         Self { marks: numbers.into_iter().map(mark).collect(), between: Vec::new(), exponent }
@@ -87,24 +88,28 @@ impl Ticks {
     fn logarithmic(extent: Extent, most: usize) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "a logarithm of a finite number is small")]
         let (low, high) = ((libm::log10(extent.low) - 1e-9).floor() as i32, (libm::log10(extent.high) + 1e-9).ceil() as i32);
+        // Rounding may place a tick slightly outside the end of the axis at which the range was set.
         let inside = |value: &f64| (-1e-9..=1.0 + 1e-9).contains(&extent.place(*value));
         let multiples = |of: &[i64]| -> Vec<(i64, i32)> {
             (low..=high).flat_map(|power| of.iter().map(move |of| (*of, power))).filter(|(of, power)| inside(&decimal(*of, *power))).collect()
         };
         let decades = multiples(&[1]);
+        // Over more than twelve decades, thin lines at all nine multiples would merge into grey.
         let nine: Vec<f64> =
             if high - low <= 12 { multiples(&[2, 3, 4, 5, 6, 7, 8, 9]).iter().map(|(of, power)| decimal(*of, *power)).collect() } else { Vec::new() };
-        // Numbers of up to four digits are read faster than powers.
+        // Numbers of up to four digits are easier to read than powers.
         let plain = extent.low > 0.0099 && extent.high < 10_001.0;
         let label = |(of, power): (i64, i32)| {
             let text = if plain { Text::from(written(of, power)) } else { Text::power_of_ten(&of.to_string(), power) };
             (decimal(of, power), text)
         };
+        // With two decades or more, only powers of ten have labels.
         if decades.len() >= 2 {
             let every = i32::try_from(decades.len().div_ceil(most.max(2))).unwrap_or(1).max(1);
             let marks = decades.into_iter().filter(|(_, power)| power.rem_euclid(every) == 0).map(label).collect();
             return Self { marks, between: nine, exponent: 0 };
         }
+        // Less than two decades: the first choice of multiples with a suitable number of ticks, or ticks as on a linear axis.
         let choices = [&[1, 2, 5][..], &[1, 2, 3, 5, 7], &[1, 2, 3, 4, 5, 6, 7, 8, 9]].map(multiples);
         match choices.into_iter().find(|marks| (2..=most.max(2)).contains(&marks.len())) {
             Some(marks) => Self { marks: marks.into_iter().map(label).collect(), between: nine, exponent: 0 },
@@ -113,7 +118,7 @@ impl Ticks {
     }
 }
 
-/// A whole number times a power of ten in digits.
+/// Writes `number`·10^`power` in digits.
 fn written(number: i64, power: i32) -> String {
     let sign = if number < 0 { "\u{2212}" } else { "" };
     let digits = number.unsigned_abs().to_string();
@@ -130,7 +135,7 @@ fn written(number: i64, power: i32) -> String {
 }
 
 impl Extent {
-    /// Ends at ticks, about seven.
+    /// Widens the range to ticks, about seven.
     pub(crate) fn widened_to_ticks(self, multiples: Option<u32>) -> Self {
         const ABOUT: usize = 7;
         match self.scale {
@@ -139,7 +144,7 @@ impl Extent {
                 Self { low: first * unit, high: last.max(first + 1.0) * unit, ..self }
             }
             Scale::Logarithmic => {
-                // A power of ten but for rounding is one.
+                // A value within rounding of a power of ten counts as the power.
                 let (first, last) = ((libm::log10(self.low) + 1e-9).floor(), (libm::log10(self.high) - 1e-9).ceil());
                 Self { low: libm::pow(10.0, first), high: libm::pow(10.0, last.max(first + 1.0)), ..self }
             }

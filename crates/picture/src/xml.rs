@@ -1,17 +1,17 @@
-//! The document as text: elements with attributes, escaped, and numbers with two decimals.
+//! Writer of the document: elements with escaped attributes, and numbers with two decimals.
 
 use std::fmt::Write as _;
 
 use crate::text::{LOWERED, RAISED, SMALL, Stand, Text, shown};
 
-/// A document, or a part of one, that is being written.
+/// A document, or a part of a document, being written.
 #[derive(Debug, Default)]
 pub(crate) struct Xml {
     pub(crate) text: String,
 }
 
-/// Text as it may stand between tags and in quoted attributes of XML and HTML. What XML cannot hold, and what turns the direction of writing, is replaced by
-/// U+FFFD.
+/// Escapes text for use between tags and in quoted attributes, in XML and HTML. Characters forbidden in XML, and characters that change the direction of
+/// writing, become U+FFFD.
 #[must_use]
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -28,15 +28,16 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
-/// A number with at most two decimals; NaN is 0, and numbers beyond any picture are cut.
+/// Writes a number with at most two decimals. NaN becomes 0, and numbers far outside any picture are limited.
 pub(crate) fn coordinate(value: f64) -> String {
     let value = if value.is_nan() { 0.0 } else { value.clamp(-1e6, 1e6) };
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
+    // A small negative number rounds to "-0.00".
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Where a text begins, ends, or has its middle.
+/// Part of a text placed at its position: beginning, middle or end.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Anchor {
     Start,
@@ -45,9 +46,10 @@ pub(crate) enum Anchor {
 }
 
 impl Xml {
-    /// An element without content. Values of attributes are written as they are: numbers and words of this crate.
+    /// Writes an element without content. Attribute values are not escaped, because they are numbers and words of this crate.
     pub(crate) fn element(&mut self, name: &str, attributes: &[(&str, &str)]) {
         self.open(name, attributes);
+        // Replaces the ">" written by `open`.
         self.text.truncate(self.text.len() - 1);
         self.text.push_str("/>\n");
     }
@@ -60,12 +62,12 @@ impl Xml {
         self.text.push('>');
     }
 
-    /// A line of text on the base line at (x, y).
+    /// Writes a line of text with the base line at (x, y).
     pub(crate) fn line_of_text(&mut self, text: &Text, (x, y): (f64, f64), size: f64, class: &str, anchor: Anchor) {
         self.write_text(text, (x, y), size, class, anchor, None);
     }
 
-    /// A line of text that runs upwards.
+    /// Writes a line of text that runs upwards.
     pub(crate) fn text_upwards(&mut self, text: &Text, (x, y): (f64, f64), size: f64, class: &str) {
         let turn = format!("rotate(-90 {} {})", coordinate(x), coordinate(y));
         self.write_text(text, (x, y), size, class, Anchor::Middle, Some(&turn));
@@ -84,7 +86,7 @@ impl Xml {
         }
         attributes.extend(turn.map(|turn| ("transform", turn)));
         self.open("text", &attributes);
-        // How far the spans before have moved the line: `dy` moves all that follows.
+        // Displacement of the base line by earlier spans. `dy` moves all following spans, so the next span must undo the displacement.
         let mut moved = 0.0;
         for span in &text.spans {
             let (shift, small) = match span.stand {

@@ -1,24 +1,24 @@
-//! What pages hold: elements that are well formed by construction.
+//! Elements of pages, well formed by construction.
 
 use std::fmt::Write as _;
 
 use super::Table;
 use crate::{Gauge, escape};
 
-/// A part of a page. Texts that become a part are escaped.
+/// A part of a page. Texts are escaped when they become a part.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Html {
     text: String,
 }
 
-/// How something was judged. The words beside a mark say the judgement too, for readers without colours.
+/// Judgement shown by a colour. The words with the mark must express the judgement too, for readers without colours.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Mark {
-    /// It is as it should be.
+    /// Success.
     Good,
-    /// It is so in part.
+    /// Partial success.
     Partly,
-    /// It is not.
+    /// Failure.
     Bad,
 }
 
@@ -35,57 +35,57 @@ impl From<String> for Html {
 }
 
 impl Html {
-    /// A text.
+    /// Makes a part from a text.
     #[must_use]
     pub fn text(text: &str) -> Self {
         Self { text: escape(text) }
     }
 
-    /// Both, one after the other.
+    /// Appends more content.
     #[must_use]
     pub fn and(mut self, more: impl Into<Self>) -> Self {
         self.text.push_str(&more.into().text);
         self
     }
 
-    /// A paragraph.
+    /// Makes a paragraph.
     #[must_use]
     pub fn paragraph(content: impl Into<Self>) -> Self {
         Self::line("p", &content.into())
     }
 
-    /// A paragraph that is not to be overlooked.
+    /// Makes a paragraph in the colour of a failure.
     #[must_use]
     pub fn warning(content: impl Into<Self>) -> Self {
         Self { text: format!("<p class=\"warning\">{}</p>\n", content.into().text) }
     }
 
-    /// A heading below that of the page: of level 2 or 3.
+    /// Makes a heading of level 2 or 3. Level 1 is the title of the page.
     #[must_use]
     pub fn heading(level: u8, content: impl Into<Self>) -> Self {
         Self::line(if level <= 2 { "h2" } else { "h3" }, &content.into())
     }
 
-    /// A part with a name that links lead to.
+    /// Makes a section with a name for links.
     #[must_use]
     pub fn section(name: &str, content: impl Into<Self>) -> Self {
         Self { text: format!("<section id=\"{}\">\n{}</section>\n", escape(name), content.into().text) }
     }
 
-    /// A link to a part of the page.
+    /// Makes a link to a section of the page.
     #[must_use]
     pub fn link(name: &str, content: impl Into<Self>) -> Self {
         Self { text: format!("<a href=\"#{}\">{}</a>", escape(name), content.into().text) }
     }
 
-    /// A list.
+    /// Makes a list.
     #[must_use]
     pub fn list(items: impl IntoIterator<Item = Self>) -> Self {
         let items: String = items.into_iter().map(|item| format!("<li>{}</li>\n", item.text)).collect();
         Self { text: format!("<ul>\n{items}</ul>\n") }
     }
 
-    /// Words with the colour of a judgement.
+    /// Makes words in the colour of a judgement.
     #[must_use]
     pub fn mark(mark: Mark, words: &str) -> Self {
         let class = match mark {
@@ -96,65 +96,65 @@ impl Html {
         Self { text: format!("<b class=\"{class}\">{}</b>", escape(words)) }
     }
 
-    /// Names with what belongs to each.
+    /// Makes a list of names with their values.
     #[must_use]
     pub fn facts<'a>(facts: impl IntoIterator<Item = (&'a str, Self)>) -> Self {
         let facts: String = facts.into_iter().map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), value.text)).collect();
         Self { text: format!("<dl>\n{facts}</dl>\n") }
     }
 
-    /// A few letters of a file or a command.
+    /// Makes a short piece of a file or a command.
     #[must_use]
     pub fn code(text: &str) -> Self {
         Self { text: format!("<code>{}</code>", escape(text)) }
     }
 
-    /// One below the other, in a cell of a table.
+    /// Places parts below each other, for a table cell.
     #[must_use]
     pub fn lines(lines: impl IntoIterator<Item = Self>) -> Self {
         Self { text: lines.into_iter().map(|line| format!("<div>{}</div>", line.text)).collect() }
     }
 
-    /// Lines of a file or a command.
+    /// Makes lines of a file or a command.
     #[must_use]
     pub fn preformatted(text: &str) -> Self {
         Self { text: format!("<pre>{}</pre>\n", escape(text)) }
     }
 
-    /// Content that is folded away until it is opened.
+    /// Makes content that is hidden until opened.
     #[must_use]
     pub fn details(summary: &str, content: impl Into<Self>) -> Self {
         Self { text: format!("<details>\n<summary>{}</summary>\n{}</details>\n", escape(summary), content.into().text) }
     }
 
-    /// A picture with what belongs to it, under a name that links lead to; without one if it is empty.
+    /// Makes a figure with a name for links, or without a name if `name` is empty.
     #[must_use]
     pub fn figure(name: &str, content: impl Into<Self>) -> Self {
         let name = if name.is_empty() { String::new() } else { format!(" id=\"{}\"", escape(name)) };
         Self { text: format!("<figure{name}>\n{}</figure>\n", content.into().text) }
     }
 
-    /// What [`Picture::svg`](crate::Picture::svg) gave.
+    /// Embeds the SVG document of [`Picture::svg`](crate::Picture::svg).
     #[must_use]
     pub fn picture(svg: &str) -> Self {
-        // Beyond the declaration of a document of its own, an SVG stands in a page as it is.
+        // Without its XML declaration, an SVG document can be embedded in a page unchanged.
         let svg = svg.find("<svg").map_or("", |start| &svg[start..]);
         Self { text: format!("<div class=\"wide\">{svg}</div>\n") }
     }
 
-    /// What stands below a picture.
+    /// Makes the caption of a figure.
     #[must_use]
     pub fn caption(content: impl Into<Self>) -> Self {
         Self::line("figcaption", &content.into())
     }
 
-    /// A small bar, for a cell of a table.
+    /// Makes a small bar for a table cell.
     #[must_use]
     pub fn gauge(gauge: &Gauge) -> Self {
         Self { text: gauge.svg() }
     }
 
-    /// A table, which can be scrolled where it is wider than the page.
+    /// Makes a table, scrollable if wider than the page.
     #[must_use]
     pub fn table(table: &Table) -> Self {
         let mut text = "<div class=\"wide\">\n<table>\n<thead><tr>".to_owned();

@@ -1,7 +1,7 @@
-//! Pages of HTML: one file each, without scripts and with nothing from elsewhere, so that it can be opened from a folder or sent by mail.
+//! HTML pages, each a single file without scripts and without external content, fit for opening from a folder or sending by mail.
 //!
-//! A [`Page`] is a title and [`Html`], which is made of texts, tables and pictures and always well formed: texts are escaped where they enter. Pages are light or
-//! dark as their reader prefers, as the pictures within them. Equal contents are equal bytes.
+//! A [`Page`] has a title and [`Html`] content made of texts, tables and pictures. Pages are always well formed, because texts are escaped at their entry.
+//! Pages and their pictures are light or dark by the reader's preference. Equal contents give equal bytes.
 //!
 //! ```
 //! use cohaptic_picture::page::{Html, Page};
@@ -22,7 +22,7 @@ pub use content::{Html, Mark};
 pub(crate) use style::STYLE;
 pub use table::Table;
 
-/// A page.
+/// A page with a title and content.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Page {
     title: String,
@@ -30,19 +30,19 @@ pub struct Page {
 }
 
 impl Page {
-    /// A page without content.
+    /// Creates a page without content.
     #[must_use]
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), content: Html::default() }
     }
 
-    /// With more content at the end.
+    /// Appends content.
     #[must_use]
     pub fn with(self, content: impl Into<Html>) -> Self {
         Self { title: self.title, content: self.content.and(content) }
     }
 
-    /// The document.
+    /// Returns the page as a document.
     #[must_use]
     pub fn html(&self) -> String {
         let title = escape(&self.title);
@@ -87,7 +87,7 @@ mod tests {
         let page = everything().html();
         assert!(!page.contains("<script") && !page.contains('\u{202e}'), "{page}");
         assert_eq!(page, everything().html());
-        // Each of its places once, the title of the page twice, that of the picture in its own title too.
+        // Each insertion once, the title of the page twice, and the title of the picture in its `<title>` too.
         assert!(page.matches("&lt;script&gt;").count() >= 16, "{page}");
     }
 

@@ -1,4 +1,4 @@
-//! How pages look: in light and in dark, on a wide screen and on a narrow one. The ground is that of pictures.
+//! Style sheet of pages, for light and dark, wide and narrow screens. The background is the background of pictures.
 
 pub(crate) const STYLE: &str = "\
 :root { color-scheme: light dark; --ground: #fff; --ink: #1b1f24; --line: #c3c8ce; --good: #00603f; --partly: #7a4b00; --bad: #9b1c1c; }

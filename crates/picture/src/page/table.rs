@@ -1,44 +1,44 @@
-//! Tables.
+//! Tables of pages.
 
 use super::Html;
 
-/// Rows below the names of columns. The first cell of a row names the row.
+/// A table: rows below named columns. The first cell of a row is the row's heading.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Table {
-    /// Names, and whether what stands below is numbers.
+    /// Names of the columns, and whether a column has numbers.
     pub(super) columns: Vec<(String, bool)>,
     pub(super) rows: Vec<Vec<Html>>,
 }
 
 impl Table {
-    /// A table without columns.
+    /// Creates a table without columns.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// With one more column of texts.
+    /// Appends a column of text.
     #[must_use]
     pub fn column(mut self, name: impl Into<String>) -> Self {
         self.columns.push((name.into(), false));
         self
     }
 
-    /// With one more column of numbers.
+    /// Appends a column of numbers.
     #[must_use]
     pub fn number(mut self, name: impl Into<String>) -> Self {
         self.columns.push((name.into(), true));
         self
     }
 
-    /// With one more row.
+    /// Appends a row.
     #[must_use]
     pub fn row(mut self, cells: impl IntoIterator<Item = Html>) -> Self {
         self.rows.push(cells.into_iter().collect());
         self
     }
 
-    /// Whether there are no rows.
+    /// Returns whether the table has no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()

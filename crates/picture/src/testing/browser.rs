@@ -1,4 +1,4 @@
-//! What Chromium says of pictures and pages, where there is one.
+//! Asks Chromium about pictures and pages, if Chromium is installed.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,35 +6,35 @@ use std::process::{Command, Stdio};
 
 use super::{TextBox, misplaced};
 
-/// Which colours the reader of a document prefers.
+/// Colour scheme preferred by the reader of a document.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Scheme {
-    /// Dark letters on a light ground.
+    /// Dark letters on a light background.
     Light,
-    /// Light letters on a dark ground.
+    /// Light letters on a dark background.
     Dark,
 }
 
-/// Writes for each picture the place of each text in the units of the picture, as lines of numbers and a text.
+/// Script that writes the place of each text of each picture, in the picture's units, as lines of numbers and a text.
 const PLACES: &str = "let lines=[];for(const [n,svg] of [...document.querySelectorAll('svg.cohaptic-picture')].entries()){\
     const o=svg.getBoundingClientRect(),v=svg.viewBox.baseVal,k=v.width/o.width;for(const t of svg.querySelectorAll('text')){const b=t.getBoundingClientRect();\
     lines.push([n,(b.left-o.left)*k,(b.top-o.top)*k,(b.right-o.left)*k,(b.bottom-o.top)*k,v.width,v.height].map(x=>x.toFixed(3)).join(' ')+' '+\
     encodeURIComponent(t.textContent))}}";
 
-/// Writes for each class of each element the colours it is drawn with, each once.
+/// Script that writes the colours of each class of each element, each once.
 const COLOURS: &str = "let lines=[...new Set([...document.querySelectorAll('[class],body')].map(e=>{const s=getComputedStyle(e);\
     return [e.tagName.toLowerCase()+'.'+(e.getAttribute('class')||''),s.fill,s.stroke,s.color,s.backgroundColor].join('|')}))];";
 
-/// Writes by how much the page is wider than the window \[px\].
+/// Script that writes by how much the page is wider than the window \[px\].
 const WIDTH: &str = "lines.push('WIDER '+(document.documentElement.scrollWidth-document.documentElement.clientWidth));";
 
-/// What a browser says of these pictures, each under its name: [`misplaced`] with the boxes that it gives. `None` where there is no `chromium` on the path.
+/// Returns the misplaced texts of named pictures, as [`misplaced`] does, with the boxes measured by a browser. Returns `None` without a `chromium` on the path.
 ///
-/// A folder for the page and for what the browser keeps is needed, which is the caller's to remove.
+/// The page and the browser's data are written into `folder`, which the caller must remove.
 ///
 /// # Panics
 ///
-/// If the browser does not start or gives no answer.
+/// If the browser does not start or does not answer.
 #[must_use]
 pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<String>> {
     let svgs: Vec<&str> = pictures.iter().map(|(_, svg)| svg.as_str()).collect();
@@ -43,8 +43,8 @@ pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<St
     Some(placed(&lines, &expected))
 }
 
-/// What a browser says of a page: texts of its pictures outside of them or on each other, and whether the page is wider than a window of a laptop. `None`
-/// where there is no `chromium` on the path; see [`in_browser`].
+/// Returns the faults of a page in a browser: misplaced texts of its pictures, and a page wider than the window of a laptop. Returns `None` without a
+/// `chromium` on the path; see [`in_browser`].
 ///
 /// # Panics
 ///
@@ -61,8 +61,8 @@ pub fn page_in_browser(folder: &Path, page: &str) -> Option<Vec<String>> {
     Some(faults)
 }
 
-/// With which colours a browser draws each kind of element (`path.line s0|fill|stroke|color|background`) of a document for a reader of that scheme.
-/// `None` where there is no `chromium` on the path; see [`in_browser`].
+/// Returns the colours used by a browser for each kind of element of a document (`path.line s0|fill|stroke|color|background`), for a reader with the given
+/// scheme. Returns `None` without a `chromium` on the path; see [`in_browser`].
 ///
 /// # Panics
 ///
@@ -72,7 +72,7 @@ pub fn computed_colours(folder: &Path, document: &str, scheme: Scheme) -> Option
     answer(folder, document, scheme, COLOURS)
 }
 
-/// The places of texts of several pictures, of which the names and numbers of texts are known, in sentences.
+/// Parses the places of texts of several pictures, with known names and numbers of texts, and returns the faults as sentences.
 fn placed(lines: &[String], expected: &[(&str, usize)]) -> Vec<String> {
     let rows: Vec<(Vec<f64>, &str)> =
         lines.iter().map(|line| (line.split(' ').take(7).filter_map(|word| word.parse().ok()).collect(), line.as_str())).collect();
@@ -92,7 +92,7 @@ fn placed(lines: &[String], expected: &[(&str, usize)]) -> Vec<String> {
     faults
 }
 
-/// The lines that a script puts into `lines` when the browser has the page.
+/// Opens a page in the browser, runs `script`, and returns the lines collected by the script in `lines`.
 fn answer(folder: &Path, page: &str, scheme: Scheme, script: &str) -> Option<Vec<String>> {
     let found = Command::new("chromium").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success());
     if !found {
@@ -105,7 +105,7 @@ fn answer(folder: &Path, page: &str, scheme: Scheme, script: &str) -> Option<Vec
     );
     let file = folder.join("page.html");
     std::fs::write(&file, page).expect("the page can be written");
-    // In Chromium's settings 0 is dark and 1 is light.
+    // Chromium's setting is 0 for dark and 1 for light.
     let preferred = if scheme == Scheme::Dark { 0 } else { 1 };
     let output = Command::new("chromium")
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-component-update"])

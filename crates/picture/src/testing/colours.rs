@@ -1,17 +1,19 @@
-//! Whether the colours of a style sheet can be seen: on a light ground and on a dark one.
+//! Checks the contrast of the colours in style sheets, on a light and on a dark background.
 //!
 //! The contrast of two colours is that of the Web Content Accessibility Guidelines 2.2: (L₁ + 0.05) / (L₂ + 0.05), with the relative luminances L₁ ≥ L₂.
-//! Its least is 4.5 for text (criterion 1.4.3) and 3 for what a picture is understood by (1.4.11).
+//! The least contrast is 4.5 for text (criterion 1.4.3), and 3 for parts needed to understand a picture (1.4.11).
 
 use std::collections::BTreeMap;
 
-/// The least contrast of text, and that of lines, markers and areas.
+/// Least contrast of text.
 const TEXT: f64 = 4.5;
+/// Least contrast of lines, markers and areas.
 const LINE: f64 = 3.0;
 
-/// The faults of the colours of all pictures and pages, in sentences; empty if there are none: a colour of the light style that the dark style leaves as it is, or one with too
-/// little contrast to the ground.
+/// Returns the faults in the colours of all pictures and pages as sentences; empty without a fault. A fault is a colour of the light style not replaced by
+/// the dark style, or a colour with too little contrast to the background.
 ///
+/// Backgrounds, and lines that only guide the eye (grid of a plot, borders of a table), need no contrast.
 /// Grounds and lines that only guide the eye (the grid of a plot, the borders of a table) need no contrast.
 #[must_use]
 pub fn colour_faults() -> Vec<String> {
@@ -47,7 +49,7 @@ fn of_style(style: &str, ground: &str, guides: &[&str], is_text: impl Fn(&str) -
     faults
 }
 
-/// The colours of a style sheet by the last class of their selector, or by the name of a variable. A class has one colour.
+/// Returns the colours of a style sheet, by the last class of their selector or by the name of a variable. A class has a single colour.
 fn colours(style: &str) -> BTreeMap<String, String> {
     let mut colours = BTreeMap::new();
     for rule in style.split('}') {
@@ -65,7 +67,7 @@ fn colours(style: &str) -> BTreeMap<String, String> {
     colours
 }
 
-/// The contrast of two colours such as `#777` and `#14181d`, from 1 to 21; `None` if one is written otherwise.
+/// Returns the contrast of two colours such as `#777` and `#14181d`, from 1 to 21; `None` for a colour in another notation.
 #[must_use]
 pub fn contrast(one: &str, other: &str) -> Option<f64> {
     Some(ratio(luminance(one)?, luminance(other)?))
@@ -94,7 +96,7 @@ fn luminance(colour: &str) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Black on white is 21 by the formula; #777 on white is 4.48, as the guidelines' own tables have it.
+    /// Black on white has the contrast 21 by the formula. #777 on white has 4.48, as in the tables of the guidelines.
     #[test]
     fn contrasts_are_those_of_the_guidelines() {
         for (one, other, expected) in [("#000", "#ffffff", 21.0), ("#777", "#fff", 4.48), ("#777777", "#fff", 4.48), ("#abc", "#aabbcc", 1.0)] {
@@ -114,7 +116,7 @@ mod tests {
         let found = |style: &str| of_style(style, "--ground", &["--ground"], |name| name == "--ink");
         let good = ":root { --ground: #fff; --ink: #222; --a: #888; }\n@media (prefers-color-scheme: dark) { :root { --ground: #111; --ink: #eee; --a: #999; } }";
         assert_eq!(found(good), [""; 0]);
-        // #888 has a contrast of 3.5 to white: enough for a line, too little for text.
+        // #888 on white has a contrast of 3.5, enough for a line and too little for text.
         for (old, new, expected) in [
             ("--ink: #222", "--ink: #888", "light: --ink is #888, with a contrast of 3.54"),
             ("--a: #888", "--a: #aaa", "light: --a is #aaa, with a contrast of 2.32"),

@@ -1,6 +1,6 @@
-//! Checks for tests of pictures: of any command, drawn by this crate.
+//! Checks for tests of pictures, drawn by this crate for any command.
 //!
-//! [`faults`] reads a document and computes where each text is with the widest of the common fonts. [`in_browser`] asks Chromium, where there is one.
+//! [`faults`] reads a document and computes the place of each text with the widest common fonts. [`in_browser`] asks Chromium, if installed.
 //! [`colour_faults`] reads the colours of pictures and pages, light and dark.
 
 mod browser;
@@ -14,17 +14,17 @@ pub use page::page_faults;
 use crate::advance::advance;
 use crate::text::SMALL;
 
-/// The box around a text.
+/// A text with its bounding box.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TextBox {
-    /// What it says.
+    /// Text.
     pub text: String,
-    /// Left, top, right and bottom \[px\].
+    /// Left, top, right and bottom of the box \[px\].
     pub sides: [f64; 4],
 }
 
-/// The faults of a picture, in sentences; empty if there are none: it is no well-formed XML, a number has more than two decimals, a text is outside of the picture
-/// or on another.
+/// Returns the faults of a picture as sentences; empty without a fault. A fault is malformed XML, a number with more than two decimals, or a text that is
+/// outside the picture or overlaps another text.
 #[must_use]
 pub fn faults(svg: &str) -> Vec<String> {
     let document = match roxmltree::Document::parse(svg) {
@@ -53,10 +53,10 @@ pub fn faults(svg: &str) -> Vec<String> {
     faults
 }
 
-/// Which texts are outside of a picture of that width and height, and which are on each other, in sentences.
+/// Returns the texts outside a picture of the given width and height, and the overlapping texts, as sentences.
 #[must_use]
 pub fn misplaced(texts: &[TextBox], (width, height): (f64, f64)) -> Vec<String> {
-    // Coordinates are rounded to a hundredth.
+    // Coordinates are rounded to a hundredth, so boxes may touch by a little more.
     const ROUNDING: f64 = 0.05;
     let mut faults = Vec::new();
     for (place, TextBox { text, sides: [left, top, right, bottom] }) in texts.iter().enumerate() {
@@ -77,11 +77,11 @@ fn numbers(text: &str) -> Vec<f64> {
     text.split([' ', '(', ')', ',']).filter_map(|word| word.parse().ok()).collect()
 }
 
-/// How far plain letters reach above and below their line in DejaVu Sans, the tallest of the common fonts \[sizes of the font\].
+/// Extent of plain letters above the base line in DejaVu Sans, the tallest common font \[font sizes\]. The next constant is the extent below the base line.
 const ABOVE: f64 = 0.93;
 const BELOW: f64 = 0.24;
 
-/// The box of a text with the widest and tallest of the common fonts.
+/// Returns the box of a text with the widest and tallest common fonts.
 fn estimated(node: roxmltree::Node<'_, '_>) -> TextBox {
     let number = |node: roxmltree::Node<'_, '_>, name: &str| node.attribute(name).and_then(|text| text.parse::<f64>().ok());
     let size = number(node, "font-size").unwrap_or(16.0);

@@ -1,13 +1,13 @@
-//! Checks of pages of HTML.
+//! Checks of HTML pages.
 
 use super::faults;
 
-/// The faults of a page, in sentences; empty if there are none: its tags do not nest, something comes from elsewhere or is a script, or one of its pictures has
-/// [`faults`].
+/// Returns the faults of a page as sentences; empty without a fault. A fault is a wrongly nested tag, external content, a script, or a fault of a picture
+/// as in [`faults`].
 #[must_use]
 pub fn page_faults(page: &str) -> Vec<String> {
     let mut found = nesting(page);
-    // A place within the page is not elsewhere.
+    // References inside the page are not external.
     let own = page.replace("url(#", "").replace("href=\"#", "");
     for word in ["src=", "<script", "<link", "@import", "url(", "href=", "<iframe", "<object"] {
         if let Some(place) = own.find(word) {
@@ -22,7 +22,7 @@ pub fn page_faults(page: &str) -> Vec<String> {
     found
 }
 
-/// Every tag that opens closes, in order, but for the one kind that has no end.
+/// Checks that every opened tag is closed in order, except tags that have no end.
 fn nesting(page: &str) -> Vec<String> {
     let mut open: Vec<&str> = Vec::new();
     let mut rest = page;

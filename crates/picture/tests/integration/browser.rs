@@ -1,4 +1,4 @@
-//! The gallery in a browser, where there is one.
+//! The gallery in a browser, if a browser is installed.
 
 use cohaptic_picture::page::{Html, Mark, Page};
 use cohaptic_picture::testing::{Scheme, computed_colours, faults, in_browser, page_in_browser};
@@ -23,7 +23,7 @@ fn a_browser_shows_every_text_of_every_kind_of_picture_inside_and_apart() {
     }
 }
 
-/// A page with one picture of each kind and each mark.
+/// Returns a page with a picture of each kind and with each mark.
 fn page() -> String {
     let pictures = gallery().into_iter().filter(|(name, _)| name.ends_with("-page"));
     let figures = pictures.fold(Html::default(), |before, (name, picture)| before.and(Html::figure(&name, Html::picture(&picture.svg()))));
@@ -31,7 +31,7 @@ fn page() -> String {
     Page::new("Each kind of picture").with(Html::list(marks)).with(Html::warning("A warning")).with(figures).html()
 }
 
-/// What a reader sees, not what the style sheet says: a rule that no browser reads would change nothing.
+/// Checks the colours drawn and not the style sheet, because a browser ignores a rule it cannot read.
 #[test]
 #[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_browser_draws_other_colours_for_readers_who_prefer_dark() {
@@ -45,7 +45,7 @@ fn a_browser_draws_other_colours_for_readers_who_prefer_dark() {
         let line = lines.iter().find(|line| line.split('|').next() == Some(element)).unwrap_or_else(|| panic!("no {element} in {lines:?}"));
         line.split('|').skip(1).map(str::to_owned).collect()
     };
-    // Fill, stroke, text and ground. #fff and #14181d are the grounds; #0072b2 and #4aa8e8 the first line.
+    // Fill, stroke, text and background. #fff and #14181d are the backgrounds; #0072b2 and #4aa8e8 belong to the first line.
     for (element, place, on_white, on_black) in [
         ("rect.paper", 0, "rgb(255, 255, 255)", "rgb(20, 24, 29)"),
         ("body.", 3, "rgb(255, 255, 255)", "rgb(20, 24, 29)"),
@@ -57,7 +57,7 @@ fn a_browser_draws_other_colours_for_readers_who_prefer_dark() {
     ] {
         assert_eq!((of(&light, element)[place].as_str(), of(&dark, element)[place].as_str()), (on_white, on_black), "{element}");
     }
-    // Colours of cells mean values, and hatchings are patterns whose path is looked at above; whatever else a picture draws changes.
+    // Colours of cells stand for values, and hatchings are patterns, whose path is checked above. All other drawn elements change.
     let drawn = |element: &str| ["path.", "rect.", "circle.", "text."].iter().any(|kind| element.starts_with(kind));
     let mut seen = 0;
     for element in light.iter().filter_map(|line| line.split('|').next()).filter(|element| drawn(element)) {

@@ -1,8 +1,8 @@
-//! One picture of each kind.
+//! A gallery: a picture of each kind.
 
 use cohaptic_picture::{Axis, Band, Fill, HeatMap, LegendPlace, Line, Look, Marker, Panel, Picture, Region, Rug, Size};
 
-/// Each under its name.
+/// Returns the pictures with their names.
 pub(crate) fn gallery() -> Vec<(String, Picture)> {
     let sized = [("page", Size::PAGE), ("one-column", Size::ONE_COLUMN), ("two-columns", Size::TWO_COLUMNS), ("600x400", "600x400".parse().unwrap())];
     let kinds = [
@@ -18,7 +18,8 @@ pub(crate) fn gallery() -> Vec<(String, Picture)> {
     kinds.into_iter().flat_map(named).collect()
 }
 
-/// Cells at 0, 1 and 10 on axes from 1 to 10: the first ends at 0.5, which is below the axes, the second at 5.5, which is 74 % up them (the decimal logarithm of 5.5).
+/// Cells at 0, 1 and 10 on axes from 1 to 10. The first cell ends at 0.5, below the axes. The second ends at 5.5, which is 74 % up (the decimal logarithm
+/// of 5.5).
 #[test]
 fn cells_and_bands_that_begin_at_zero_reach_the_foot_of_a_logarithmic_axis() {
     let places = [0.0, 1.0, 10.0];

@@ -1,4 +1,4 @@
-//! Pictures as a reader sees them: no text outside, none on another, whatever is asked for.
+//! Pictures as seen by a reader: in any picture no text is outside the picture or overlaps another.
 #![allow(clippy::unwrap_used, clippy::print_stderr, reason = "these are tests, which say what they skip")]
 
 mod any_picture;
