@@ -135,12 +135,6 @@ impl AddressPlan {
         self.owners.get(Self::place(address)).copied().flatten()
     }
 
-    #[inline]
-    pub(crate) fn owner_of_v4(&self, address: Ipv4Addr) -> Option<NodeId> {
-        let place = address.to_bits().wrapping_sub(FIRST.0 + 1);
-        self.owners.get(place as usize).copied().flatten()
-    }
-
     /// Where an address stands among the owners; behind them all if nobody can have had it.
     #[inline]
     fn place(address: IpAddr) -> usize {
@@ -247,7 +241,7 @@ impl<T: ToSocketAddrs + ?Sized> ToSocketAddrs for &T {
 
 fn look_up(name: &str) -> io::Result<Addresses> {
     let shared = context::shared().ok_or_else(|| context::outside(&format!("the name `{name}` of a host means something")))?;
-    let found = shared.lock().plan.addresses(name);
+    let found = shared.with(|core| core.plan.addresses(name));
     found.ok_or_else(|| {
         // A program that looks a wrong name up until it is found lets no time pass.
         shared.note_call();

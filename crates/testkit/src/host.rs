@@ -38,7 +38,7 @@ impl Host {
     /// The addresses that it has now.
     #[must_use]
     pub fn addresses(&self) -> Addresses {
-        self.shared.lock().plan.of(self.node)
+        self.shared.with(|core| core.plan.of(self.node))
     }
 
     /// Its address of version 4.
@@ -116,7 +116,7 @@ impl Host {
     pub async fn connect(&self, address: impl ToSocketAddrs) -> io::Result<crate::TcpStream> {
         self.shared.check_open(self.node, "a connection")?;
         let address = address.to_socket_addr()?;
-        let config = self.shared.lock().tcp_config(self.node).clone();
+        let config = self.shared.with(|core| core.tcp_config(self.node).clone());
         crate::TcpStream::connect_on(Arc::clone(&self.shared), self.node, None, address, config)?.established().await
     }
 
@@ -139,7 +139,7 @@ impl Host {
     pub fn crash(&self) {
         let running = self.running("hosts crash");
         // First the sockets: what the tasks do while they are dropped does not reach anybody.
-        self.shared.lock().crash(self.node);
+        self.shared.with(|core| core.crash(self.node));
         running.tasks.stop_all_of(self.node);
     }
 
@@ -154,7 +154,7 @@ impl Host {
         if self.is_up() {
             // First the tasks, which drop what they hold; then what others hold of this host's.
             running.tasks.stop_all_of(self.node);
-            self.shared.lock().kill(self.node);
+            self.shared.with(|core| core.kill(self.node));
         }
     }
 
@@ -165,7 +165,7 @@ impl Host {
     /// Outside the run.
     pub fn restart(&self) {
         let running = self.running("hosts restart");
-        let begins = self.shared.lock().restart(self.node);
+        let begins = self.shared.with(|core| core.restart(self.node));
         if begins {
             running.tasks.restart(self.node);
         }
@@ -174,13 +174,13 @@ impl Host {
     /// Whether it is up.
     #[must_use]
     pub fn is_up(&self) -> bool {
-        self.shared.lock().is_up(self.node)
+        self.shared.with(|core| core.is_up(self.node))
     }
 
     /// Gives the host addresses that nobody has had, as a phone gets that leaves its network. Those before belong to nobody: packets to them, also those on their way, are
     /// lost. Sockets bound to `0.0.0.0` or `[::]` go on with the new ones, others cannot send any more.
     pub fn change_addresses(&self) -> Addresses {
-        self.shared.lock().change_addresses(self.node)
+        self.shared.with(|core| core.change_addresses(self.node))
     }
 
     /// The run of this host, on its thread.
@@ -206,7 +206,7 @@ impl Host {
 
 impl fmt::Debug for Host {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let addresses = self.shared.try_lock().map(|core| core.plan.of(self.node));
+        let addresses = self.shared.try_with(|core| core.plan.of(self.node));
         f.debug_struct("Host").field("name", &self.name()).field("addresses", &addresses).finish_non_exhaustive()
     }
 }
@@ -220,7 +220,7 @@ impl From<&Host> for IpAddr {
 impl ToSocketAddrs for (&Host, u16) {
     fn to_socket_addr(&self) -> io::Result<std::net::SocketAddr> {
         let (host, port) = self;
-        let core = host.shared.open(host.node, "the address")?;
-        Ok((core.plan.of(host.node).v4, *port).into())
+        let addresses = host.shared.open(host.node, "the address", |core| core.plan.of(host.node))?;
+        Ok((addresses.v4, *port).into())
     }
 }

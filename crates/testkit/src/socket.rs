@@ -13,7 +13,7 @@ use cohaptic_wan::NodeId;
 
 use crate::address::ToSocketAddrs;
 use crate::context::Call;
-use crate::core::{Guard, Inlet, Shared, SocketId};
+use crate::core::{Core, Shared, SocketId};
 
 /// Name of this kind of socket in messages.
 const KIND: &str = "a UDP socket";
@@ -38,7 +38,6 @@ pub struct UdpSocket {
     shared: Arc<Shared>,
     host: NodeId,
     id: SocketId,
-    inlet: Arc<Inlet>,
     options: options::Options,
 }
 
@@ -66,23 +65,23 @@ impl UdpSocket {
         // The host is asked before the address is looked up: a name means nothing, or another host, where this one may not be used.
         shared.check_open(host, KIND)?;
         let address = address.to_socket_addr()?;
-        let mut core = shared.lock();
-        core.check_up(host)?;
-        let id = core.bind(host, address)?;
-        let inlet = core.inlet_of(id);
-        drop(core);
-        Ok(Self { shared, host, id, inlet, options: options::Options::default() })
+        let id = shared.with(|core| {
+            core.check_up(host)?;
+            core.bind(host, address)
+        })?;
+        Ok(Self { shared, host, id, options: options::Options::default() })
     }
 
-    /// The state, for a call.
+    /// Asks the state.
     ///
     /// # Errors
     ///
     /// If the run has ended, this is another thread, or the host of the socket has crashed.
-    fn open(&self) -> io::Result<Guard<'_>> {
-        let core = self.shared.open(self.host, KIND)?;
-        core.check_alive(self.id)?;
-        Ok(core)
+    fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
+        self.shared.open(self.host, KIND, |core| {
+            core.check_alive(self.id)?;
+            Ok(ask(core))
+        })?
     }
 
     /// The address at which it is bound.
@@ -91,7 +90,7 @@ impl UdpSocket {
     ///
     /// If its host has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        Ok(self.open()?.local_of(self.id))
+        self.open(|core| core.local_of(self.id))
     }
 
     /// The peer to which it is connected.
@@ -100,7 +99,7 @@ impl UdpSocket {
     ///
     /// [`io::ErrorKind::NotConnected`] if it is not.
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
-        self.open()?.peer_of(self.id).ok_or_else(|| io::ErrorKind::NotConnected.into())
+        self.open(|core| core.peer_of(self.id))?.ok_or_else(|| io::ErrorKind::NotConnected.into())
     }
 
     /// From now on it sends to that peer and hears nobody else. What has come before stays in its buffer.
@@ -112,7 +111,7 @@ impl UdpSocket {
     pub async fn connect(&self, peer: impl ToSocketAddrs) -> io::Result<()> {
         self.shared.check_open(self.host, KIND)?;
         let peer = peer.to_socket_addr()?;
-        self.shared.lock().connect(self.id, peer)
+        self.shared.with(|core| core.connect(self.id, peer))
     }
 
     /// Whether it may send to 255.255.255.255, which reaches all other hosts.
@@ -121,7 +120,7 @@ impl UdpSocket {
     ///
     /// If its host has crashed.
     pub fn broadcast(&self) -> io::Result<bool> {
-        Ok(*self.open()?.may_broadcast(self.id))
+        self.open(|core| *core.may_broadcast(self.id))
     }
 
     /// Lets it send to 255.255.255.255, or not.
@@ -130,8 +129,7 @@ impl UdpSocket {
     ///
     /// If its host has crashed.
     pub fn set_broadcast(&self, on: bool) -> io::Result<()> {
-        *self.open()?.may_broadcast(self.id) = on;
-        Ok(())
+        self.open(|core| *core.may_broadcast(self.id) = on)
     }
 
     /// Takes out the error that the next call would give otherwise.
@@ -140,7 +138,7 @@ impl UdpSocket {
     ///
     /// If its host has crashed.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
-        Ok(self.open()?.take_error(self.id))
+        self.open(|core| core.take_error(self.id))
     }
 }
 
@@ -153,7 +151,7 @@ impl Drop for UdpSocket {
 
 impl fmt::Debug for UdpSocket {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let local = self.shared.try_lock().map(|core| core.local_of(self.id));
+        let local = self.shared.try_with(|core| core.local_of(self.id));
         f.debug_struct("UdpSocket").field("local", &local).finish_non_exhaustive()
     }
 }

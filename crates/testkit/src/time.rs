@@ -12,7 +12,7 @@ use std::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::context;
-use crate::core::{Registered, Shared, TimerId, asked_here, registered};
+use crate::core::{Registered, Shared, TimerId, registered};
 
 /// The time since the run began.
 ///
@@ -22,12 +22,6 @@ use crate::core::{Registered, Shared, TimerId, asked_here, registered};
 #[must_use]
 #[inline]
 pub fn now() -> Instant {
-    asked_here().unwrap_or_else(asked_now)
-}
-
-/// The time where the state does not lie with this thread, or the clock must be asked.
-#[inline(never)]
-fn asked_now() -> Instant {
     context::ask("time is known", |shared| {
         shared.note_call();
         shared.now()
@@ -75,10 +69,13 @@ impl Sleep {
         let registered = registered(waker);
         match &mut self.timer {
             Some((timer, known)) => {
-                self.shared.lock().timers.renew(*timer, waker);
+                self.shared.with(|core| core.timers.renew(*timer, waker));
                 *known = registered;
             }
-            None => self.timer = Some((self.shared.lock().timers.set(self.deadline, waker.clone()), registered)),
+            None => {
+                let timer = self.shared.with(|core| core.timers.set(self.deadline, waker.clone()));
+                self.timer = Some((timer, registered));
+            }
         }
     }
 
@@ -91,7 +88,7 @@ impl Sleep {
     /// Waits until another instant from now on.
     pub fn reset(&mut self, deadline: Instant) {
         if let Some((timer, _)) = self.timer.take() {
-            self.shared.lock().timers.cancel(timer);
+            self.shared.with(|core| core.timers.cancel(timer));
         }
         self.deadline = deadline;
     }

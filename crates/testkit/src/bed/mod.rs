@@ -395,7 +395,7 @@ pub(crate) struct Recorder<'a> {
 
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {
-        *self.recorded = Some(self.shared.lock().recorded());
+        *self.recorded = Some(self.shared.with(|core| core.recorded()));
         // Tasks hold the state, and the state their wakers.
         self.tasks.stop_all();
         self.shared.end();
@@ -422,9 +422,10 @@ where
     let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
     watched.is_of(&shared);
     let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
+    // The run has ended when the recorder is dropped: the state is back by then, where other threads find it.
+    let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     // After it is known that no other one runs on this thread.
     let _here = shared.stay();
-    let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let outcome = Rc::new(RefCell::new(None));
     // In a box: a program may hold arrays, and without optimisation each call that a future is handed to has a copy of it on the stack.
     let (future, slot) = (Box::pin(program(Bed::new(Arc::clone(&shared)))), Rc::clone(&outcome));

@@ -48,13 +48,13 @@ impl Bed {
     /// Which host has which addresses now.
     #[must_use]
     pub fn addresses(&self) -> AddressPlan {
-        self.shared.lock().plan.clone()
+        self.shared.with(|core| core.plan.clone())
     }
 
     /// The name of the host that has this address now.
     #[must_use]
     pub fn owner(&self, address: IpAddr) -> Option<String> {
-        self.shared.lock().plan.owner(address).map(str::to_owned)
+        self.shared.with(|core| core.plan.owner(address).map(str::to_owned))
     }
 
     /// The time since the run began.
@@ -116,7 +116,7 @@ impl Bed {
 
     /// Mends all ways.
     pub fn mend_all(&self) {
-        self.shared.lock().wire.mend_all();
+        self.shared.with(|core| core.wire.mend_all());
     }
 
     /// The link from one host to another is another one from now on. Packets in it follow the rules of [`cohaptic_wan::Link::set_model`].
@@ -127,7 +127,8 @@ impl Bed {
     pub fn set_link(&self, from: &str, to: &str, link: impl ToLink) {
         let path = self.names().path(from, to);
         assert!(path.from != path.to, "host `{from}` has no link to itself");
-        self.shared.lock().set_link(path, link.to_link());
+        let link = link.to_link();
+        self.shared.with(|core| core.set_link(path, link));
     }
 
     /// What the link from one host to another has done so far.
@@ -138,7 +139,7 @@ impl Bed {
     #[must_use]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
         let path = self.names().path(from, to);
-        self.shared.lock().wire.link_stats(path).unwrap_or_else(|| unreachable_link(from))
+        self.shared.with(|core| core.wire.link_stats(path)).unwrap_or_else(|| unreachable_link(from))
     }
 
     /// How many packets from one host to another were [hit](crate::hit) so far.
@@ -149,39 +150,37 @@ impl Bed {
     #[must_use]
     pub fn hits(&self, from: &str, to: &str) -> u64 {
         let path = self.names().path(from, to);
-        self.shared.lock().wire.hits(path)
+        self.shared.with(|core| core.wire.hits(path))
     }
 
     /// All ends of TCP connections that are not over, those that no program holds any more included, in the order of hosts, ports and peers.
     #[cfg(feature = "tcp")]
     #[must_use]
     pub fn connections(&self) -> Vec<crate::tcp::ConnectionInfo> {
-        let core = self.shared.lock();
-        let names = core.plan.names();
         let end = |(host, connection): (NodeId, &cohaptic_tcp::Connection)| crate::tcp::ConnectionInfo {
-            host: names[host.index()].clone(),
+            host: self.names()[host.index()].clone(),
             local: connection.local_addr(),
             peer: connection.peer_addr(),
             info: connection.info(),
         };
-        core.connections().map(end).collect()
+        self.shared.with(|core| core.connections().map(end).collect())
     }
 
     /// Notes something in the trace: what a program computes, say, so that two runs are compared by it too.
     pub fn note(&self, text: impl fmt::Display) {
         let text = text.to_string();
-        self.shared.lock().wire.note(Happening::Note(text));
+        self.shared.with(|core| core.wire.note(Happening::Note(text)));
     }
 
     /// What has happened so far, if it is recorded: in [`Testbed::run_twice`](crate::Testbed::run_twice) and with [`Testbed::traced`](crate::Testbed::traced).
     #[must_use]
     pub fn trace(&self) -> Trace {
-        self.shared.lock().wire.recording().trace().clone()
+        self.shared.with(|core| core.wire.recording().trace().clone())
     }
 
     fn set_cut(&self, from: &str, to: &str, cut: bool) {
         let path = self.names().path(from, to);
-        self.shared.lock().wire.set_cut(path, cut);
+        self.shared.with(|core| core.wire.set_cut(path, cut));
     }
 
     fn names(&self) -> &Names {

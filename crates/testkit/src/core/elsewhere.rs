@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 
 use cohaptic_wan::NodeId;
 
-use super::{Core, Guard, Shared};
+use super::{Core, Shared};
 use crate::context;
 
 /// Acts that other threads have left for the thread of a run.
@@ -47,15 +47,15 @@ impl Shared {
         context::is_running(self) || self.has_ended()
     }
 
-    /// The state, for a call of something of that host: `kind`, such as "a UDP socket".
+    /// Asks the state for something of that host: `kind`, such as "a UDP socket".
     ///
     /// # Errors
     ///
     /// As [`Shared::check_open`].
-    #[inline]
-    pub(crate) fn open(&self, host: NodeId, kind: &str) -> io::Result<Guard<'_>> {
+    #[inline(always)]
+    pub(crate) fn open<T>(&self, host: NodeId, kind: &str, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
         self.check_open(host, kind)?;
-        Ok(self.lock())
+        Ok(self.with(ask))
     }
 
     /// Fails unless something of that host may be used here and now.
@@ -108,7 +108,7 @@ impl Shared {
     /// Lets go of something: now, or, on a thread that may not have the state, when the task that the run's thread polls has returned.
     pub(crate) fn release(&self, act: impl FnOnce(&mut Core) + Send + 'static) {
         if self.is_at_hand() || self.may_be_had() {
-            act(&mut self.lock());
+            self.with(act);
         } else {
             self.elsewhere.leave(|left| left.acts.push(Box::new(act)));
         }
@@ -130,7 +130,7 @@ impl Shared {
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     fn attend_now(&self) {
         let Left { misuse, acts } = self.elsewhere.take();
-        acts.into_iter().for_each(|act| act(&mut self.lock()));
+        acts.into_iter().for_each(|act| self.with(act));
         if let Some(text) = misuse {
             panic!("{text}");
         }

@@ -1,7 +1,8 @@
 //! The two ends of a packet, in as few bytes as they take: the event queue moves them.
 
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
+use super::bound::Port;
 use crate::address::Addresses;
 
 /// The two ends of a packet, and its kind.
@@ -36,16 +37,10 @@ impl Ends {
         Self { ips: [short(from.ip()), short(to.ip())], ports: [from.port(), to.port()], is_six: to.is_ipv6(), kind }
     }
 
-    /// As [`Ends::new`], of version 4.
+    /// The version and the port of the receiver.
     #[inline]
-    pub(super) const fn of_v4(from: SocketAddrV4, to: SocketAddrV4, kind: Kind) -> Self {
-        Self { ips: [from.ip().to_bits(), to.ip().to_bits()], ports: [from.port(), to.port()], is_six: false, kind }
-    }
-
-    /// The receiver, of version 4.
-    #[inline]
-    pub(super) const fn receiver_v4(self) -> Option<(Ipv4Addr, u16)> {
-        if self.is_six { None } else { Some((Ipv4Addr::from_bits(self.ips[1]), self.ports[1])) }
+    pub(super) const fn port(&self) -> Port {
+        Port { is_six: self.is_six, number: self.ports[1] }
     }
 
     #[inline]

@@ -1,11 +1,11 @@
 //! The hosts, their sockets and the network between them, as one state machine: it is told the time.
 
+mod bound;
 mod elsewhere;
 mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
 mod face;
-mod inlet;
 mod octets;
 mod passing;
 mod shared;
@@ -16,8 +16,6 @@ mod tcp;
 mod timers;
 mod waking;
 
-use std::collections::BTreeMap;
-use std::net::Ipv4Addr;
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
@@ -28,15 +26,15 @@ use crate::bed::Names;
 use crate::file::LinkChange;
 use crate::trace::Happening;
 use crate::wire::{self, Recorded, Settings, Wire};
+use bound::Bound;
 use ends::{Ends, Kind};
 use face::Face;
 use sockets::Sockets;
 use waking::Woken;
 
-pub(crate) use inlet::Inlet;
 pub(crate) use octets::Octets;
 pub(crate) use passing::Outgoing;
-pub(crate) use shared::{Clock, Guard, Shared, asked_here};
+pub(crate) use shared::{Clock, Shared};
 pub(crate) use socket_name::SocketName;
 pub(crate) use sockets::{Datagram, SocketId};
 #[cfg(feature = "tcp")]
@@ -60,10 +58,6 @@ pub(crate) struct Core {
     face: Arc<Face>,
     /// Which run it is the state of.
     run: u64,
-    /// The same number as long as the time is that of the clock: then a task takes the state without another question. Else 0.
-    at_hand: u64,
-    /// Whether it goes back to where other threads find it.
-    is_from_home: bool,
 }
 
 pub(crate) type Parcel = wire::Parcel<Ends>;
@@ -91,8 +85,6 @@ impl Core {
             tcp: tcp::Tcp::new(seed, names.len()),
             woken: Woken::default(),
             run: 0,
-            at_hand: 0,
-            is_from_home: false,
         }
     }
 
@@ -131,9 +123,12 @@ impl Core {
         self.timers.fire(self.wire.now(), &mut self.woken);
     }
 
-    /// Lets time pass until then, event by event: tokio's clock may have jumped over some.
+    /// Lets time pass until then, event by event, unless it has: tokio's clock may have jumped over some.
     #[cfg(feature = "tokio")]
     fn pass_until(&mut self, now: Instant) {
+        if now <= self.now() {
+            return;
+        }
         while let Some(next) = self.next_event().filter(|next| *next < now) {
             self.pass(next);
         }
@@ -186,11 +181,8 @@ struct HostState {
     is_down: bool,
     /// Its program was killed, and not begun again.
     is_idle: bool,
-    /// The sockets of a port, by version (6 or not) and port.
-    ports: BTreeMap<(bool, u16), Vec<SocketId>>,
-    /// The address and port to which the last plain datagram went, and its socket, until a socket of the host is bound, connected or closed, or the host is down or has other
-    /// addresses: see [`Core::arrive`].
-    plain: Option<(Ipv4Addr, u16, SocketId)>,
+    /// The sockets of its ports.
+    bound: Bound,
     /// The port that is given next to a socket that asks for none.
     next_port: u16,
 }
@@ -215,7 +207,7 @@ impl Core {
         if std::mem::replace(&mut state.is_down, true) {
             return;
         }
-        (state.ports, state.plain) = (BTreeMap::new(), None);
+        state.bound = Bound::default();
         let now = self.now();
         for socket in self.sockets.all_of(host) {
             socket.die(now, &mut self.wire.held, &mut self.woken);
@@ -233,7 +225,7 @@ impl Core {
         self.wire.note(Happening::Killed(host));
         let state = &mut self.hosts[host.index()];
         state.is_idle = true;
-        (state.ports, state.plain) = (BTreeMap::new(), None);
+        state.bound = Bound::default();
         let now = self.now();
         for socket in self.sockets.all_of(host) {
             socket.die(now, &mut self.wire.held, &mut self.woken);
@@ -255,7 +247,6 @@ impl Core {
     /// The host has other addresses from now on.
     pub(crate) fn change_addresses(&mut self, host: NodeId) -> address::Addresses {
         self.wire.note(Happening::Readdressed(host));
-        self.hosts[host.index()].plain = None;
         self.plan.change(host)
     }
 }

@@ -1,6 +1,6 @@
 //! What packets carry, in memory that is used again.
 
-use std::net::{Ipv4Addr, SocketAddrV4};
+use std::net::{Ipv4Addr, SocketAddr};
 use std::ops::Deref;
 
 use bytes::Bytes;
@@ -120,8 +120,8 @@ impl Spare {
 #[cold]
 #[inline(never)]
 fn empty() -> Box<Parcel> {
-    let nowhere = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);
-    Box::new(Parcel { addresses: Ends::of_v4(nowhere, nowhere, Kind::Datagram), bytes: Octets::default(), ecn_capable: false })
+    let nowhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0));
+    Box::new(Parcel { addresses: Ends::new(nowhere, nowhere, Kind::Datagram), bytes: Octets::default(), ecn_capable: false })
 }
 
 #[cfg(test)]

@@ -1,13 +1,16 @@
 //! How tasks get at the state machine.
 //!
-//! The state lies with the thread that polls the tasks of a run: each call takes it from there and puts it back, which costs a few moves where a mutex costs two
-//! atomic operations. A datagram makes six or seven calls, and they were a quarter of its time. Other threads have no part in a run: see
-//! [`elsewhere`](super::elsewhere). Where the watchdog looks at the record of a run while a task has the thread, the state lies behind the mutex all the time.
+//! While a run goes on, its state lies with the thread that polls its tasks, and a call borrows the state there: [`Shared::with`] is the only way to it. A borrow takes a few
+//! instructions, where a mutex takes two atomic operations, and a datagram borrows three times: to be sent, to be received, and when its reader waits again. Other
+//! threads have no part in a run: see [`elsewhere`](super::elsewhere).
+//!
+//! Before and after the run the state lies behind a mutex, in `home`. The state of a run that others look at stays there all the time: the watchdog looks at the record while a
+//! task has the thread.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::task::Waker;
 use std::time::Duration;
 
@@ -20,38 +23,17 @@ use crate::bed::Names;
 use crate::wire::Recorded;
 
 thread_local! {
-    /// The state of the run whose tasks this thread polls, unless it is in use. Nothing is to be dropped with the thread, so that no access asks whether that was
-    /// done: [`Stay`] has taken the state away before.
-    static HERE: Cell<ManuallyDrop<Option<Box<Core>>>> = const { Cell::new(ManuallyDrop::new(None)) };
-    /// The run whose state this thread has for itself, at the time of its clock; 0 if there is none. In use or not, no other thread has the state then.
+    /// The state of the run whose tasks this thread polls. Nothing is to be dropped with the thread, so that no access asks whether that was done: [`Stay`] has taken
+    /// the state away before.
+    static HERE: RefCell<ManuallyDrop<Option<Box<Core>>>> = const { RefCell::new(ManuallyDrop::new(None)) };
+    /// The run whose state lies here, at the time of its clock; 0 if there is none.
     static AT_HAND: Cell<u64> = const { Cell::new(0) };
-}
-
-#[inline]
-fn take_here() -> Option<Box<Core>> {
-    ManuallyDrop::into_inner(HERE.with(|here| here.replace(ManuallyDrop::new(None))))
-}
-
-#[inline]
-fn put_here(core: Box<Core>) {
-    HERE.with(|here| here.set(ManuallyDrop::new(Some(core))));
-}
-
-/// The time, if the state of a run lies here at the time of its clock: for a program that asks. `None` too if it has asked too often; see [`Face::note_call`].
-#[inline]
-pub(crate) fn asked_here() -> Option<Instant> {
-    let core = take_here()?;
-    let now = (core.at_hand != 0 && core.face.count_call()).then(|| core.now());
-    put_here(core);
-    now
 }
 
 /// The state machine, and how what belongs to tasks gets at it.
 pub(crate) struct Shared {
     /// The state while it does not lie with the thread of the run.
     home: Mutex<Option<Box<Core>>>,
-    /// Somebody has put the state into `home`.
-    returned: Condvar,
     /// Acts that other threads have left for the thread of the run.
     pub(super) elsewhere: Elsewhere,
     /// The run is over: a value of the run, such as a socket, may lock the state from any thread to be let go.
@@ -65,7 +47,6 @@ pub(crate) struct Shared {
     /// move it.
     #[cfg(feature = "tokio")]
     is_synced: AtomicBool,
-    #[cfg_attr(not(feature = "tokio"), expect(dead_code, reason = "there is one clock"))]
     clock: Clock,
     face: Arc<Face>,
 }
@@ -87,11 +68,8 @@ impl Shared {
         static RUNS: AtomicU64 = AtomicU64::new(1);
         let run = RUNS.fetch_add(1, Ordering::Relaxed);
         let (face, stays, names) = (Arc::clone(&core.face), core.is_looked_at(), Arc::clone(core.plan.shared_names()));
-        let at_hand = if matches!(clock, Clock::Own) { run } else { 0 };
-        let home = Mutex::new(Some(Box::new(Core { run, at_hand, ..core })));
         Self {
-            home,
-            returned: Condvar::new(),
+            home: Mutex::new(Some(Box::new(Core { run, ..core }))),
             elsewhere: Elsewhere::default(),
             has_ended: AtomicBool::new(false),
             names,
@@ -141,23 +119,21 @@ impl Shared {
     /// The time of a clock that must be asked.
     #[inline(never)]
     fn asked_now(&self) -> Instant {
-        self.lock().now()
+        self.with(|core| core.now())
     }
 
     /// Follows tokio's clock, and then not until the guard is dropped. `moved` is where the clock stands, if that is known: to ask it takes four atomic operations.
     #[cfg(feature = "tokio")]
     pub(crate) fn sync(&self, moved: Option<Instant>) -> Synced<'_> {
         if moved.is_none() {
-            drop(self.lock());
+            self.asked_now();
         }
         self.is_synced.store(true, Ordering::Relaxed);
-        let mut core = self.lock();
-        core.at_hand = self.run;
-        if !core.is_from_home {
+        if !self.stays {
             AT_HAND.set(self.run);
         }
-        if let Some(moved) = moved.filter(|moved| *moved > core.now()) {
-            core.pass_until(moved);
+        if let Some(moved) = moved {
+            self.with(|core| core.pass_until(moved));
         }
         Synced(self)
     }
@@ -187,93 +163,81 @@ impl Shared {
     /// Tries for half a second of the wall clock: a loop of tokio takes the state again and again, each time for a moment, on a thread that may have to wait for a processor.
     fn try_home<T>(&self, look: impl Fn(&Core) -> T) -> Option<T> {
         for _ in 0..500 {
-            if let Some(core) = self.lock_home().as_deref() {
+            let home = match self.home.try_lock() {
+                Ok(home) => Some(home),
+                Err(TryLockError::Poisoned(home)) => Some(home.into_inner()),
+                Err(TryLockError::WouldBlock) => None,
+            };
+            if let Some(core) = home.as_ref().and_then(|home| home.as_deref()) {
                 return Some(look(core));
             }
+            drop(home);
             // Nobody wakes the thread that watches: it looks again after a millisecond at least.
             std::thread::park_timeout(Duration::from_millis(1));
         }
         None
     }
 
-    /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.
+    /// Asks the state at this instant. Tasks that are to be woken are woken when it has answered.
     ///
     /// # Panics
     ///
-    /// On another thread while the run goes on.
-    #[inline]
-    pub(crate) fn lock(&self) -> Guard<'_> {
-        Guard { core: Some(self.take()), shared: self }
-    }
-
-    /// As [`Shared::lock`]; `None` on another thread while the run goes on.
-    pub(crate) fn try_lock(&self) -> Option<Guard<'_>> {
-        (self.is_at_hand() || self.may_be_had()).then(|| self.lock())
-    }
-
-    #[inline(always)]
-    fn take(&self) -> Box<Core> {
-        match take_here() {
-            Some(core) if core.at_hand == self.run => core,
-            other => self.fetch(other),
-        }
-    }
-
-    #[inline(always)]
-    fn put(&self, core: Box<Core>) {
-        if core.is_from_home || core.woken.is_any() {
-            self.give_back(core);
-        } else {
-            put_here(core);
-        }
-    }
-
-    /// Asks the state, as [`Shared::lock`] gives it, and gives it back without a call. Nothing has the address of the guard, so that it lies in registers: together this
-    /// took more than half off the instructions of a guard.
+    /// On another thread while the run goes on; if the state is asked while it answers.
     #[inline(always)]
     pub(crate) fn with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> T {
-        let mut lent = Lent { core: Some(self.take()), shared: self };
-        ask(lent.core.as_mut().expect("it is there until it is given back"))
+        if self.is_at_hand() {
+            let (outcome, woken) = HERE.with_borrow_mut(|here| {
+                let core = here.as_mut().expect("it is at hand");
+                (ask(core), core.woken.take())
+            });
+            if let Some(woken) = woken {
+                wake(woken);
+            }
+            return outcome;
+        }
+        let (mut ask, mut outcome) = (Some(ask), None);
+        self.ask_anywhere(&mut |core| outcome = ask.take().map(|ask| ask(core)));
+        outcome.expect("it was asked once")
     }
 
-    /// Takes the state from where others find it, unless it lay here, and lets time pass to that of the clock. The state of another run, which may lie here, stays here.
+    /// As [`Shared::with`]; `None` on another thread while the run goes on.
+    pub(crate) fn try_with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> Option<T> {
+        (self.is_at_hand() || self.may_be_had()).then(|| self.with(ask))
+    }
+
+    /// As [`Shared::with`], wherever the state lies, and lets time pass to that of the clock before.
     #[inline(never)]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
-    fn fetch(&self, here: Option<Box<Core>>) -> Box<Core> {
-        #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
-        let mut core = match here {
-            Some(core) if core.run == self.run => core,
-            other => {
-                if let Some(other) = other {
-                    put_here(other);
-                }
-                if !self.may_be_had() {
-                    panic!("{}", self.note_misuse("a test bed"));
-                }
-                let mut core = self.take_home();
-                core.is_from_home = true;
-                core
-            }
+    fn ask_anywhere(&self, ask: &mut dyn FnMut(&mut Core)) {
+        let mut ask = |core: Option<&mut Box<Core>>| {
+            let core = core.expect("the state is not asked while it answers");
+            self.follow(core);
+            ask(core);
+            core.woken.take()
         };
-        #[cfg(feature = "tokio")]
-        if !self.is_synced()
-            // By then this thread may have the clock of another test bed.
-            && !self.has_ended()
-            && let Clock::Tokio { origin } = self.clock
-        {
-            follow(&mut core, origin);
-        }
-        core
+        // The state of another run may lie here, and be in use: a task may drop a socket of a run that has ended.
+        let is_here = HERE.with(|here| here.try_borrow().is_ok_and(|here| here.as_ref().is_some_and(|core| core.run == self.run)));
+        let woken = if is_here {
+            HERE.with_borrow_mut(|here| ask(here.as_mut()))
+        } else if self.may_be_had() {
+            ask(self.lock_home().as_mut())
+        } else {
+            panic!("{}", self.note_misuse("a test bed"));
+        };
+        woken.into_iter().for_each(wake);
     }
 
-    /// Waits until nobody else has the state.
-    fn take_home(&self) -> Box<Core> {
-        let mut home = self.lock_home();
-        loop {
-            if let Some(core) = home.take() {
-                return core;
+    /// Lets time pass up to that of tokio's clock, unless the state is at its time.
+    fn follow(&self, core: &mut Core) {
+        match self.clock {
+            Clock::Own => {}
+            #[cfg(feature = "tokio")]
+            Clock::Tokio { origin } => {
+                // By its end this thread may have the clock of another test bed, and after `block_on` tokio's clock is that of the machine.
+                if !self.is_synced() && !self.has_ended() && tokio::runtime::Handle::try_current().is_ok() {
+                    core.pass_until(Instant::ZERO + origin.elapsed());
+                }
             }
-            home = self.returned.wait(home).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
@@ -281,45 +245,24 @@ impl Shared {
         self.home.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// This thread polls the tasks of the run until the guard is dropped.
+    /// This thread polls the tasks of the run until the guard is dropped: the state lies with it, unless others look at the state.
     pub(crate) fn stay(&self) -> Stay<'_> {
-        self.bring_here();
+        if !self.stays {
+            let core = self.lock_home().take();
+            HERE.with_borrow_mut(|here| **here = core);
+            if matches!(self.clock, Clock::Own) {
+                AT_HAND.set(self.run);
+            }
+        }
         Stay(self)
     }
+}
 
-    /// The state lies with this thread, unless others look at it.
-    fn bring_here(&self) {
-        if !self.stays {
-            let core = self.take_home();
-            AT_HAND.set(core.at_hand);
-            put_here(core);
-        }
-    }
-
-    /// Others may have the state.
-    fn bring_home(&self) {
-        if let Some(core) = take_here() {
-            AT_HAND.set(0);
-            self.return_home(core);
-        }
-    }
-
-    /// Gives the state back, and then wakes the tasks that could not be woken while it was held.
-    #[inline(never)]
-    fn give_back(&self, mut core: Box<Core>) {
-        let woken = core.woken.take();
-        if std::mem::take(&mut core.is_from_home) {
-            self.return_home(core);
-        } else {
-            put_here(core);
-        }
-        woken.into_iter().for_each(Waker::wake);
-    }
-
-    fn return_home(&self, core: Box<Core>) {
-        *self.lock_home() = Some(core);
-        self.returned.notify_one();
-    }
+/// Wakes tasks that could not be woken while the state was asked.
+#[cold]
+#[inline(never)]
+fn wake(woken: Vec<Waker>) {
+    woken.into_iter().for_each(Waker::wake);
 }
 
 /// The state lies with this thread until this is dropped.
@@ -327,7 +270,10 @@ pub(crate) struct Stay<'a>(&'a Shared);
 
 impl Drop for Stay<'_> {
     fn drop(&mut self) {
-        self.0.bring_home();
+        AT_HAND.set(0);
+        if let Some(core) = HERE.with_borrow_mut(|here| here.take()) {
+            *self.0.lock_home() = Some(core);
+        }
     }
 }
 
@@ -339,65 +285,6 @@ pub(crate) struct Synced<'a>(&'a Shared);
 impl Drop for Synced<'_> {
     fn drop(&mut self) {
         self.0.is_synced.store(false, Ordering::Relaxed);
-        self.0.lock().at_hand = 0;
         AT_HAND.set(0);
-    }
-}
-
-/// The state, as long as it is held.
-pub(crate) struct Guard<'a> {
-    core: Option<Box<Core>>,
-    shared: &'a Shared,
-}
-
-/// Lets time pass up to that of tokio's clock.
-#[cfg(feature = "tokio")]
-#[inline(never)]
-fn follow(core: &mut Core, origin: tokio::time::Instant) {
-    // After `block_on` tokio's clock is that of the machine.
-    if !core.is_from_home || tokio::runtime::Handle::try_current().is_ok() {
-        let now = Instant::ZERO + origin.elapsed();
-        if now > core.now() {
-            core.pass_until(now);
-        }
-    }
-}
-
-impl std::ops::Deref for Guard<'_> {
-    type Target = Core;
-
-    #[inline]
-    fn deref(&self) -> &Core {
-        self.core.as_ref().expect("it is there until the guard is dropped")
-    }
-}
-
-impl std::ops::DerefMut for Guard<'_> {
-    #[inline]
-    fn deref_mut(&mut self) -> &mut Core {
-        self.core.as_mut().expect("it is there until the guard is dropped")
-    }
-}
-
-impl Drop for Guard<'_> {
-    fn drop(&mut self) {
-        if let Some(core) = self.core.take() {
-            self.shared.put(core);
-        }
-    }
-}
-
-/// The state for one question: a [`Guard`] that is compiled into the function that asks.
-struct Lent<'a> {
-    core: Option<Box<Core>>,
-    shared: &'a Shared,
-}
-
-impl Drop for Lent<'_> {
-    #[inline(always)]
-    fn drop(&mut self) {
-        if let Some(core) = self.core.take() {
-            self.shared.put(core);
-        }
     }
 }

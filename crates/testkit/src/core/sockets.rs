@@ -2,21 +2,21 @@
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
-use std::sync::Arc;
 use std::task::{Poll, Waker};
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 use cohaptic_wan::{NodeId, Ring};
 
+use super::bound::Port;
 use super::waking::{Waiters, Woken};
-use super::{Core, Inlet, Parcel, SocketName};
+use super::{Core, Parcel, SocketName};
 use crate::trace::Lost;
 use crate::wire::{Held, Where};
 
 /// A socket, until it is closed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct SocketId(usize);
+pub(crate) struct SocketId(pub(super) usize);
 
 /// A datagram in the buffer of a socket.
 #[derive(Clone, Debug)]
@@ -25,7 +25,6 @@ pub(crate) struct Datagram {
     parcel: Box<Parcel>,
     /// When it arrived.
     pub(crate) at: Instant,
-    len: usize,
     /// Whether an active queue marked it.
     marked: bool,
 }
@@ -76,8 +75,7 @@ pub(crate) struct SocketState {
     pub(super) inbox: Ring<Datagram>,
     /// The bytes of the datagrams in `inbox`.
     pub(super) held: usize,
-    readers: Waiters,
-    inlet: Arc<Inlet>,
+    pub(super) readers: Waiters,
     /// What IP told about something that was sent, until the program is told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
@@ -85,12 +83,6 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
-    /// Returns whether a task with that waker waits for a datagram.
-    fn is_awaited_by(&self, waker: &Waker) -> bool {
-        // A reader that waits again is known to the inlet alone.
-        self.readers.has(waker) || self.inlet.is_waited_for() && self.readers.first().is_some_and(|first| first.will_wake(waker))
-    }
-
     /// Takes a datagram into the buffer, which holds this number of bytes.
     #[inline(always)]
     pub(super) fn keep(
@@ -108,8 +100,8 @@ impl SocketState {
         }
         self.held = held;
         all.add(Where::Buffers, Held::cost(len));
-        self.inbox.push(|| Datagram { parcel, at, len, marked });
-        self.wake_readers(woken);
+        self.inbox.push(|| Datagram { parcel, at, marked });
+        self.readers.wake(woken);
         Ok(())
     }
 
@@ -131,30 +123,15 @@ impl SocketState {
         self.died.is_some() | self.refused
     }
 
-    #[inline]
-    pub(super) fn wake_readers(&mut self, woken: &mut Woken) {
-        if self.inlet.set_busy() {
-            self.readers.first_waits();
-        }
-        self.readers.wake(woken);
-    }
-
-    /// A task waits until there is something to read.
-    #[inline(never)]
-    fn wait(&mut self, waker: &Waker) {
-        if self.inlet.set_busy() {
-            self.readers.first_waits();
-        }
-        self.readers.wait(waker);
-        if let Some(first) = self.readers.first() {
-            self.inlet.keep(first);
-        }
+    /// Version and port at which it is bound.
+    pub(super) const fn port(&self) -> Port {
+        Port { is_six: self.local.is_ipv6(), number: self.local.port() }
     }
 
     pub(super) fn die(&mut self, at: Instant, all: &mut Held, woken: &mut Woken) {
         self.died = Some(at);
         self.clear(all);
-        self.wake_readers(woken);
+        self.readers.wake(woken);
     }
 }
 
@@ -197,7 +174,7 @@ pub(super) const FIRST_DYNAMIC: u16 = 49_152;
 impl Core {
     /// Binds a socket of a host that is up.
     pub(crate) fn bind(&mut self, host: NodeId, wanted: SocketAddr) -> io::Result<SocketId> {
-        let (ip, six) = (wanted.ip(), wanted.is_ipv6());
+        let ip = wanted.ip();
         self.check_owned(host, ip)?;
         let port = match wanted.port() {
             0 => self.free_port(host, ip)?,
@@ -208,11 +185,11 @@ impl Core {
             port => port,
         };
         let local = SocketAddr::new(ip, port);
-        let (readers, inlet, inbox) = (Waiters::default(), Arc::default(), Ring::new());
-        let state = SocketState { host, local, peer: None, inbox, held: 0, readers, inlet, refused: false, may_broadcast: false, died: None };
+        let (readers, inbox) = (Waiters::default(), Ring::new());
+        let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
+        let port = state.port();
         let id = self.sockets.insert(state);
-        self.hosts[host.index()].ports.entry((six, port)).or_default().push(id);
-        self.hosts[host.index()].plain = None;
+        self.hosts[host.index()].bound.add(port, id);
         Ok(id)
     }
 
@@ -226,11 +203,10 @@ impl Core {
     }
 
     fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {
-        self.hosts[host.index()].ports.get(&(ip.is_ipv6(), port)).is_some_and(|bound| {
-            bound.iter().any(|id| {
-                let other = self.sockets.get(*id).local.ip();
-                other == ip || other.is_unspecified() || ip.is_unspecified()
-            })
+        let bound = self.hosts[host.index()].bound.at(Port { is_six: ip.is_ipv6(), number: port });
+        bound.iter().any(|(_, id)| {
+            let other = self.sockets.get(*id).local.ip();
+            other == ip || other.is_unspecified() || ip.is_unspecified()
         })
     }
 
@@ -252,14 +228,7 @@ impl Core {
         let Some(mut state) = self.sockets.places[id.0].take() else { return };
         state.clear(&mut self.wire.held);
         self.sockets.free.push(id.0);
-        self.hosts[state.host.index()].plain = None;
-        let key = (state.local.is_ipv6(), state.local.port());
-        if let Some(bound) = self.hosts[state.host.index()].ports.get_mut(&key) {
-            bound.retain(|other| *other != id);
-            if bound.is_empty() {
-                self.hosts[state.host.index()].ports.remove(&key);
-            }
-        }
+        self.hosts[state.host.index()].bound.remove(state.port(), id);
     }
 
     /// Fails if the socket died with its host.
@@ -275,10 +244,6 @@ impl Core {
         let text =
             format!("host `{name}` crashed at {} s, and this socket ({}) with it; after `Host::restart`, bind a new one", Seconds(at), socket.local);
         Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
-    }
-
-    pub(crate) fn inlet_of(&self, id: SocketId) -> Arc<Inlet> {
-        Arc::clone(&self.sockets.get(id).inlet)
     }
 
     pub(crate) fn local_of(&self, id: SocketId) -> SocketAddr {
@@ -299,15 +264,13 @@ impl Core {
                 format!("a socket at {local} cannot reach {peer}, which is of the other version of IP"),
             ));
         }
-        let socket = self.sockets.get_mut(id);
-        socket.peer = Some(peer);
-        self.hosts[socket.host.index()].plain = None;
+        self.sockets.get_mut(id).peer = Some(peer);
         Ok(())
     }
 
     /// A line for each socket that a task waits for.
     pub(crate) fn waits(&self) -> Vec<String> {
-        let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty() || socket.inlet.is_waited_for());
+        let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty());
         let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local));
         #[cfg(feature = "tcp")]
         let lines = lines.chain(self.tcp_waits());
@@ -316,7 +279,7 @@ impl Core {
 
     /// Returns the things that a task with that waker waits for, in words; empty if sockets and timers do not know the task.
     pub(crate) fn awaited_by(&self, waker: &Waker) -> Vec<String> {
-        let sockets = self.sockets.places.iter().flatten().filter(|socket| socket.is_awaited_by(waker));
+        let sockets = self.sockets.places.iter().flatten().filter(|socket| socket.readers.has(waker));
         let mut awaited: Vec<String> = sockets.map(|socket| format!("a datagram at UDP {}", socket.local)).collect();
         #[cfg(feature = "tcp")]
         awaited.extend(self.tcp_awaited_by(waker));
@@ -345,15 +308,13 @@ impl Core {
         }
         let Some(datagram) = socket.inbox.pop() else {
             if let Some(waker) = waker {
-                socket.wait(waker);
+                socket.readers.wait(waker);
             }
             return Poll::Pending;
         };
-        socket.held -= datagram.len;
-        self.wire.held.remove(Where::Buffers, Held::cost(datagram.len));
-        if socket.inbox.is_empty() && socket.readers.first().is_some() {
-            socket.inlet.set_quiet();
-        }
+        let len = datagram.bytes().len();
+        socket.held -= len;
+        self.wire.held.remove(Where::Buffers, Held::cost(len));
         let seen = look(&datagram);
         self.spare.put(datagram.parcel);
         Poll::Ready(Ok(seen))
@@ -389,8 +350,12 @@ impl Core {
         std::mem::take(&mut self.sockets.get_mut(id).refused).then(|| io::ErrorKind::ConnectionRefused.into())
     }
 
-    /// Somebody wants to be woken when the socket becomes readable.
-    pub(crate) fn wait_to_read(&mut self, id: SocketId, waker: &Waker) {
-        self.sockets.get_mut(id).wait(waker);
+    /// Ready when [`Core::receive`] has something to say; else the waker is woken when it has.
+    pub(crate) fn poll_readable(&mut self, id: SocketId, waker: &Waker) -> Poll<()> {
+        if self.is_readable(id) {
+            return Poll::Ready(());
+        }
+        self.sockets.get_mut(id).readers.wait(waker);
+        Poll::Pending
     }
 }

@@ -42,18 +42,6 @@ impl Waiters {
         }
     }
 
-    /// The first one, whether it waits or was woken.
-    #[inline]
-    pub(super) const fn first(&self) -> Option<&Waker> {
-        self.first.as_ref()
-    }
-
-    /// The first one waits again.
-    #[inline]
-    pub(super) const fn first_waits(&mut self) {
-        self.first_waits = true;
-    }
-
     pub(super) const fn is_empty(&self) -> bool {
         !self.first_waits && self.others.is_empty()
     }
@@ -128,13 +116,14 @@ impl Woken {
     }
 
     /// Whether some wait for that.
-    #[inline]
+    #[cfg(feature = "tokio")]
     pub(crate) const fn is_any(&self) -> bool {
         !self.later.is_empty()
     }
 
-    /// Those that are to be woken once nobody holds the state.
-    pub(crate) fn take(&mut self) -> Vec<Waker> {
-        std::mem::take(&mut self.later)
+    /// Those that are to be woken once nobody holds the state, if there are any.
+    #[inline]
+    pub(super) fn take(&mut self) -> Option<Vec<Waker>> {
+        (!self.later.is_empty()).then(|| std::mem::take(&mut self.later))
     }
 }

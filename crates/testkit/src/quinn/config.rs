@@ -25,7 +25,7 @@ const FIRST_ID_LENGTH: usize = 20;
 /// Random bytes of the running test bed.
 fn draw<const N: usize>() -> [u8; N] {
     let running = context::expect_running("the numbers of an endpoint can be drawn");
-    running.shared.lock().entropy(context::host()).bytes()
+    running.shared.with(|core| core.entropy(context::host()).bytes())
 }
 
 /// Connection ids from the test bed's random numbers.

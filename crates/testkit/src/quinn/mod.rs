@@ -97,7 +97,7 @@ use socket::VirtualSocket;
 #[track_caller]
 pub fn endpoint(host: &Host, address: impl ToSocketAddrs, mut config: EndpointConfig, server: Option<ServerConfig>) -> io::Result<Endpoint> {
     let socket = VirtualSocket::new(host, address)?;
-    let seed = host.shared().lock().entropy(Some(host.node())).bytes();
+    let seed = host.shared().with(|core| core.entropy(Some(host.node())).bytes());
     config.rng_seed(Some(seed));
     let server = server.map(|mut server| {
         server.time_source(Arc::new(TestTime));

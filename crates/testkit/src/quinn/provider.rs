@@ -27,7 +27,7 @@ struct FromTestbed;
 
 impl SecureRandom for FromTestbed {
     fn fill(&self, buffer: &mut [u8]) -> Result<(), GetRandomFailed> {
-        context::shared().ok_or(GetRandomFailed)?.lock().entropy(context::host()).fill(buffer);
+        context::shared().ok_or(GetRandomFailed)?.with(|core| core.entropy(context::host()).fill(buffer));
         Ok(())
     }
 }

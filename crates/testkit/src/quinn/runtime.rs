@@ -42,7 +42,7 @@ impl Runtime for OnHost {
     fn spawn(&self, future: Pin<Box<dyn Future<Output = ()> + Send>>) {
         let running = context::expect_running("an endpoint works");
         // What a host starts while it goes down is gone with it.
-        if self.shared.lock().is_up(self.node) {
+        if self.shared.with(|core| core.is_up(self.node)) {
             drop(running.tasks.spawn(Some(self.node), self.origin, future));
         }
     }

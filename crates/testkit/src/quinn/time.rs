@@ -41,7 +41,7 @@ pub struct TestTime;
 
 impl TestTime {
     fn since_1970() -> Option<Duration> {
-        let now = context::shared()?.lock().now();
+        let now = context::shared()?.with(|core| core.now());
         Some(Duration::from_secs(DAY) + now.saturating_duration_since(Instant::ZERO))
     }
 }

@@ -78,10 +78,7 @@ fn who_waits(core: &Core, tasks: &Tasks) -> String {
 /// Always.
 #[expect(clippy::panic, reason = "the program waits for ever; says who does, and the way out")]
 pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
-    let (now, text) = {
-        let core = shared.lock();
-        (core.now(), who_waits(&core, tasks))
-    };
+    let (now, text) = shared.with(|core| (core.now(), who_waits(core, tasks)));
     panic!(
         "nothing will ever happen after {} s: no packet is on its way, no timer is set, and these wait for what never comes. A lost packet needs a `timeout`:{text}",
         Seconds(now)
@@ -95,13 +92,12 @@ pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
 /// Always.
 #[expect(clippy::panic, reason = "the program goes on for ever; says who does, over which network, and the way out")]
 pub(super) fn goes_on(shared: &Shared, tasks: &Tasks, limit: Reached) -> ! {
-    let (now, text) = {
-        let core = shared.lock();
+    let (now, text) = shared.with(|core| {
         let mut text = String::new();
         write_lines(&mut text, " links", core.settings.said.lines(core.plan.names()).into_iter());
         let network = if text.is_empty() { "\n  ideal links".to_owned() } else { text };
-        (core.now(), format!("The network:{network}\nWho waits:{}", who_waits(&core, tasks)))
-    };
+        (core.now(), format!("The network:{network}\nWho waits:{}", who_waits(core, tasks)))
+    });
     let (limit, method) = match limit {
         Reached::Time(time) => (format!("its time limit of {}", Span(time)), "time_limit"),
         Reached::Steps(steps) => (format!("its step limit of {steps} polls of tasks"), "step_limit"),

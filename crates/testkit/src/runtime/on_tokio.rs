@@ -103,11 +103,16 @@ impl Idle {
 
     /// Tokio is about to park its thread: all wait.
     fn notice(&self, shared: &Shared) {
-        let mut core = shared.lock();
-        if self.must_end(&mut core) || shared.is_left_something() {
-            let now = core.now();
-            drop(core);
-            return self.wake(now);
+        let is_left_something = shared.is_left_something();
+        if let Some(now) = shared.with(|core| self.move_clock(core, is_left_something)) {
+            self.wake(now);
+        }
+    }
+
+    /// Moves the clock, from event to event as long as none of them wakes a task. Gives the time if the executor is to be woken.
+    fn move_clock(&self, core: &mut Core, is_left_something: bool) -> Option<Instant> {
+        if self.must_end(core) || is_left_something {
+            return Some(core.now());
         }
         loop {
             let (now, next) = (core.now(), core.next_event());
@@ -119,10 +124,10 @@ impl Idle {
             if is_any_ready() {
                 // What woke one has woken the executor.
                 self.moved.store(core.now().as_nanos(), Ordering::Relaxed);
-                return;
+                return None;
             }
             if core.woken.is_any() {
-                return;
+                return None;
             }
             if is_due {
                 continue;
@@ -131,17 +136,15 @@ impl Idle {
             advance(to.saturating_duration_since(now));
             if floor(to) == to {
                 // What tokio has for this millisecond goes off first.
-                drop(core);
-                return self.wake(to);
+                return Some(to);
             }
             core.pass(to);
         }
-        let (armed, now) = (armed(core.next_event()), core.now());
-        drop(core);
-        if self.armed.load(Ordering::Relaxed) != armed {
-            self.is_wanted.store(true, Ordering::Relaxed);
-            self.wake(now);
+        if self.armed.load(Ordering::Relaxed) == armed(core.next_event()) {
+            return None;
         }
+        self.is_wanted.store(true, Ordering::Relaxed);
+        Some(core.now())
     }
 }
 
@@ -245,7 +248,7 @@ async fn drive(
     let mut main = pin!(main);
     let mut pump = pin!(pump(shared, tasks, idle, origin));
     let mut woken: Option<Arc<SetWaker>> = None;
-    let limits = shared.lock().settings.limits;
+    let limits = shared.with(|core| core.settings.limits);
     let mut steps = 0;
     let mut turn = |cx: &mut Context<'_>| {
         let woken = woken.get_or_insert_with(|| {
@@ -323,7 +326,7 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
             return Poll::Pending;
         }
         idle.is_wanted.store(false, Ordering::Relaxed);
-        let next = shared.lock().next_event();
+        let next = shared.with(Core::next_event);
         let wanted = armed(next);
         if idle.armed.swap(wanted, Ordering::Relaxed) != wanted {
             due = if next.is_some() { Duration::from_nanos(wanted) } else { since + NEVER };

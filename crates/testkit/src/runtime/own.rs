@@ -16,7 +16,6 @@ use cohaptic_units::print::Seconds;
 use super::limits::{goes_on, nothing_will_happen};
 use crate::core::Shared;
 use crate::task::{Spawner, Task, Tasks};
-use crate::wire::Settings;
 
 thread_local! {
     static HERE: Here = const { Here { executor: Cell::new(0), ready: RefCell::new(Vec::new()), main: RefCell::new(None), waits: Cell::new(false) } };
@@ -224,7 +223,7 @@ impl Executor {
     ///
     /// If nothing will ever happen any more, if time cannot pass because tasks are polled again and again, or at a limit of the run.
     pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
-        let Settings { patience, limits, .. } = shared.lock().settings;
+        let (patience, limits) = shared.with(|core| (core.settings.patience, core.settings.limits));
         let (mut polls, mut steps, mut batch) = (0, 0, Batch::default());
         let (mut now, until) = (shared.now(), limits.until());
         self.begin(None);
@@ -242,20 +241,22 @@ impl Executor {
                 continue;
             }
             tasks.turns();
-            let mut core = shared.lock();
-            let Some(next) = core.next_event() else {
-                drop(core);
-                nothing_will_happen(shared, tasks);
-            };
-            if next > now {
-                steps += std::mem::take(&mut polls);
-                if next > until || steps > limits.steps {
-                    drop(core);
-                    goes_on(shared, tasks, limits.reached(steps));
+            let passed = shared.with(|core| {
+                let next = core.next_event()?;
+                if next > now {
+                    steps += std::mem::take(&mut polls);
+                    if next > until || steps > limits.steps {
+                        return Some(Err(limits.reached(steps)));
+                    }
                 }
-            }
-            core.pass(next);
-            now = core.now();
+                core.pass(next);
+                Some(Ok(core.now()))
+            });
+            now = match passed {
+                None => nothing_will_happen(shared, tasks),
+                Some(Err(limit)) => goes_on(shared, tasks, limit),
+                Some(Ok(now)) => now,
+            };
         }
     }
 
@@ -349,7 +350,7 @@ impl Executor {
 /// Always.
 #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
 pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>) -> ! {
-    let now = shared.lock().now();
+    let now = shared.with(|core| core.now());
     let who = last.map_or_else(|| "a task that is over now".to_owned(), |task| task.words(shared.names()));
     panic!(
         "time stands still at {} s: tasks were polled {polls} times without waiting for it to pass, {who} the last. It wakes itself, or others, again and again: let \

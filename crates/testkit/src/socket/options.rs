@@ -46,12 +46,12 @@ fn no_groups<T>() -> io::Result<T> {
 
 impl UdpSocket {
     fn option(&self, option: impl FnOnce(&Options) -> &AtomicU32) -> io::Result<u32> {
-        drop(self.open()?);
+        self.open(|_| ())?;
         Ok(option(&self.options).load(Ordering::Relaxed))
     }
 
     fn set_option(&self, option: impl FnOnce(&Options) -> &AtomicU32, value: u32, allowed: std::ops::RangeInclusive<u32>) -> io::Result<()> {
-        drop(self.open()?);
+        self.open(|_| ())?;
         set(option(&self.options), value, allowed)
     }
 
@@ -210,7 +210,7 @@ impl UdpSocket {
         if interest.is_readable() && !interest.is_writable() {
             self.readable().await?;
         }
-        let is_readable = self.shared.open(self.host, KIND)?.is_readable(self.id) && interest.is_readable();
+        let is_readable = self.shared.open(self.host, KIND, |core| core.is_readable(self.id))? && interest.is_readable();
         let readable = if is_readable { Ready::READABLE } else { Ready::EMPTY };
         Ok(if interest.is_writable() { readable | Ready::WRITABLE } else { readable })
     }
@@ -222,7 +222,7 @@ impl UdpSocket {
     /// Those of the operation; [`io::ErrorKind::WouldBlock`] if it is to read and there is nothing.
     #[cfg(feature = "tokio-net")]
     pub fn try_io<R>(&self, interest: tokio::io::Interest, operation: impl FnOnce() -> io::Result<R>) -> io::Result<R> {
-        let is_readable = self.shared.open(self.host, KIND)?.is_readable(self.id);
+        let is_readable = self.shared.open(self.host, KIND, |core| core.is_readable(self.id))?;
         if !interest.is_writable() && !is_readable {
             return Err(io::ErrorKind::WouldBlock.into());
         }

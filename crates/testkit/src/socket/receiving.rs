@@ -201,17 +201,13 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::readable`].
     pub fn poll_recv_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let mut core = self.shared.open(self.host, KIND)?;
-        if core.is_readable(self.id) {
-            return Poll::Ready(Ok(()));
-        }
-        core.wait_to_read(self.id, cx.waker());
-        Poll::Pending
+        let polled = self.shared.open(self.host, KIND, |core| core.poll_readable(self.id, cx.waker()));
+        polled.map_or_else(|error| Poll::Ready(Err(error)), |ready| ready.map(Ok))
     }
 
     /// A view of a datagram, if there is one.
     pub(crate) fn try_look<const PEEK: bool, T>(&self, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
-        self.shared.open(self.host, KIND)?.try_receive::<PEEK, _>(self.id, look)
+        self.shared.open(self.host, KIND, |core| core.try_receive::<PEEK, _>(self.id, look))?
     }
 
     /// A view of the next datagram. It gives the future that is polled, and no other around it: each that is there for a datagram takes 20 instructions.
@@ -222,11 +218,7 @@ impl UdpSocket {
 
     #[inline]
     pub(crate) fn poll_look<const PEEK: bool, T>(&self, cx: &Context<'_>, look: impl FnOnce(&Datagram) -> T) -> Poll<io::Result<T>> {
-        if !self.inlet.is_busy() && self.shared.is_at_hand() && self.inlet.waits_again(cx.waker()) {
-            return Poll::Pending;
-        }
-        self.shared.check_open(self.host, KIND)?;
-        self.shared.with(|core| core.receive::<PEEK, _>(self.id, Some(cx.waker()), look))
+        self.shared.open(self.host, KIND, |core| core.receive::<PEEK, _>(self.id, Some(cx.waker()), look))?
     }
 }
 

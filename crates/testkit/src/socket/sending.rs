@@ -77,10 +77,9 @@ impl UdpSocket {
 
     #[inline]
     pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
-        self.shared.check_open(self.host, KIND)?;
         let ecn_capable = ecn_capable || self.options.is_ecn_capable();
         let outgoing = Outgoing { to, bytes, ecn_capable };
-        self.shared.with(|core| core.send(self.id, outgoing))?;
+        self.shared.open(self.host, KIND, |core| core.send(self.id, outgoing))??;
         Ok(bytes.len())
     }
 

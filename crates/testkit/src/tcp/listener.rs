@@ -12,7 +12,7 @@ use cohaptic_wan::NodeId;
 use super::{KIND, TcpStream};
 use crate::address::ToSocketAddrs;
 use crate::context::Call;
-use crate::core::{Guard, HoldId, Inherited, ListenId, Shared};
+use crate::core::{Core, HoldId, Inherited, ListenId, Shared};
 
 /// How many connections may wait at a listener that does not say it; Linux lets one more wait.
 const BACKLOG: usize = 128;
@@ -57,34 +57,36 @@ impl TcpListener {
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
         shared.check_open(host, KIND)?;
         let address = address.to_socket_addr()?;
-        let mut core = shared.lock();
-        core.check_up(host)?;
-        let held = core.hold_port(host, address, true)?;
-        let config = core.tcp_config(host).clone();
-        drop(core);
+        let (held, config) = shared.with(|core| {
+            core.check_up(host)?;
+            let held = core.hold_port(host, address, true)?;
+            io::Result::Ok((held, core.tcp_config(host).clone()))
+        })?;
         Self::listen(shared, host, held, BACKLOG, (config, None))
     }
 
     /// Listens at a port that is held, and releases it if that fails.
     pub(super) fn listen(shared: Arc<Shared>, host: NodeId, held: (HoldId, SocketAddr), backlog: usize, inherited: Inherited) -> io::Result<Self> {
-        let mut core = shared.open(host, KIND)?;
-        let listening = core.listen(host, held, backlog, inherited);
-        if listening.is_err() {
-            core.release_port(held.0);
-        }
-        drop(core);
-        Ok(Self { id: listening?, host, shared })
+        let id = shared.open(host, KIND, |core| {
+            let listening = core.listen(host, held, backlog, inherited);
+            if listening.is_err() {
+                core.release_port(held.0);
+            }
+            listening
+        })??;
+        Ok(Self { shared, host, id })
     }
 
-    /// The state, for a call.
+    /// Asks the state.
     ///
     /// # Errors
     ///
     /// If the run has ended, this is another thread, or the host of the listener has crashed.
-    fn open(&self) -> io::Result<Guard<'_>> {
-        let core = self.shared.open(self.host, KIND)?;
-        core.check_listener(self.id)?;
-        Ok(core)
+    fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
+        self.shared.open(self.host, KIND, |core| {
+            core.check_listener(self.id)?;
+            Ok(ask(core))
+        })?
     }
 
     /// Waits for a connection; gives it and the address of its other end.
@@ -102,17 +104,16 @@ impl TcpListener {
     ///
     /// As [`TcpListener::accept`].
     pub fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(TcpStream, SocketAddr)>> {
-        let mut core = self.shared.open(self.host, KIND)?;
-        match core.accept(self.id) {
-            Ok(Some((id, peer))) => {
-                drop(core);
-                Poll::Ready(Ok((TcpStream::new(Arc::clone(&self.shared), self.host, id), peer)))
-            }
-            Ok(None) => {
+        let accepted = self.shared.open(self.host, KIND, |core| {
+            let accepted = core.accept(self.id);
+            if matches!(accepted, Ok(None)) {
                 core.wait_to_accept(self.id, cx.waker());
-                Poll::Pending
             }
-            Err(error) => Poll::Ready(Err(error)),
+            accepted
+        })??;
+        match accepted {
+            Some((id, peer)) => Poll::Ready(Ok((TcpStream::new(Arc::clone(&self.shared), self.host, id), peer))),
+            None => Poll::Pending,
         }
     }
 
@@ -122,7 +123,7 @@ impl TcpListener {
     ///
     /// If its host has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        Ok(self.open()?.listener_address(self.id))
+        self.open(|core| core.listener_address(self.id))
     }
 
     /// The time to live of packets of the connections that it takes, which nothing counts down here: there are no routers.
@@ -131,7 +132,7 @@ impl TcpListener {
     ///
     /// If its host has crashed.
     pub fn ttl(&self) -> io::Result<u32> {
-        Ok(self.open()?.listener_config(self.id).ttl.into())
+        self.open(|core| core.listener_config(self.id).ttl.into())
     }
 
     /// Sets that time to live, from 1 to 255.
@@ -140,9 +141,10 @@ impl TcpListener {
     ///
     /// If it is none, or its host has crashed.
     pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
-        let mut core = self.open()?;
-        core.listener_config(self.id).ttl = super::options::ttl(ttl)?;
-        Ok(())
+        self.open(|core| {
+            core.listener_config(self.id).ttl = super::options::ttl(ttl)?;
+            Ok(())
+        })?
     }
 }
 
@@ -155,7 +157,7 @@ impl Drop for TcpListener {
 
 impl fmt::Debug for TcpListener {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let local = self.shared.try_lock().map(|core| core.listener_address(self.id));
+        let local = self.shared.try_with(|core| core.listener_address(self.id));
         f.debug_struct("TcpListener").field("local", &local).finish_non_exhaustive()
     }
 }

@@ -20,8 +20,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn nodelay(&self) -> io::Result<bool> {
-        let core = self.open_alive()?;
-        Ok(core.connection(self.id).nodelay())
+        self.open_alive(|core| core.connection(self.id).nodelay())
     }
 
     /// Lets small segments leave while others are unanswered, or holds them back by Nagle's algorithm. What was held back leaves.
@@ -30,7 +29,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn set_nodelay(&self, nodelay: bool) -> io::Result<()> {
-        self.open()?.change_connection(self.id, |_, connection| connection.set_nodelay(nodelay))
+        self.change(|_, connection| connection.set_nodelay(nodelay))
     }
 
     /// Whether acknowledgements leave at once now (`TCP_QUICKACK`).
@@ -39,8 +38,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn quickack(&self) -> io::Result<bool> {
-        let core = self.open_alive()?;
-        Ok(core.connection(self.id).quickack())
+        self.open_alive(|core| core.connection(self.id).quickack())
     }
 
     /// Acknowledges at once from now on, or lets acknowledgements wait. As in Linux, it does not stay so.
@@ -49,7 +47,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn set_quickack(&self, quickack: bool) -> io::Result<()> {
-        self.open()?.change_connection(self.id, |_, connection| connection.set_quickack(quickack))
+        self.change(|_, connection| connection.set_quickack(quickack))
     }
 
     /// What [`TcpStream::set_linger`] has set.
@@ -58,8 +56,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn linger(&self) -> io::Result<Option<Duration>> {
-        let mut core = self.open_alive()?;
-        Ok(*core.linger(self.id))
+        self.open_alive(|core| *core.linger(self.id))
     }
 
     /// With zero, the connection is reset when the stream is dropped. Another time is kept and does nothing: to drop a stream takes no time here. Rounded down to
@@ -69,9 +66,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn set_linger(&self, linger: Option<Duration>) -> io::Result<()> {
-        let mut core = self.open_alive()?;
-        *core.linger(self.id) = linger.map(|linger| Duration::from_secs(linger.as_secs()));
-        Ok(())
+        self.open_alive(|core| *core.linger(self.id) = linger.map(|linger| Duration::from_secs(linger.as_secs())))
     }
 
     /// Lets the connection be reset when the stream is dropped.
@@ -89,8 +84,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn ttl(&self) -> io::Result<u32> {
-        let core = self.open_alive()?;
-        Ok(core.connection(self.id).config().ttl.into())
+        self.open_alive(|core| core.connection(self.id).config().ttl.into())
     }
 
     /// Sets the time to live, from 1 to 255.
@@ -100,7 +94,7 @@ impl TcpStream {
     /// If it is none, or its host has crashed.
     pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
         let ttl = self::ttl(ttl)?;
-        self.open()?.change_connection(self.id, |_, connection| connection.set_ttl(ttl))
+        self.change(|_, connection| connection.set_ttl(ttl))
     }
 
     /// Probes the peer while nothing is sent, at these times, or does not (`SO_KEEPALIVE`, `TCP_KEEPIDLE`, `TCP_KEEPINTVL`, `TCP_KEEPCNT`): with tokio this takes
@@ -113,7 +107,7 @@ impl TcpStream {
         if keepalive.is_some_and(|keepalive| keepalive.idle.is_zero() || keepalive.interval.is_zero()) {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "a time of keep-alive probes is zero; expected one above zero"));
         }
-        self.open()?.change_connection(self.id, |now, connection| connection.set_keepalive(now, keepalive))
+        self.change(|now, connection| connection.set_keepalive(now, keepalive))
     }
 
     /// How long written data may stay unanswered before the connection is given up (`TCP_USER_TIMEOUT`, RFC 5482); `None`: as
@@ -123,6 +117,6 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn set_user_timeout(&self, timeout: Option<Duration>) -> io::Result<()> {
-        self.open()?.change_connection(self.id, |_, connection| connection.set_user_timeout(timeout))
+        self.change(|_, connection| connection.set_user_timeout(timeout))
     }
 }

@@ -24,12 +24,13 @@ impl TcpStream {
     ///
     /// As [`TcpStream::readable`].
     pub fn poll_read_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let mut core = self.open()?;
-        if core.is_ready(self.id)[0] {
-            return Poll::Ready(Ok(()));
-        }
-        core.wait_to_read_from(self.id, cx.waker());
-        Poll::Pending
+        self.open(|core| {
+            if core.is_ready(self.id)[0] {
+                return Poll::Ready(Ok(()));
+            }
+            core.wait_to_read_from(self.id, cx.waker());
+            Poll::Pending
+        })?
     }
 
     /// Waits until something can be written, or the connection is over.
@@ -47,12 +48,13 @@ impl TcpStream {
     ///
     /// As [`TcpStream::writable`].
     pub fn poll_write_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let mut core = self.open()?;
-        if core.is_ready(self.id)[1] {
-            return Poll::Ready(Ok(()));
-        }
-        core.wait_to_write_to(self.id, cx.waker());
-        Poll::Pending
+        self.open(|core| {
+            if core.is_ready(self.id)[1] {
+                return Poll::Ready(Ok(()));
+            }
+            core.wait_to_write_to(self.id, cx.waker());
+            Poll::Pending
+        })?
     }
 
     /// Reads what has arrived.
@@ -70,7 +72,7 @@ impl TcpStream {
     ///
     /// As [`TcpStream::try_read`].
     pub fn try_read_vectored(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
-        self.open()?.read(self.id, buffers)
+        self.open(|core| core.read(self.id, buffers))?
     }
 
     /// Reads what has arrived into the free room of a buffer.
@@ -81,7 +83,7 @@ impl TcpStream {
     pub fn try_read_buf<B: BufMut>(&self, buffer: &mut B) -> io::Result<usize> {
         // As much as a buffer that grows would be given by tokio.
         let room = buffer.chunk_mut().len().min(buffer.remaining_mut());
-        let unread = self.open()?.connection(self.id).info().unread;
+        let unread = self.open(|core| core.connection(self.id).info().unread)?;
         let mut read = vec![0; room.min(unread.max(1))];
         let count = self.try_read(&mut read)?;
         buffer.put_slice(&read[..count]);
@@ -103,7 +105,7 @@ impl TcpStream {
     ///
     /// As [`TcpStream::try_write`].
     pub fn try_write_vectored(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize> {
-        self.open()?.write(self.id, buffers)
+        self.open(|core| core.write(self.id, buffers))?
     }
 
     /// Waits until it can do one of these.
@@ -118,13 +120,14 @@ impl TcpStream {
             if !ready.is_empty() {
                 return Poll::Ready(Ok(ready));
             }
-            let mut core = self.open()?;
-            if interest.is_readable() {
-                core.wait_to_read_from(self.id, cx.waker());
-            }
-            if interest.is_writable() {
-                core.wait_to_write_to(self.id, cx.waker());
-            }
+            self.open(|core| {
+                if interest.is_readable() {
+                    core.wait_to_read_from(self.id, cx.waker());
+                }
+                if interest.is_writable() {
+                    core.wait_to_write_to(self.id, cx.waker());
+                }
+            })?;
             Poll::Pending
         })
         .await
@@ -134,13 +137,14 @@ impl TcpStream {
     #[cfg(feature = "tokio-net")]
     fn readiness(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         use tokio::io::Ready;
-        let core = self.open()?;
-        let [can_read, can_write] = core.is_ready(self.id);
-        let connection = core.connection(self.id);
-        let flag = |is_set: bool, flag| if is_set { flag } else { Ready::EMPTY };
-        let readable = flag(can_read, Ready::READABLE) | flag(connection.is_read_closed(), Ready::READ_CLOSED);
-        let writable = flag(can_write, Ready::WRITABLE) | flag(connection.is_write_closed() && can_write, Ready::WRITE_CLOSED);
-        Ok(flag(interest.is_readable(), readable) | flag(interest.is_writable(), writable))
+        self.open(|core| {
+            let [can_read, can_write] = core.is_ready(self.id);
+            let connection = core.connection(self.id);
+            let flag = |is_set: bool, flag| if is_set { flag } else { Ready::EMPTY };
+            let readable = flag(can_read, Ready::READABLE) | flag(connection.is_read_closed(), Ready::READ_CLOSED);
+            let writable = flag(can_write, Ready::WRITABLE) | flag(connection.is_write_closed() && can_write, Ready::WRITE_CLOSED);
+            flag(interest.is_readable(), readable) | flag(interest.is_writable(), writable)
+        })
     }
 
     /// Tries an operation of one's own, such as [`TcpStream::try_read`].

@@ -79,10 +79,10 @@ impl TcpSocket {
     #[track_caller]
     fn new(call: Call, is_six: bool) -> io::Result<Self> {
         let (shared, host) = call.host("wrap the call in `Host::scope`");
-        let core = shared.lock();
-        core.check_up(host)?;
-        let config = core.tcp_config(host).clone();
-        drop(core);
+        let config = shared.with(|core| {
+            core.check_up(host)?;
+            io::Result::Ok(core.tcp_config(host).clone())
+        })?;
         let settings = Settings { config, bound: None, is_shared: false, is_port_shared: false, linger: None, type_of_service: 0 };
         Ok(Self { shared, host, is_six, settings: Mutex::new(settings) })
     }
@@ -105,10 +105,15 @@ impl TcpSocket {
                 if settings.bound.is_some() { "the socket is bound already".to_owned() } else { format!("{address} is of the other version of IP") };
             return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
         }
-        let mut core = self.shared.open(self.host, KIND)?;
-        core.check_up(self.host)?;
-        settings.bound = Some(core.hold_port(self.host, address, settings.is_shared)?);
+        settings.bound = Some(self.hold_port(address, settings.is_shared)?);
         Ok(())
+    }
+
+    fn hold_port(&self, address: SocketAddr, is_shared: bool) -> io::Result<(HoldId, SocketAddr)> {
+        self.shared.open(self.host, KIND, |core| {
+            core.check_up(self.host)?;
+            core.hold_port(self.host, address, is_shared)
+        })?
     }
 
     /// Opens a connection, and waits until it is there.
@@ -140,11 +145,7 @@ impl TcpSocket {
         let mut settings = self.settings();
         let held = match settings.bound.take() {
             Some(held) => held,
-            None => {
-                let mut core = self.shared.open(self.host, KIND)?;
-                core.check_up(self.host)?;
-                core.hold_port(self.host, self.any(), settings.is_shared)?
-            }
+            None => self.hold_port(self.any(), settings.is_shared)?,
         };
         let inherited = (settings.config.clone(), settings.linger);
         TcpListener::listen(Arc::clone(&self.shared), self.host, held, usize::try_from(backlog).unwrap_or(usize::MAX), inherited)

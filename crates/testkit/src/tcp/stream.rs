@@ -5,15 +5,16 @@ use std::future::poll_fn;
 use std::io::{self, IoSlice, IoSliceMut};
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::task::{Context, Poll};
+use std::task::{Context, Poll, Waker};
 
-use cohaptic_tcp::State;
+use cohaptic_tcp::{Connection, State};
+use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
 use super::{Info, KIND, TcpConfig};
 use crate::address::ToSocketAddrs;
 use crate::context::Call;
-use crate::core::{ConnId, Guard, HoldId, Shared};
+use crate::core::{ConnId, Core, HoldId, Shared};
 
 /// A TCP connection of a host of the running test bed: the methods of tokio's, with the same meaning.
 ///
@@ -41,24 +42,34 @@ impl TcpStream {
         Self { shared, host, id }
     }
 
-    /// The state, for a call.
+    /// Asks the state.
     ///
     /// # Errors
     ///
     /// If the run has ended, or this is another thread.
-    pub(super) fn open(&self) -> io::Result<Guard<'_>> {
-        self.shared.open(self.host, KIND)
+    pub(super) fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
+        self.shared.open(self.host, KIND, ask)
     }
 
-    /// The state, for a call that a connection without a host cannot answer.
+    /// Asks the state what a connection without a host cannot answer.
     ///
     /// # Errors
     ///
     /// As [`TcpStream::open`]; if the host has crashed.
-    pub(super) fn open_alive(&self) -> io::Result<Guard<'_>> {
-        let core = self.open()?;
-        core.check_connection(self.id)?;
-        Ok(core)
+    pub(super) fn open_alive<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
+        self.open(|core| {
+            core.check_connection(self.id)?;
+            Ok(ask(core))
+        })?
+    }
+
+    /// Changes the connection.
+    ///
+    /// # Errors
+    ///
+    /// As [`TcpStream::open_alive`].
+    pub(super) fn change<T>(&self, change: impl FnOnce(Instant, &mut Connection) -> T) -> io::Result<T> {
+        self.open(|core| core.change_connection(self.id, change))?
     }
 
     /// Opens a connection from the host of the task that is running, and waits until it is there.
@@ -77,7 +88,7 @@ impl TcpStream {
         async move {
             let (shared, host) = call.host("wrap the call in `Host::scope`; `Host::connect` and, for hyper, `Connector` name the host");
             let address = address.to_socket_addr()?;
-            let config = shared.lock().tcp_config(host).clone();
+            let config = shared.with(|core| core.tcp_config(host).clone());
             Self::connect_on(shared, host, None, address, config)?.established().await
         }
     }
@@ -90,24 +101,23 @@ impl TcpStream {
         to: SocketAddr,
         config: TcpConfig,
     ) -> io::Result<Self> {
-        let mut core = shared.open(host, KIND)?;
-        core.check_up(host)?;
-        let id = core.connect_tcp(host, bound, to, config)?;
-        drop(core);
+        let id = shared.open(host, KIND, |core| {
+            core.check_up(host)?;
+            core.connect_tcp(host, bound, to, config)
+        })??;
         Ok(Self { shared, host, id })
     }
 
     /// Waits until the handshake is over.
     pub(crate) async fn established(self) -> io::Result<Self> {
         poll_fn(|cx| {
-            let mut core = self.open()?;
-            core.is_settled(self.id).map_or_else(
-                || {
+            self.open(|core| match core.is_settled(self.id) {
+                Some(outcome) => Poll::Ready(outcome),
+                None => {
                     core.wait_to_write_to(self.id, cx.waker());
                     Poll::Pending
-                },
-                Poll::Ready,
-            )
+                }
+            })?
         })
         .await?;
         Ok(self)
@@ -119,8 +129,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        let core = self.open_alive()?;
-        Ok(core.connection(self.id).local_addr())
+        self.open_alive(|core| core.connection(self.id).local_addr())
     }
 
     /// The address of the other end.
@@ -129,12 +138,14 @@ impl TcpStream {
     ///
     /// [`io::ErrorKind::NotConnected`] once the connection is gone.
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
-        let core = self.open_alive()?;
-        let connection = core.connection(self.id);
-        match connection.state() {
+        let (state, peer) = self.open_alive(|core| {
+            let connection = core.connection(self.id);
+            (connection.state(), connection.peer_addr())
+        })?;
+        match state {
             State::SynSent | State::Closed | State::TimeWait => Err(io::ErrorKind::NotConnected.into()),
             State::SynReceived | State::Established | State::FinWait1 | State::FinWait2 | State::CloseWait | State::Closing | State::LastAck => {
-                Ok(connection.peer_addr())
+                Ok(peer)
             }
         }
     }
@@ -146,7 +157,7 @@ impl TcpStream {
     /// On another thread than that of the run.
     #[must_use]
     pub fn info(&self) -> Info {
-        self.shared.lock().connection(self.id).info()
+        self.shared.with(|core| core.connection(self.id).info())
     }
 
     /// Takes out the error that the next call would give otherwise.
@@ -155,7 +166,7 @@ impl TcpStream {
     ///
     /// If its host has crashed.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
-        self.open()?.take_error_of(self.id)
+        self.open(|core| core.take_error_of(self.id))?
     }
 
     /// Reads what has arrived and leaves it; waits until something has.
@@ -167,45 +178,40 @@ impl TcpStream {
         poll_fn(|cx| self.poll_peek_into(cx, buffer)).await
     }
 
-    pub(super) fn poll_peek_into(&self, cx: &Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
-        let mut core = self.open()?;
-        match core.peek_connection(self.id, buffer) {
+    /// Does something, or waits until it can be done.
+    fn poll_with(
+        &self,
+        cx: &Context<'_>,
+        act: impl FnOnce(&mut Core) -> io::Result<usize>,
+        wait: impl FnOnce(&mut Core, ConnId, &Waker),
+    ) -> Poll<io::Result<usize>> {
+        self.open(|core| match act(core) {
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
-                core.wait_to_read_from(self.id, cx.waker());
+                wait(core, self.id, cx.waker());
                 Poll::Pending
             }
             outcome => Poll::Ready(outcome),
-        }
+        })?
+    }
+
+    pub(super) fn poll_peek_into(&self, cx: &Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
+        self.poll_with(cx, |core| core.peek_connection(self.id, buffer), Core::wait_to_read_from)
     }
 
     #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
     pub(super) fn poll_read_into(&self, cx: &Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
-        let mut core = self.open()?;
-        match core.read(self.id, &mut [IoSliceMut::new(buffer)]) {
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
-                core.wait_to_read_from(self.id, cx.waker());
-                Poll::Pending
-            }
-            outcome => Poll::Ready(outcome),
-        }
+        self.poll_with(cx, |core| core.read(self.id, &mut [IoSliceMut::new(buffer)]), Core::wait_to_read_from)
     }
 
     #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
     pub(super) fn poll_write_from(&self, cx: &Context<'_>, buffers: &[IoSlice<'_>]) -> Poll<io::Result<usize>> {
-        let mut core = self.open()?;
-        match core.write(self.id, buffers) {
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
-                core.wait_to_write_to(self.id, cx.waker());
-                Poll::Pending
-            }
-            outcome => Poll::Ready(outcome),
-        }
+        self.poll_with(cx, |core| core.write(self.id, buffers), Core::wait_to_write_to)
     }
 
     /// A FIN follows what was written. On a connection that is gone it does nothing, as tokio's.
     #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
     pub(super) fn shut_write_half(&self) -> io::Result<()> {
-        self.open()?.change_connection(self.id, |_, connection| connection.shutdown())
+        self.change(|_, connection| connection.shutdown())
     }
 }
 
@@ -228,10 +234,11 @@ impl Drop for TcpStream {
 
 impl fmt::Debug for TcpStream {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some(core) = self.shared.try_lock() else { return f.debug_struct("TcpStream").finish_non_exhaustive() };
-        let connection = core.connection(self.id);
-        let (local, peer, state) = (connection.local_addr(), connection.peer_addr(), connection.state());
-        drop(core);
+        let seen = self.shared.try_with(|core| {
+            let connection = core.connection(self.id);
+            (connection.local_addr(), connection.peer_addr(), connection.state())
+        });
+        let Some((local, peer, state)) = seen else { return f.debug_struct("TcpStream").finish_non_exhaustive() };
         f.debug_struct("TcpStream").field("local", &local).field("peer", &peer).field("state", &state).finish_non_exhaustive()
     }
 }

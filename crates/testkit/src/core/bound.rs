@@ -1,0 +1,65 @@
+//! Sockets of a host, by their ports.
+
+use super::SocketId;
+
+/// Sockets that are bound on a host, in the order of version of IP and port; those of one port in the order in which they were bound.
+///
+/// A sorted array, since each datagram that arrives looks its port up here and most hosts have few sockets. Ports that are given in turn are added at the end.
+#[derive(Debug, Default)]
+pub(super) struct Bound(Vec<(Port, SocketId)>);
+
+/// A port of one version of IP.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(super) struct Port {
+    pub(super) is_six: bool,
+    pub(super) number: u16,
+}
+
+impl Bound {
+    /// Returns the sockets of a port.
+    #[inline]
+    pub(super) fn at(&self, port: Port) -> &[(Port, SocketId)] {
+        let first = self.0.partition_point(|(bound, _)| *bound < port);
+        let rest = &self.0[first..];
+        let count = rest.iter().take_while(|(bound, _)| *bound == port).count();
+        &rest[..count]
+    }
+
+    /// Adds a socket.
+    pub(super) fn add(&mut self, port: Port, socket: SocketId) {
+        let place = self.0.partition_point(|(bound, _)| *bound <= port);
+        self.0.insert(place, (port, socket));
+    }
+
+    /// Removes a socket; a host that went down has forgotten it.
+    pub(super) fn remove(&mut self, port: Port, socket: SocketId) {
+        let first = self.0.partition_point(|(bound, _)| *bound < port);
+        if let Some(place) = self.at(port).iter().position(|(_, bound)| *bound == socket) {
+            self.0.remove(first + place);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_has_its_sockets_in_the_order_in_which_they_were_bound() {
+        let port = |is_six, number| Port { is_six, number };
+        let mut bound = Bound::default();
+        let given = [(port(false, 9), 0), (port(true, 7), 1), (port(false, 7), 2), (port(false, 7), 3), (port(false, 8), 4), (port(false, 7), 5)];
+        for (port, socket) in given {
+            bound.add(port, SocketId(socket));
+        }
+        let at = |bound: &Bound, port| bound.at(port).iter().map(|(_, socket)| socket.0).collect::<Vec<_>>();
+        assert_eq!(at(&bound, port(false, 7)), [2, 3, 5]);
+        bound.remove(port(false, 7), SocketId(3));
+        // The second time it is gone.
+        bound.remove(port(false, 7), SocketId(3));
+        assert_eq!(at(&bound, port(false, 7)), [2, 5]);
+        assert_eq!(at(&bound, port(true, 7)), [1]);
+        assert_eq!([at(&bound, port(false, 8)), at(&bound, port(false, 9))], [[4], [0]]);
+        assert!(at(&bound, port(true, 8)).is_empty());
+    }
+}
