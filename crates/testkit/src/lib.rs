@@ -110,6 +110,7 @@ mod runtime;
 #[cfg(feature = "scenes")]
 mod scenes;
 mod seed;
+mod setup;
 mod socket;
 #[cfg(feature = "strategies")]
 pub mod strategies;

@@ -4,16 +4,17 @@ use std::panic::Location;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{RECEIVE_BUFFER, Testbed};
+use super::Testbed;
 use crate::again::Again;
 use crate::runtime::limits::Limits;
 use crate::seed::Seed;
+use crate::setup::RECEIVE_BUFFER;
 use crate::wire::Settings;
 
 impl Testbed {
     /// Returns the parts of the test bed with which a run is the same again.
     pub(super) fn again(&self, seed: &Seed, place: &'static Location<'static>) -> Again {
-        let Settings { receive_buffer, limits, said, laws, .. } = &self.settings;
+        let Settings { receive_buffer, limits, said, laws, .. } = &self.setup.settings;
         let default = Limits::default();
         let nanos = |span: Duration| format!("std::time::Duration::from_nanos({})", u64::try_from(span.as_nanos()).unwrap_or(u64::MAX));
         #[cfg(feature = "tokio")]
@@ -29,11 +30,11 @@ impl Testbed {
             (limits.time != default.time).then(|| format!(".time_limit({})", nanos(limits.time))),
             (limits.steps != default.steps).then(|| format!(".step_limit({})", limits.steps)),
             has_constants.then(|| "// The constants of TCP, as the test says them.".to_owned()),
-            (!self.changes.is_empty()).then(|| "// The changes of links, as the file of the test says them.".to_owned()),
+            (!self.setup.changes.is_empty()).then(|| "// The changes of links, as the file of the test says them.".to_owned()),
             is_tokio.then(|| ".on_tokio()".to_owned()),
         ];
         Again {
-            names: Arc::clone(&self.names),
+            names: Arc::clone(&self.setup.names),
             said: Arc::clone(said),
             laws: laws.clone(),
             seed: seed.clone(),

@@ -10,6 +10,7 @@ mod running;
 mod tcp;
 
 use std::cell::RefCell;
+#[cfg(feature = "tcp")]
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, Location, catch_unwind, resume_unwind};
@@ -18,9 +19,9 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use cohaptic_wan::{LinkModel, NodeId, Path};
+#[cfg(feature = "tcp")]
+use cohaptic_wan::NodeId;
 
-pub(crate) use hitting::{add_all, add_function, add_law, add_words};
 pub(crate) use names::{Names, SHOWN, name_fault};
 pub use running::Bed;
 
@@ -28,19 +29,18 @@ use crate::artefacts::Artefacts;
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::failure;
-use crate::file::{LinkChange, LinkFile};
-use crate::hit::Laws;
+use crate::file::LinkFile;
 use crate::link::ToLink;
 use crate::record::Record;
-use crate::runtime::limits::Limits;
 use crate::runtime::own::Executor;
 use crate::seed::{Place, Seed};
+use crate::setup::Setup;
 use crate::task::Tasks;
 #[cfg(feature = "tcp")]
 use crate::tcp::TcpConfig;
 use crate::trace::Trace;
-use crate::watch::{Kind, LIMIT, Watched};
-use crate::wire::{BYTE_LIMIT, Recorded, Settings};
+use crate::watch::{Kind, Watched};
+use crate::wire::Recorded;
 
 /// Hosts, the links between them, and a program that is run on them in virtual time.
 ///
@@ -65,26 +65,13 @@ use crate::wire::{BYTE_LIMIT, Recorded, Settings};
 #[derive(Clone, Debug)]
 #[must_use = "a test bed does nothing until it is run"]
 pub struct Testbed {
-    names: Arc<Names>,
-    every: LinkModel,
-    links: BTreeMap<Path, LinkModel>,
-    changes: Vec<LinkChange>,
-    seed: Option<u64>,
-    settings: Settings,
+    setup: Setup,
     /// By host, where they are not Linux's.
     #[cfg(feature = "tcp")]
     tcp: BTreeMap<NodeId, TcpConfig>,
     #[cfg(feature = "tokio")]
     is_tokio: bool,
-    artefacts: Option<PathBuf>,
-    stall_limit: Duration,
 }
-
-/// As Linux gives a socket (`net.core.rmem_default`) \[bytes\].
-const RECEIVE_BUFFER: usize = 212_992;
-
-/// A million polls at one instant take a tenth of a second.
-const PATIENCE: u64 = 1_000_000;
 
 impl Testbed {
     /// Hosts of these names, with ideal links between them.
@@ -97,28 +84,11 @@ impl Testbed {
         let names: Names = hosts.into_iter().collect();
         assert!(!names.is_empty(), "a test bed without hosts; expected one name at least");
         Self {
-            names: Arc::new(names),
-            every: LinkModel::default(),
-            links: BTreeMap::new(),
-            changes: Vec::new(),
-            seed: None,
-            settings: Settings {
-                receive_buffer: RECEIVE_BUFFER,
-                traces: false,
-                digests: true,
-                keeps_packets: false,
-                patience: PATIENCE,
-                byte_limit: BYTE_LIMIT,
-                limits: Limits::default(),
-                said: Arc::default(),
-                laws: Laws::default(),
-            },
+            setup: Setup::new("host", names),
             #[cfg(feature = "tcp")]
             tcp: BTreeMap::new(),
             #[cfg(feature = "tokio")]
             is_tokio: false,
-            artefacts: None,
-            stall_limit: LIMIT,
         }
     }
 
@@ -139,7 +109,7 @@ impl Testbed {
     /// The names of the hosts.
     #[must_use]
     pub fn hosts(&self) -> &[String] {
-        &self.names
+        &self.setup.names
     }
 
     /// What every link is that is not named by [`Testbed::link`], before or after: a model, or words of `tc-netem`.
@@ -148,8 +118,7 @@ impl Testbed {
     ///
     /// If the words are none.
     pub fn links(mut self, link: impl ToLink) -> Self {
-        self.every = link.to_link();
-        Arc::make_mut(&mut self.settings.said).set_every(&link);
+        self.setup.set_every(link);
         self
     }
 
@@ -159,10 +128,7 @@ impl Testbed {
     ///
     /// If there is no such host, both are the same, or the words are none.
     pub fn link(mut self, from: &str, to: &str, link: impl ToLink) -> Self {
-        let path = self.names.path(from, to);
-        assert!(path.from != path.to, "host `{from}` has no link to itself");
-        self.links.insert(path, link.to_link());
-        Arc::make_mut(&mut self.settings.said).set(path, &link);
+        self.setup.set_link(from, to, link);
         self
     }
 
@@ -179,33 +145,33 @@ impl Testbed {
     /// the file in which the bed is run and the function in which the program stands. So it does not depend on threads, and is the same with `--test-threads=1` and with
     /// nextest; to edit other functions, or to move this one within its file, does not change it, and to rename it does. Two beds of one function have one seed.
     pub const fn seed(mut self, seed: u64) -> Self {
-        self.seed = Some(seed);
+        self.setup.seed = Some(seed);
         self
     }
 
     /// How many bytes of datagrams a socket holds that nobody has read; what comes beyond is lost. 212,992 if it is not said, as with Linux.
     pub const fn receive_buffer(mut self, bytes: usize) -> Self {
-        self.settings.receive_buffer = bytes;
+        self.setup.settings.receive_buffer = bytes;
         self
     }
 
     /// How often tasks may be polled at one instant before the run is given up, because time does not pass; a million if it is not said.
     pub const fn patience(mut self, polls: u64) -> Self {
-        self.settings.patience = polls;
+        self.setup.settings.patience = polls;
         self
     }
 
     /// Until when the program may run, in its own time; an hour if it is not said. A run that goes on is given up, with the network, each task, and what the
     /// task waits for since when: a program that asks again and again over a network that answers nothing would never end. [`Duration::MAX`] is no limit.
     pub const fn time_limit(mut self, limit: Duration) -> Self {
-        self.settings.limits.time = limit;
+        self.setup.settings.limits.time = limit;
         self
     }
 
     /// Limit of the polls of all tasks of a run; twenty million if it is not said, which takes some seconds. A run that goes on is given up as with
     /// [`Testbed::time_limit`]. `u64::MAX` is no limit.
     pub const fn step_limit(mut self, polls: u64) -> Self {
-        self.settings.limits.steps = polls;
+        self.setup.settings.limits.steps = polls;
         self
     }
 
@@ -213,7 +179,7 @@ impl Testbed {
     /// said. Each packet counts 200 bytes more than its content, for its places in queues. A run that comes to hold more fails, and names the host, the
     /// socket and the task that sent last: a loop that only sends would take all memory otherwise. `u64::MAX` is no limit.
     pub const fn byte_limit(mut self, bytes: u64) -> Self {
-        self.settings.byte_limit = bytes;
+        self.setup.settings.byte_limit = bytes;
         self
     }
 
@@ -222,27 +188,27 @@ impl Testbed {
     /// cannot be stopped otherwise. Tasks of tokio's own that wake each other without letting time pass are found too. [`STALL_VARIABLE`](crate::STALL_VARIABLE)
     /// says it for all tests of a process; [`Duration::MAX`] is never. On Linux a process under a debugger is left alone.
     pub const fn stall_limit(mut self, limit: Duration) -> Self {
-        self.stall_limit = limit;
+        self.setup.stall_limit = limit;
         self
     }
 
     /// Leaves what packets carry out of what [`Testbed::run_twice`] compares: for protocols whose keys are random. The times, the sizes and the ends of all
     /// packets are compared still.
     pub const fn without_digests(mut self) -> Self {
-        self.settings.digests = false;
+        self.setup.settings.digests = false;
         self
     }
 
     /// Records what happens, for [`Bed::trace`].
     pub const fn traced(mut self) -> Self {
-        self.settings.traces = true;
+        self.setup.settings.traces = true;
         self
     }
 
     /// If the run fails, what happened is written into this folder: see [`Record::write`]. [`ARTEFACTS_VARIABLE`](crate::ARTEFACTS_VARIABLE) asks for it without
     /// the test.
     pub fn artefacts(mut self, folder: impl Into<PathBuf>) -> Self {
-        self.artefacts = Some(folder.into());
+        self.setup.artefacts = Some(folder.into());
         self
     }
 
@@ -270,7 +236,7 @@ impl Testbed {
         F: Future<Output = T> + 'static,
         T: 'static,
     {
-        let seed = Seed::choose(self.seed, &Place::of(&program));
+        let seed = Seed::choose(self.setup.seed, &Place::of(&program));
         self.run_once(&seed, program, Location::caller()).0
     }
 
@@ -285,9 +251,8 @@ impl Testbed {
         F: Future<Output = T> + 'static,
         T: 'static,
     {
-        self.settings.traces = true;
-        self.settings.keeps_packets = true;
-        let seed = Seed::choose(self.seed, &Place::of(&program));
+        self.setup.record();
+        let seed = Seed::choose(self.setup.seed, &Place::of(&program));
         self.run_once(&seed, program, Location::caller())
     }
 
@@ -303,8 +268,8 @@ impl Testbed {
         F: Future<Output = T> + 'static,
         T: 'static,
     {
-        self.settings.traces = true;
-        let seed = Seed::choose(self.seed, &Place::of(&program));
+        self.setup.settings.traces = true;
+        let seed = Seed::choose(self.setup.seed, &Place::of(&program));
         let (outcome, first) = self.clone().run_once(&seed, &program, Location::caller());
         let (_, second) = self.run_once(&seed, &program, Location::caller());
         if let Some(difference) = first.trace().first_difference(second.trace()) {
@@ -322,15 +287,15 @@ impl Testbed {
         F: Future<Output = T> + 'static,
         T: 'static,
     {
-        let artefacts = Artefacts::new(self.artefacts.clone(), seed);
         let again = self.again(seed, origin);
-        let mut settings = self.settings.clone();
-        settings.keeps_packets |= artefacts.is_wanted();
-        settings.traces |= artefacts.is_wanted();
-        let (every, links) = (self.every, self.links);
-        let link = move |from, to| links.get(&Path { from, to }).unwrap_or(&every).clone();
+        let mut setup = self.setup;
+        let artefacts = Artefacts::new(setup.artefacts.take(), seed);
+        if artefacts.is_wanted() {
+            setup.record();
+        }
+        let (link, names) = (setup.links(), setup.names);
         #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only TCP has constants"))]
-        let mut core = Core::new(&self.names, seed.value, settings, self.changes.clone(), link);
+        let mut core = Core::new(&names, seed.value, setup.settings, setup.changes, link);
         #[cfg(feature = "tcp")]
         self.tcp.iter().for_each(|(host, config)| core.set_tcp(*host, config.clone()));
         let mut recorded = None;
@@ -338,19 +303,19 @@ impl Testbed {
         let kind = if self.is_tokio { Kind::Tokio } else { Kind::Own };
         #[cfg(not(feature = "tokio"))]
         let kind = Kind::Own;
-        let watched = Watched::begin(kind, &self.names, self.stall_limit, seed, &artefacts);
+        let watched = Watched::begin(kind, &names, setup.stall_limit, seed, &artefacts);
         let run = || {
             #[cfg(feature = "tokio")]
             if self.is_tokio {
-                return crate::runtime::on_tokio::run(core, self.names.len(), program, origin, &watched, &mut recorded);
+                return crate::runtime::on_tokio::run(core, names.len(), program, origin, &watched, &mut recorded);
             }
-            on_own(core, self.names.len(), program, origin, &watched, &mut recorded)
+            on_own(core, names.len(), program, origin, &watched, &mut recorded)
         };
         let outcome = catch_unwind(AssertUnwindSafe(|| failure::__rust_begin_short_backtrace(run)));
         // While a panic is reported nothing is watched any more.
-        let panicked = watched.pulse.running().map(|runner| runner.words(&self.names));
+        let panicked = watched.pulse.running().map(|runner| runner.words(&names));
         drop(watched);
-        let mut recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(Arc::clone(&self.names)), ..Recorded::default() });
+        let mut recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(Arc::clone(&names)), ..Recorded::default() });
         let drawn = std::mem::take(&mut recorded.drawn);
         let record = Record::new(seed.clone(), recorded);
         match outcome {
@@ -376,13 +341,9 @@ impl Testbed {
 
 impl From<LinkFile> for Testbed {
     fn from(file: LinkFile) -> Self {
-        let LinkFile { hosts, every, links, changes, hits, seed } = file;
-        let mut bed = Self::new(hosts);
-        add_all(&mut bed.settings.laws, &bed.names, &hits);
-        let paths = links.keys().map(|(from, to)| Path { from: NodeId::new(*from), to: NodeId::new(*to) });
-        Arc::make_mut(&mut bed.settings.said).set_models(every == LinkModel::default(), paths);
-        let links = links.into_iter().map(|((from, to), link)| (Path { from: NodeId::new(from), to: NodeId::new(to) }, link)).collect();
-        Self { every, links, changes, seed, ..bed }
+        let mut bed = Self::new(&*file.hosts);
+        bed.setup.read(file);
+        bed
     }
 }
 

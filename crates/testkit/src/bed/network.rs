@@ -1,7 +1,5 @@
 //! Test beds with the networks that strategies draw.
 
-use std::sync::Arc;
-
 use cohaptic_wan::{LinkModel, Path};
 
 use super::Testbed;
@@ -15,12 +13,10 @@ impl Testbed {
     ///
     /// If it has not as many hosts as the test bed.
     pub fn network(mut self, network: &ImpairedNetwork) -> Self {
-        let hosts = self.names.len();
+        let hosts = self.setup.names.len();
         assert!(network.hosts() == hosts, "a network of {} hosts for a test bed of {hosts}: expected as many", network.hosts());
-        let said = Arc::make_mut(&mut self.settings.said);
         for (from, to, link) in network.links() {
-            said.set(Path { from, to }, link);
-            self.links.insert(Path { from, to }, link.model());
+            self.setup.set_path(Path { from, to }, link);
         }
         self
     }

@@ -13,7 +13,7 @@ impl Testbed {
     /// If they cannot be.
     pub fn tcp(mut self, config: TcpConfig) -> Self {
         check_tcp(&config);
-        self.tcp = (0..self.names.len()).map(|host| (NodeId::new(host), config.clone())).collect();
+        self.tcp = (0..self.setup.names.len()).map(|host| (NodeId::new(host), config.clone())).collect();
         self
     }
 
@@ -24,7 +24,7 @@ impl Testbed {
     /// If they cannot be, or there is no such host.
     pub fn tcp_of(mut self, host: &str, config: TcpConfig) -> Self {
         check_tcp(&config);
-        self.tcp.insert(self.names.node(host), config);
+        self.tcp.insert(self.setup.names.node(host), config);
         self
     }
 }

@@ -1,7 +1,6 @@
 //! Packets that are hit between nodes.
 
 use super::Nodes;
-use crate::bed::{add_all, add_function, add_law, add_words};
 use crate::hit::{Hits, PacketLaw, SentPacket, Verdict};
 
 impl Nodes {
@@ -12,7 +11,7 @@ impl Nodes {
     /// If there is no such node yet, or both are the same.
     #[track_caller]
     pub fn on_packet(mut self, from: &str, to: &str, judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static) -> Self {
-        add_function(&mut self.settings.laws, &self.names, [from, to], judge);
+        self.setup.add_function([from, to], judge);
         self
     }
 
@@ -23,7 +22,7 @@ impl Nodes {
     /// As [`Nodes::on_packet`].
     #[track_caller]
     pub fn law(mut self, from: &str, to: &str, law: impl PacketLaw + Clone + Send + 'static) -> Self {
-        add_law(&mut self.settings.laws, &self.names, [from, to], law);
+        self.setup.add_law([from, to], law);
         self
     }
 
@@ -34,7 +33,7 @@ impl Nodes {
     /// As [`Nodes::on_packet`]; if the words make no sense, with the place.
     #[track_caller]
     pub fn hit(mut self, from: &str, to: &str, words: &str) -> Self {
-        add_words(&mut self.settings.laws, &self.names, [from, to], words);
+        self.setup.add_words([from, to], words);
         self
     }
 
@@ -45,7 +44,7 @@ impl Nodes {
     /// If it names a node that there is not.
     #[track_caller]
     pub fn hits(mut self, hits: &Hits) -> Self {
-        add_all(&mut self.settings.laws, &self.names, &hits.all);
+        self.setup.add_hits(&hits.all);
         self
     }
 }

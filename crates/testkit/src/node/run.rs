@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{LinkModel, LinkStats, NodeId};
+use cohaptic_wan::{LinkStats, NodeId};
 
 use super::deadlines::Deadlines;
 use super::passing::Does;
@@ -20,6 +20,7 @@ use crate::bed::Names;
 use crate::failure;
 use crate::record::Record;
 use crate::seed::Seed;
+use crate::setup::Setup;
 use crate::watch::{Kind, Watched};
 use crate::wire::Wire;
 
@@ -77,13 +78,14 @@ pub struct NodeCounts {
 }
 
 impl NodeRun {
-    pub(super) fn new(nodes: Nodes, seed: Seed, link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static) -> Self {
-        let Nodes { names, nodes, changes, mut settings, time_limit, artefacts, stall_limit, .. } = nodes;
-        let artefacts = Artefacts::new(artefacts, &seed);
-        let said = std::mem::take(&mut settings.said);
-        settings.traces |= artefacts.is_wanted();
-        settings.keeps_packets |= artefacts.is_wanted();
-        let names = Arc::new(names);
+    pub(super) fn new(nodes: Nodes, seed: Seed) -> Self {
+        let Nodes { mut setup, nodes } = nodes;
+        let artefacts = Artefacts::new(setup.artefacts.take(), &seed);
+        if artefacts.is_wanted() {
+            setup.record();
+        }
+        let link = setup.links();
+        let Setup { names, settings, changes, stall_limit, .. } = setup;
         let count = names.len();
         let watched = Watched::begin(Kind::Nodes, &names, stall_limit, &seed, &artefacts);
         let mut run = Self {
@@ -96,8 +98,8 @@ impl NodeRun {
             touched: (0..count).map(NodeId::new).collect(),
             done: 0,
             patience: settings.patience,
-            time_limit,
-            again: Again { names: Arc::clone(&names), said, laws: settings.laws.clone(), seed, others: Vec::new(), place: Location::caller() },
+            time_limit: settings.limits.time,
+            again: Again { names: Arc::clone(&names), said: settings.said, laws: settings.laws, seed, others: Vec::new(), place: Location::caller() },
             artefacts,
             watched,
             names,
