@@ -1,6 +1,6 @@
-//! What a program finds around it: the test bed that runs on this thread, and the host on which the task that is being polled lives.
+//! The test bed that runs on this thread, which a program finds around it.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::io;
 use std::panic::Location;
 use std::rc::Rc;
@@ -9,11 +9,11 @@ use std::sync::Arc;
 use cohaptic_wan::NodeId;
 
 use crate::core::Shared;
+use crate::current;
 use crate::task::Tasks;
 
 thread_local! {
     static RUNNING: RefCell<Option<Running>> = const { RefCell::new(None) };
-    static HOST: Cell<Option<NodeId>> = const { Cell::new(None) };
 }
 
 /// A test bed that runs.
@@ -36,6 +36,8 @@ impl Running {
             if running.is_some() {
                 panic!("a test bed runs inside another one: the time of both cannot pass. Give both programs hosts of one test bed, or run one after the other");
             }
+            let Self { shared, tasks } = self.clone();
+            current::begin(shared.run(), Rc::new(move || tasks.current(shared.names())));
             *running = Some(self);
         });
         Entered(())
@@ -45,6 +47,7 @@ impl Running {
 impl Drop for Entered {
     fn drop(&mut self) {
         let left = RUNNING.with_borrow_mut(Option::take);
+        current::end();
         drop(left);
     }
 }
@@ -52,12 +55,6 @@ impl Drop for Entered {
 /// The test bed that runs on this thread.
 pub(crate) fn running() -> Option<Running> {
     RUNNING.with_borrow(Clone::clone)
-}
-
-/// Whether the run with that state is the one of this thread. A value may ask that is dropped while the thread ends.
-#[inline]
-pub(crate) fn is_running(shared: &Shared) -> bool {
-    RUNNING.try_with(|running| running.borrow().as_ref().is_some_and(|running| std::ptr::eq(&raw const *running.shared, shared))).unwrap_or(false)
 }
 
 /// Its state.
@@ -86,17 +83,6 @@ pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T 
         Some(running) => question(&running.shared),
         None => panic!("{}", outside_text(what)),
     })
-}
-
-/// The task that is being polled on this thread, in words; `None` outside of a run.
-pub(crate) fn task() -> Option<String> {
-    let running = running()?;
-    Some(running.tasks.current(running.shared.names()))
-}
-
-/// The host on which the task that is being polled lives.
-pub(crate) fn host() -> Option<NodeId> {
-    HOST.get()
 }
 
 /// A call that makes a socket, where a test has written it. The call needs a running test bed and a host.
@@ -130,7 +116,7 @@ impl Call {
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn host(self, how: &str) -> (Arc<Shared>, NodeId) {
         let Some(shared) = shared() else { self.is_outside() };
-        if let Some(host) = host() {
+        if let Some(host) = current::host() {
             return (shared, host);
         }
         let Self { name, place } = self;
@@ -146,18 +132,6 @@ impl Call {
     fn is_outside(self) -> ! {
         panic!("`{}` at {} is called outside of a test bed: call it within `Testbed::run`, on its thread", self.name, self.place);
     }
-}
-
-/// Does something as a task of that host.
-pub(crate) fn on_host<T>(host: Option<NodeId>, act: impl FnOnce() -> T) -> T {
-    struct Back(Option<NodeId>);
-    impl Drop for Back {
-        fn drop(&mut self) {
-            HOST.set(self.0);
-        }
-    }
-    let _back = Back(HOST.replace(host));
-    act()
 }
 
 /// The error of what works only inside a test bed.

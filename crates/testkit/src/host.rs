@@ -11,9 +11,11 @@ use std::sync::Arc;
 
 use cohaptic_wan::NodeId;
 
-use crate::address::{Addresses, ToSocketAddrs};
+use crate::address::Addresses;
 use crate::context::{self, Running};
 use crate::core::Shared;
+use crate::current;
+use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
 use crate::task::JoinHandle;
 
@@ -126,7 +128,7 @@ impl Host {
         let node = self.node;
         async move {
             let mut future = pin!(future);
-            poll_fn(|cx| context::on_host(Some(node), || future.as_mut().poll(cx))).await
+            poll_fn(|cx| current::on_host(Some(node), || future.as_mut().poll(cx))).await
         }
     }
 

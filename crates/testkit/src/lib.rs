@@ -93,23 +93,28 @@ pub mod axum;
 mod bed;
 mod context;
 mod core;
+mod current;
 mod failure;
+mod fault;
 mod file;
 pub mod hit;
 mod host;
 #[cfg(feature = "hyper")]
 pub mod hyper;
 mod link;
+mod names;
 #[cfg(feature = "tcp")]
 pub mod net;
 pub mod node;
 #[cfg(feature = "quinn")]
 pub mod quinn;
 mod record;
+mod resolve;
 mod runtime;
 #[cfg(feature = "scenes")]
 mod scenes;
 mod seed;
+mod settings;
 mod setup;
 mod socket;
 #[cfg(feature = "strategies")]
@@ -125,7 +130,7 @@ mod watch;
 mod wire;
 mod words;
 
-pub use address::{AddressPlan, Addresses, ToSocketAddrs};
+pub use address::{AddressPlan, Addresses};
 pub use artefacts::{ARTEFACTS_VARIABLE, WriteError};
 pub use bed::{Bed, Testbed};
 #[cfg(feature = "scenes")]
@@ -133,12 +138,14 @@ pub use cohaptic_harness as harness;
 pub use cohaptic_units as units;
 pub use cohaptic_units::Instant;
 pub use cohaptic_wan as wan;
+pub use fault::WordsError;
 pub use file::{LinkFile, LinkFileError};
 pub use host::Host;
 pub use link::ToLink;
 #[cfg(feature = "strategies")]
 pub use proptest;
 pub use record::Record;
+pub use resolve::ToSocketAddrs;
 #[cfg(feature = "scenes")]
 pub use scenes::{check_scene, check_scenes};
 pub use seed::SEED_VARIABLE;
@@ -148,4 +155,3 @@ pub use task::{JoinHandle, TaskStopped};
 pub use tcp::{TcpConfig, TcpListener, TcpSocket, TcpStream};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use watch::STALL_VARIABLE;
-pub use words::WordsError;

@@ -1,5 +1,6 @@
 //! What can be said in place of a link.
 
+use cohaptic_units::Instant;
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{KernelNetem, LinkConfig, LinkModel, Modulated};
 
@@ -16,6 +17,15 @@ pub trait ToLink {
     fn words(&self) -> Option<String> {
         None
     }
+}
+
+/// A link that becomes another one.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct LinkChange {
+    pub(crate) at: Instant,
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    pub(crate) link: LinkModel,
 }
 
 impl ToLink for LinkModel {

@@ -8,13 +8,13 @@ use std::time::Duration;
 
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
-use crate::bed::Names;
-use crate::file::{LinkChange, LinkFile};
+use crate::file::LinkFile;
 use crate::hit::{Laws, PacketLaw, PathHit, SentPacket, Verdict};
-use crate::link::ToLink;
-use crate::runtime::limits::Limits;
+use crate::link::{LinkChange, ToLink};
+use crate::names::Names;
+use crate::settings::{Limits, Settings};
 use crate::watch::LIMIT;
-use crate::wire::{BYTE_LIMIT, Settings};
+use crate::wire::BYTE_LIMIT;
 use crate::words::hits_on;
 
 /// Hosts and the links between them, as the test says them.

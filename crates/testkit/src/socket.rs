@@ -11,9 +11,9 @@ use std::sync::Arc;
 
 use cohaptic_wan::NodeId;
 
-use crate::address::ToSocketAddrs;
 use crate::context::Call;
 use crate::core::{Core, Shared, SocketId};
+use crate::resolve::ToSocketAddrs;
 
 /// Name of this kind of socket in messages.
 const KIND: &str = "a UDP socket";

@@ -7,8 +7,8 @@ use cohaptic_units::Instant;
 use cohaptic_units::print::{Seconds, Span};
 use cohaptic_wan::{DropCause, NodeId, Path};
 
-use crate::bed::Names;
 use crate::hit::Verdict;
+use crate::names::Names;
 
 /// What happened, and when.
 #[derive(Clone, PartialEq, Eq, Debug)]

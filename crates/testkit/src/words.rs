@@ -16,16 +16,16 @@
 //! the order of the lines. Names are parted from the arrow by blanks. `hit` and a path, before the colon, says which of its packets are [hit](crate::hit).
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::ops::Range;
+use std::str::FromStr;
 use std::sync::Arc;
 
-use cohaptic_units::Excerpt;
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{FateLog, LinkModel, MOST_NODES};
 
-use crate::bed::{Names, name_fault};
-use crate::hit::{self, PathHit};
+use crate::fault::{Fault, WordsError, locate};
+use crate::hit::{self, Hits, PathHit};
+use crate::names::{Names, name_fault};
 
 /// What a text says.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -40,47 +40,6 @@ pub(crate) struct Words {
     pub(crate) hits: Vec<PathHit>,
     pub(crate) seed: Option<u64>,
 }
-
-/// Why a text says no links, and where.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct WordsError {
-    excerpt: Excerpt,
-    message: String,
-}
-
-impl WordsError {
-    /// The line, from 1.
-    #[must_use]
-    pub const fn line(&self) -> usize {
-        self.excerpt.line
-    }
-
-    /// The column, from 1, in characters.
-    #[must_use]
-    pub const fn column(&self) -> usize {
-        self.excerpt.column
-    }
-
-    /// The fault, and what was expected.
-    #[must_use]
-    pub fn message(&self) -> &str {
-        &self.message
-    }
-}
-
-impl std::error::Error for WordsError {}
-
-impl fmt::Display for WordsError {
-    /// The place, the message, and the line with the place marked.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Excerpt { line, column, .. } = self.excerpt;
-        writeln!(f, "{line}:{column}: {}", self.message)?;
-        self.excerpt.write(f, true)
-    }
-}
-
-/// A fault in some bytes of a line.
-pub(crate) type Fault = (Range<usize>, String);
 
 /// Reads a text. `file` reads the file of a fate log, by the path in the text.
 pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, String>) -> Result<Words, WordsError> {
@@ -98,24 +57,22 @@ pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, Str
     Ok(Words { hosts: reader.hosts.to_vec(), every, links: reader.links, hits: reader.hits, seed: reader.seed })
 }
 
-/// Reads lines of hits alone: a path, a colon, and the words.
-pub(crate) fn hits_of(text: &str) -> Result<Vec<PathHit>, WordsError> {
-    let mut reader = Reader::default();
-    for (number, line) in (1..).zip(text.lines()) {
-        reader.hits_alone(line).map_err(|fault| locate(number, line, fault))?;
+impl FromStr for Hits {
+    type Err = WordsError;
+
+    /// Reads lines of hits alone: a path, a colon, and the words.
+    fn from_str(text: &str) -> Result<Self, WordsError> {
+        let mut reader = Reader::default();
+        for (number, line) in (1..).zip(text.lines()) {
+            reader.hits_alone(line).map_err(|fault| locate(number, line, fault))?;
+        }
+        Ok(Self { all: reader.hits })
     }
-    Ok(reader.hits)
 }
 
 /// Reads the words of hits on one path.
 pub(crate) fn hits_on(words: &str) -> Result<Vec<hit::Hit>, WordsError> {
     hit::parse(words, 0..words.len()).map_err(|fault| locate(1, words, fault))
-}
-
-fn locate(number: usize, line: &str, (span, message): Fault) -> WordsError {
-    let mut excerpt = Excerpt::new(line, span);
-    excerpt.line = number;
-    WordsError { excerpt, message }
 }
 
 #[derive(Debug, Default)]

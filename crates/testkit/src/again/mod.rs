@@ -13,8 +13,8 @@ use cohaptic_wan::{NodeId, Path};
 pub(crate) use said::Said;
 use said::{Chance, Words};
 
-use crate::bed::Names;
 use crate::hit::{Hit, Laws};
+use crate::names::Names;
 use crate::seed::Seed;
 use crate::trace::PacketName;
 

@@ -6,10 +6,9 @@ use std::time::Duration;
 
 use super::Testbed;
 use crate::again::Again;
-use crate::runtime::limits::Limits;
 use crate::seed::Seed;
+use crate::settings::{Limits, Settings};
 use crate::setup::RECEIVE_BUFFER;
-use crate::wire::Settings;
 
 impl Testbed {
     /// Returns the parts of the test bed with which a run is the same again.

@@ -2,40 +2,34 @@
 
 mod again;
 mod hitting;
-mod names;
 #[cfg(feature = "strategies")]
 mod network;
 mod running;
 #[cfg(feature = "tcp")]
 mod tcp;
 
-use std::cell::RefCell;
 #[cfg(feature = "tcp")]
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, Location, catch_unwind, resume_unwind};
 use std::path::PathBuf;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
 #[cfg(feature = "tcp")]
 use cohaptic_wan::NodeId;
 
-pub(crate) use names::{Names, SHOWN, name_fault};
 pub use running::Bed;
 
 use crate::artefacts::Artefacts;
-use crate::context::Running;
-use crate::core::{Clock, Core, Shared};
+use crate::core::Core;
 use crate::failure;
 use crate::file::LinkFile;
 use crate::link::ToLink;
+use crate::names::Names;
 use crate::record::Record;
-use crate::runtime::own::Executor;
 use crate::seed::{Place, Seed};
 use crate::setup::Setup;
-use crate::task::Tasks;
 #[cfg(feature = "tcp")]
 use crate::tcp::TcpConfig;
 use crate::trace::Trace;
@@ -307,9 +301,9 @@ impl Testbed {
         let run = || {
             #[cfg(feature = "tokio")]
             if self.is_tokio {
-                return crate::runtime::on_tokio::run(core, names.len(), program, origin, &watched, &mut recorded);
+                return crate::runtime::on_tokio::run(core, names.len(), |shared| program(Bed::new(shared)), origin, &watched, &mut recorded);
             }
-            on_own(core, names.len(), program, origin, &watched, &mut recorded)
+            crate::runtime::own::run(core, names.len(), |shared| program(Bed::new(shared)), origin, &watched, &mut recorded)
         };
         let outcome = catch_unwind(AssertUnwindSafe(|| failure::__rust_begin_short_backtrace(run)));
         // While a panic is reported nothing is watched any more.
@@ -345,55 +339,4 @@ impl From<LinkFile> for Testbed {
         bed.setup.read(file);
         bed
     }
-}
-
-/// Takes what was recorded out of a run that ends, however it ends.
-pub(crate) struct Recorder<'a> {
-    pub(crate) shared: Arc<Shared>,
-    pub(crate) tasks: Rc<Tasks>,
-    pub(crate) recorded: &'a mut Option<Recorded>,
-}
-
-impl Drop for Recorder<'_> {
-    fn drop(&mut self) {
-        *self.recorded = Some(self.shared.with(|core| core.recorded()));
-        // Tasks hold the state, and the state their wakers.
-        self.tasks.stop_all();
-        self.shared.end();
-    }
-}
-
-/// Runs a program on the executor of this crate.
-fn on_own<T, F>(
-    core: Core,
-    hosts: usize,
-    program: impl FnOnce(Bed) -> F,
-    origin: &'static Location<'static>,
-    watched: &Watched,
-    recorded: &mut Option<Recorded>,
-) -> T
-where
-    F: Future<Output = T> + 'static,
-    T: 'static,
-{
-    let executor = Executor::new();
-    let mut core = core;
-    core.woken.trust(&executor.waker());
-    let shared = Arc::new(Shared::new(core, Clock::Own));
-    let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
-    watched.is_of(&shared);
-    let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
-    // The run has ended when the recorder is dropped: the state is back by then, where other threads find it.
-    let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
-    // After it is known that no other one runs on this thread.
-    let _here = shared.stay();
-    let outcome = Rc::new(RefCell::new(None));
-    // In a box: a program may hold arrays, and without optimisation each call that a future is handed to has a copy of it on the stack.
-    let (future, slot) = (Box::pin(program(Bed::new(Arc::clone(&shared)))), Rc::clone(&outcome));
-    let _main = tasks.spawn(None, origin, async move {
-        let came_out = future.await;
-        *slot.borrow_mut() = Some(came_out);
-    });
-    executor.run(&shared, &tasks, || outcome.borrow().is_some());
-    outcome.take().expect("the executor runs until the program is over")
 }

@@ -9,12 +9,12 @@ use std::sync::Arc;
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkStats, NodeId};
 
-use super::Names;
 use crate::address::AddressPlan;
 use crate::context;
 use crate::core::Shared;
 use crate::host::Host;
 use crate::link::ToLink;
+use crate::names::Names;
 use crate::task::JoinHandle;
 use crate::trace::{Happening, Trace};
 

@@ -1,6 +1,8 @@
 //! Sockets of a host, by their ports.
 
-use super::SocketId;
+/// A socket, until it is closed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct SocketId(pub(super) usize);
 
 /// Sockets that are bound on a host, in the order of version of IP and port; those of one port in the order in which they were bound.
 ///

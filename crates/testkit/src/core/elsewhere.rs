@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 use cohaptic_wan::NodeId;
 
 use super::{Core, Shared};
-use crate::context;
+use crate::current;
 
 /// Acts that other threads have left for the thread of a run.
 #[derive(Default)]
@@ -42,9 +42,15 @@ impl Elsewhere {
 }
 
 impl Shared {
+    /// Whether the run is that of this thread.
+    #[inline]
+    fn is_running(&self) -> bool {
+        current::run() == self.run()
+    }
+
     /// Whether this thread may have the state, which may lie elsewhere: it runs the test bed, or the run has ended.
     pub(super) fn may_be_had(&self) -> bool {
-        context::is_running(self) || self.has_ended()
+        self.is_running() || self.has_ended()
     }
 
     /// Asks the state for something of that host: `kind`, such as "a UDP socket".
@@ -65,7 +71,7 @@ impl Shared {
     /// [`io::ErrorKind::ConnectionAborted`] once the run has ended; [`io::ErrorKind::Unsupported`] on another thread than that of the run, which fails then.
     #[inline]
     pub(crate) fn check_open(&self, host: NodeId, kind: &str) -> io::Result<()> {
-        if self.is_at_hand() || context::is_running(self) { Ok(()) } else { self.refuse(host, kind) }
+        if self.is_at_hand() || self.is_running() { Ok(()) } else { self.refuse(host, kind) }
     }
 
     #[cold]
@@ -73,7 +79,7 @@ impl Shared {
     fn refuse(&self, host: NodeId, kind: &str) -> io::Result<()> {
         let name = &self.names()[host.index()];
         if self.has_ended() {
-            let place = if context::running().is_some() { ", in the run of another test bed" } else { "" };
+            let place = if current::run() != 0 { ", in the run of another test bed" } else { "" };
             let text =
                 format!("{kind} of host `{name}` is used after the run of its test bed has ended{place}: take one of a host of the run that uses it");
             return Err(io::Error::new(io::ErrorKind::ConnectionAborted, text));

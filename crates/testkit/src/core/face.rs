@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 
-use crate::context;
+use crate::current;
 
 /// The time, and the calls since it last passed. The holder of the state writes the time; a call that is lost between two threads counts for nothing.
 #[derive(Debug)]
@@ -83,7 +83,7 @@ impl Face {
     pub(super) fn lose_patience(&self, socket: Option<&str>) -> ! {
         // A value that is dropped while it unwinds may ask again.
         self.calls.store(0, Ordering::Relaxed);
-        let who = match (context::task(), socket) {
+        let who = match (current::task(), socket) {
             (Some(task), Some(socket)) => format!(". It is {task}, which called {socket} last"),
             (Some(task), None) => format!(". It is {task}"),
             (None, Some(socket)) => format!(". It called {socket} last"),

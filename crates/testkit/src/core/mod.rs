@@ -6,7 +6,6 @@ mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
 mod face;
-mod octets;
 mod passing;
 mod shared;
 mod socket_name;
@@ -22,21 +21,23 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
 use crate::address::{self, AddressPlan};
-use crate::bed::Names;
-use crate::file::LinkChange;
+use crate::current;
+use crate::link::LinkChange;
+use crate::names::Names;
+use crate::settings::Settings;
 use crate::trace::Happening;
-use crate::wire::{self, Recorded, Settings, Wire};
+use crate::wire::{self, Recorded, Wire};
 use bound::Bound;
+pub(crate) use bound::SocketId;
 use ends::{Ends, Kind};
 use face::Face;
 use sockets::Sockets;
 use waking::Woken;
 
-pub(crate) use octets::Octets;
 pub(crate) use passing::Outgoing;
 pub(crate) use shared::{Clock, Shared};
 pub(crate) use socket_name::SocketName;
-pub(crate) use sockets::{Datagram, SocketId};
+pub(crate) use sockets::Datagram;
 #[cfg(feature = "tcp")]
 pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
 pub(crate) use timers::{TimerId, Timers};
@@ -51,7 +52,7 @@ pub(crate) struct Core {
     entropy: entropy::ByHost,
     hosts: Vec<HostState>,
     sockets: Sockets,
-    spare: octets::Spare,
+    spare: wire::Spare<Ends>,
     #[cfg(feature = "tcp")]
     tcp: tcp::Tcp,
     pub(crate) woken: Woken,
@@ -80,7 +81,7 @@ impl Core {
             entropy: entropy::ByHost::of_programs(seed),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
-            spare: octets::Spare::default(),
+            spare: wire::Spare::default(),
             #[cfg(feature = "tcp")]
             tcp: tcp::Tcp::new(seed, names.len()),
             woken: Woken::default(),
@@ -150,6 +151,14 @@ impl Core {
     #[cold]
     fn lose_patience(&self, socket: SocketName) -> ! {
         self.face.lose_patience(Some(&socket.words(&self.plan)))
+    }
+
+    /// Fails the run, which holds too many bytes: that socket has sent last.
+    #[cold]
+    #[inline(never)]
+    fn fail_for(&self, socket: SocketName) {
+        let task = current::task().map_or_else(String::new, |task| format!(", used by {task},"));
+        self.wire.held.fail(format_args!("{}{task}", socket.words(&self.plan)));
     }
 
     /// Random bytes for a program of a host.

@@ -19,7 +19,7 @@ use cohaptic_units::Instant;
 use super::Core;
 use super::elsewhere::Elsewhere;
 use super::face::Face;
-use crate::bed::Names;
+use crate::names::Names;
 use crate::wire::Recorded;
 
 thread_local! {
@@ -86,6 +86,12 @@ impl Shared {
     #[inline]
     pub(crate) fn is_at_hand(&self) -> bool {
         AT_HAND.get() == self.run
+    }
+
+    /// The number of the run.
+    #[inline]
+    pub(crate) const fn run(&self) -> u64 {
+        self.run
     }
 
     /// The names of the hosts.

@@ -8,15 +8,11 @@ use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 use cohaptic_wan::{NodeId, Ring};
 
-use super::bound::Port;
+use super::bound::{Port, SocketId};
 use super::waking::{Waiters, Woken};
 use super::{Core, Parcel, SocketName};
 use crate::trace::Lost;
 use crate::wire::{Held, Where};
-
-/// A socket, until it is closed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct SocketId(pub(super) usize);
 
 /// A datagram in the buffer of a socket.
 #[derive(Clone, Debug)]

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use cohaptic_linkfile::{LinkTable, RelayChange, RelayFile};
 use cohaptic_wan::LinkModel;
 
-use super::{LinkChange, LinkFile, LinkFileError};
+use super::{LinkFile, LinkFileError};
+use crate::link::LinkChange;
 
 impl LinkFile {
     /// Reads the text of a relay file or, with the feature `scenes`, of a scene file. A relay file has programs.

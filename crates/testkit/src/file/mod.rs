@@ -11,11 +11,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use cohaptic_files::{MOST_TOML_BYTES, read_text, read_text_up_to};
-use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
+use crate::fault::WordsError;
 use crate::hit::PathHit;
-use crate::words::{self, WordsError};
+use crate::link::LinkChange;
+use crate::words;
 
 /// Hosts and the links between them, read from a file.
 ///
@@ -52,15 +53,6 @@ pub struct LinkFile {
     /// Which packets are hit.
     pub(crate) hits: Vec<PathHit>,
     pub(crate) seed: Option<u64>,
-}
-
-/// A link that becomes another one.
-#[derive(Clone, PartialEq, Debug)]
-pub(crate) struct LinkChange {
-    pub(crate) at: Instant,
-    pub(crate) from: usize,
-    pub(crate) to: usize,
-    pub(crate) link: LinkModel,
 }
 
 /// Why a file says no links.

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use cohaptic_linkfile::mesh::pairs;
 use cohaptic_scene::{ChangeKind, Scene};
 
-use super::{LinkChange, LinkFile, LinkFileError};
+use super::{LinkFile, LinkFileError};
+use crate::link::LinkChange;
 
 /// Whether a text is a relay file. Text that is no TOML is refused as a scene, with the place.
 pub(super) fn is_relay(text: &str) -> bool {

@@ -1,10 +1,8 @@
 //! Hits of several paths, as a value.
 
 use std::fmt;
-use std::str::FromStr;
 
 use super::words::Hit;
-use crate::words::{WordsError, hits_of};
 
 /// Which packets are hit between hosts, by their names, and how: what [`Testbed::hits`](crate::Testbed::hits) takes and `strategies::any_hits` draws (feature `strategies`).
 ///
@@ -58,14 +56,6 @@ impl Hits {
     #[must_use]
     pub const fn len(&self) -> usize {
         self.all.len()
-    }
-}
-
-impl FromStr for Hits {
-    type Err = WordsError;
-
-    fn from_str(text: &str) -> Result<Self, WordsError> {
-        hits_of(text).map(|all| Self { all })
     }
 }
 

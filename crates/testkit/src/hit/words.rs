@@ -8,7 +8,7 @@ use std::time::Duration;
 use cohaptic_tcp::Flags;
 use cohaptic_units::{parse, print};
 
-use crate::words::Fault;
+use crate::fault::Fault;
 
 /// Which packets of a path are hit, and how.
 #[derive(Clone, PartialEq, Eq, Debug)]

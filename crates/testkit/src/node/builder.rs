@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::{Node, NodeRun};
-use crate::bed::Names;
 use crate::file::LinkFile;
 use crate::link::ToLink;
+use crate::names::Names;
 use crate::record::Record;
 use crate::seed::{Place, Seed};
 use crate::setup::Setup;
@@ -145,7 +145,7 @@ impl Nodes {
     fn start_at(self, place: &Place) -> NodeRun {
         assert!(!self.setup.names.is_empty(), "a run without nodes; `add` one before `start`");
         let seed = Seed::choose(self.setup.seed, place);
-        NodeRun::new(self, seed)
+        NodeRun::new(self.setup, self.nodes, seed)
     }
 
     /// Runs nodes twice, and gives what came out first, if all that happened was the same to the nanosecond: every packet, with what it carried. `build` makes the

@@ -5,18 +5,10 @@ use cohaptic_units::print::Seconds;
 use cohaptic_wan::{NodeId, Path};
 
 use super::address::{addresses, place_of};
-use super::run::Ports;
+use super::run::{Does, Ports};
 use super::{NodeRun, Packet, Transmit};
 use crate::trace::{Happening, Lost};
 use crate::wire::{Arrival, Held, Parcel, Where};
-
-/// What a node does that keeps time from passing.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Does {
-    Sends,
-    Receives,
-    Wakes,
-}
 
 impl NodeRun {
     /// Lets the events of an instant happen.

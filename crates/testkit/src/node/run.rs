@@ -12,12 +12,11 @@ use cohaptic_units::print::Seconds;
 use cohaptic_wan::{LinkStats, NodeId};
 
 use super::deadlines::Deadlines;
-use super::passing::Does;
-use super::{Node, Nodes, Packet};
+use super::{Node, Packet};
 use crate::again::Again;
 use crate::artefacts::Artefacts;
-use crate::bed::Names;
 use crate::failure;
+use crate::names::Names;
 use crate::record::Record;
 use crate::seed::Seed;
 use crate::setup::Setup;
@@ -50,6 +49,14 @@ pub struct NodeRun {
     pub(super) watched: Arc<Watched>,
 }
 
+/// What a node does that keeps time from passing.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Does {
+    Sends,
+    Receives,
+    Wakes,
+}
+
 /// The ports of a packet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ports {
@@ -78,8 +85,7 @@ pub struct NodeCounts {
 }
 
 impl NodeRun {
-    pub(super) fn new(nodes: Nodes, seed: Seed) -> Self {
-        let Nodes { mut setup, nodes } = nodes;
+    pub(super) fn new(mut setup: Setup, nodes: Vec<Box<dyn Node>>, seed: Seed) -> Self {
         let artefacts = Artefacts::new(setup.artefacts.take(), &seed);
         if artefacts.is_wanted() {
             setup.record();

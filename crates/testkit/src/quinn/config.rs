@@ -15,6 +15,7 @@ use super::certificate::{CERTIFICATE, PRIVATE_KEY};
 use super::provider::crypto_provider;
 use super::time::TestTime;
 use crate::context;
+use crate::current;
 
 /// The length of the connection ids of an endpoint, as quinn has it without further words \[byte\].
 const ID_LENGTH: usize = 8;
@@ -25,7 +26,7 @@ const FIRST_ID_LENGTH: usize = 20;
 /// Random bytes of the running test bed.
 fn draw<const N: usize>() -> [u8; N] {
     let running = context::expect_running("the numbers of an endpoint can be drawn");
-    running.shared.with(|core| core.entropy(context::host()).bytes())
+    running.shared.with(|core| core.entropy(current::host()).bytes())
 }
 
 /// Connection ids from the test bed's random numbers.

@@ -78,8 +78,8 @@ pub use config::{client_config, endpoint_config, server_config, tls_client_confi
 pub use provider::crypto_provider;
 pub use time::TestTime;
 
-use crate::address::ToSocketAddrs;
 use crate::host::Host;
+use crate::resolve::ToSocketAddrs;
 use runtime::OnHost;
 use socket::VirtualSocket;
 

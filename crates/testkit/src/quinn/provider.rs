@@ -10,6 +10,7 @@ use ::quinn::rustls::{Error, NamedGroup, PeerMisbehaved};
 use x25519_dalek::{X25519_BASEPOINT_BYTES, x25519};
 
 use crate::context;
+use crate::current;
 
 /// The length of a key of X25519, secret or public \[byte\].
 const KEY: usize = 32;
@@ -27,7 +28,7 @@ struct FromTestbed;
 
 impl SecureRandom for FromTestbed {
     fn fill(&self, buffer: &mut [u8]) -> Result<(), GetRandomFailed> {
-        context::shared().ok_or(GetRandomFailed)?.with(|core| core.entropy(context::host()).fill(buffer));
+        context::shared().ok_or(GetRandomFailed)?.with(|core| core.entropy(current::host()).fill(buffer));
         Ok(())
     }
 }

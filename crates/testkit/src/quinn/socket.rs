@@ -9,9 +9,9 @@ use std::task::{Context, Poll};
 use ::quinn::udp::{EcnCodepoint, RecvMeta, Transmit};
 use ::quinn::{AsyncUdpSocket, UdpPoller};
 
-use crate::address::ToSocketAddrs;
 use crate::core::Datagram;
 use crate::host::Host;
+use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
 
 /// The socket of an endpoint.

@@ -1,53 +1,12 @@
 //! Runs that are given up: nothing will ever happen, or the run does not end.
 
 use std::fmt::Write as _;
-use std::time::Duration;
 
-use cohaptic_units::Instant;
 use cohaptic_units::print::{Seconds, Span};
 
 use crate::core::{Core, Shared};
+use crate::settings::Reached;
 use crate::task::Tasks;
-
-/// Limits of a run, beyond which it is given up.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Limits {
-    /// Time of the run.
-    pub(crate) time: Duration,
-    /// Polls of its tasks.
-    pub(crate) steps: u64,
-}
-
-/// Longer than any test means to run. A program that asks five times a second has asked 18,000 times by then, which takes a tenth of a second.
-const TIME: Duration = Duration::from_secs(3600);
-
-/// A number of polls that takes some seconds by the wall clock.
-const STEPS: u64 = 20_000_000;
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self { time: TIME, steps: STEPS }
-    }
-}
-
-/// The limit that a run has reached.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Reached {
-    Time(Duration),
-    Steps(u64),
-}
-
-impl Limits {
-    /// The last instant of a run.
-    pub(super) fn until(self) -> Instant {
-        Instant::ZERO.saturating_add(self.time)
-    }
-
-    /// Returns the limit that a run has reached which goes on after this number of steps.
-    pub(super) const fn reached(self, steps: u64) -> Reached {
-        if steps > self.steps { Reached::Steps(self.steps) } else { Reached::Time(self.time) }
-    }
-}
 
 /// Lines of a kind that a message has at most.
 const SHOWN: usize = 8;

@@ -1,6 +1,7 @@
 //! The executors: they poll tasks and let time pass.
 
-pub(crate) mod limits;
+mod limits;
 #[cfg(feature = "tokio")]
 pub(crate) mod on_tokio;
 pub(crate) mod own;
+mod recorder;

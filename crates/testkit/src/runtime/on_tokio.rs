@@ -29,7 +29,7 @@ use tokio::task::LocalSet;
 
 use super::limits::{goes_on, nothing_will_happen};
 use super::own::{Executor, is_any_ready, time_stands_still};
-use crate::bed::{Bed, Recorder};
+use super::recorder::Recorder;
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::failure::__rust_begin_short_backtrace;
@@ -177,7 +177,7 @@ fn step(now: Instant, next: Option<Instant>) -> Option<Instant> {
 pub(crate) fn run<T, F>(
     core: Core,
     hosts: usize,
-    program: impl FnOnce(Bed) -> F,
+    program: impl FnOnce(Arc<Shared>) -> F,
     origin: &'static Location<'static>,
     watched: &Watched,
     recorded: &mut Option<Recorded>,
@@ -225,7 +225,7 @@ where
         let _local = set.enter();
         let _here = shared.stay();
         let outcome = Rc::new(RefCell::new(None));
-        let (future, slot) = (Box::pin(program(Bed::new(Arc::clone(&shared)))), Rc::clone(&outcome));
+        let (future, slot) = (Box::pin(program(Arc::clone(&shared))), Rc::clone(&outcome));
         let main = tasks.spawn(None, origin, async move {
             let came_out = future.await;
             *slot.borrow_mut() = Some(came_out);

@@ -5,6 +5,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::ops::Deref;
+use std::panic::Location;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,8 +15,12 @@ use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 
 use super::limits::{goes_on, nothing_will_happen};
-use crate::core::Shared;
+use super::recorder::Recorder;
+use crate::context::Running;
+use crate::core::{Clock, Core, Shared};
 use crate::task::{Spawner, Task, Tasks};
+use crate::watch::Watched;
+use crate::wire::Recorded;
 
 thread_local! {
     static HERE: Here = const { Here { executor: Cell::new(0), ready: RefCell::new(Vec::new()), main: RefCell::new(None), waits: Cell::new(false) } };
@@ -341,6 +346,41 @@ impl Executor {
     fn give_up(&self, shared: &Shared, polls: u64) -> ! {
         time_stands_still(shared, polls, self.last().as_deref())
     }
+}
+
+/// Runs a program on the executor of this crate.
+pub(crate) fn run<T, F>(
+    core: Core,
+    hosts: usize,
+    program: impl FnOnce(Arc<Shared>) -> F,
+    origin: &'static Location<'static>,
+    watched: &Watched,
+    recorded: &mut Option<Recorded>,
+) -> T
+where
+    F: Future<Output = T> + 'static,
+    T: 'static,
+{
+    let executor = Executor::new();
+    let mut core = core;
+    core.woken.trust(&executor.waker());
+    let shared = Arc::new(Shared::new(core, Clock::Own));
+    let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
+    watched.is_of(&shared);
+    let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
+    // The run has ended when the recorder is dropped: the state is back by then, where other threads find it.
+    let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
+    // After it is known that no other one runs on this thread.
+    let _here = shared.stay();
+    let outcome = Rc::new(RefCell::new(None));
+    // In a box: a program may hold arrays, and without optimisation each call that a future is handed to has a copy of it on the stack.
+    let (future, slot) = (Box::pin(program(Arc::clone(&shared))), Rc::clone(&outcome));
+    let _main = tasks.spawn(None, origin, async move {
+        let came_out = future.await;
+        *slot.borrow_mut() = Some(came_out);
+    });
+    executor.run(&shared, &tasks, || outcome.borrow().is_some());
+    outcome.take().expect("the executor runs until the program is over")
 }
 
 /// Tells that time does not pass, because tasks are polled again and again.

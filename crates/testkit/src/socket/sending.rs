@@ -6,8 +6,8 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 
 use super::{KIND, UdpSocket};
-use crate::address::ToSocketAddrs;
 use crate::core::Outgoing;
+use crate::resolve::ToSocketAddrs;
 
 impl UdpSocket {
     /// Sends to the peer; gives the length.

@@ -4,25 +4,29 @@ use cohaptic_wan::netem::{ChanceSpec, LossSpec, Netem, SlotGap};
 
 use super::bounds::{LinkBounds, LossModel, Presence};
 use super::link::ImpairedLink;
-use super::numbers::{ALL, nanos, units, whole};
 use super::stage::{self, Stage};
+use super::units::{ALL, nanos, units, whole};
 
 /// By how much the long-run loss of a model with bursts may miss its range: a hundredth of a percent.
 pub(super) const SLACK: u64 = 100;
 
-pub(super) fn admits(bounds: &LinkBounds, link: &ImpairedLink) -> bool {
-    let netem = link.netem();
-    let present = |stage: Stage| stage::has(netem, stage);
-    let right = |stage: Stage| match bounds.presence(stage) {
-        Presence::Never => !present(stage),
-        Presence::Maybe => true,
-        // Whatever varies or is overtaken is delayed.
-        Presence::Always => present(stage) || (stage == Stage::Delay && netem.delay.is_some()),
-    };
-    Stage::ALL.into_iter().all(|stage| right(stage) && (number(netem, stage).is_none_or(|number| bounds.span(stage).contains(number))))
-        && netem.delay.as_ref().is_none_or(|delay| bounds.span(Stage::Delay).contains(nanos(delay.time)))
-        && loss(bounds, link)
-        && shapes(bounds, netem)
+impl LinkBounds {
+    /// Whether such a link may be drawn, or be shrunk to.
+    #[must_use]
+    pub fn admits(&self, link: &ImpairedLink) -> bool {
+        let netem = link.netem();
+        let present = |stage: Stage| stage::has(netem, stage);
+        let right = |stage: Stage| match self.presence(stage) {
+            Presence::Never => !present(stage),
+            Presence::Maybe => true,
+            // Whatever varies or is overtaken is delayed.
+            Presence::Always => present(stage) || (stage == Stage::Delay && netem.delay.is_some()),
+        };
+        Stage::ALL.into_iter().all(|stage| right(stage) && (number(netem, stage).is_none_or(|number| self.span(stage).contains(number))))
+            && netem.delay.as_ref().is_none_or(|delay| self.span(Stage::Delay).contains(nanos(delay.time)))
+            && loss(self, link)
+            && shapes(self, netem)
+    }
 }
 
 /// The number of a stage that is there.

@@ -5,9 +5,8 @@ use core::time::Duration;
 
 use super::bounds_error::BoundsError;
 use super::grid::Span;
-use super::link::ImpairedLink;
 use super::stage::Stage;
-use super::{admits, numbers};
+use super::units::{nanos, percent, units};
 
 /// Bounds of links, stage by stage: whether it may be there, and its numbers.
 ///
@@ -246,12 +245,6 @@ impl LinkBounds {
         if no_model { Err(BoundsError::NoModel) } else { Ok(()) }
     }
 
-    /// Whether such a link may be drawn, or be shrunk to.
-    #[must_use]
-    pub fn admits(&self, link: &ImpairedLink) -> bool {
-        admits::admits(self, link)
-    }
-
     pub(super) const fn presence(&self, stage: Stage) -> Presence {
         self.presence[stage.place()]
     }
@@ -283,7 +276,7 @@ impl LinkBounds {
             return self.refuse(error);
         }
         let low = if low.is_zero() { high.min(Duration::from_micros(1)) } else { low };
-        self.set(stage, numbers::nanos(low), numbers::nanos(high));
+        self.set(stage, nanos(low), nanos(high));
         self
     }
 
@@ -292,8 +285,8 @@ impl LinkBounds {
         if let Some(found) = [low, high].into_iter().find(|percent| !(0.0..=100.0).contains(percent)) {
             return self.refuse(BoundsError::Percentage { stage, found });
         }
-        let units = |percent: f64| numbers::units(percent);
-        if let Err(error) = check(stage, units(low), units(high), |units| numbers::percent(units).to_string()) {
+
+        if let Err(error) = check(stage, units(low), units(high), |units| percent(units).to_string()) {
             return self.refuse(error);
         }
         let least = if units(low) == 0 { units(high).min(PERCENT / 100) } else { units(low) };

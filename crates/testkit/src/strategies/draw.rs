@@ -11,8 +11,8 @@ use super::admits::fitting;
 use super::bounds::{LinkBounds, LossModel, Presence};
 use super::grid::{Dice, Span};
 use super::link::ImpairedLink;
-use super::numbers::{ALL, percent};
 use super::stage::Stage;
+use super::units::{ALL, percent};
 
 /// A link within bounds: each stage that may be there is, in one of three cases; none, if it `is_ideal`. `None` if the bounds leave nothing.
 pub(super) fn link(bounds: &LinkBounds, is_ideal: bool, dice: &mut Dice<'_>) -> Option<ImpairedLink> {

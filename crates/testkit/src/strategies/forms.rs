@@ -5,8 +5,9 @@ use cohaptic_wan::netem::{ChanceSpec, GemodelSpec, JitterSpec, LossSpec, Netem, 
 use super::admits::{fitting, long_run};
 use super::bounds::LinkBounds;
 use super::link::ImpairedLink;
-use super::numbers::{ALL, jitter_mut, percent, random_mut, reorder_mut, whole};
+use super::numbers::{jitter_mut, random_mut, reorder_mut};
 use super::stage::{self, Stage};
+use super::units::{ALL, percent, whole};
 
 /// A form that can be made plainer, in the order in which they are.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

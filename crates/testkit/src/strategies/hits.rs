@@ -48,7 +48,7 @@ pub fn any_hits<N: Into<String>, A: AsRef<str>>(
     packets: u64,
     actions: impl IntoIterator<Item = A>,
 ) -> PacketSets {
-    let hosts: crate::bed::Names = hosts.into_iter().collect();
+    let hosts: crate::names::Names = hosts.into_iter().collect();
     let actions: Vec<Action> = actions.into_iter().map(|words| action(words.as_ref())).collect();
     assert!(!actions.is_empty(), "hits without actions: expected one at least, such as `drop`");
     let space = SetSpace { hosts: hosts.to_vec().into(), actions: actions.into() };

@@ -70,6 +70,7 @@ pub mod scene;
 mod shrink;
 mod space;
 mod stage;
+mod units;
 
 pub use any::{Links, Networks, any_link, any_network, links_like, networks_like};
 pub use bounds::{LinkBounds, LossModel};

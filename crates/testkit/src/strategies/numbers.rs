@@ -3,31 +3,12 @@
 use core::num::{NonZeroU32, NonZeroU64};
 use core::time::Duration;
 
-use cohaptic_wan::netem::{ChanceSpec, GemodelSpec, JitterSpec, LossSpec, Netem, Percent, RateSpec, SlotGap, StateSpec};
+use cohaptic_wan::netem::{ChanceSpec, GemodelSpec, JitterSpec, LossSpec, Netem, RateSpec, SlotGap, StateSpec};
 
 use super::bounds::LinkBounds;
 use super::shrink::Number;
 use super::stage::Stage;
-
-/// 100 % in ten-thousandths of a percent.
-pub(super) const ALL: u64 = 1_000_000;
-
-pub(super) fn nanos(time: Duration) -> u64 {
-    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
-}
-
-/// A percentage in ten-thousandths, to the nearest.
-pub(super) fn units(percent: f64) -> u64 {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a percentage is from 0 to 100")]
-    let units = (percent * 10_000.0).round() as u64;
-    units.min(ALL)
-}
-
-/// The percentage of that number of ten-thousandths: the decimal fraction that prints with at most four places.
-pub(super) fn percent(units: u64) -> Percent {
-    let units = u32::try_from(units.min(ALL)).unwrap_or(u32::MAX);
-    Percent::new(f64::from(units) / 10_000.0).unwrap_or_default()
-}
+use super::units::{ALL, nanos, percent, whole};
 
 /// Where the least impairing value of a number is.
 #[derive(Clone, Copy, Debug)]
@@ -125,10 +106,6 @@ const ONE: u64 = 10_000;
 
 const fn time(nanos: u64) -> Duration {
     Duration::from_nanos(nanos)
-}
-
-pub(super) fn whole(percent: Percent) -> u64 {
-    units(percent.get())
 }
 
 fn count(value: u64) -> Option<NonZeroU32> {

@@ -17,8 +17,8 @@ use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 use cohaptic_wan::NodeId;
 
-use crate::context;
 use crate::core::Core;
+use crate::current;
 use crate::watch::{Pulse, Runner};
 
 /// What a task runs.
@@ -65,7 +65,7 @@ impl Task {
         let mut program = self.program.borrow_mut();
         let Some(future) = program.as_mut() else { return Poll::Ready(()) };
         self.pulse.begins(self.number);
-        let polled = context::on_host(self.runner.host, || future.as_mut().poll(cx));
+        let polled = current::on_host(self.runner.host, || future.as_mut().poll(cx));
         self.pulse.returns();
         if polled.is_pending() && !self.is_doomed.get() {
             return Poll::Pending;
@@ -79,7 +79,7 @@ impl Task {
     /// Drops the program as one of its host.
     #[inline(never)]
     fn drop_there(&self, program: Option<Program>) {
-        context::on_host(self.runner.host, || drop(program));
+        current::on_host(self.runner.host, || drop(program));
     }
 
     /// Drops the program; a task that stops itself is dropped when it next waits.
@@ -171,7 +171,7 @@ impl Tasks {
     pub(crate) fn restart(&self, host: NodeId) {
         let factory = self.factories.borrow()[host.index()].clone();
         if let Some((factory, origin)) = factory {
-            let program = context::on_host(Some(host), || factory());
+            let program = current::on_host(Some(host), || factory());
             self.start(Some(host), origin, program);
         }
     }
@@ -202,7 +202,7 @@ impl Tasks {
 
     /// The task that is being polled, in words.
     pub(crate) fn current(&self, hosts: &[String]) -> String {
-        let host = context::host();
+        let host = current::host();
         match (self.pulse.running(), host.and_then(|host| hosts.get(host.index()))) {
             // A task that lives on no host may do this as one of a host: see `Host::scope`.
             (Some(runner), _) => Runner { host: runner.host.or(host), ..runner }.words(hosts),

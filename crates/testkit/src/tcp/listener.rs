@@ -10,9 +10,9 @@ use std::task::{Context, Poll};
 use cohaptic_wan::NodeId;
 
 use super::{KIND, TcpStream};
-use crate::address::ToSocketAddrs;
 use crate::context::Call;
 use crate::core::{Core, HoldId, Inherited, ListenId, Shared};
+use crate::resolve::ToSocketAddrs;
 
 /// How many connections may wait at a listener that does not say it; Linux lets one more wait.
 const BACKLOG: usize = 128;

@@ -12,9 +12,9 @@ use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
 use super::{Info, KIND, TcpConfig};
-use crate::address::ToSocketAddrs;
 use crate::context::Call;
 use crate::core::{ConnId, Core, HoldId, Shared};
+use crate::resolve::ToSocketAddrs;
 
 /// A TCP connection of a host of the running test bed: the methods of tokio's, with the same meaning.
 ///

@@ -15,8 +15,8 @@ use std::time::Duration;
 use cohaptic_wan::NodeId;
 
 use crate::artefacts::Artefacts;
-use crate::bed::Names;
 use crate::core::Shared;
+use crate::names::Names;
 use crate::seed::Seed;
 
 pub use guard::STALL_VARIABLE;

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use cohaptic_units::Instant;
 use cohaptic_wan::{DropCause, Fate, Network, PacketEvent, PacketRecord, Path};
 
-use super::Parcel;
-use crate::core::Octets;
+use super::parcel::{Octets, Parcel};
 use crate::hit::Verdict;
 
 /// What comes out of a link. Its copies are counted as the links of a network without access lines count them: 0, 1, 2.

@@ -10,8 +10,8 @@ use cohaptic_units::print::Counted;
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{Network, Path};
 
-use super::Parcel;
 use super::exits::Exits;
+use super::parcel::Parcel;
 #[cfg(feature = "tcp")]
 use crate::hit::Segment;
 use crate::hit::{Laws, PacketLaw, Seen, SentPacket, Verdict};

@@ -6,6 +6,7 @@
 mod exits;
 mod held;
 mod hitting;
+mod parcel;
 mod recording;
 
 use std::collections::{BTreeSet, VecDeque};
@@ -18,48 +19,16 @@ use exits::{Out, counted};
 pub(crate) use held::{BYTE_LIMIT, Held, Where};
 pub(crate) use hitting::HitCount;
 use hitting::Hitting;
+pub(crate) use parcel::{Octets, Parcel, Spare};
 pub(crate) use recording::{Recorded, Recording, Seen};
 
-use crate::again::{Drawn, MOST_LOST, Said};
-use crate::bed::Names;
-use crate::core::Octets;
-use crate::file::LinkChange;
-use crate::hit::{Laws, Verdict};
-use crate::runtime::limits::Limits;
+use crate::again::{Drawn, MOST_LOST};
+use crate::hit::Verdict;
+use crate::link::LinkChange;
+use crate::names::Names;
 use crate::seed::hash;
+use crate::settings::Settings;
 use crate::trace::{Happening, Lost, PacketName};
-
-/// The settings of a run.
-#[derive(Clone, Debug)]
-pub(crate) struct Settings {
-    /// How many bytes of datagrams a socket holds that have not been read.
-    pub(crate) receive_buffer: usize,
-    /// Whether events are recorded.
-    pub(crate) traces: bool,
-    /// Whether the events have digests of the packets' bytes.
-    pub(crate) digests: bool,
-    /// Whether packets are recorded, with their bytes.
-    pub(crate) keeps_packets: bool,
-    /// How often tasks may be polled, or packets and timers handled, at one instant.
-    pub(crate) patience: u64,
-    /// How many bytes the run may hold.
-    pub(crate) byte_limit: u64,
-    /// Limits beyond which a run is given up.
-    pub(crate) limits: Limits,
-    /// The network in the words of the test.
-    pub(crate) said: Arc<Said>,
-    /// Which packets are hit.
-    pub(crate) laws: Laws,
-}
-
-/// What travels: bytes, and the addresses that their owner writes on them. It is in a box that goes from the sender through its link to the receiver.
-#[derive(Clone, Debug)]
-pub(crate) struct Parcel<A> {
-    pub(crate) addresses: A,
-    pub(crate) bytes: Octets,
-    /// Whether its sender understands marks.
-    pub(crate) ecn_capable: bool,
-}
 
 /// The earlier of two instants that may not be there.
 #[inline]

@@ -9,7 +9,7 @@ use cohaptic_wan::{Fate, Network, PacketEvent, Path};
 use super::exits::{Exits, Out};
 use super::{HitCount, Parcel, Settings};
 use crate::again::Drawn;
-use crate::bed::Names;
+use crate::names::Names;
 use crate::trace::{Happening, Trace};
 
 /// The record of a run, as far as it is asked for.

@@ -1,17 +1,7 @@
 //! Numbers towards the least impairing value, by bisection among round ones.
 
-use super::Space;
+use super::space::{Number, Space};
 use crate::strategies::grid::{is_round, next_towards, round_between};
-
-/// A number that can be changed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(in crate::strategies) struct Number {
-    pub(in crate::strategies) value: u64,
-    /// What would impair least.
-    pub(in crate::strategies) goal: u64,
-    /// What digits are counted in.
-    pub(in crate::strategies) step: u64,
-}
 
 /// The numbers of a value, one after the other.
 #[derive(Clone, Debug)]

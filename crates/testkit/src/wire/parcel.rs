@@ -1,12 +1,17 @@
-//! What packets carry, in memory that is used again.
+//! What travels, in memory that is used again.
 
-use std::net::{Ipv4Addr, SocketAddr};
 use std::ops::Deref;
 
 use bytes::Bytes;
 
-use super::Parcel;
-use super::ends::{Ends, Kind};
+/// What travels: bytes, and the addresses that their owner writes on them. It is in a box that goes from the sender through its link to the receiver.
+#[derive(Clone, Debug)]
+pub(crate) struct Parcel<A> {
+    pub(crate) addresses: A,
+    pub(crate) bytes: Octets,
+    /// Whether its sender understands marks.
+    pub(crate) ecn_capable: bool,
+}
 
 /// What a packet carries.
 #[derive(Clone, Debug)]
@@ -76,20 +81,25 @@ impl Octets {
 
 /// Parcels that were read, with their memory. A parcel stays in its box from the socket that sends through the link and the buffer of the other socket to the program that
 /// reads: what carries it moves one word, where it moved seven, six times.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 #[expect(clippy::vec_box, reason = "a box goes on its way and comes back: a parcel is never moved out of it")]
-pub(super) struct Spare(Vec<Box<Parcel>>);
+pub(crate) struct Spare<A>(Vec<Box<Parcel<A>>>);
 
-impl Spare {
+impl<A> Default for Spare<A> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<A> Spare<A> {
     /// The largest number that is kept, and the longest \[bytes\]: a megabyte at most.
     const MOST: usize = 512;
     const LONGEST: usize = 2048;
 
     /// A parcel with a copy of what a program sends.
     #[inline(always)]
-    pub(super) fn copied(&mut self, addresses: Ends, bytes: &[u8], ecn_capable: bool) -> Box<Parcel> {
-        // The addresses are given to no call, so that they are written once.
-        let mut parcel = self.0.pop().unwrap_or_else(empty);
+    pub(crate) fn copied(&mut self, addresses: A, bytes: &[u8], ecn_capable: bool) -> Box<Parcel<A>> {
+        let Some(mut parcel) = self.0.pop() else { return boxed(addresses, Octets::Own(bytes.to_vec()), ecn_capable) };
         (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);
         parcel.bytes.refill(bytes);
         parcel
@@ -97,15 +107,15 @@ impl Spare {
 
     /// A parcel of anything else.
     #[cfg(feature = "tcp")]
-    pub(super) fn wrapped(&mut self, addresses: Ends, bytes: Bytes, ecn_capable: bool) -> Box<Parcel> {
-        let mut parcel = self.0.pop().unwrap_or_else(empty);
+    pub(crate) fn wrapped(&mut self, addresses: A, bytes: Bytes, ecn_capable: bool) -> Box<Parcel<A>> {
+        let Some(mut parcel) = self.0.pop() else { return boxed(addresses, bytes.into(), ecn_capable) };
         *parcel = Parcel { addresses, bytes: bytes.into(), ecn_capable };
         parcel
     }
 
     /// What was read.
     #[inline]
-    pub(super) fn put(&mut self, mut parcel: Box<Parcel>) {
+    pub(crate) fn put(&mut self, mut parcel: Box<Parcel<A>>) {
         if self.0.len() >= Self::MOST {
             return;
         }
@@ -116,50 +126,45 @@ impl Spare {
     }
 }
 
-/// A new parcel, of which all is to be written.
+/// A new parcel.
 #[cold]
 #[inline(never)]
-fn empty() -> Box<Parcel> {
-    let nowhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0));
-    Box::new(Parcel { addresses: Ends::new(nowhere, nowhere, Kind::Datagram), bytes: Octets::default(), ecn_capable: false })
+fn boxed<A>(addresses: A, bytes: Octets, ecn_capable: bool) -> Box<Parcel<A>> {
+    Box::new(Parcel { addresses, bytes, ecn_capable })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn ends() -> Ends {
-        Ends::new("10.0.0.1:1".parse().unwrap(), "10.0.0.2:2".parse().unwrap(), Kind::Datagram)
-    }
-
-    fn parcel_of(bytes: Octets) -> Box<Parcel> {
-        Box::new(Parcel { addresses: ends(), bytes, ecn_capable: false })
+    fn parcel_of(bytes: Octets) -> Box<Parcel<u8>> {
+        Box::new(Parcel { addresses: 1, bytes, ecn_capable: false })
     }
 
     #[test]
     fn memory_that_was_read_is_used_again() {
         let mut spare = Spare::default();
-        let parcel = spare.copied(ends(), b"longer than the next one", true);
+        let parcel = spare.copied(1, b"longer than the next one", true);
         let places = (std::ptr::from_ref(&*parcel), parcel.bytes.as_ptr());
         spare.put(parcel);
-        let next = spare.copied(ends().back(Kind::Datagram), b"next", false);
-        assert_eq!((&*next.bytes, next.ecn_capable, next.addresses.to()), (&b"next"[..], false, ends().from()));
+        let next = spare.copied(2, b"next", false);
+        assert_eq!((&*next.bytes, next.ecn_capable, next.addresses), (&b"next"[..], false, 2));
         assert_eq!((std::ptr::from_ref(&*next), next.bytes.as_ptr()), places);
     }
 
     #[test]
     fn no_more_than_a_megabyte_is_kept() {
         let mut spare = Spare::default();
-        for bytes in [Octets::Shared(Bytes::from_static(b"not ours")), Octets::Own(Vec::with_capacity(Spare::LONGEST + 1))] {
+        for bytes in [Octets::Shared(Bytes::from_static(b"not ours")), Octets::Own(Vec::with_capacity(Spare::<u8>::LONGEST + 1))] {
             spare.put(parcel_of(bytes));
             let Some(Octets::Own(kept)) = spare.0.first().map(|parcel| &parcel.bytes) else { panic!("the box is kept") };
             assert_eq!(kept.capacity(), 0);
-            let filled = spare.copied(ends(), b"ours", false);
+            let filled = spare.copied(1, b"ours", false);
             assert_eq!(&*filled.bytes, b"ours");
         }
-        for _ in 0..2 * Spare::MOST {
+        for _ in 0..2 * Spare::<u8>::MOST {
             spare.put(parcel_of(Octets::Own(Vec::with_capacity(1))));
         }
-        assert_eq!(spare.0.len(), Spare::MOST);
+        assert_eq!(spare.0.len(), Spare::<u8>::MOST);
     }
 }

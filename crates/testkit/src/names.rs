@@ -5,7 +5,7 @@ use std::ops::Deref;
 
 use cohaptic_wan::{MOST_NODES, NodeId, Path};
 
-use crate::context;
+use crate::current;
 
 /// The names of hosts, in the order in which they were given, and an index of them: to look a host up takes as many steps as the number of hosts has bits.
 #[derive(Clone, PartialEq, Eq, Default)]
@@ -71,7 +71,7 @@ impl Names {
         if self.list.len() > SHOWN {
             let _ = write!(text, " and {} more", self.list.len() - SHOWN);
         }
-        if let Some(task) = context::task() {
+        if let Some(task) = current::task() {
             let _ = write!(text, "; {task} asks for it");
         }
         text
