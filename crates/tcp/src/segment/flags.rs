@@ -47,7 +47,7 @@ impl Flags {
 
     /// These flags, and those of `other` if `condition` holds.
     #[must_use]
-    pub const fn with_if(self, other: Self, condition: bool) -> Self {
+    pub(crate) const fn with_if(self, other: Self, condition: bool) -> Self {
         if condition { Self(self.0 | other.0) } else { self }
     }
 }
