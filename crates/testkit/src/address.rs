@@ -15,7 +15,8 @@ use crate::names::{Names, SHOWN};
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct AddressPlan {
     names: Arc<Names>,
-    current: Vec<Addresses>,
+    /// By host: the number of the addresses that it has.
+    current: Vec<u32>,
     /// By number, from 1: the host that has the addresses of that number. Those behind the last one no host has had.
     owners: Vec<Option<NodeId>>,
 }
@@ -34,16 +35,44 @@ const FIRST: (u32, u128) = (Ipv4Addr::new(10, 0, 0, 0).to_bits(), 0xfd00 << 112)
 
 impl Addresses {
     pub(crate) fn numbered(number: u32) -> Self {
-        Self { v4: Ipv4Addr::from_bits(FIRST.0 + number), v6: Ipv6Addr::from_bits(FIRST.1 + u128::from(number)) }
+        Self { v4: Ipv4Addr::from_bits(FIRST.0.wrapping_add(number)), v6: Ipv6Addr::from_bits(FIRST.1 + u128::from(number)) }
     }
 
-    /// The number of an address, if it has one.
+    /// An address among those of its version, in 32 bits: its distance to the address of number 0. That of an address of a host is its number, the same in both
+    /// versions. Of version 6 the loopback address has 0, and all that can be no host's have the last number.
     #[inline]
-    pub(crate) fn number(address: IpAddr) -> Option<u32> {
+    pub(crate) const fn short(address: IpAddr) -> u32 {
         match address {
-            IpAddr::V4(v4) => v4.to_bits().checked_sub(FIRST.0),
-            IpAddr::V6(v6) => v6.to_bits().checked_sub(FIRST.1).and_then(|number| number.try_into().ok()),
+            IpAddr::V4(v4) => v4.to_bits().wrapping_sub(FIRST.0),
+            IpAddr::V6(v6) => {
+                let number = v6.to_bits().wrapping_sub(FIRST.1);
+                #[expect(clippy::cast_possible_truncation, reason = "it is small enough")]
+                if v6.is_loopback() {
+                    0
+                } else if number > 0 && number < u32::MAX as u128 {
+                    number as u32
+                } else {
+                    u32::MAX
+                }
+            }
         }
+    }
+
+    /// The address of which that is [short](Self::short); another one that is no host's for the last number of version 6.
+    #[inline]
+    pub(crate) fn long(short: u32, is_six: bool) -> IpAddr {
+        match (is_six, short) {
+            (false, _) => Ipv4Addr::from_bits(FIRST.0.wrapping_add(short)).into(),
+            (true, 0) => Ipv6Addr::LOCALHOST.into(),
+            (true, number) => Self::numbered(number).v6.into(),
+        }
+    }
+
+    /// Whether the address of which that is short is one of loopback.
+    #[inline]
+    pub(crate) const fn is_loopback(short: u32, is_six: bool) -> bool {
+        let bits = short.wrapping_add(FIRST.0);
+        if is_six { short == 0 } else { bits >> 24 == 127 }
     }
 
     /// The one of the same version as `other`.
@@ -66,24 +95,23 @@ impl AddressPlan {
     pub(crate) fn new(names: Arc<Names>) -> Self {
         let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: Vec::new() };
         for host in 0..plan.names.len() {
-            let addresses = plan.fresh(NodeId::new(host));
-            plan.current.push(addresses);
+            let number = plan.fresh(NodeId::new(host));
+            plan.current.push(number);
         }
         plan
     }
 
-    fn fresh(&mut self, host: NodeId) -> Addresses {
+    fn fresh(&mut self, host: NodeId) -> u32 {
         self.owners.push(Some(host));
-        Addresses::numbered(u32::try_from(self.owners.len()).unwrap_or(u32::MAX))
+        u32::try_from(self.owners.len()).unwrap_or(u32::MAX)
     }
 
     /// Gives a host addresses that nobody has had. Those that it had belong to nobody from now on.
     pub(crate) fn change(&mut self, host: NodeId) -> Addresses {
-        let before = self.current[host.index()].v4.into();
-        self.owners.iter_mut().skip(Self::place(before)).take(1).for_each(|owner| *owner = None);
-        let addresses = self.fresh(host);
-        self.current[host.index()] = addresses;
-        addresses
+        let before = Self::place(self.number(host));
+        self.owners.iter_mut().skip(before).take(1).for_each(|owner| *owner = None);
+        self.current[host.index()] = self.fresh(host);
+        self.of(host)
     }
 
     /// The names of the hosts, in the order in which they were given.
@@ -110,7 +138,7 @@ impl AddressPlan {
 
     /// Whether any host has or had that address.
     pub(crate) fn was_given(&self, address: IpAddr) -> bool {
-        Self::place(address) < self.owners.len()
+        Self::place(Addresses::short(address)) < self.owners.len()
     }
 
     /// Says that no host has an address, and which hosts have which.
@@ -126,22 +154,37 @@ impl AddressPlan {
 
     /// A line for each of the first hosts.
     fn write_lines(&self, to: &mut impl fmt::Write, count: usize) -> fmt::Result {
-        self.names.iter().zip(&self.current).take(count).try_for_each(|(name, addresses)| writeln!(to, "{name} {} {}", addresses.v4, addresses.v6))
+        self.names.iter().zip(&self.current).take(count).try_for_each(|(name, number)| {
+            let Addresses { v4, v6 } = Addresses::numbered(*number);
+            writeln!(to, "{name} {v4} {v6}")
+        })
     }
 
     pub(crate) fn owner_node(&self, address: IpAddr) -> Option<NodeId> {
-        self.owners.get(Self::place(address)).copied().flatten()
+        self.owner_of(Addresses::short(address))
     }
 
-    /// Where an address stands among the owners; behind them all if nobody can have had it.
+    /// The host that has the addresses of that number.
     #[inline]
-    fn place(address: IpAddr) -> usize {
-        Addresses::number(address).and_then(|number| number.checked_sub(1)).map_or(usize::MAX, |place| place as usize)
+    pub(crate) fn owner_of(&self, number: u32) -> Option<NodeId> {
+        self.owners.get(Self::place(number)).copied().flatten()
+    }
+
+    /// Where addresses stand among the owners; behind them all if nobody can have had them.
+    #[inline]
+    const fn place(number: u32) -> usize {
+        number.wrapping_sub(1) as usize
+    }
+
+    /// The number of the addresses that a host has.
+    #[inline]
+    pub(crate) fn number(&self, host: NodeId) -> u32 {
+        self.current[host.index()]
     }
 
     #[inline]
     pub(crate) fn of(&self, host: NodeId) -> Addresses {
-        self.current[host.index()]
+        Addresses::numbered(self.number(host))
     }
 }
 

@@ -10,21 +10,35 @@ pub(crate) struct SocketId(pub(super) usize);
 #[derive(Debug, Default)]
 pub(super) struct Bound(Vec<(Port, SocketId)>);
 
-/// A port of one version of IP.
+/// A port of one version of IP: its number, and the bit above for version 6.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct Port {
-    pub(super) is_six: bool,
-    pub(super) number: u16,
+pub(super) struct Port(u32);
+
+impl Port {
+    #[inline]
+    pub(super) const fn new(is_six: bool, number: u16) -> Self {
+        Self((is_six as u32) << u16::BITS | number as u32)
+    }
+
+    #[inline]
+    pub(super) const fn is_six(self) -> bool {
+        self.0 >> u16::BITS != 0
+    }
+
+    #[inline]
+    pub(super) const fn number(self) -> u16 {
+        #[expect(clippy::cast_possible_truncation, reason = "the lower bits")]
+        let number = self.0 as u16;
+        number
+    }
 }
 
 impl Bound {
     /// Returns the sockets of a port.
     #[inline]
-    pub(super) fn at(&self, port: Port) -> &[(Port, SocketId)] {
+    pub(super) fn at(&self, port: Port) -> impl Iterator<Item = SocketId> {
         let first = self.0.partition_point(|(bound, _)| *bound < port);
-        let rest = &self.0[first..];
-        let count = rest.iter().take_while(|(bound, _)| *bound == port).count();
-        &rest[..count]
+        self.0[first..].iter().take_while(move |(bound, _)| *bound == port).map(|(_, socket)| *socket)
     }
 
     /// Adds a socket.
@@ -36,7 +50,8 @@ impl Bound {
     /// Removes a socket; a host that went down has forgotten it.
     pub(super) fn remove(&mut self, port: Port, socket: SocketId) {
         let first = self.0.partition_point(|(bound, _)| *bound < port);
-        if let Some(place) = self.at(port).iter().position(|(_, bound)| *bound == socket) {
+        let place = self.at(port).position(|bound| bound == socket);
+        if let Some(place) = place {
             self.0.remove(first + place);
         }
     }
@@ -48,13 +63,13 @@ mod tests {
 
     #[test]
     fn a_port_has_its_sockets_in_the_order_in_which_they_were_bound() {
-        let port = |is_six, number| Port { is_six, number };
+        let port = Port::new;
         let mut bound = Bound::default();
         let given = [(port(false, 9), 0), (port(true, 7), 1), (port(false, 7), 2), (port(false, 7), 3), (port(false, 8), 4), (port(false, 7), 5)];
         for (port, socket) in given {
             bound.add(port, SocketId(socket));
         }
-        let at = |bound: &Bound, port| bound.at(port).iter().map(|(_, socket)| socket.0).collect::<Vec<_>>();
+        let at = |bound: &Bound, port| bound.at(port).map(|socket| socket.0).collect::<Vec<_>>();
         assert_eq!(at(&bound, port(false, 7)), [2, 3, 5]);
         bound.remove(port(false, 7), SocketId(3));
         // The second time it is gone.

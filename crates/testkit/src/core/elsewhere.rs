@@ -60,8 +60,8 @@ impl Shared {
     /// As [`Shared::check_open`].
     #[inline(always)]
     pub(crate) fn open<T>(&self, host: NodeId, kind: &str, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
-        self.check_open(host, kind)?;
-        Ok(self.with(ask))
+        let visit = if self.is_at_hand() { None } else { Some(self.check_open(host, kind).map(|()| self.visit())?) };
+        Ok(self.ask(visit, ask))
     }
 
     /// Fails unless something of that host may be used here and now.
@@ -113,7 +113,7 @@ impl Shared {
 
     /// Lets go of something: now, or, on a thread that may not have the state, when the task that the run's thread polls has returned.
     pub(crate) fn release(&self, act: impl FnOnce(&mut Core) + Send + 'static) {
-        if self.is_at_hand() || self.may_be_had() {
+        if self.may_be_asked() {
             self.with(act);
         } else {
             self.elsewhere.leave(|left| left.acts.push(Box::new(act)));

@@ -1,23 +1,26 @@
 //! The two ends of a packet, in as few bytes as they take: the event queue moves them.
 
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use super::bound::Port;
 use crate::address::Addresses;
 
 /// The two ends of a packet, and its kind.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct Ends {
-    /// Of version 4 the address, of version 6 its number; 0 is the loopback address then.
-    ips: [u32; 2],
-    ports: [u16; 2],
+    /// Sender and receiver, as [`Addresses::short`].
+    pub(super) from: u32,
+    pub(super) to: u32,
+    from_port: u16,
+    to_port: u16,
     is_six: bool,
     pub(super) kind: Kind,
 }
 
 /// What a packet is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub(super) enum Kind {
+    #[default]
     Datagram,
     /// "There is no socket at that port", which IP tells a sender.
     Unreachable,
@@ -28,45 +31,48 @@ pub(super) enum Kind {
 
 impl Ends {
     /// Both of one version of IP, and addresses of hosts, of loopback or for all.
-    #[inline]
+    #[cfg(any(test, feature = "tcp"))]
     pub(super) fn new(from: SocketAddr, to: SocketAddr, kind: Kind) -> Self {
-        let short = |ip| match ip {
-            IpAddr::V4(v4) => v4.to_bits(),
-            IpAddr::V6(_) => Addresses::number(ip).unwrap_or(0),
-        };
-        Self { ips: [short(from.ip()), short(to.ip())], ports: [from.port(), to.port()], is_six: to.is_ipv6(), kind }
+        Self::of([from, to].map(|end| Addresses::short(end.ip())), [from, to].map(|end| end.port()), to.is_ipv6(), kind)
+    }
+
+    /// As [`Ends::new`], of short addresses.
+    #[inline]
+    pub(super) const fn of([from, to]: [u32; 2], [from_port, to_port]: [u16; 2], is_six: bool, kind: Kind) -> Self {
+        Self { from, to, from_port, to_port, is_six, kind }
     }
 
     /// The version and the port of the receiver.
     #[inline]
     pub(super) const fn port(&self) -> Port {
-        Port { is_six: self.is_six, number: self.ports[1] }
+        Port::new(self.is_six, self.to_port)
     }
 
     #[inline]
     pub(super) fn from(&self) -> SocketAddr {
-        self.end(0)
+        SocketAddr::new(Addresses::long(self.from, self.is_six), self.from_port)
     }
 
     #[inline]
     pub(super) fn to(&self) -> SocketAddr {
-        self.end(1)
+        SocketAddr::new(Addresses::long(self.to, self.is_six), self.to_port)
+    }
+
+    /// Whether it goes to an address that every host has: of loopback, or for all.
+    #[inline(never)]
+    pub(super) fn is_to_any_host(&self) -> bool {
+        self.is_broadcast() || Addresses::is_loopback(self.to, self.is_six)
+    }
+
+    /// Whether it goes to all hosts.
+    pub(super) fn is_broadcast(&self) -> bool {
+        self.to().ip() == IpAddr::V4(Ipv4Addr::BROADCAST)
     }
 
     /// What goes back.
     pub(super) const fn back(self, kind: Kind) -> Self {
-        let ([from, to], [from_port, to_port]) = (self.ips, self.ports);
-        Self { ips: [to, from], ports: [to_port, from_port], kind, ..self }
-    }
-
-    #[inline]
-    fn end(&self, which: usize) -> SocketAddr {
-        let ip = match (self.is_six, self.ips[which]) {
-            (false, bits) => Ipv4Addr::from_bits(bits).into(),
-            (true, 0) => Ipv6Addr::LOCALHOST.into(),
-            (true, number) => Addresses::numbered(number).v6.into(),
-        };
-        SocketAddr::new(ip, self.ports[which])
+        let Self { from, to, from_port, to_port, is_six, .. } = self;
+        Self { from: to, to: from, from_port: to_port, to_port: from_port, is_six, kind }
     }
 }
 

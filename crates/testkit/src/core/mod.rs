@@ -37,7 +37,6 @@ use waking::Woken;
 pub(crate) use passing::Outgoing;
 pub(crate) use shared::{Clock, Shared};
 pub(crate) use socket_name::SocketName;
-pub(crate) use sockets::Datagram;
 #[cfg(feature = "tcp")]
 pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
 pub(crate) use timers::{TimerId, Timers};

@@ -3,11 +3,11 @@
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-use cohaptic_units::Instant;
 use cohaptic_wan::{NodeId, Path};
 
 use super::{Core, Ends, Kind, Parcel, SocketId};
-use crate::trace::Lost;
+use crate::address::Addresses;
+use crate::trace::{Lost, PacketName};
 use crate::wire::Arrival;
 
 /// The longest datagram over IPv4 and over IPv6 \[bytes\].
@@ -22,7 +22,7 @@ pub(crate) struct Outgoing<'a> {
     pub(crate) ecn_capable: bool,
 }
 
-/// Who gets a datagram.
+/// The receivers of a datagram.
 #[derive(Clone, Copy, Debug)]
 enum Receivers {
     /// A host, which may be the one that sends.
@@ -54,6 +54,7 @@ fn refuse_datagram(local: SocketAddr, to: SocketAddr, len: usize) -> io::Result<
 
 impl Core {
     /// Sends a datagram, now.
+    #[inline(always)]
     pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
         self.note_call(|core| core.sockets.get(id).name());
         let Outgoing { to, bytes, ecn_capable } = outgoing;
@@ -65,16 +66,18 @@ impl Core {
         let Some(to) = to.or(socket.peer.as_ref()) else {
             return refuse(io::ErrorKind::NotConnected, "the socket is not connected; use `send_to`, or `connect` before".into());
         };
-        if to.is_ipv6() != socket.local.is_ipv6() || to.port() == 0 || bytes.len() > LONGEST[usize::from(to.is_ipv6())] {
-            return refuse_datagram(socket.local, *to, bytes.len());
+        let is_six = to.is_ipv6();
+        if is_six != socket.port.is_six() || to.port() == 0 || bytes.len() > LONGEST[usize::from(is_six)] {
+            return refuse_datagram(socket.local(), *to, bytes.len());
         }
         // An address that a host has is no other kind of address: most often this is all that is asked.
-        let (ip, receivers) = match self.plan.owner_node(to.ip()) {
-            Some(owner) => (to.ip(), Receivers::One(owner)),
-            None => self.other_receivers(host, to)?,
+        let mut number = Addresses::short(to.ip());
+        let receivers = match self.plan.owner_of(number) {
+            Some(owner) => Receivers::One(owner),
+            None => self.other_receivers(host, to, &mut number)?,
         };
-        let from = self.source(host, socket.local.ip(), ip)?;
-        let addresses = Ends::new((from, socket.local.port()).into(), (ip, to.port()).into(), Kind::Datagram);
+        let from = self.source(host, socket.at, number, to)?;
+        let addresses = Ends::of([from, number], [socket.port.number(), to.port()], is_six, Kind::Datagram);
         if matches!(receivers, Receivers::All) && !socket.may_broadcast {
             return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
         }
@@ -87,8 +90,8 @@ impl Core {
                     self.offer(Path { from: host, to: other }, parcel.clone());
                 }
             }
-            Receivers::Nobody if self.plan.was_given(ip) => {}
-            Receivers::Nobody => return refuse(io::ErrorKind::HostUnreachable, self.plan.unknown(ip)),
+            Receivers::Nobody if self.plan.was_given(to.ip()) => {}
+            Receivers::Nobody => return refuse(io::ErrorKind::HostUnreachable, self.plan.unknown(to.ip())),
         }
         // A packet that arrives at once and is read or lost counts no more.
         if self.wire.held.is_too_much() {
@@ -97,41 +100,48 @@ impl Core {
         Ok(())
     }
 
-    /// Who gets a datagram of that host to an address that no host has, and the address that is written on it.
+    /// The receivers of a datagram of that host to an address that no host has. `number` becomes that of the address which is written on it.
     #[inline(never)]
-    fn other_receivers(&self, host: NodeId, to: &SocketAddr) -> io::Result<(IpAddr, Receivers)> {
+    fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
         if ip.is_multicast() {
             return refuse(io::ErrorKind::Unsupported, format!("{to} is a multicast address, and a test bed has no groups"));
         }
         if ip.is_unspecified() {
             let loopback = if ip.is_ipv6() { Ipv6Addr::LOCALHOST.into() } else { IpAddr::V4(Ipv4Addr::LOCALHOST) };
-            return Ok((loopback, Receivers::One(host)));
+            *number = Addresses::short(loopback);
+            return Ok(Receivers::One(host));
         }
         if ip.is_loopback() {
-            return Ok((ip, Receivers::One(host)));
+            return Ok(Receivers::One(host));
         }
-        if ip == IpAddr::V4(Ipv4Addr::BROADCAST) {
-            return Ok((ip, Receivers::All));
-        }
-        Ok((ip, Receivers::Nobody))
+        Ok(if ip == IpAddr::V4(Ipv4Addr::BROADCAST) { Receivers::All } else { Receivers::Nobody })
     }
 
-    /// The address from which a socket that is bound to `bound` reaches `to`.
-    pub(super) fn source(&self, host: NodeId, bound: IpAddr, to: IpAddr) -> io::Result<IpAddr> {
-        let addresses = self.plan.of(host);
-        if bound.is_unspecified() {
-            return Ok(if to.is_loopback() { to } else { addresses.like(to) });
+    /// The address from which a socket that is bound at `at`, or to all addresses, reaches the one of that number, as a program said it `to`. All are as
+    /// [`Addresses::short`].
+    #[inline]
+    pub(super) fn source(&self, host: NodeId, at: Option<u32>, number: u32, to: &SocketAddr) -> io::Result<u32> {
+        match at {
+            None if Addresses::is_loopback(number, to.is_ipv6()) => Ok(number),
+            None => Ok(self.plan.number(host)),
+            Some(at) => self.check_source(host, at, number, to).map(|()| at),
         }
-        if bound.is_loopback() && !to.is_loopback() {
-            return refuse(io::ErrorKind::InvalidInput, format!("a socket at {bound} reaches no other host, and so not {to}"));
+    }
+
+    /// Fails if a socket that is bound to one address does not reach another one.
+    #[inline(never)]
+    fn check_source(&self, host: NodeId, at: u32, number: u32, to: &SocketAddr) -> io::Result<()> {
+        let (addresses, bound) = (self.plan.of(host), Addresses::long(at, to.is_ipv6()));
+        if bound.is_loopback() && !Addresses::is_loopback(number, to.is_ipv6()) {
+            return refuse(io::ErrorKind::InvalidInput, format!("a socket at {bound} reaches no other host, and so not {}", to.ip()));
         }
         if !bound.is_loopback() && !addresses.has(bound) {
             let text =
                 format!("host `{}` does not have the address {bound} any more; it has {}", self.plan.names()[host.index()], addresses.like(bound));
             return refuse(io::ErrorKind::AddrNotAvailable, text);
         }
-        Ok(bound)
+        Ok(())
     }
 
     /// Hands a packet to its link.
@@ -148,9 +158,12 @@ impl Core {
     #[cfg_attr(not(feature = "tcp"), expect(clippy::never_loop, reason = "only TCP has packets that do not leave their host"))]
     pub(super) fn take_arrivals(&mut self) {
         loop {
-            while let Some(Arrival { packet, at, parcel, marked, is_cut }) = self.wire.poll() {
-                let end = if is_cut { Err(Lost::Cut) } else { self.arrive(packet.path, at, parcel, marked) };
-                self.wire.ends(packet, at, end);
+            while let Some(parcel) = self.wire.poll() {
+                // Part by part: a whole that was written in parts a moment ago is read late by a processor, which took a twentieth of the time of a datagram.
+                let Arrival { packet: PacketName { path: Path { from, to }, sequence, copy }, at, is_cut, .. } = parcel.arrival;
+                let path = Path { from, to };
+                let end = if is_cut { Err(Lost::Cut) } else { self.arrive(path, parcel) };
+                self.wire.ends(PacketName { path, sequence, copy }, at, end);
             }
             #[cfg(feature = "tcp")]
             if self.take_from_loopback() {
@@ -161,64 +174,71 @@ impl Core {
     }
 
     /// Hands a packet that does not leave its host to its socket.
-    pub(super) fn hand_over(&mut self, host: NodeId, parcel: Box<Parcel>) {
+    pub(super) fn hand_over(&mut self, host: NodeId, mut parcel: Box<Parcel>) {
+        (parcel.arrival.at, parcel.arrival.marked) = (self.now(), false);
         // Loopback tells of no end: it is not the network.
-        let _ = self.arrive(Path { from: host, to: host }, self.now(), parcel, false);
+        let _ = self.arrive(Path { from: host, to: host }, parcel);
     }
 
     /// Hands a packet that has arrived to its socket.
+    #[inline(always)]
     #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only a segment is taken out of its parcel"))]
-    fn arrive(&mut self, path: Path, at: Instant, mut parcel: Box<Parcel>, marked: bool) -> Result<(), Lost> {
-        let host = path.to;
+    fn arrive(&mut self, path: Path, mut parcel: Box<Parcel>) -> Result<(), Lost> {
         #[cfg(feature = "tcp")]
         if parcel.addresses.kind == Kind::Segment {
-            let bytes = std::mem::take(&mut parcel.bytes);
+            let (bytes, marked) = (std::mem::take(&mut parcel.bytes), parcel.arrival.marked);
             self.spare.put(parcel);
-            return self.arrive_segment(host, &bytes.into(), marked);
+            return self.arrive_segment(path.to, &bytes.into(), marked);
         }
-        if self.hosts[host.index()].is_down {
-            return Err(Lost::HostDown);
-        }
-        let to = parcel.addresses.to().ip();
-        if !(self.plan.of(host).has(to) || to.is_loopback() || to == IpAddr::V4(Ipv4Addr::BROADCAST)) {
-            return Err(Lost::NoSuchAddress);
-        }
-        let Some(id) = self.socket_for(host, &parcel.addresses) else {
-            if parcel.addresses.kind == Kind::Datagram && to != IpAddr::V4(Ipv4Addr::BROADCAST) {
-                self.tell_unreachable(path, &parcel);
-            }
-            return Err(Lost::NoSocket);
-        };
+        let Some(id) = self.socket_for(path.to, &parcel.addresses) else { return Err(self.lose(path, &parcel)) };
         let socket = self.sockets.get_mut(id);
-        match parcel.addresses.kind {
-            #[cfg(feature = "tcp")]
-            Kind::Segment => Ok(()),
-            // Only a connected socket is told, as with Linux: another one could not know of whom it speaks.
-            Kind::Unreachable => {
-                if socket.peer == Some(parcel.addresses.from()) {
-                    socket.refused = true;
-                    socket.readers.wake(&mut self.woken);
-                }
-                Ok(())
-            }
-            Kind::Datagram => socket.keep(at, parcel, marked, (self.settings.receive_buffer, &mut self.wire.held), &mut self.woken),
+        // Only a connected socket is told that nobody is there, as with Linux: another one could not know of whom it speaks.
+        if parcel.addresses.kind == Kind::Unreachable {
+            socket.refuse(parcel.addresses.from(), &mut self.woken);
+            return Ok(());
         }
+        socket.keep(parcel, (self.settings.receive_buffer, &mut self.wire.held), &mut self.woken)
     }
 
     /// The socket of a host for which a packet is: one that is connected to its sender before one that is not, one that is bound to its address before one that
     /// is bound to all.
+    #[inline(always)]
     fn socket_for(&self, host: NodeId, ends: &Ends) -> Option<SocketId> {
-        let rank = |id: SocketId| {
-            let (socket, to) = (self.sockets.get(id), ends.to().ip());
-            let at_address = socket.local.ip() == to;
-            let fits = at_address || socket.local.ip().is_unspecified();
-            let hears = socket.peer.is_none_or(|peer| peer == ends.from());
-            (fits && hears).then_some((socket.peer.is_some(), at_address))
-        };
-        match self.hosts[host.index()].bound.at(ends.port()) {
-            [(_, only)] => rank(*only).map(|_| *only),
-            several => several.iter().map(|(_, id)| *id).filter(|id| rank(*id).is_some()).max_by_key(|id| rank(*id)),
+        if !self.has_address(host, ends) {
+            return None;
         }
+        let mut best = None;
+        for id in self.hosts[host.index()].bound.at(ends.port()) {
+            let socket = self.sockets.get(id);
+            let fits = socket.at.is_none_or(|at| at == ends.to) && socket.peer.is_none_or(|peer| peer == ends.from());
+            let rank = (socket.peer.is_some(), socket.at.is_some());
+            if fits && best.is_none_or(|(highest, _)| rank >= highest) {
+                best = Some((rank, id));
+            }
+        }
+        best.map(|(_, id)| id)
+    }
+
+    /// Whether a host has the address to which a packet goes.
+    #[inline(always)]
+    fn has_address(&self, host: NodeId, ends: &Ends) -> bool {
+        self.plan.number(host) == ends.to || ends.is_to_any_host()
+    }
+
+    /// Why a packet is lost that no socket takes. A host that is down has none.
+    #[inline(never)]
+    fn lose(&mut self, path: Path, parcel: &Parcel) -> Lost {
+        let ends = &parcel.addresses;
+        if !self.is_up(path.to) {
+            return Lost::HostDown;
+        }
+        if !self.has_address(path.to, ends) {
+            return Lost::NoSuchAddress;
+        }
+        if ends.kind == Kind::Datagram && !ends.is_broadcast() {
+            self.tell_unreachable(path, parcel);
+        }
+        Lost::NoSocket
     }
 
     /// Tells the sender of a datagram that nobody is at that port.

@@ -191,49 +191,55 @@ impl Shared {
     /// On another thread while the run goes on; if the state is asked while it answers.
     #[inline(always)]
     pub(crate) fn with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> T {
-        if self.is_at_hand() {
-            let (outcome, woken) = HERE.with_borrow_mut(|here| {
-                let core = here.as_mut().expect("it is at hand");
-                (ask(core), core.woken.take())
-            });
-            if let Some(woken) = woken {
-                wake(woken);
-            }
-            return outcome;
+        self.ask(if self.is_at_hand() { None } else { Some(self.visit()) }, ask)
+    }
+
+    /// Asks the state, which is at hand or has come for a visit.
+    #[inline(always)]
+    pub(super) fn ask<T>(&self, visit: Option<Visit<'_>>, ask: impl FnOnce(&mut Core) -> T) -> T {
+        let (outcome, woken) = HERE.with_borrow_mut(|here| {
+            let core = here.as_mut().expect("it was brought here");
+            (ask(core), core.woken.take())
+        });
+        if let Some(visit) = visit {
+            drop(visit);
         }
-        let (mut ask, mut outcome) = (Some(ask), None);
-        self.ask_anywhere(&mut |core| outcome = ask.take().map(|ask| ask(core)));
-        outcome.expect("it was asked once")
+        if let Some(woken) = woken {
+            wake(woken);
+        }
+        outcome
     }
 
-    /// As [`Shared::with`]; `None` on another thread while the run goes on.
+    /// Whether [`Shared::with`] may be called: not on another thread while the run goes on, nor while a state answers on this one.
+    pub(super) fn may_be_asked(&self) -> bool {
+        (self.is_at_hand() || self.may_be_had()) && HERE.with(|here| here.try_borrow().is_ok())
+    }
+
+    /// As [`Shared::with`]; `None` if it may not be called.
     pub(crate) fn try_with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> Option<T> {
-        (self.is_at_hand() || self.may_be_had()).then(|| self.with(ask))
+        self.may_be_asked().then(|| self.with(ask))
     }
 
-    /// As [`Shared::with`], wherever the state lies, and lets time pass to that of the clock before.
+    /// Brings the state here for one question, unless it lies here, and lets time pass to that of the clock.
     #[inline(never)]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
-    fn ask_anywhere(&self, ask: &mut dyn FnMut(&mut Core)) {
-        let mut ask = |core: Option<&mut Box<Core>>| {
-            let core = core.expect("the state is not asked while it answers");
-            self.follow(core);
-            ask(core);
-            core.woken.take()
-        };
-        // The state of another run may lie here, and be in use: a task may drop a socket of a run that has ended.
-        let is_here = HERE.with(|here| here.try_borrow().is_ok_and(|here| here.as_ref().is_some_and(|core| core.run == self.run)));
-        let woken = if is_here {
-            HERE.with_borrow_mut(|here| ask(here.as_mut()))
-        } else if self.may_be_had() {
-            ask(self.lock_home().as_mut())
-        } else {
+    pub(super) fn visit(&self) -> Visit<'_> {
+        let is_here = HERE.with_borrow(|here| here.as_ref().is_some_and(|core| core.run == self.run));
+        if !is_here && !self.may_be_had() {
             panic!("{}", self.note_misuse("a test bed"));
-        };
-        woken.into_iter().for_each(wake);
+        }
+        let mut visit = Visit { home: None, other: None };
+        if !is_here {
+            let mut home = self.lock_home();
+            visit.other = HERE.with_borrow_mut(|here| std::mem::replace(&mut **here, home.take()));
+            visit.home = Some(home);
+        }
+        HERE.with_borrow_mut(|here| self.follow(here.as_mut().expect("no other thread has it")));
+        visit
     }
 
     /// Lets time pass up to that of tokio's clock, unless the state is at its time.
+    #[cfg_attr(not(feature = "tokio"), expect(unused_variables, reason = "no other clock moves by itself"))]
     fn follow(&self, core: &mut Core) {
         match self.clock {
             Clock::Own => {}
@@ -269,6 +275,23 @@ impl Shared {
 #[inline(never)]
 fn wake(woken: Vec<Waker>) {
     woken.into_iter().for_each(Waker::wake);
+}
+
+/// The state is here for one question, until this is dropped.
+pub(super) struct Visit<'a> {
+    /// Where the state goes back to; `None` if it stays here.
+    home: Option<MutexGuard<'a, Option<Box<Core>>>>,
+    /// The state of another run, which lay here: a task may drop a socket of a run that has ended.
+    other: Option<Box<Core>>,
+}
+
+impl Drop for Visit<'_> {
+    #[inline(never)]
+    fn drop(&mut self) {
+        if let Some(home) = &mut self.home {
+            **home = HERE.with_borrow_mut(|here| std::mem::replace(&mut **here, self.other.take()));
+        }
+    }
 }
 
 /// The state lies with this thread until this is dropped.

@@ -1,7 +1,7 @@
 //! Sockets: where they are bound, what lies in their buffers, and the tasks that wait.
 
 use std::io;
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::task::{Poll, Waker};
 
 use cohaptic_units::Instant;
@@ -11,67 +11,43 @@ use cohaptic_wan::{NodeId, Ring};
 use super::bound::{Port, SocketId};
 use super::waking::{Waiters, Woken};
 use super::{Core, Parcel, SocketName};
+use crate::address::Addresses;
 use crate::trace::Lost;
 use crate::wire::{Held, Where};
 
-/// A datagram in the buffer of a socket.
-#[derive(Clone, Debug)]
-#[cfg_attr(not(feature = "quinn"), allow(dead_code, reason = "the adapters of protocols ask for congestion"))]
-pub(crate) struct Datagram {
-    parcel: Box<Parcel>,
-    /// When it arrived.
-    pub(crate) at: Instant,
-    /// Whether an active queue marked it.
-    marked: bool,
-}
-
-impl Datagram {
+/// A datagram, for its readers.
+impl Parcel {
     #[inline]
     pub(crate) fn from(&self) -> SocketAddr {
-        self.parcel.addresses.from()
+        self.addresses.from()
+    }
+
+    /// The address to which it was sent.
+    #[cfg(feature = "quinn")]
+    pub(crate) fn to(&self) -> IpAddr {
+        self.addresses.to().ip()
     }
 
     /// Copies what fits into a buffer; gives the length.
     #[inline]
     pub(crate) fn copy_to(&self, buffer: &mut [u8]) -> usize {
-        let bytes = self.bytes();
-        let len = bytes.len().min(buffer.len());
-        buffer[..len].copy_from_slice(&bytes[..len]);
+        let len = self.bytes.len().min(buffer.len());
+        buffer[..len].copy_from_slice(&self.bytes[..len]);
         len
-    }
-
-    #[inline]
-    pub(crate) fn bytes(&self) -> &[u8] {
-        &self.parcel.bytes
-    }
-}
-
-/// What the adapters of protocols ask for.
-#[cfg(feature = "quinn")]
-impl Datagram {
-    /// The address to which it was sent.
-    pub(crate) fn to(&self) -> IpAddr {
-        self.parcel.addresses.to().ip()
-    }
-
-    pub(crate) fn ecn_capable(&self) -> bool {
-        self.parcel.ecn_capable
-    }
-
-    pub(crate) const fn marked(&self) -> bool {
-        self.marked
     }
 }
 
 #[derive(Debug)]
 pub(crate) struct SocketState {
     pub(super) host: NodeId,
-    pub(super) local: SocketAddr,
+    /// The address at which it is bound, as [`Addresses::short`]; `None` if it hears all addresses of its host.
+    pub(super) at: Option<u32>,
+    pub(super) port: Port,
     pub(super) peer: Option<SocketAddr>,
-    pub(super) inbox: Ring<Datagram>,
+    pub(super) inbox: Ring<Box<Parcel>>,
     /// The bytes of the datagrams in `inbox`.
     pub(super) held: usize,
-    pub(super) readers: Waiters,
+    readers: Waiters,
     /// What IP told about something that was sent, until the program is told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
@@ -81,14 +57,7 @@ pub(crate) struct SocketState {
 impl SocketState {
     /// Takes a datagram into the buffer, which holds this number of bytes.
     #[inline(always)]
-    pub(super) fn keep(
-        &mut self,
-        at: Instant,
-        parcel: Box<Parcel>,
-        marked: bool,
-        (room, all): (usize, &mut Held),
-        woken: &mut Woken,
-    ) -> Result<(), Lost> {
+    pub(super) fn keep(&mut self, parcel: Box<Parcel>, (room, all): (usize, &mut Held), woken: &mut Woken) -> Result<(), Lost> {
         let len = parcel.bytes.len();
         let held = self.held + len;
         if held > room {
@@ -96,7 +65,7 @@ impl SocketState {
         }
         self.held = held;
         all.add(Where::Buffers, Held::cost(len));
-        self.inbox.push(|| Datagram { parcel, at, marked });
+        self.inbox.push(|| parcel);
         self.readers.wake(woken);
         Ok(())
     }
@@ -108,8 +77,8 @@ impl SocketState {
         self.held = 0;
     }
 
-    pub(super) const fn name(&self) -> SocketName {
-        SocketName { kind: "UDP", host: self.host, local: self.local, peer: None }
+    pub(super) fn name(&self) -> SocketName {
+        SocketName { kind: "UDP", host: self.host, local: self.local(), peer: None }
     }
 
     /// Whether the next call gives an error.
@@ -119,9 +88,24 @@ impl SocketState {
         self.died.is_some() | self.refused
     }
 
-    /// Version and port at which it is bound.
-    pub(super) const fn port(&self) -> Port {
-        Port { is_six: self.local.is_ipv6(), number: self.local.port() }
+    /// The address at which it is bound.
+    pub(super) fn local(&self) -> SocketAddr {
+        let (is_six, number) = (self.port.is_six(), self.port.number());
+        let ip = match self.at {
+            Some(at) => Addresses::long(at, is_six),
+            None if is_six => Ipv6Addr::UNSPECIFIED.into(),
+            None => Ipv4Addr::UNSPECIFIED.into(),
+        };
+        SocketAddr::new(ip, number)
+    }
+
+    /// IP says that nobody is at a port of that address.
+    #[inline(never)]
+    pub(super) fn refuse(&mut self, by: SocketAddr, woken: &mut Woken) {
+        if self.peer == Some(by) {
+            self.refused = true;
+            self.readers.wake(woken);
+        }
     }
 
     pub(super) fn die(&mut self, at: Instant, all: &mut Held, woken: &mut Woken) {
@@ -180,10 +164,9 @@ impl Core {
             }
             port => port,
         };
-        let local = SocketAddr::new(ip, port);
+        let (at, port) = ((!ip.is_unspecified()).then(|| Addresses::short(ip)), Port::new(ip.is_ipv6(), port));
         let (readers, inbox) = (Waiters::default(), Ring::new());
-        let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
-        let port = state.port();
+        let state = SocketState { host, at, port, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
         let id = self.sockets.insert(state);
         self.hosts[host.index()].bound.add(port, id);
         Ok(id)
@@ -199,11 +182,8 @@ impl Core {
     }
 
     fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {
-        let bound = self.hosts[host.index()].bound.at(Port { is_six: ip.is_ipv6(), number: port });
-        bound.iter().any(|(_, id)| {
-            let other = self.sockets.get(*id).local.ip();
-            other == ip || other.is_unspecified() || ip.is_unspecified()
-        })
+        let mut bound = self.hosts[host.index()].bound.at(Port::new(ip.is_ipv6(), port));
+        bound.any(|id| ip.is_unspecified() || self.sockets.get(id).at.is_none_or(|other| other == Addresses::short(ip)))
     }
 
     fn free_port(&mut self, host: NodeId, ip: IpAddr) -> io::Result<u16> {
@@ -224,7 +204,7 @@ impl Core {
         let Some(mut state) = self.sockets.places[id.0].take() else { return };
         state.clear(&mut self.wire.held);
         self.sockets.free.push(id.0);
-        self.hosts[state.host.index()].bound.remove(state.port(), id);
+        self.hosts[state.host.index()].bound.remove(state.port, id);
     }
 
     /// Fails if the socket died with its host.
@@ -237,13 +217,16 @@ impl Core {
     #[cold]
     fn refuse_dead(&self, socket: &SocketState, at: Instant) -> io::Result<()> {
         let name = &self.plan.names()[socket.host.index()];
-        let text =
-            format!("host `{name}` crashed at {} s, and this socket ({}) with it; after `Host::restart`, bind a new one", Seconds(at), socket.local);
+        let text = format!(
+            "host `{name}` crashed at {} s, and this socket ({}) with it; after `Host::restart`, bind a new one",
+            Seconds(at),
+            socket.local()
+        );
         Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
     }
 
     pub(crate) fn local_of(&self, id: SocketId) -> SocketAddr {
-        self.sockets.get(id).local
+        self.sockets.get(id).local()
     }
 
     pub(crate) fn peer_of(&self, id: SocketId) -> Option<SocketAddr> {
@@ -253,7 +236,7 @@ impl Core {
     /// From now on the socket hears that peer only. What lies in its buffer already stays, as it does with Linux.
     pub(crate) fn connect(&mut self, id: SocketId, peer: SocketAddr) -> io::Result<()> {
         self.check_alive(id)?;
-        let local = self.sockets.get(id).local;
+        let local = self.sockets.get(id).local();
         if local.is_ipv6() != peer.is_ipv6() {
             return Err(io::Error::new(
                 io::ErrorKind::InvalidInput,
@@ -267,7 +250,7 @@ impl Core {
     /// A line for each socket that a task waits for.
     pub(crate) fn waits(&self) -> Vec<String> {
         let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty());
-        let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local));
+        let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local()));
         #[cfg(feature = "tcp")]
         let lines = lines.chain(self.tcp_waits());
         lines.collect()
@@ -276,7 +259,7 @@ impl Core {
     /// Returns the things that a task with that waker waits for, in words; empty if sockets and timers do not know the task.
     pub(crate) fn awaited_by(&self, waker: &Waker) -> Vec<String> {
         let sockets = self.sockets.places.iter().flatten().filter(|socket| socket.readers.has(waker));
-        let mut awaited: Vec<String> = sockets.map(|socket| format!("a datagram at UDP {}", socket.local)).collect();
+        let mut awaited: Vec<String> = sockets.map(|socket| format!("a datagram at UDP {}", socket.local())).collect();
         #[cfg(feature = "tcp")]
         awaited.extend(self.tcp_awaited_by(waker));
         awaited.extend(self.timers.deadline_of(waker).map(|deadline| format!("{} s of the run", Seconds(deadline))));
@@ -293,7 +276,7 @@ impl Core {
         &mut self,
         id: SocketId,
         waker: Option<&Waker>,
-        look: impl FnOnce(&Datagram) -> T,
+        look: impl FnOnce(&Parcel) -> T,
     ) -> Poll<io::Result<T>> {
         let socket = self.sockets.get_mut(id);
         if socket.has_error() {
@@ -308,16 +291,16 @@ impl Core {
             }
             return Poll::Pending;
         };
-        let len = datagram.bytes().len();
+        let len = datagram.bytes.len();
         socket.held -= len;
         self.wire.held.remove(Where::Buffers, Held::cost(len));
         let seen = look(&datagram);
-        self.spare.put(datagram.parcel);
+        self.spare.put(datagram);
         Poll::Ready(Ok(seen))
     }
 
     /// As [`Core::receive`], for a program that does not wait.
-    pub(crate) fn try_receive<const PEEK: bool, T>(&mut self, id: SocketId, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
+    pub(crate) fn try_receive<const PEEK: bool, T>(&mut self, id: SocketId, look: impl FnOnce(&Parcel) -> T) -> io::Result<T> {
         self.note_call(|core| core.sockets.get(id).name());
         match self.receive::<PEEK, _>(id, None, look) {
             Poll::Ready(seen) => seen,

@@ -69,7 +69,7 @@ impl NodeRun {
             return;
         };
         let addresses = Ports { from: from_port, to: address.port(), is_six: address.is_ipv6() };
-        let parcel = Parcel { addresses, bytes: bytes.into(), ecn_capable };
+        let parcel = Parcel::new(addresses, bytes.into(), ecn_capable);
         let path = Path { from, to };
         if to == from {
             // It does not leave the node, and so meets no link.
@@ -87,7 +87,8 @@ impl NodeRun {
 
     /// Deals with what has come out of the links.
     pub(super) fn take_arrivals(&mut self) {
-        while let Some(Arrival { packet, at, parcel, marked, is_cut }) = self.wire.poll() {
+        while let Some(parcel) = self.wire.poll() {
+            let Arrival { packet, at, marked, is_cut } = parcel.arrival;
             let Path { from, to } = packet.path;
             if is_cut {
                 self.counts[from.index()].cut += 1;

@@ -9,7 +9,7 @@ use std::task::{Context, Poll};
 use ::quinn::udp::{EcnCodepoint, RecvMeta, Transmit};
 use ::quinn::{AsyncUdpSocket, UdpPoller};
 
-use crate::core::Datagram;
+use crate::core::Parcel;
 use crate::host::Host;
 use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
@@ -78,9 +78,9 @@ impl AsyncUdpSocket for VirtualSocket {
 }
 
 /// Copies a datagram, cut off where the buffer ends, and describes it.
-fn fill(buffer: &mut [u8], datagram: &Datagram) -> RecvMeta {
+fn fill(buffer: &mut [u8], datagram: &Parcel) -> RecvMeta {
     let len = datagram.copy_to(buffer);
-    let ecn = match (datagram.marked(), datagram.ecn_capable()) {
+    let ecn = match (datagram.arrival.marked, datagram.ecn_capable) {
         (true, _) => Some(EcnCodepoint::Ce),
         (false, true) => Some(EcnCodepoint::Ect0),
         (false, false) => None,

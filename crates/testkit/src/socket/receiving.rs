@@ -9,7 +9,7 @@ use bytes::BufMut;
 use cohaptic_units::Instant;
 
 use super::{KIND, UdpSocket};
-use crate::core::Datagram;
+use crate::core::Parcel;
 
 impl UdpSocket {
     /// Receives a datagram from any sender; gives its length.
@@ -54,7 +54,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn recv_from_at<'a>(&'a self, buffer: &'a mut [u8]) -> impl Future<Output = io::Result<(usize, SocketAddr, Instant)>> + 'a {
-        self.look::<false, _>(move |datagram| (datagram.copy_to(buffer), datagram.from(), datagram.at))
+        self.look::<false, _>(move |datagram| (datagram.copy_to(buffer), datagram.from(), datagram.arrival.at))
     }
 
     /// Looks at the next datagram and leaves it; gives its length.
@@ -81,7 +81,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn peek_sender(&self) -> impl Future<Output = io::Result<SocketAddr>> + '_ {
-        self.look::<true, _>(Datagram::from)
+        self.look::<true, _>(Parcel::from)
     }
 
     /// Receives a datagram if there is one.
@@ -144,7 +144,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::try_recv`].
     pub fn try_peek_sender(&self) -> io::Result<SocketAddr> {
-        self.try_look::<true, _>(Datagram::from)
+        self.try_look::<true, _>(Parcel::from)
     }
 
     /// Receives a datagram, or sees to it that the task is woken when there is one.
@@ -183,7 +183,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::recv`].
     pub fn poll_peek_sender(&self, cx: &mut Context<'_>) -> Poll<io::Result<SocketAddr>> {
-        self.poll_look::<true, _>(cx, Datagram::from)
+        self.poll_look::<true, _>(cx, Parcel::from)
     }
 
     /// Waits until something can be received.
@@ -206,33 +206,33 @@ impl UdpSocket {
     }
 
     /// A view of a datagram, if there is one.
-    pub(crate) fn try_look<const PEEK: bool, T>(&self, look: impl FnOnce(&Datagram) -> T) -> io::Result<T> {
+    pub(crate) fn try_look<const PEEK: bool, T>(&self, look: impl FnOnce(&Parcel) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, |core| core.try_receive::<PEEK, _>(self.id, look))?
     }
 
     /// A view of the next datagram. It gives the future that is polled, and no other around it: each that is there for a datagram takes 20 instructions.
     #[inline]
-    fn look<'a, const PEEK: bool, T>(&'a self, mut look: impl FnMut(&Datagram) -> T + 'a) -> impl Future<Output = io::Result<T>> + 'a {
+    fn look<'a, const PEEK: bool, T>(&'a self, mut look: impl FnMut(&Parcel) -> T + 'a) -> impl Future<Output = io::Result<T>> + 'a {
         poll_fn(move |cx| self.poll_look::<PEEK, _>(cx, &mut look))
     }
 
     #[inline]
-    pub(crate) fn poll_look<const PEEK: bool, T>(&self, cx: &Context<'_>, look: impl FnOnce(&Datagram) -> T) -> Poll<io::Result<T>> {
+    pub(crate) fn poll_look<const PEEK: bool, T>(&self, cx: &Context<'_>, look: impl FnOnce(&Parcel) -> T) -> Poll<io::Result<T>> {
         self.shared.open(self.host, KIND, |core| core.receive::<PEEK, _>(self.id, Some(cx.waker()), look))?
     }
 }
 
-impl Datagram {
+impl Parcel {
     fn put_into(&self, buffer: &mut impl BufMut) -> usize {
-        let len = self.bytes().len().min(buffer.remaining_mut());
-        buffer.put_slice(&self.bytes()[..len]);
+        let len = self.bytes.len().min(buffer.remaining_mut());
+        buffer.put_slice(&self.bytes[..len]);
         len
     }
 
     #[cfg(feature = "tokio")]
     fn fill(&self, buffer: &mut tokio::io::ReadBuf<'_>) -> SocketAddr {
-        let len = self.bytes().len().min(buffer.remaining());
-        buffer.put_slice(&self.bytes()[..len]);
+        let len = self.bytes.len().min(buffer.remaining());
+        buffer.put_slice(&self.bytes[..len]);
         self.from()
     }
 }

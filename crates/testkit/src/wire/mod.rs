@@ -19,7 +19,7 @@ use exits::{Out, counted};
 pub(crate) use held::{BYTE_LIMIT, Held, Where};
 pub(crate) use hitting::HitCount;
 use hitting::Hitting;
-pub(crate) use parcel::{Octets, Parcel, Spare};
+pub(crate) use parcel::{Arrival, Octets, Parcel, Spare};
 pub(crate) use recording::{Recorded, Recording, Seen};
 
 use crate::again::{Drawn, MOST_LOST};
@@ -37,19 +37,6 @@ pub(crate) fn earlier(one: Option<Instant>, other: Option<Instant>) -> Option<In
         (Some(one), Some(other)) => Some(one.min(other)),
         (one, other) => one.or(other),
     }
-}
-
-/// A packet that its link has delivered.
-#[derive(Debug)]
-pub(crate) struct Arrival<A> {
-    pub(crate) packet: PacketName,
-    pub(crate) at: Instant,
-    /// With the damage that the link did to it.
-    pub(crate) parcel: Box<Parcel<A>>,
-    /// Whether an active queue marked it.
-    pub(crate) marked: bool,
-    /// Whether the way of the packet is cut, so that it is lost here.
-    pub(crate) is_cut: bool,
 }
 
 pub(crate) struct Wire<A> {
@@ -179,15 +166,16 @@ impl<A: Clone> Wire<A> {
 
     /// The next packet that has arrived. What becomes of it is told by [`Wire::ends`].
     #[inline(always)]
-    pub(crate) fn poll(&mut self) -> Option<Arrival<A>> {
+    pub(crate) fn poll(&mut self) -> Option<Box<Parcel<A>>> {
         if !self.is_watched {
             // Of a packet that can only arrive its network tells less, and faster: what else it tells of each takes a fifth of the time of a datagram.
             let Self { network, cut, held, .. } = self;
             let arrived = network.take_mere_arrival(|event| {
-                held.remove(Where::Links, Held::cost(event.payload.bytes.len()));
-                let (path, sequence, at) = (event.path, event.sequence, event.at);
+                let (path, sequence, at, mut parcel) = (event.path, event.sequence, event.at, event.payload);
+                held.remove(Where::Links, Held::cost(parcel.bytes.len()));
                 let is_cut = !cut.is_empty() && cut.contains(&path);
-                Arrival { packet: PacketName { path, sequence, copy: 0 }, at, parcel: event.payload, marked: false, is_cut }
+                parcel.arrival = Arrival { packet: PacketName { path, sequence, copy: 0 }, at, marked: false, is_cut };
+                parcel
             });
             if arrived.is_some() || !self.network.may_have_events(self.now) {
                 return arrived;
@@ -198,7 +186,7 @@ impl<A: Clone> Wire<A> {
 
     /// As [`Wire::poll`], of packets to which more may happen than that they arrive, or of which more is recorded.
     #[inline(never)]
-    fn poll_event(&mut self) -> Option<Arrival<A>> {
+    fn poll_event(&mut self) -> Option<Box<Parcel<A>>> {
         loop {
             let event = self.poll_out()?;
             let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy };
@@ -222,7 +210,8 @@ impl<A: Clone> Wire<A> {
                         damage.apply(&mut bytes);
                         parcel.bytes = Octets::Own(bytes);
                     }
-                    return Some(Arrival { packet, at, parcel, marked, is_cut });
+                    parcel.arrival = Arrival { packet, at, marked, is_cut };
+                    return Some(parcel);
                 }
                 Fate::Dropped(cause) => {
                     if cause == DropCause::Loss && self.drawn.lost.len() < MOST_LOST {

@@ -3,14 +3,39 @@
 use std::ops::Deref;
 
 use bytes::Bytes;
+use cohaptic_units::Instant;
+use cohaptic_wan::{NodeId, Path};
 
-/// What travels: bytes, and the addresses that their owner writes on them. It is in a box that goes from the sender through its link to the receiver.
+use crate::trace::PacketName;
+
+/// What travels: bytes, and the addresses that their owner writes on them. It is in a box that goes from the sender through its link and the buffer of the other socket to the
+/// program that reads, so that one word is moved.
 #[derive(Clone, Debug)]
 pub(crate) struct Parcel<A> {
     pub(crate) addresses: A,
     pub(crate) bytes: Octets,
     /// Whether its sender understands marks.
     pub(crate) ecn_capable: bool,
+    /// Of a parcel that its link has delivered; else whatever was there before.
+    pub(crate) arrival: Arrival,
+}
+
+/// What a link says of a packet that it has delivered.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arrival {
+    pub(crate) packet: PacketName,
+    pub(crate) at: Instant,
+    /// Whether an active queue marked it.
+    pub(crate) marked: bool,
+    /// Whether the way of the packet is cut, so that it is lost here.
+    pub(crate) is_cut: bool,
+}
+
+impl<A> Parcel<A> {
+    pub(crate) const fn new(addresses: A, bytes: Octets, ecn_capable: bool) -> Self {
+        let packet = PacketName { path: Path { from: NodeId(0), to: NodeId(0) }, sequence: 0, copy: 0 };
+        Self { addresses, bytes, ecn_capable, arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false } }
+    }
 }
 
 /// What a packet carries.
@@ -79,10 +104,8 @@ impl Octets {
     }
 }
 
-/// Parcels that were read, with their memory. A parcel stays in its box from the socket that sends through the link and the buffer of the other socket to the program that
-/// reads: what carries it moves one word, where it moved seven, six times.
+/// Parcels that were read, with their memory.
 #[derive(Debug)]
-#[expect(clippy::vec_box, reason = "a box goes on its way and comes back: a parcel is never moved out of it")]
 pub(crate) struct Spare<A>(Vec<Box<Parcel<A>>>);
 
 impl<A> Default for Spare<A> {
@@ -91,7 +114,7 @@ impl<A> Default for Spare<A> {
     }
 }
 
-impl<A> Spare<A> {
+impl<A: Default> Spare<A> {
     /// The largest number that is kept, and the longest \[bytes\]: a megabyte at most.
     const MOST: usize = 512;
     const LONGEST: usize = 2048;
@@ -99,7 +122,8 @@ impl<A> Spare<A> {
     /// A parcel with a copy of what a program sends.
     #[inline(always)]
     pub(crate) fn copied(&mut self, addresses: A, bytes: &[u8], ecn_capable: bool) -> Box<Parcel<A>> {
-        let Some(mut parcel) = self.0.pop() else { return boxed(addresses, Octets::Own(bytes.to_vec()), ecn_capable) };
+        // The addresses are given to no call, so that they are written once, in their place.
+        let mut parcel = self.0.pop().unwrap_or_else(empty);
         (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);
         parcel.bytes.refill(bytes);
         parcel
@@ -108,8 +132,8 @@ impl<A> Spare<A> {
     /// A parcel of anything else.
     #[cfg(feature = "tcp")]
     pub(crate) fn wrapped(&mut self, addresses: A, bytes: Bytes, ecn_capable: bool) -> Box<Parcel<A>> {
-        let Some(mut parcel) = self.0.pop() else { return boxed(addresses, bytes.into(), ecn_capable) };
-        *parcel = Parcel { addresses, bytes: bytes.into(), ecn_capable };
+        let mut parcel = self.0.pop().unwrap_or_else(empty);
+        *parcel = Parcel::new(addresses, bytes.into(), ecn_capable);
         parcel
     }
 
@@ -126,11 +150,11 @@ impl<A> Spare<A> {
     }
 }
 
-/// A new parcel.
+/// A new parcel, of which all is to be written.
 #[cold]
 #[inline(never)]
-fn boxed<A>(addresses: A, bytes: Octets, ecn_capable: bool) -> Box<Parcel<A>> {
-    Box::new(Parcel { addresses, bytes, ecn_capable })
+fn empty<A: Default>() -> Box<Parcel<A>> {
+    Box::new(Parcel::new(A::default(), Octets::default(), false))
 }
 
 #[cfg(test)]
@@ -138,7 +162,7 @@ mod tests {
     use super::*;
 
     fn parcel_of(bytes: Octets) -> Box<Parcel<u8>> {
-        Box::new(Parcel { addresses: 1, bytes, ecn_capable: false })
+        Box::new(Parcel::new(1, bytes, false))
     }
 
     #[test]

@@ -11,6 +11,7 @@ use cohaptic_wan::NodeId;
 
 use super::super::waking::Waiters;
 use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener, SocketName};
+use crate::address::Addresses;
 use crate::trace::Lost;
 
 /// What connections inherit of their listener: the constants, and the time to linger when they are dropped.
@@ -72,7 +73,8 @@ impl Core {
         if remote.ip().is_unspecified() {
             remote.set_ip(loopback);
         }
-        let from = self.source(host, local.map_or(any, |local| local.ip()), remote.ip())?;
+        let at = local.map(|local| local.ip()).filter(|ip| !ip.is_unspecified()).map(Addresses::short);
+        let from = Addresses::long(self.source(host, at, Addresses::short(remote.ip()), &remote)?, remote.is_ipv6());
         if !remote.ip().is_loopback() && self.plan.owner_node(remote.ip()).is_none() && !self.plan.was_given(remote.ip()) {
             return refuse(io::ErrorKind::HostUnreachable, self.plan.unknown(remote.ip()));
         }
