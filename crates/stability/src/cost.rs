@@ -3,8 +3,7 @@
 //! An operation is a multiplication with an addition on one number. Estimates count what the innermost loops do and leave out the rest; they are good to a
 //! factor of about three, which is enough to tell seconds from hours. What an operation takes in time is the machine's affair, not this crate's.
 
-use crate::structure::count;
-use crate::{AnalysisError, Watch};
+use crate::rounding::real;
 
 /// The most memory that the matrices of a part may take if nobody says otherwise, 8 GiB: those of 8192 states.
 pub const MOST_MEMORY: u64 = 8 << 30;
@@ -57,36 +56,13 @@ impl PartCost {
     /// The eigenvalues of a part.
     #[must_use]
     pub fn of_eigenvalues(states: usize) -> Self {
-        let bytes = 8.0 * MATRICES * count(states).powi(2);
+        let bytes = 8.0 * MATRICES * real(states).powi(2);
         Self { states, bytes, operations: eigenvalue_operations(states) }
     }
 
     /// The same of a part whose unit vectors are pushed, one by one, through that number of events along all axes.
     pub(crate) fn of_full(states: usize, events: usize, axes: usize) -> Self {
         Self { operations: full_operations(states, events, axes), ..Self::of_eigenvalues(states) }
-    }
-
-    /// Tells the watch of the cost before anything of that size is made.
-    ///
-    /// # Errors
-    ///
-    /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if it ends the analysis.
-    pub(crate) fn begin(self, watch: &dyn Watch) -> Result<(), AnalysisError> {
-        self.allowed(watch)?;
-        watch.begins(&self);
-        watch.expects(self.operations);
-        if watch.stops() { Err(AnalysisError::Stopped) } else { Ok(()) }
-    }
-
-    /// [`PartCost::begin`] without telling the watch.
-    ///
-    /// # Errors
-    ///
-    /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows.
-    pub(crate) fn allowed(self, watch: &dyn Watch) -> Result<(), AnalysisError> {
-        let Self { states, bytes, .. } = self;
-        let most = watch.most_memory();
-        if bytes <= Memory::of(most).0 { Ok(()) } else { Err(AnalysisError::TooMuchMemory { states, bytes, most }) }
     }
 }
 
@@ -116,38 +92,38 @@ impl FrameCost {
     /// How many operations the spectral radius takes.
     #[must_use]
     pub fn operations(&self) -> f64 {
-        TO_PREPARE * count(self.events) + PASSES * self.of_a_pass()
+        TO_PREPARE * real(self.events) + PASSES * self.of_a_pass()
     }
 
     /// One way through the frame, and the work for all numbers at its end.
     pub(crate) fn of_a_pass(&self) -> f64 {
         // Half of a symmetric moment is added up.
-        let sums = 0.5 * count(self.sums) * count(self.rows).powi(2);
-        OF_AN_EVENT * count(self.joint) * count(self.rows) * count(self.events) + sums + BETWEEN * self.numbers()
+        let sums = 0.5 * real(self.sums) * real(self.rows).powi(2);
+        OF_AN_EVENT * real(self.joint) * real(self.rows) * real(self.events) + sums + BETWEEN * self.numbers()
     }
 
     /// How many numbers are kept at once within the frame.
     #[must_use]
     pub fn numbers(&self) -> f64 {
-        count(self.joint) * count(self.rows) * count(self.rows)
+        real(self.joint) * real(self.rows) * real(self.rows)
     }
 }
 
 /// The operations that it takes to push unit vectors through the events of a frame along all axes, and then to find the eigenvalues.
 #[must_use]
 pub fn full_operations(states: usize, events: usize, axes: usize) -> f64 {
-    pushed_operations(events, axes) * count(states) + eigenvalue_operations(states)
+    pushed_operations(events, axes) * real(states) + eigenvalue_operations(states)
 }
 
 /// Those of one of the vectors: a tick of a peer is some sixty operations an axis.
 pub(crate) fn pushed_operations(events: usize, axes: usize) -> f64 {
-    60.0 * count(events) * count(axes)
+    60.0 * real(events) * real(axes)
 }
 
 /// How many operations the eigenvalues of a matrix of that size take: 10·n³ (Golub & Van Loan 2013, Section 7.5.6).
 #[must_use]
 pub fn eigenvalue_operations(size: usize) -> f64 {
-    10.0 * count(size).powi(3)
+    10.0 * real(size).powi(3)
 }
 
 #[cfg(test)]
@@ -168,15 +144,6 @@ mod tests {
         assert!((summed.operations() / (60.0 * 5e9) - 1.0).abs() < 0.01);
         // 8 bytes each: a gibibyte is 2^27 numbers.
         assert_eq!(FrameCost { events: 1, rows: 8192, joint: 2, sums: 0 }.numbers().to_bits(), 134_217_728_f64.to_bits());
-    }
-
-    /// 8192 states are 2^26 entries, of 8 bytes, in 16 matrices: 8 GiB.
-    #[test]
-    fn the_memory_of_a_part_is_refused_beyond_the_limit_before_it_is_taken() {
-        assert_eq!(PartCost::of_eigenvalues(8192).begin(&crate::Unwatched), Ok(()));
-        let refused = PartCost::of_eigenvalues(8193).begin(&crate::Unwatched).unwrap_err();
-        assert!(matches!(refused, AnalysisError::TooMuchMemory { states: 8193, most: MOST_MEMORY, .. }), "{refused}");
-        assert!(refused.to_string().contains("8193 states") && refused.to_string().contains("8.0 GiB"), "{refused}");
     }
 
     /// 300 peers with 4 states and 2·4 numbers of samples each: the eigenvalues of 3600 rows are 4.7·10^11 operations.

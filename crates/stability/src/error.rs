@@ -211,7 +211,7 @@ struct Many(Option<usize>);
 impl std::fmt::Display for Many {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.0 {
-            Some(number) => write!(formatter, "{}", SixDigits(crate::structure::count(number))),
+            Some(number) => write!(formatter, "{}", SixDigits(crate::rounding::real(number))),
             None => formatter.write_str("far too many"),
         }
     }

@@ -14,12 +14,13 @@ use cohaptic_peer::{Acting, Contact, Device as _, Gains, Hand, Held, ObjectCopy,
 use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::Instant;
 
-use self::layout::Layout;
+use self::layout::{Layout, Member};
 use crate::cost::{PartCost, pushed_operations};
 use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
-use crate::structure::{Contacts, Structure, common_time, count, has_one_drift, linear_law};
+use crate::rounding::real;
+use crate::structure::{Contacts, Structure, common_time, has_one_drift, linear_law};
 use crate::timetable::{Event, Instants, NodeClock, Timetable, UseOfHeld};
 use crate::unseen::felt;
 use crate::{AnalysisError, Matrix, StateName, Watch};
@@ -123,8 +124,6 @@ fn compliance(scene: &Scene, peer: usize, time: f64) -> f64 {
 
 /// Time that a clock without an offset shows when a frame begins, so that samples of the frames before were sent at instants too.
 const EARLIER: Instant = Instant::from_nanos(1 << 60);
-
-type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;
 
 /// The peers, and where their states stand in a vector.
 struct Pusher<const A: usize, S> {
@@ -249,7 +248,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
         // As for the lifted system: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
-        let error = 10.0 * f64::EPSILON * count(ticks) * self.growth * self.growth * count(kept.len()).sqrt();
+        let error = 10.0 * f64::EPSILON * real(ticks) * self.growth * self.growth * real(kept.len()).sqrt();
         let names = self.layout.names::<A>(&self.timetable.depth);
         Ok(FullMap {
             monodromy,
@@ -466,6 +465,6 @@ fn write<const A: usize>(state: &State<A>, z: &mut [f64], time: f64) {
 /// Numbers of either sign up to `amplitude` in size, always the same ones: multiples of an irrational number, which spread evenly.
 fn noise(size: usize, seed: u32, amplitude: f64) -> Vec<f64> {
     const GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
-    let place = |number: usize| (count(number) + 0.5) * GOLDEN_RATIO * f64::from(seed);
+    let place = |number: usize| (real(number) + 0.5) * GOLDEN_RATIO * f64::from(seed);
     (0..size).map(|number| amplitude * (2.0 * (place(number) - place(number).floor()) - 1.0)).collect()
 }

@@ -5,20 +5,20 @@
 //! scaled, and hears λ times its own samples: the scene is as many systems of one node. λ = 1 is there once for each connected part, which can be
 //! displaced as a whole.
 
-mod enclosed;
+pub(crate) mod enclosed;
 
 use cohaptic_peer::coordination::Pull;
 use cohaptic_scene::{Scene, Topology, TopologyKind};
 
-use self::enclosed::symmetric;
-pub(crate) use self::enclosed::{EnclosedSpectrum, eigenvectors};
-use crate::analysis::{Analysis, combinations, combine};
+use crate::analysis::combine;
+use crate::combinations::combinations;
 use crate::lifted::{Lifted, Node};
 use crate::network::NominalNetwork;
 use crate::parts::{alone, lifted_part};
 use crate::pieces::{Piece, pieces};
-use crate::structure::{Structure, count};
-use crate::{AnalysisError, ContactMode, Matrix, Method, PartKind, Unwatched, Watch};
+use crate::rounding::real;
+use crate::structure::Structure;
+use crate::{Analysis, AnalysisError, ContactMode, Matrix, Method, PartKind, Unwatched, Watch};
 
 /// Which peer hears which.
 #[derive(Clone, PartialEq, Debug)]
@@ -82,6 +82,19 @@ pub enum GraphError {
     /// One-sided contacts or walls.
     #[error("a scene that is not linear cannot be analysed on a graph: expected contact = \"grasp\" or \"none\" and no enclosure")]
     NotLinear,
+}
+
+/// Why a scene with a topology is refused.
+pub(crate) fn on_this_topology(error: GraphError) -> AnalysisError {
+    match error {
+        GraphError::Analysis(error) => error,
+        GraphError::Unequal { .. }
+        | GraphError::Weight { .. }
+        | GraphError::Alone { .. }
+        | GraphError::Neighbours { .. }
+        | GraphError::Irregular
+        | GraphError::NotLinear => AnalysisError::OnTopology { why: error.to_string() },
+    }
 }
 
 /// Analyses the scene's equal peers as if each heard only its neighbours on that graph.
@@ -154,7 +167,7 @@ pub(crate) fn node_on(scene: &Scene, structure: &Structure, degree: Option<f64>)
     for _ in pulls.into_iter().filter(|pull| *pull == Pull::Sum) {
         // The sum over as many as are heard, in place of that over all others.
         let degree = degree.ok_or(GraphError::Irregular)?;
-        node.law = node.law.scaled(degree / count(scene.peers.len() - 1));
+        node.law = node.law.scaled(degree / real(scene.peers.len() - 1));
     }
     Ok(node)
 }
@@ -199,7 +212,7 @@ impl Graph {
     #[expect(clippy::type_complexity, reason = "used once, above")]
     fn spectrum(&self, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>, Option<f64>), GraphError> {
         let peers = scene.peers.len();
-        let n = count(peers);
+        let n = real(peers);
         Ok(match self {
             Self::Complete => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(-1.0 / (n - 1.0)), peers - 1)], Some(n - 1.0)),
             // Two peers hear each other, whatever the graph is called.
@@ -208,11 +221,11 @@ impl Graph {
                 return Err(GraphError::Neighbours { peers, neighbours: *neighbours });
             }
             Self::Ring { neighbours } => {
-                let angle = |k: usize, m: usize| 2.0 * std::f64::consts::PI * count(k * m % peers) / n;
+                let angle = |k: usize, m: usize| 2.0 * std::f64::consts::PI * real(k * m % peers) / n;
                 let half = neighbours / 2;
-                let eigenvalue = |k: usize| (1..=half).map(|m| libm::cos(angle(k, m))).sum::<f64>() / count(half);
+                let eigenvalue = |k: usize| (1..=half).map(|m| libm::cos(angle(k, m))).sum::<f64>() / real(half);
                 let pair = |k: usize| (Eigenvalue::Other(eigenvalue(k)), if 2 * k == peers { 1 } else { 2 });
-                (std::iter::once((Eigenvalue::One, 1)).chain((1..=peers / 2).map(pair)).collect(), Some(count(*neighbours)))
+                (std::iter::once((Eigenvalue::One, 1)).chain((1..=peers / 2).map(pair)).collect(), Some(real(*neighbours)))
             }
             Self::Star => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(0.0), peers - 2), (Eigenvalue::Other(-1.0), 1)], None),
             Self::Weighted(weights) => weighted(weights, scene)?,
@@ -251,6 +264,18 @@ fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>
     spectrum.extend(eigenvalues.into_iter().map(|value| (Eigenvalue::Other(value), 1)));
     let regular = degrees.iter().all(|degree| (degree - degrees[0]).abs() <= 1e-12 * degrees[0]);
     Ok((spectrum, regular.then_some(degrees[0])))
+}
+
+/// D^−½·W·D^−½ and the row sums D; `None` if a sum is beyond all numbers.
+fn symmetric(weights: &Matrix) -> Option<(Matrix, Vec<f64>)> {
+    let size = weights.rows();
+    let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
+    if degrees.iter().any(|degree| !degree.is_finite()) {
+        return None;
+    }
+    // Divided one by one, nothing leaves the range of numbers: no weight is above its degree.
+    let entry = |row: usize, column: usize| weights[(row, column)] / degrees[row].sqrt() / degrees[column].sqrt();
+    Some((Matrix::from_fn(size, size, entry), degrees))
 }
 
 /// How many parts of the graph are not connected with one another.

@@ -26,9 +26,12 @@
 //! ```
 
 mod admittance;
+mod analyse;
 mod analysis;
 mod boundary;
+mod combinations;
 mod cost;
+mod definite;
 mod determinant;
 mod error;
 mod factorisation;
@@ -43,6 +46,7 @@ mod linear_form;
 mod map;
 mod matrix;
 mod mean_square;
+mod method;
 mod monodromy;
 mod network;
 #[cfg(test)]
@@ -51,9 +55,11 @@ mod parts;
 mod pieces;
 mod proof;
 mod radius;
+mod rounding;
 mod scene_radius;
 mod spectrum;
 mod stack_frame;
+mod state_name;
 mod structure;
 mod switching;
 mod timetable;
@@ -63,21 +69,23 @@ mod watch;
 mod worst_case;
 
 pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, PushedAxis, admittance, ideal};
-pub use analysis::{
-    Analysis, CHANGES_LEFT_OUT, ContactMode, Method, UNLOADED, analyse, analyse_loaded, analyse_spinning, analyse_watched, analyse_with,
-};
-pub use boundary::{Boundary, BoundaryBlock, BoundaryError, BoundaryOptions, Crossing, Stretch};
+pub use analyse::{analyse, analyse_loaded, analyse_spinning, analyse_watched, analyse_with};
+pub use analysis::{Analysis, CHANGES_LEFT_OUT, ContactMode, UNLOADED};
+pub use boundary::blocks::BoundaryBlock;
+pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use cost::{FrameCost, MOST_MEMORY, PartCost, eigenvalue_operations, full_operations};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use error::AnalysisError;
-pub use family::{Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange, KeyRangeError};
+pub use family::{Cell, Family, FamilyError, FamilyScratch, KeyRange, KeyRangeError};
 pub use graph::{Graph, GraphError, analyse_on, analyse_on_watched};
 pub use judgement::{Judgement, NOMINAL, has_chance, judge, judge_watched, left_out};
-pub use kind::{Kinds, VerdictKind, nominal_head};
-pub use map::{Grid, Map, MapError, MapRow, Polyline};
+pub use kind::{Criterion, Kinds, VerdictKind, nominal_head};
+pub use map::contour::Polyline;
+pub use map::{Grid, Map, MapError, MapRow};
 pub use matrix::{Dense, Matrix};
 pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square, mean_square_watched, mean_square_within};
-pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
+pub use method::Method;
+pub use monodromy::{Monodromy, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use proof::{
     BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, KnownPieces, MOST_FOLLOWED, MOST_HALVINGS, MomentCertificate, Nearness,
@@ -86,6 +94,7 @@ pub use proof::{
 };
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
+pub use state_name::{StateKind, StateName};
 pub use switching::{GrowingMotion, PushCertificate, Switching, SwitchingCertificate, SwitchingError, SwitchingMotion, prove_switching};
 pub use watch::{Limits, Unwatched, Watch};
 pub use worst_case::{

@@ -92,6 +92,17 @@ impl Radius {
     }
 }
 
+/// The larger of two radii, or what both may be; without `BOUND` their errors mean nothing.
+pub(crate) fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
+    if BOUND {
+        one.or(other)
+    } else if other.value > one.value || other.value.is_nan() {
+        other
+    } else {
+        one
+    }
+}
+
 impl Verdict {
     /// The word in JSON and CSV: `stable`, `marginal`, `overflow` or `unstable`.
     #[must_use]

@@ -6,7 +6,8 @@ use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::{Gains, Plant};
 use cohaptic_scene::{FromScene, Scene};
 
-use crate::analysis::{Combination, analyse, pairs};
+use crate::analyse::analyse;
+use crate::combinations::{Combination, pairs};
 use crate::cost::PartCost;
 use crate::full::{FullMap, Trust, full_along};
 use crate::lifted::{Autonomous, Body, Lifted, Node};
@@ -14,6 +15,7 @@ use crate::mean_square::{EqualScratch, Followed};
 use crate::network::NominalNetwork;
 use crate::parts::loose_device;
 use crate::pieces::split;
+use crate::radius::worse;
 use crate::spectrum::Workspace;
 use crate::stack_frame::{StackFrame, StackNode};
 use crate::structure::{Contacts, Structure, linear_law};
@@ -354,17 +356,6 @@ impl PartsRadius {
             }
             node.wall = node.wall.and(scene.object.enclosure).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
         }
-    }
-}
-
-/// The larger of two radii, or what both may be.
-pub(crate) fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
-    if BOUND {
-        one.or(other)
-    } else if other.value > one.value || other.value.is_nan() {
-        other
-    } else {
-        one
     }
 }
 

@@ -14,6 +14,7 @@ use cohaptic_scene::{PeerRotation, PeerSpec, Scene};
 use crate::lifted::{Body, Lifted, Node, Sampling};
 use crate::linear_form::LinearLaw;
 use crate::network::{LinkTiming, NominalNetwork};
+use crate::rounding::real;
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix};
 
@@ -101,10 +102,10 @@ impl Structure {
             own.map(|(_, _, timing)| Timetable::new(&clocks[class..=class], &[(0, 0, timing.clone())])).transpose()
         });
         let apart = apart.collect::<Result<Vec<_>, _>>()?;
-        let others = count(peers - 1);
+        let others = real(peers - 1);
         let weights = Matrix::from_fn(classes.len(), classes.len(), |row, column| {
             let heard = classes[column].len() - usize::from(row == column);
-            count(heard) / others
+            real(heard) / others
         });
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
         let arm = |class: &Vec<usize>| contacts.touching[class[0]] && scene.device_plant(class[0]).stiffness > 0.0;
@@ -167,7 +168,7 @@ impl Structure {
 
     /// The weight with which a difference within a class comes back: −1/(N−1).
     pub(crate) fn difference_weight(&self) -> f64 {
-        -1.0 / count(self.peers - 1)
+        -1.0 / real(self.peers - 1)
     }
 
     /// The common time of the classes, of which those are the nodes \[s\].
@@ -335,9 +336,4 @@ fn even(senders: &[usize], receivers: &[usize], network: &NominalNetwork) -> boo
         }
     }
     true
-}
-
-#[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-pub(crate) fn count(number: usize) -> f64 {
-    number as f64
 }

@@ -136,7 +136,7 @@ impl Timetable {
     /// No sample that is used in the frame is older \[s\].
     pub(crate) fn oldest(&self) -> f64 {
         let frames = self.depth.iter().zip(&self.sent).map(|(depth, sent)| depth.div_ceil((*sent).max(1)) + 1).max().unwrap_or(1);
-        self.frame.as_secs_f64() * crate::structure::count(frames)
+        self.frame.as_secs_f64() * crate::rounding::real(frames)
     }
 
     /// The frame of nodes that send to each other over those links: (from, to, timing).

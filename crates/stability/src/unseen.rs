@@ -37,7 +37,7 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
             let other = null_space(&unfelt.transposed(), 1.0);
             let quotient = other.transposed().times(&matrix.times(&other));
             // The rounding of the products, and the part of the subspace that a frame leads out of it.
-            let error = f64::EPSILON * crate::structure::count(size) * matrix.frobenius_norm() + outside.frobenius_norm();
+            let error = f64::EPSILON * crate::rounding::real(size) * matrix.frobenius_norm() + outside.frobenius_norm();
             return (quotient, error);
         }
         unfelt = unfelt.times(&inside);

@@ -1,6 +1,7 @@
 //! The watch over a computation, and the limits of its cost.
 
-use crate::cost::{MOST_MEMORY, PartCost};
+use crate::AnalysisError;
+use crate::cost::{MOST_MEMORY, Memory, PartCost};
 
 /// Sees how far a computation is, and may end it.
 pub trait Watch: Sync {
@@ -62,5 +63,44 @@ pub(crate) struct Asks<F>(pub(crate) F);
 impl<F: Fn() -> bool + Sync> Watch for Asks<F> {
     fn stops(&self) -> bool {
         (self.0)()
+    }
+}
+
+impl PartCost {
+    /// Tells the watch of the cost before anything of that size is made.
+    ///
+    /// # Errors
+    ///
+    /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if it ends the analysis.
+    pub(crate) fn begin(self, watch: &dyn Watch) -> Result<(), AnalysisError> {
+        self.allowed(watch)?;
+        watch.begins(&self);
+        watch.expects(self.operations);
+        if watch.stops() { Err(AnalysisError::Stopped) } else { Ok(()) }
+    }
+
+    /// [`PartCost::begin`] without telling the watch.
+    ///
+    /// # Errors
+    ///
+    /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows.
+    pub(crate) fn allowed(self, watch: &dyn Watch) -> Result<(), AnalysisError> {
+        let Self { states, bytes, .. } = self;
+        let most = watch.most_memory();
+        if bytes <= Memory::of(most).0 { Ok(()) } else { Err(AnalysisError::TooMuchMemory { states, bytes, most }) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 8192 states are 2^26 entries, of 8 bytes, in 16 matrices: 8 GiB.
+    #[test]
+    fn the_memory_of_a_part_is_refused_beyond_the_limit_before_it_is_taken() {
+        assert_eq!(PartCost::of_eigenvalues(8192).begin(&Unwatched), Ok(()));
+        let refused = PartCost::of_eigenvalues(8193).begin(&Unwatched).unwrap_err();
+        assert!(matches!(refused, AnalysisError::TooMuchMemory { states: 8193, most: MOST_MEMORY, .. }), "{refused}");
+        assert!(refused.to_string().contains("8193 states") && refused.to_string().contains("8.0 GiB"), "{refused}");
     }
 }

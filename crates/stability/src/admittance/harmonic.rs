@@ -13,7 +13,7 @@ use super::response::AdmittancePoint;
 use crate::factorisation::Lu;
 use crate::lifted::{FrameMap, Instrument, Lifted};
 use crate::matrix::ComplexMatrix;
-use crate::structure::count;
+use crate::rounding::real;
 
 /// e^{jωt} after that number of periods, whole ones left out first.
 pub(super) fn turn(periods: f64) -> Complex64 {
@@ -90,7 +90,7 @@ impl Harmonic {
         let periods = hz * lifted.timetable.frame.as_secs_f64();
         let size = map.state_unknowns() + map.used.len();
         let (matrix, right) = (ComplexMatrix::zeros(size, size), vec![Complex64::ZERO; size]);
-        let unit = compliance / (count(sine.ticks) * lifted.time);
+        let unit = compliance / (real(sine.ticks) * lifted.time);
         let mut harmonic = Self { hz, map, sine, back: turn(-periods), periods, unit, matrix, right };
         harmonic.write_states();
         harmonic.write_samples();
@@ -118,7 +118,7 @@ impl Harmonic {
             let frames = 1 + (age - 1) / sent.len();
             let place = states + number;
             self.matrix[(place, place)] += Complex64::ONE;
-            self.subtract(place, Source::Sent(sent.end - 1 - (age - 1) % sent.len()), turn(-self.periods * count(frames)));
+            self.subtract(place, Source::Sent(sent.end - 1 - (age - 1) % sent.len()), turn(-self.periods * real(frames)));
             self.subtract_reference(place, self.back * self.sum_of_turns(frames) * self.map.translation(age));
         }
     }
@@ -127,8 +127,8 @@ impl Harmonic {
     fn sum_of_turns(&self, frames: usize) -> Complex64 {
         let angle = TAU * (self.periods - self.periods.round());
         let half = 0.5 * angle;
-        let ratio = if half == 0.0 { count(frames) } else { libm::sin(count(frames) * half) / libm::sin(half) };
-        let middle = -half * (count(frames) - 1.0);
+        let ratio = if half == 0.0 { real(frames) } else { libm::sin(real(frames) * half) / libm::sin(half) };
+        let middle = -half * (real(frames) - 1.0);
         Complex64::new(libm::cos(middle), libm::sin(middle)) * ratio
     }
 
@@ -185,8 +185,8 @@ pub(super) fn solved(hz: f64, matrix: &ComplexMatrix, right: &[Complex64], seen:
     let largest = solution.iter().map(|value| value.norm()).fold(1.0, f64::max);
     let row_sum = |row: usize| (0..size).map(|column| matrix[(row, column)].norm()).sum::<f64>();
     let norm = (0..size).map(row_sum).fold(0.0, f64::max);
-    let change = 4.0 * error + f64::EPSILON * count(size) * norm;
-    let error = (weight + count(seen.ticks)) * change * largest * seen.unit;
+    let change = 4.0 * error + f64::EPSILON * real(size) * norm;
+    let error = (weight + real(seen.ticks)) * change * largest * seen.unit;
     AdmittancePoint { hz, value: (of_states + seen.push) * seen.unit, error }
 }
 

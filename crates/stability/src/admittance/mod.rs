@@ -17,7 +17,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::network::NominalNetwork;
-use crate::structure::count;
+use crate::rounding::real;
+
 use crate::timetable::{Event, Timetable};
 use crate::{AnalysisError, Radius, UNLOADED, Unwatched, Verdict, Watch};
 
@@ -191,7 +192,7 @@ impl Admittance {
     ///
     /// As [`Admittance::at`], for the first frequency that is not one.
     pub fn response_watched(&self, frequencies: &[f64], watch: &dyn Watch) -> Result<FrequencyResponse, AdmittanceError> {
-        watch.expects(self.operations() * count(frequencies.len()));
+        watch.expects(self.operations() * real(frequencies.len()));
         let at = |hz: &f64| {
             (!watch.stops()).then(|| {
                 let point = self.at(*hz);
@@ -219,7 +220,7 @@ impl Admittance {
         match &self.system {
             System::OneAxis(axis) => {
                 let columns = 6 * axis.nodes.len() + axis.timetable.depth.iter().sum::<usize>();
-                20.0 * count(axis.timetable.events.len()) * count(columns) + count(columns).powi(3)
+                20.0 * real(axis.timetable.events.len()) * real(columns) + real(columns).powi(3)
             }
             System::Turned(turned) => turned.operations(),
         }
@@ -311,7 +312,7 @@ impl Admittance {
         };
         let own = |event: &&Event| matches!(event, Event::Tick { node, .. } if *node == pushed);
         let timetable = self.timetable();
-        count(timetable.events.iter().filter(own).count()) / timetable.frame.as_secs_f64()
+        real(timetable.events.iter().filter(own).count()) / timetable.frame.as_secs_f64()
     }
 }
 
@@ -396,7 +397,7 @@ mod tests {
         let mut structure = Structure::with_alone(&[&scene], &network, &contacts, Some(0)).unwrap();
         assert_eq!(structure.classes.len(), 2);
         structure.peers = count;
-        let others = crate::structure::count(count - 1);
+        let others = real(count - 1);
         structure.weights = Matrix::from_fn(2, 2, |row, column| [[0.0, 1.0], [1.0 / others, (others - 1.0) / others]][row][column]);
         let (axis, radius) = OneAxis::of_classes(&scene, structure, 0, &Unwatched).unwrap();
         Admittance::new(System::OneAxis(Box::new(axis)), radius, Vec::new(), 0.45, [PushedAxis::X; 2])
@@ -412,7 +413,7 @@ mod tests {
         (axis.weights, axis.tied) = (Matrix::zeros(2, 2), true);
         for hz in [1.0, 8.0, 70.0] {
             let held = limit.at(hz).unwrap().value;
-            let apart = |peers: usize| (with_peers(peers).at(hz).unwrap().value - held).norm() / held.norm() * count(peers - 1);
+            let apart = |peers: usize| (with_peers(peers).at(hz).unwrap().value - held).norm() / held.norm() * real(peers - 1);
             let (fifty, thousand, most) = (apart(50), apart(1000), apart(100_000));
             assert!((thousand / most - 1.0).abs() < 0.02 && (fifty / most - 1.0).abs() < 0.3, "{hz} Hz: {fifty} {thousand} {most}");
         }

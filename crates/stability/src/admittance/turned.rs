@@ -12,7 +12,8 @@ use super::harmonic::{Seen, phase, solved, turn};
 use super::response::AdmittancePoint;
 use crate::matrix::ComplexMatrix;
 use crate::network::NominalNetwork;
-use crate::structure::count;
+use crate::rounding::real;
+
 use crate::timetable::{Instants, Timetable};
 use crate::turning::{Together, mode_of};
 use crate::{AnalysisError, Matrix, Method, Radius, Watch};
@@ -84,7 +85,7 @@ impl Turned {
         let back: Vec<Complex64> = ticks.iter().map(|at| phase(hz, *at).conj()).collect();
         let states: Vec<Complex64> = (0..size).map(|state| velocities.row(state).iter().zip(&back).map(|(v, back)| back * v).sum()).collect();
         let lengths: f64 = components.iter().map(|component| if *component > 2 { node.length } else { 1.0 }).product();
-        let unit = compliance / (count(ticks.len()) * time * lengths);
+        let unit = compliance / (real(ticks.len()) * time * lengths);
         solved(hz, &matrix, &right, &Seen { states: &states, push, ticks: ticks.len(), unit }, self.error)
     }
 
@@ -113,6 +114,6 @@ impl Turned {
 
     /// See [`super::Admittance::operations`].
     pub(super) fn operations(&self) -> f64 {
-        40.0 * count(self.timetable().events.len()) + 4.0 * count(self.frame.rows()).powi(3)
+        40.0 * real(self.timetable().events.len()) + 4.0 * real(self.frame.rows()).powi(3)
     }
 }

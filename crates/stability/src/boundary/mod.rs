@@ -6,7 +6,7 @@
 //! by the second differences around it, so an island that is smooth on the scale of the samples, or a tangency, is found however narrow it is; one that
 //! shows nothing of itself at the samples around it is not, and the result says how fine it looked.
 
-mod blocks;
+pub(crate) mod blocks;
 mod intervals;
 #[cfg(test)]
 mod tests;
@@ -19,7 +19,6 @@ use rayon::prelude::*;
 use crate::map::{Scratches, nodes};
 use crate::watch::Asks;
 use crate::{AnalysisError, Cell, Family, FamilyError, KeyRange, Verdict, Watch};
-pub use blocks::BoundaryBlock;
 use intervals::{Samples, wanted};
 
 /// How closely a boundary is looked for.
@@ -106,7 +105,7 @@ fn go_on<E: Send>(
     options: BoundaryOptions,
     look: impl Fn(f64) -> Result<Option<(f64, Cell)>, E> + Sync,
 ) -> Result<(Samples, End), E> {
-    let spacing = (range.high - range.low) / crate::structure::count(options.samples - 1);
+    let spacing = (range.high - range.low) / crate::rounding::real(options.samples - 1);
     let (mut seen, mut next) = (Samples::default(), first);
     while !next.is_empty() {
         if seen.len() + next.len() > options.most {

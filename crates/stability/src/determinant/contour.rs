@@ -9,7 +9,8 @@ use core::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::DelayedLoop;
+use super::delayed_loop::DelayedLoop;
+use super::kernel::Kernel;
 use super::point::Point;
 use crate::Watch;
 
@@ -107,8 +108,7 @@ impl DelayedLoop {
     }
 
     fn limits(&self, inner: f64, perturbation: f64) -> Limits {
-        let kernels: Vec<_> =
-            self.terms.iter().map(|term| (term.kernel.limits(inner), super::Kernel::Delay(term.kernel.steps()).limits(inner).0)).collect();
+        let kernels: Vec<_> = self.terms.iter().map(|term| (term.kernel.limits(inner), Kernel::Delay(term.kernel.steps()).limits(inner).0)).collect();
         let mut blur = perturbation;
         for (term, ((largest, _), _)) in self.terms.iter().zip(&kernels) {
             blur += largest * (perturbation + term.kernel.rounding() * term.norm);

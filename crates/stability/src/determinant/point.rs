@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::DelayedLoop;
+use super::delayed_loop::DelayedLoop;
 
 /// A(z) = z − now − Σ kernel(z)·matrix, inverted.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@ use num_complex::Complex64;
 use proptest::prelude::*;
 
 use super::*;
-use crate::{Verdict, bounded_radius, eigenvalues};
+use crate::{Matrix, Verdict, bounded_radius, eigenvalues};
 
 fn scalar(now: f64, terms: &[(Kernel, f64)]) -> DelayedLoop {
     let one = |entry| Matrix::from_fn(1, 1, |_, _| entry);

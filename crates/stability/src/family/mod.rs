@@ -4,7 +4,7 @@
 //! a key does nothing but set certain numbers, the key is *learned*, and from then on only those numbers are written. A key that is not learned, such
 //! as a delay, is read anew for each value.
 
-mod criterion;
+mod cell;
 mod error;
 mod leaves;
 mod prepared;
@@ -18,12 +18,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use cohaptic_scene::Scene;
 
-pub use criterion::{Cell, Criterion};
+pub use cell::Cell;
 pub use error::FamilyError;
 pub use range::{KeyRange, KeyRangeError};
 
 use crate::scene_radius::RadiusScratch;
-use crate::{Radius, Unwatched, Watch, left_out};
+use crate::{Criterion, Radius, Unwatched, Watch, left_out};
 use leaves::Probe;
 use prepared::Prepared;
 

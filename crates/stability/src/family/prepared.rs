@@ -2,10 +2,11 @@
 
 use cohaptic_scene::Scene;
 
-use super::criterion::Cell;
+use super::cell::Cell;
 use super::leaves::{Leaf, Probe, learn};
 use crate::mean_square::Followed;
-use crate::scene_radius::{RadiusScratch, SceneRadius, scene_radii, worse};
+use crate::radius::worse;
+use crate::scene_radius::{RadiusScratch, SceneRadius, scene_radii};
 use crate::{AnalysisError, Limits, Radius, Watch, has_chance, mean_square_watched};
 
 /// A scene with learned keys.

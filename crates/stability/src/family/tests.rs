@@ -149,7 +149,7 @@ proptest! {
         prepared.write(&[stiffness], &mut own);
         prepared.radius::<true>(&own, &mut radii);
         let network = crate::network::NominalNetwork::of(&scene).unwrap();
-        let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
+        let contacts = crate::combinations::whole(&scene).unwrap().remove(0).contacts;
         let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
         let nodes = [structure.node(&scene, 0)];
         let frame = structure.quotient(&scene, &nodes).frame(&mut crate::lifted::Autonomous);

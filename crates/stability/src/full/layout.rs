@@ -1,13 +1,15 @@
 //! Where the states of all peers stand in a vector.
 
-use cohaptic_peer::Strategy;
 use cohaptic_peer::wire::SampleKind;
+use cohaptic_peer::{Peer, SimulatedDevice, Strategy};
 use cohaptic_scene::Scene;
 
-use super::Member;
 use crate::structure::Contacts;
 use crate::timetable::Timetable;
 use crate::{StateKind, StateName};
+
+/// A peer whose device is simulated.
+pub(super) type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;
 
 /// Where the states of each peer begin, and what they are.
 pub(super) struct Layout {

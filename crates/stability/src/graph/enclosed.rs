@@ -2,10 +2,10 @@
 
 use cohaptic_scene::Scene;
 
-use super::{Eigenvalue, Graph, GraphError};
+use super::{Eigenvalue, Graph, GraphError, symmetric};
 use crate::Matrix;
 use crate::factorisation::eigen;
-use crate::structure::count;
+use crate::rounding::real;
 
 /// The eigenvalues of an averaging matrix but for 1, which each connected part has once.
 #[derive(Clone, PartialEq, Debug)]
@@ -33,7 +33,7 @@ impl Graph {
             // −1/(N − 1) is rounded once.
             Self::Complete => f64::EPSILON,
             // An angle below 2π is off by four roundings, a cosine by no more than its angle and one of its own, and a mean of them by one each and one more.
-            Self::Ring { neighbours } => (32.0 + count(*neighbours)) * f64::EPSILON,
+            Self::Ring { neighbours } => (32.0 + real(*neighbours)) * f64::EPSILON,
         };
         let other = |(eigenvalue, _): &(Eigenvalue, usize)| if let Eigenvalue::Other(value) = eigenvalue { Some(*value) } else { None };
         let others = spectrum.iter().filter_map(other).map(|value| within_unit(value, error)).collect();
@@ -79,24 +79,12 @@ fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     }
     // An entry of A is within (n + 4)·u of itself, for the sums D and five operations, which A takes over, since it has no negative ones and norm 1. Those of A·U − U·Λ and of UᵀU are sums of n terms: in the
     // Frobenius norm within 4·(n + 2)·√n·u·(1 + ε) and n²·u·(1 + ε)². All together is less than half of this, which has room for the sums of squares.
-    let rounding = 8.0 * (count(size) + 8.0).powi(2) * f64::EPSILON;
+    let rounding = 8.0 * (real(size) + 8.0).powi(2) * f64::EPSILON;
     let error = residual + skew * (1.0 + largest) + rounding;
     let mut sorted = values;
     sorted.sort_by(f64::total_cmp);
     sorted.truncate(size - ones);
     sorted.into_iter().map(|value| within_unit(value, error)).collect()
-}
-
-/// D^−½·W·D^−½ and the row sums D; `None` if a sum is beyond all numbers.
-pub(super) fn symmetric(weights: &Matrix) -> Option<(Matrix, Vec<f64>)> {
-    let size = weights.rows();
-    let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
-    if degrees.iter().any(|degree| !degree.is_finite()) {
-        return None;
-    }
-    // Divided one by one, nothing leaves the range of numbers: no weight is above its degree.
-    let entry = |row: usize, column: usize| weights[(row, column)] / degrees[row].sqrt() / degrees[column].sqrt();
-    Some((Matrix::from_fn(size, size, entry), degrees))
 }
 
 /// The eigenvectors of D⁻¹W, nearly: columns x with xᵀDx = 1 for a connected graph, but for that of the eigenvalue 1. `None` if they were not found.
@@ -149,15 +137,15 @@ mod tests {
     /// Spectra in closed form, some of whose eigenvalues are repeated: each of them is enclosed, by an interval not much wider than rounding, and nothing else is.
     #[test]
     fn eigenvalues_in_closed_form_are_enclosed() {
-        let cos = |k: usize, of: usize| libm::cos(std::f64::consts::PI * count(k) / count(of));
+        let cos = |k: usize, of: usize| libm::cos(std::f64::consts::PI * real(k) / real(of));
         let is = |truth: bool| f64::from(u8::from(truth));
         let root = (0.0625_f64 + 1.0 / 6.0).sqrt();
         let cases: Vec<(&str, Matrix, Vec<f64>)> = vec![
             ("complete", weights(6, |_, _| 0.3), vec![-0.2]),
-            ("star of uneven weights", weights(7, |one, other| is(one == 0) * 0.7 * count(other)), vec![-1.0, 0.0]),
+            ("star of uneven weights", weights(7, |one, other| is(one == 0) * 0.7 * real(other)), vec![-1.0, 0.0]),
             ("path", weights(9, |one, other| is(other == one + 1)), (1..=8).map(|k| cos(k, 8)).collect()),
             ("ring", weights(8, |one, other| is(other == one + 1 || other == one + 7) * 2.5), (1..=4).map(|k| cos(k, 4)).collect()),
-            ("hypercube", weights(16, |one, other| is((one ^ other).is_power_of_two()) / 3.0), (1..=4).map(|k| 1.0 - count(k) / 2.0).collect()),
+            ("hypercube", weights(16, |one, other| is((one ^ other).is_power_of_two()) / 3.0), (1..=4).map(|k| 1.0 - real(k) / 2.0).collect()),
             ("complete bipartite", weights(7, |one, other| is(one < 3 && other >= 3) * 1e-3), vec![-1.0, 0.0]),
             // −1/2 of the two that are alike; of the others, with 1, 6·λ³ − 3·λ² − 4·λ + 1 = (λ − 1)·(6·λ² + 3·λ − 1).
             ("triangle with a tail", weights(4, |one, other| is(other < 3 || one == 2)), vec![-0.5, -0.25 + root, -0.25 - root]),

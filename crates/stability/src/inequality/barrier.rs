@@ -8,9 +8,9 @@
 //!
 //! for a growing η (Nesterov & Nemirovskii 1994). With W = S⁻¹, the derivatives of −ln det S along sums of (u·vᵀ + v·uᵀ)/2 take nothing but the numbers uᵀWv.
 
-use super::{Inequality, Measured, Part, Solution};
+use super::parts::{Inequality, Measured, Part, Solution};
 use crate::factorisation::{cholesky, solve, triangle_inverse};
-use crate::worst_case::rounding::real;
+use crate::rounding::real;
 use crate::{Matrix, Watch};
 
 /// By how much η grows from one centre to the next.

@@ -3,10 +3,10 @@
 //! M is computed again with a bound of every entry's error: of rounding, and of the errors that rows of a frame have. It is shown below zero, and shapes above, by a
 //! factorisation that accounts for its own rounding ([`is_positive`]).
 
-use super::{Inequality, Measured, Part, Row, Solution};
+use super::parts::{Inequality, Measured, Part, Row, Solution};
 use crate::Matrix;
-use crate::worst_case::rounding::{UNDERFLOW, gamma, outward, real};
-use crate::worst_case::verified::is_positive;
+use crate::definite::is_positive;
+use crate::rounding::{UNDERFLOW, gamma, outward, real};
 
 /// The least factor, of those looked at, by which the shapes are shown to shrink in a step; `None` if they are not shown to shrink at all.
 pub(crate) fn rate(inequality: &Inequality, solution: &Solution) -> Option<f64> {

@@ -2,25 +2,9 @@
 
 use super::node::{External, Node, Rows, Scale, Scratch};
 use super::rounding::Rounding;
-use super::{Sampling, majorant};
-use crate::timetable::{Event, Instants, Timetable};
+use super::system::Lifted;
+use crate::timetable::{Event, Instants};
 use crate::{Matrix, Unwatched, Watch};
-
-/// Nodes that are coupled through samples.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Lifted<'a> {
-    pub(crate) nodes: &'a [Node],
-    /// The weight of each node's samples (column) in each node's target (row).
-    pub(crate) weights: &'a Matrix,
-    pub(crate) timetable: &'a Timetable,
-    /// Which numbers of a sample the laws of the nodes use.
-    pub(crate) sampling: Sampling,
-    /// What velocities are multiplied by \[s\].
-    pub(crate) time: f64,
-    /// Whether something ties the motion to ground. If not, the whole may be moved without a force, and positions are taken relative to the first
-    /// node's copy.
-    pub(crate) tied: bool,
-}
 
 /// The inputs and outputs within a frame.
 pub(crate) trait Instrument {
@@ -42,17 +26,6 @@ pub(crate) trait Instrument {
     fn touch(&mut self, _node: usize, _z: &Matrix, _rows: Rows, _inputs: [&mut [f64]; 2]) -> [bool; 2] {
         [false; 2]
     }
-}
-
-/// How large the matrix of a frame is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Sizes {
-    /// Its rows: see [`FrameMap::size`].
-    pub(crate) states: usize,
-    /// How many of these are numbers of samples of earlier frames: see [`FrameMap::history`].
-    pub(crate) history: usize,
-    /// The rows of its delayed loop: see [`FrameMap::signals`].
-    pub(crate) signals: usize,
 }
 
 /// Nothing is pushed or looked at.
@@ -232,45 +205,6 @@ impl Lifted<'_> {
                 rounding.bound(|| f64::INFINITY)
             },
         })
-    }
-
-    /// How large its matrix is, told without making one.
-    pub(crate) fn sizes(&self) -> Sizes {
-        let channels = self.sampling.channels();
-        let silent = self.sampling.is_silent(self.time);
-        let reference = usize::from(!self.tied);
-        let own = self.nodes.iter().map(Node::states).sum::<usize>() - reference;
-        let history = if silent { 0 } else { self.timetable.depth.iter().sum::<usize>() * channels };
-        let sent = self.timetable.sent.iter().sum::<usize>() * channels;
-        Sizes { states: own + history, history, signals: own + sent + reference }
-    }
-
-    /// The rows of each node.
-    pub(crate) fn rows(&self) -> Vec<Rows> {
-        let mut count = 0;
-        let rows = self.nodes.iter().map(|node| {
-            let rows = node.rows(count);
-            count += node.states();
-            rows
-        });
-        rows.collect()
-    }
-
-    /// How often each node ticks in a frame.
-    pub(crate) fn ticks(&self) -> Vec<usize> {
-        let mut ticks = vec![0; self.nodes.len()];
-        for event in &self.timetable.events {
-            if let Event::Tick { node, .. } = event {
-                ticks[*node] += 1;
-            }
-        }
-        ticks
-    }
-
-    /// A bound of the rounding errors of a frame: see [`majorant`].
-    pub(crate) fn error(&self) -> f64 {
-        let compliance = self.nodes[0].compliance(self.time);
-        majorant::error_of(self, |_| compliance)
     }
 
     /// Whether the law of a node uses the ages of samples, so that the same sample is heard differently from tick to tick.

@@ -13,9 +13,9 @@
 
 use std::collections::VecDeque;
 
-use super::frame::Lifted;
 use super::node::{Body, Node, Scale};
-use crate::structure::count;
+use super::system::Lifted;
+use crate::rounding::real;
 use crate::timetable::Event;
 
 /// What the operations of a tick round, relative to the terms that they add up: at most fifteen in a row, the rounding of the step maps' coefficients and of
@@ -56,6 +56,14 @@ struct NodeSizes {
     memory: Vec<Size>,
     /// What it takes of the own states of the latest ticks, the newest first.
     past: VecDeque<Size>,
+}
+
+impl Lifted<'_> {
+    /// A bound of the rounding errors of a frame.
+    pub(crate) fn error(&self) -> f64 {
+        let compliance = self.nodes[0].compliance(self.time);
+        error_of(self, |_| compliance)
+    }
 }
 
 /// A bound of the errors of all rows of a frame as one matrix, in the 2-norm: of the states at the end and of the samples sent, positions and velocities,
@@ -116,7 +124,7 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
                         }
                     }
                 }
-                heard.iter_mut().for_each(|heard| *heard = heard.rounded(MEAN + count(channels * nodes) * f64::EPSILON));
+                heard.iter_mut().for_each(|heard| *heard = heard.rounded(MEAN + real(channels * nodes) * f64::EPSILON));
                 tick(&lifted.nodes[node], &mut sizes[node], &heard, lifted, span);
             }
         }
@@ -153,7 +161,7 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
     let remembered = |sum: Size, by: &[f64]| by.iter().zip(&sizes.memory).fold(sum, |sum, (by, number)| sum.plus(*by, *number));
     let next = node.law.memory.iter().zip(&heard[1..]).map(|(row, heard)| {
         remembered(heard.plus(row.own.stiffness, x).plus(row.own.damping / time, v), &row.memory)
-            .rounded(TICK + count(row.memory.len()) * f64::EPSILON)
+            .rounded(TICK + real(row.memory.len()) * f64::EPSILON)
     });
     let next: Vec<Size> = next.collect();
     let mut on_copy =

@@ -9,8 +9,10 @@ pub(crate) mod majorant;
 pub(crate) mod node;
 mod rounding;
 mod sampling;
+mod system;
 
-pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted, Sizes};
+pub(crate) use frame::{Autonomous, FrameMap, Instrument};
 pub(crate) use node::{Body, Node};
 pub(crate) use rounding::{Rounding, closer_of};
 pub(crate) use sampling::Sampling;
+pub(crate) use system::{Lifted, Sizes};

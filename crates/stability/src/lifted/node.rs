@@ -381,6 +381,22 @@ impl Node {
     }
 }
 
+impl Sampling {
+    /// One number if that is all that the laws of the nodes use; of laws that hear nothing too.
+    pub(crate) fn of(nodes: &[Node]) -> Self {
+        let heard = |row: &LawRow| (row.heard.stiffness != 0.0 || row.heard.damping != 0.0).then_some(row.heard);
+        let rows = || nodes.iter().flat_map(|node| node.law.rows());
+        let gains = rows().find_map(heard).unwrap_or(Gains { stiffness: 0.0, damping: 0.0 });
+        #[expect(clippy::float_cmp, reason = "multiples of one another to the bit")]
+        let is_multiple = |row: &LawRow| {
+            row.ahead == 0.0
+                && (row.heard == gains
+                    || (row.heard.stiffness * gains.damping == row.heard.damping * gains.stiffness && row.heard.damping.is_finite()))
+        };
+        if rows().all(is_multiple) { Self::Combined(gains) } else { Self::Whole }
+    }
+}
+
 /// Coordination and wall pull on the copy's own state alike.
 pub(crate) fn coordination_of(coordination: Gains, wall: Option<Gains>) -> Gains {
     wall.map_or(coordination, |wall| Gains { stiffness: coordination.stiffness + wall.stiffness, damping: coordination.damping + wall.damping })

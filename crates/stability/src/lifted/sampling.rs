@@ -2,7 +2,6 @@
 
 use cohaptic_peer::Gains;
 
-use super::Node;
 use crate::linear_form::LawRow;
 
 /// Which numbers of a sample are unknowns of their own.
@@ -15,20 +14,6 @@ pub(crate) enum Sampling {
 }
 
 impl Sampling {
-    /// One number if that is all that the laws of the nodes use; of laws that hear nothing too.
-    pub(crate) fn of(nodes: &[Node]) -> Self {
-        let heard = |row: &LawRow| (row.heard.stiffness != 0.0 || row.heard.damping != 0.0).then_some(row.heard);
-        let rows = || nodes.iter().flat_map(|node| node.law.rows());
-        let gains = rows().find_map(heard).unwrap_or(Gains { stiffness: 0.0, damping: 0.0 });
-        #[expect(clippy::float_cmp, reason = "multiples of one another to the bit")]
-        let is_multiple = |row: &LawRow| {
-            row.ahead == 0.0
-                && (row.heard == gains
-                    || (row.heard.stiffness * gains.damping == row.heard.damping * gains.stiffness && row.heard.damping.is_finite()))
-        };
-        if rows().all(is_multiple) { Self::Combined(gains) } else { Self::Whole }
-    }
-
     /// How many numbers of a sample there are.
     pub(crate) const fn channels(self) -> usize {
         match self {

@@ -16,6 +16,22 @@ pub struct Polyline {
     pub closed: bool,
 }
 
+impl Map {
+    /// Where the radius is 1: polylines with the stable side on their left, x to the right and y up. One that does not end at the edge of the map is
+    /// closed. Between two nodes the logarithm of the radius is taken to be linear; rows that were not computed count as unstable.
+    #[must_use]
+    pub fn contour(&self) -> Vec<Polyline> {
+        contour(self, false)
+    }
+
+    /// The stable region: closed polylines along its edge and the edge of the map, anticlockwise around stable cells and clockwise around the
+    /// others, to be filled by either rule.
+    #[must_use]
+    pub fn regions(&self) -> Vec<Polyline> {
+        contour(self, true)
+    }
+}
+
 /// A side of a square: from the node at that row and column to the right, or up.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Side {

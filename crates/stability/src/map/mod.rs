@@ -1,6 +1,6 @@
 //! Maps: the radius over a grid of two keys, by the criterion of the family.
 
-mod contour;
+pub(crate) mod contour;
 #[cfg(test)]
 mod tests;
 mod verdicts;
@@ -9,8 +9,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
-
-pub use contour::Polyline;
 
 use crate::watch::Asks;
 use crate::{AnalysisError, Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange, Watch};
@@ -190,20 +188,6 @@ impl Map {
     pub fn is_complete(&self) -> bool {
         self.radius.iter().all(|row| !row.is_empty())
     }
-
-    /// Where the radius is 1: polylines with the stable side on their left, x to the right and y up. One that does not end at the edge of the map is
-    /// closed. Between two nodes the logarithm of the radius is taken to be linear; rows that were not computed count as unstable.
-    #[must_use]
-    pub fn contour(&self) -> Vec<Polyline> {
-        contour::contour(self, false)
-    }
-
-    /// The stable region: closed polylines along its edge and the edge of the map, anticlockwise around stable cells and clockwise around the
-    /// others, to be filled by either rule.
-    #[must_use]
-    pub fn regions(&self) -> Vec<Polyline> {
-        contour::contour(self, true)
-    }
 }
 
 /// One row; `None` if it was stopped.
@@ -234,12 +218,12 @@ fn cells(
 
 /// As many values from the low end of the range to the high one, both included, at equal distances; of one the low end.
 pub(crate) fn nodes(range: &KeyRange, count: usize) -> Vec<f64> {
-    let last = crate::structure::count(count.saturating_sub(1));
+    let last = crate::rounding::real(count.saturating_sub(1));
     let node = |number: usize| {
         if number + 1 == count && number > 0 {
             return range.high;
         }
-        let share = if number == 0 { 0.0 } else { crate::structure::count(number) / last };
+        let share = if number == 0 { 0.0 } else { crate::rounding::real(number) / last };
         (range.low + (range.high - range.low) * share).min(range.high)
     };
     (0..count).map(node).collect()

@@ -1,5 +1,6 @@
 //! Maps of scenes, and lines in maps made up.
 
+use super::contour::Polyline;
 use super::*;
 use crate::paper_scene::PAPER;
 

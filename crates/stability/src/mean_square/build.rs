@@ -7,7 +7,6 @@ use super::bursts::Bursts;
 use super::events::{Arrive, Events, Step};
 use super::held::staying;
 use super::law::LossChain;
-use super::nanoseconds;
 use super::tracked::Tracked;
 use crate::lifted::Lifted;
 use crate::lifted::node::Scale;
@@ -194,4 +193,8 @@ fn gap(sample: i64, sends: &[u64], frame: u64) -> f64 {
     let place = usize::try_from(sample.rem_euclid(count)).unwrap_or(0);
     let before = if place == 0 { sends[sends.len() - 1].wrapping_sub(frame) } else { sends[place - 1] };
     Duration::from_nanos(sends[place].wrapping_sub(before)).as_secs_f64()
+}
+
+pub(super) fn nanoseconds(span: Duration) -> u64 {
+    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -29,8 +29,9 @@ use super::variance::Variance;
 use crate::Matrix;
 use crate::lifted::Lifted;
 use crate::lifted::node::{External, Scale, Scratch};
+use crate::rounding::real;
 use crate::spectrum::{Schur, Workspace};
-use crate::structure::count;
+
 use crate::timetable::{Event, Timetable};
 
 /// How near to the true γ the search ends, relative to it.
@@ -101,7 +102,7 @@ impl Equal {
         for (delivery, left) in deliveries.iter_mut().zip(&left[1..]) {
             delivery.at_end = *left;
         }
-        Self { peers: count(peers), timetable, deliveries, depth: hazards.depth(), kept: left[0] }
+        Self { peers: real(peers), timetable, deliveries, depth: hazards.depth(), kept: left[0] }
     }
 
     /// The radius of the second moment of what acts, over a frame; `None` where the numbers leave their range.

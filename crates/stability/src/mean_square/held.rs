@@ -22,7 +22,7 @@ pub(crate) fn staying(states: usize, frame: &[Vec<Outcome>]) -> Radius {
         stay = step.times(&stay);
         roundings += states + outcomes.len() + 1;
     }
-    let rounding = f64::EPSILON * crate::structure::count(roundings);
+    let rounding = f64::EPSILON * crate::rounding::real(roundings);
     match states {
         1 => Radius { value: stay[(0, 0)], error: rounding * stay[(0, 0)] },
         _ => spectrum::bounded_radius(&stay, rounding),

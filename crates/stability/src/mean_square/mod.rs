@@ -34,18 +34,20 @@ use std::time::Duration;
 use cohaptic_scene::Scene;
 
 use self::arrivals::Hazards;
-use self::build::{Line, events_watched};
+use self::build::{Line, events_watched, nanoseconds};
 pub(crate) use self::equal::{Equal, EqualScratch};
 use self::law::{LinkLaw, is_random};
 use self::positive::{Positive, radius_watched};
 use self::symmetric::Symmetric;
-use crate::analysis::{CHANGES_LEFT_OUT, Combination, UNLOADED, pairs};
+use crate::analysis::{CHANGES_LEFT_OUT, UNLOADED};
+use crate::combinations::{Combination, pairs};
 use crate::cost::PASSES;
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
 use crate::pieces::{refuse_topology, split};
-use crate::structure::{Contacts, Structure, count, has_equal_clocks, linear_law};
+use crate::rounding::real;
+use crate::structure::{Contacts, Structure, has_equal_clocks, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
 use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, PartCost, Radius, Verdict, Watch};
 
@@ -303,7 +305,7 @@ impl Found {
         watch: &dyn Watch,
     ) -> Result<Self, AnalysisError> {
         let unknowns = operator.unknowns();
-        PartCost { states: unknowns, bytes: 8.0 * count(unknowns), operations: PASSES * operations }.begin(watch)?;
+        PartCost { states: unknowns, bytes: 8.0 * real(unknowns), operations: PASSES * operations }.begin(watch)?;
         let radius = radius_watched(operator, operations, watch).ok_or(AnalysisError::Stopped)?;
         Ok(Self { radius, held, method, frame, unknowns: operator.unknowns() })
     }
@@ -493,7 +495,7 @@ fn one_by_one(
     let class_of = |peer: usize| structure.classes.iter().position(|class| class.contains(&peer)).unwrap_or(0);
     let nodes: Vec<Node> = (0..peers).map(|peer| structure.node(scene, class_of(peer))).collect();
     debug_assert_eq!(nodes.iter().map(|node| node.device.is_some()).collect::<Vec<_>>(), contacts.touching);
-    let share = 1.0 / count(peers - 1);
+    let share = 1.0 / real(peers - 1);
     let weights = Matrix::from_fn(peers, peers, |row, column| if row == column { 0.0 } else { share });
     let quotient = structure.quotient(scene, &nodes);
     let lifted = Lifted { nodes: &nodes, weights: &weights, timetable: &timetable, tied, ..quotient };
@@ -521,7 +523,7 @@ const BEYOND_HORIZON: &str = "its samples may be held for longer than the strate
 /// before one is older than `horizon` \[s\], up to which a law extrapolates; but for a probability of [`NEVER`].
 fn within_horizon(horizon: Option<f64>, frame: Duration, stays: Radius, depth: usize) -> bool {
     horizon.is_none_or(|horizon| {
-        let frames = horizon / frame.as_secs_f64() - count(depth + 1);
+        let frames = horizon / frame.as_secs_f64() - real(depth + 1);
         frames >= 0.0 && stays.value.powf(frames.floor()) <= NEVER
     })
 }
@@ -541,13 +543,9 @@ fn within(cost: FrameCost, limits: &Limits<'_>) -> Result<(), AnalysisError> {
     if operations > limits.operations {
         return Err(AnalysisError::TooManyOperations { operations, most: limits.operations });
     }
-    if cost.numbers() > count(MOST_NUMBERS) {
+    if cost.numbers() > real(MOST_NUMBERS) {
         let unknowns = cost.rows.checked_mul(cost.rows).and_then(|square| square.checked_mul(cost.joint));
         return Err(AnalysisError::TooManyMoments { joint: Some(cost.joint), unknowns, most: MOST_NUMBERS });
     }
     Ok(())
-}
-
-fn nanoseconds(span: Duration) -> u64 {
-    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -14,11 +14,11 @@
 //! A computation of sums, products and constants changes each of its terms by at most as many roundings as the term goes through. If these are at most K
 //! (`roundings`) and S are the sizes of the terms of each entry, added up (`sizes`), then the computed image is within γ_K·S of the exact image (Higham 2002,
 //! Section 3.1). That γY − L(Y) is positive definite whatever these errors are is shown by Cholesky's factorisation with Rump's criterion
-//! (`worst_case::verified`). That Y is not is shown by an entry of its diagonal below zero, with no rounding at all. So the bounds hold for the operator with
+//! (`definite`). That Y is not is shown by an entry of its diagonal below zero, with no rounding at all. So the bounds hold for the operator with
 //! the coefficients as stored, and as far as the errors of these are counted among the roundings for the exact one; numbers that underflow are not counted.
 
-use crate::worst_case::rounding::{gamma, outward};
-use crate::worst_case::verified::is_positive;
+use crate::definite::is_positive;
+use crate::rounding::{gamma, outward};
 use crate::{Matrix, Radius, Watch};
 
 /// An operator on symmetric matrices, or tuples of them, that maps positive ones to positive ones. Elements are vectors of coordinates.

@@ -26,7 +26,8 @@ use super::tracked::Tracked;
 use crate::Matrix;
 use crate::lifted::Lifted;
 use crate::lifted::node::Scale;
-use crate::structure::count;
+use crate::rounding::real;
+
 use crate::timetable::Event;
 
 /// One frame of equal peers.
@@ -121,14 +122,14 @@ impl Symmetric {
             states.resize(size, moved);
             (states, moved)
         });
-        Self { peers: count(peers), count: peers, steps, size, translation, position: rows.object, roundings }
+        Self { peers: real(peers), count: peers, steps, size, translation, position: rows.object, roundings }
     }
 
     /// How many operations an image is: at each step two blocks go from one side and from the other through its matrix.
     pub(crate) fn operations(&self) -> f64 {
         let of = |step: &Step| match step {
-            Step::Move { map: Map { own, .. }, .. } => 4.0 * count(own.rows()) * count(own.columns()) * (count(own.rows()) + count(own.columns())),
-            Step::Deliver { .. } => 4.0 * count(self.size) * count(self.size),
+            Step::Move { map: Map { own, .. }, .. } => 4.0 * real(own.rows()) * real(own.columns()) * (real(own.rows()) + real(own.columns())),
+            Step::Deliver { .. } => 4.0 * real(self.size) * real(self.size),
         };
         self.steps.iter().map(of).sum()
     }

@@ -26,7 +26,7 @@ fn found(overrides: &[&str]) -> MeanSquare {
 fn both_ways(overrides: &[&str]) -> (Radius, Radius) {
     let scene = scene(overrides);
     let network = NominalNetwork::of(&scene).unwrap();
-    let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
+    let contacts = crate::combinations::whole(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
     let one = symmetric(&scene, &network, &structure, &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap().unwrap();
     let other = one_by_one(&scene, &network, &structure, &contacts, &[], &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap();
@@ -81,7 +81,7 @@ fn by_symmetry_and_one_by_one_agree() {
 fn by_noise(overrides: &[&str]) -> f64 {
     let scene = scene(overrides);
     let network = NominalNetwork::of(&scene).unwrap();
-    let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
+    let contacts = crate::combinations::whole(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
     let Followed::Equal { frame, .. } = Followed::of(&scene, &network, &structure).unwrap() else { panic!("{overrides:?}: not equal peers") };
     let node = structure.node(&scene, 0);
@@ -113,7 +113,7 @@ fn the_noise_of_losses_makes_the_radius_of_the_second_moment() {
             let overrides = [link, &[count.as_str()]].concat();
             let scene = scene(&overrides);
             let network = NominalNetwork::of(&scene).unwrap();
-            let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
+            let contacts = crate::combinations::whole(&scene).unwrap().remove(0).contacts;
             let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
             let expected = symmetric(&scene, &network, &structure, &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap().unwrap().radius;
             let found = by_noise(&overrides);
@@ -142,7 +142,7 @@ impl Explicit {
     /// Where a state leads if exactly those links (by receiver and sender) lose.
     fn lead(&self, mut z: Vec<f64>, lost: &dyn Fn(usize, usize) -> bool) -> Vec<f64> {
         let step = Duration::from_millis(1);
-        let mass = 0.45 / count(self.peers);
+        let mass = 0.45 / real(self.peers);
         let device = Plant { mass: 0.1, damping: 5.0, stiffness: 0.0 }.step(step, Integrator::Exact);
         let copy = Plant { mass, damping: 0.0, stiffness: 0.0 }.step(step, Integrator::Exact);
         let (kt, bt, kc, bc) = (1000.0, 5.0, 3500.0, 5.0);
@@ -164,7 +164,7 @@ impl Explicit {
             for to in 0..self.peers {
                 let [xh, vh, x, v] = [0, 1, 2, 3].map(|k| z[4 * to + k]);
                 let others: Vec<usize> = (0..self.peers).filter(|from| *from != to).map(|from| self.held(to, from)).collect();
-                let mean = |k: usize| others.iter().map(|held| z[held + k]).sum::<f64>() / count(others.len());
+                let mean = |k: usize| others.iter().map(|held| z[held + k]).sum::<f64>() / real(others.len());
                 let coupling = kc * (xh - x) + bc * (vh - v);
                 let coordination = kt * (x - mean(0)) + bt * (v - mean(1));
                 for (place, map, force) in [(0, &device, -coupling), (2, &copy, coupling - coordination)] {
@@ -406,7 +406,7 @@ fn the_mean_of_many_runs_is_what_the_operator_says() {
     let (loss, explicit) = (0.4, Explicit { peers: 2, frames: 1 });
     let scene = scene(&["scene.count=2", "link.loss=0.4"]);
     let network = NominalNetwork::of(&scene).unwrap();
-    let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
+    let contacts = crate::combinations::whole(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
     let timetable = Timetable::new(&[NodeClock::of(&scene, 0), NodeClock::of(&scene, 1)], &[]).unwrap();
     let instants = Instants::of(&timetable);
@@ -447,11 +447,11 @@ fn the_mean_of_many_runs_is_what_the_operator_says() {
         }
         for (what, place, explicit) in [("device", device, 0), ("copy", copy, 6)] {
             let squares = || starts.iter().map(|state| state[explicit] * state[explicit]);
-            let mean = squares().sum::<f64>() / count(RUNS);
-            let variance = squares().map(|square| (square - mean) * (square - mean)).sum::<f64>() / count(RUNS - 1);
+            let mean = squares().sum::<f64>() / real(RUNS);
+            let variance = squares().map(|square| (square - mean) * (square - mean)).sum::<f64>() / real(RUNS - 1);
             let off = mean - expected[(place, place)];
             // 24 comparisons at five standard errors: one in 70,000 seeds fails. At first nothing has been left to chance.
-            let allowed = 5.0 * (variance / count(RUNS)).sqrt() + 1e-12;
+            let allowed = 5.0 * (variance / real(RUNS)).sqrt() + 1e-12;
             assert!(off.abs() < allowed, "{what} after {frame} frames: {mean} instead of {}, {off} > {allowed}", expected[(place, place)]);
         }
     }

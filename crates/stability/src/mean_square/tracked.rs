@@ -86,7 +86,7 @@ impl Tracked {
     /// At least the size of each entry, and a [`SHARE`]-th of the terms that it was added up from, on average over the events. Little more than the former:
     /// a coefficient that is larger here grows from step to step.
     pub(crate) fn sizes(&self) -> Matrix {
-        let share = 1.0 / crate::structure::count(SHARE * self.events.max(1));
+        let share = 1.0 / crate::rounding::real(SHARE * self.events.max(1));
         Matrix::from_fn(self.value.rows(), self.value.columns(), |row, column| self.value[(row, column)].abs().max(self.terms[(row, column)] * share))
     }
 

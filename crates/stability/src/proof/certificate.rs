@@ -10,10 +10,12 @@ use cohaptic_scene::TopologyKind;
 
 use super::corners::{Common, Point, States, states};
 use super::discs::{FreeCircle, Witness};
+use super::error::ProofError;
+use super::guarantee::{Guarantee, Proven};
 use super::halving::Ranges;
 use super::steps::FrameState;
-use super::{Guarantee, ProofError, Proven};
-use crate::graph::{eigenvectors, weights_of};
+use crate::graph::enclosed::eigenvectors;
+use crate::graph::weights_of;
 use crate::{Family, Matrix};
 
 /// A box of keys, and the numbers by which its verdict can be checked.

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 use cohaptic_peer::{Gains, StepMap};
 
-use super::ProofError;
+use super::error::ProofError;
 use super::span::{FrameSpan, StepSpan};
 use super::steps::{FrameState, Numbers, Plan, Plans, StepMatrix};
 use crate::Matrix;

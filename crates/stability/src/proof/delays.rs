@@ -5,7 +5,7 @@
 
 use cohaptic_scene::Scene;
 
-use super::ProofError;
+use super::error::ProofError;
 use crate::KeyRange;
 
 /// More stretches than this are refused.

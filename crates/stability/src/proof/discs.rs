@@ -14,12 +14,12 @@
 
 use num_complex::Complex64;
 
-use super::Proven;
 use super::basis::{Basis, solved};
+use super::guarantee::Proven;
 use super::span::{StepSpan, absolute};
 use crate::Matrix;
 use crate::matrix::ComplexMatrix;
-use crate::worst_case::rounding::{gamma, outward, real};
+use crate::rounding::{gamma, outward, real};
 
 /// A verdict on all matrices of a box, and the numbers by which anybody can check it.
 pub(super) struct Decision {

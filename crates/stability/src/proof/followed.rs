@@ -9,21 +9,23 @@ use super::certificate::{BoxCertificate, Certified, Named, PartCertificate};
 use super::corners::{Common, Point, doubled, steps};
 use super::delays;
 use super::discs::decide;
+use super::error::ProofError;
 use super::growing::{ENDLESS, nu, plans_of, weights_of_growing};
+use super::guarantee::{Guarantee, Proven};
 use super::server::Server;
 use super::steps::Plans;
 use super::waves::{self, Waves};
-use super::{Guarantee, ProofError, Proven};
-use crate::analysis::{on_this_topology, pairs};
-use crate::graph::{EnclosedSpectrum, node_on};
+use crate::combinations::pairs;
+use crate::graph::enclosed::EnclosedSpectrum;
+use crate::graph::{node_on, on_this_topology};
 use crate::lifted::Node;
 use crate::network::NominalNetwork;
 use crate::parts::alone;
 use crate::pieces::pieces;
+use crate::rounding::real;
 use crate::structure::Structure;
 use crate::timetable::Timetable;
-use crate::worst_case::rounding::real;
-use crate::{AnalysisError, Family, FamilyError, Graph, GraphError, Matrix, Verdict, Watch};
+use crate::{AnalysisError, Family, FamilyError, Graph, GraphError, Matrix, Verdict, Watch, has_chance};
 
 /// One motion in one combination of contacts: the classes of its peers, for all values of the keys.
 pub(super) struct Motion {
@@ -232,7 +234,7 @@ fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, O
     };
     // Values inside tell peers apart that are equal by chance at an end.
     let scenes = [at(&|key| keys[key].odd(key))?, at(&|key| keys[key].low)?, at(&|key| keys[key].high)?];
-    scenes.iter().try_for_each(super::refuse)?;
+    scenes.iter().try_for_each(refuse)?;
     let graph = scenes[0].topology.as_ref().map(|topology| Graph::from(&**topology));
     let scenes: Vec<Cow<'_, Scene>> = scenes.iter().map(mutual).collect();
     let all = scenes.iter().map(|scene| pieces(scene, "a proof")).collect::<Result<Vec<_>, _>>()?;
@@ -429,4 +431,9 @@ impl Motion {
         }
         doubled(&points, |point, upper| Point { weights: weights[usize::from(upper)].clone(), ..point.clone() })
     }
+}
+
+/// Refuses scenes of which a deterministic frame is not all.
+fn refuse(scene: &Scene) -> Result<(), ProofError> {
+    if has_chance(scene) { Err(ProofError::Chance) } else { Ok(()) }
 }

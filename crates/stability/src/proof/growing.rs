@@ -16,19 +16,21 @@ use cohaptic_scene::Scene;
 use super::certificate::{Certified, Named};
 use super::corners::{Common, Growth, Point, doubled, steps, steps_beyond};
 use super::discs::decide;
+use super::error::ProofError;
+use super::guarantee::Proven;
 use super::program::NamedFrame;
 use super::span::FrameSpan;
 use super::steps::Plans;
 use super::waves::{self, Part, Waves};
-use super::{ProofError, Proven};
-use crate::analysis::pairs;
+use crate::combinations::pairs;
 use crate::lifted::Node;
 use crate::lifted::node::Body;
 use crate::network::NominalNetwork;
 use crate::parts::alone;
 use crate::pieces::pieces;
+use crate::rounding::real;
 use crate::spectrum::radius;
-use crate::structure::{Structure, check_laws, classes, count};
+use crate::structure::{Structure, check_laws, classes};
 use crate::{Matrix, Verdict};
 
 /// As good as without end: a weight of 1/(N − 1) is below a rounding.
@@ -295,9 +297,9 @@ impl Motion {
     /// How large each class is beside the one that grows; of itself it does not matter.
     fn shares(&self, nu: f64) -> Vec<f64> {
         let classes = &self.structure.classes;
-        let others = count(self.structure.peers - classes[self.growing].len());
+        let others = real(self.structure.peers - classes[self.growing].len());
         (0..classes.len())
-            .map(|class| if class == self.growing { 1.0 } else { count(classes[class].len()) * nu / (1.0 - (others - 1.0) * nu) })
+            .map(|class| if class == self.growing { 1.0 } else { real(classes[class].len()) * nu / (1.0 - (others - 1.0) * nu) })
             .collect()
     }
 
@@ -430,14 +432,14 @@ pub(super) fn plans_of(structure: &Structure) -> (Plans, Vec<Plans>) {
 /// The weights of the averages of classes (columns) in the targets of classes (rows), of which one grows, or the weight of a difference in itself: constants, and multiples of ν.
 pub(super) fn weights_of_growing(structure: &Structure, growing: usize, nu: f64, is_difference: bool) -> Matrix {
     let classes = &structure.classes;
-    let others = count(structure.peers - classes[growing].len());
+    let others = real(structure.peers - classes[growing].len());
     let size = if is_difference { 1 } else { classes.len() };
     Matrix::from_fn(size, size, |row, column| {
         let own = f64::from(u8::from(row == column));
         let (constant, slope) = match column {
             _ if is_difference => (0.0, -1.0),
             _ if column == growing => (1.0, 1.0 - others - own),
-            _ => (0.0, count(classes[column].len()) - own),
+            _ => (0.0, real(classes[column].len()) - own),
         };
         constant + slope * nu
     })
@@ -455,5 +457,5 @@ pub(super) fn nu(number: u64) -> f64 {
 }
 
 fn count_of(number: u64) -> f64 {
-    usize::try_from(number).map_or(f64::INFINITY, count)
+    usize::try_from(number).map_or(f64::INFINITY, real)
 }

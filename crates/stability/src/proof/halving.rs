@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::{Guarantee, ProofError};
+use super::error::ProofError;
+use super::guarantee::Guarantee;
 use crate::Watch;
-use crate::worst_case::rounding::real;
+use crate::rounding::real;
 
 /// From which value of each key to which.
 pub(super) type Ranges = Vec<[f64; 2]>;

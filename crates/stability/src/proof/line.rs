@@ -1,10 +1,12 @@
 //! A line along one key: stretches of which each is proven stable or proven unstable, and between them stretches that hold every crossing.
 
+use super::certificate::BoxCertificate;
 use super::certificate::uncertified;
+use super::error::ProofError;
 use super::followed::{Followed, certify};
+use super::guarantee::Guarantee;
 use super::halving::{Halved, Halving};
-use super::shared::{KnownPieces, NothingKnown};
-use super::{BoxCertificate, Guarantee, ProofError};
+use super::known::{KnownPieces, NothingKnown};
 use crate::{Family, Watch};
 
 /// Values of a key from one to another, and the verdict on all scenes with them.

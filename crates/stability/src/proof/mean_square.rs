@@ -19,10 +19,12 @@ use cohaptic_peer::Gains;
 
 use super::certificate::MomentCertificate;
 use super::corners::{check_units, enclosed, takes_one_past};
+use super::error::ProofError;
 use super::growing::{ENDLESS, Growing, Motion, WIDER, nu};
+use super::guarantee::Proven;
 use super::span::StepSpan;
 use super::steps::{StepMatrix, error};
-use super::{ProofError, Proven};
+use crate::definite::is_positive;
 use crate::factorisation::{cholesky, triangle_inverse};
 use crate::lifted::node::{External, Scale, Scratch};
 use crate::lifted::{Lifted, Node, Sampling};
@@ -30,9 +32,8 @@ use crate::mean_square::Independent;
 use crate::mean_square::positive::{Positive, is_definite, is_indefinite, leaves_less, radius_watched, solution};
 use crate::mean_square::symmetric::Symmetric;
 use crate::network::NominalNetwork;
+use crate::rounding::{UNIT, gamma, real};
 use crate::timetable::Event;
-use crate::worst_case::rounding::{UNIT, gamma, real};
-use crate::worst_case::verified::is_positive;
 use crate::{Matrix, Unwatched, Verdict};
 
 /// The second moments of a scene with more and more equal peers.

@@ -4,9 +4,10 @@
 use cohaptic_scene::Scene;
 
 use super::certificate::{NumberCertificate, needed};
+use super::error::ProofError;
 use super::growing::{ENDLESS, Growing, PartPlace};
+use super::guarantee::{Guarantee, Proven};
 use super::mean_square::GrowingMoments;
-use super::{Guarantee, ProofError, Proven};
 use crate::network::NominalNetwork;
 use crate::pieces::refuse_topology;
 use crate::{AnalysisError, Watch, has_chance};

@@ -5,6 +5,7 @@
 use serde_json::Value;
 
 use super::followed::Followed;
+use super::guarantee::Proven;
 use super::mutation::{Mutation, with};
 use super::*;
 use crate::{Family, KeyRange};

@@ -5,15 +5,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::ProofError;
 use super::certificate::Named;
 use super::corners::{Point, States, enclosed};
+use super::error::ProofError;
 use super::span::FrameSpan;
 use super::steps::{FrameState, StepMatrix};
 use crate::Matrix;
 use crate::lifted::Node;
 use crate::lifted::node::Scale;
-use crate::worst_case::rounding::real;
+use crate::rounding::real;
 
 /// A number that operations set and read.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]

@@ -1,10 +1,12 @@
 //! A whole region of two keys: boxes of which each is proven stable or proven unstable, and a rest that is not decided.
 
+use super::certificate::BoxCertificate;
 use super::certificate::uncertified;
+use super::error::ProofError;
 use super::followed::{Followed, certify};
+use super::guarantee::Guarantee;
 use super::halving::{Halved, Halving};
-use super::shared::{KnownPieces, NothingKnown};
-use super::{BoxCertificate, Guarantee, ProofError};
+use super::known::{KnownPieces, NothingKnown};
 use crate::{Family, Watch};
 
 /// A box of two keys, and the verdict on all scenes in it.

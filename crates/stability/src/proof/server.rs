@@ -10,8 +10,8 @@ use cohaptic_peer::Gains;
 use cohaptic_peer::coordination::{Coordination, LawValue};
 use cohaptic_scene::Scene;
 
-use super::ProofError;
 use super::corners::Point;
+use super::error::ProofError;
 use super::heard::Heard;
 use super::program::{NamedFrame, Operation, Program, Register, Sum};
 use super::pushed::{Pushed, StateRegisters, coupling, device, moved, negative, state};
@@ -20,7 +20,8 @@ use crate::lifted::Node;
 use crate::lifted::node::Scale;
 use crate::linear_form::LinearLaw;
 use crate::network::NominalNetwork;
-use crate::structure::{Contacts, Structure, count};
+use crate::rounding::real;
+use crate::structure::{Contacts, Structure};
 use crate::timetable::{Event, Timetable};
 
 /// The coordination of a server with its clients.
@@ -70,7 +71,7 @@ impl Server {
     /// A frame over a box, of the averages of classes or of how the members of one differ. `ends`: the nodes of that part at the corners of the box.
     pub(super) fn frame(self, structure: &Structure, ends: &[Vec<Node>], apart: Option<usize>, time: f64) -> Result<NamedFrame, ProofError> {
         // Of each class, how many members send to the server.
-        let sizes = Matrix::from_fn(1, structure.classes.len(), |_, class| count(structure.classes[class].len()));
+        let sizes = Matrix::from_fn(1, structure.classes.len(), |_, class| real(structure.classes[class].len()));
         let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: sizes.clone() }).collect();
         let scale = Scale { time, compliance: ends[0][0].compliance(time) };
         let heard = Heard::new(&structure.timetable);

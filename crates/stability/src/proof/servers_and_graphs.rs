@@ -6,9 +6,10 @@ use cohaptic_scene::Scene;
 
 use super::server::Server;
 use super::*;
+use crate::lifted::Node;
 use crate::paper_scene::PAPER;
 use crate::structure::{Contacts, Structure};
-use crate::{Family, KeyRange, Method, Unwatched, Verdict, analyse, bounded_radius, monodromy};
+use crate::{Family, KeyRange, Matrix, Method, Unwatched, Verdict, analyse, bounded_radius, monodromy};
 
 const SERVER: &str = "coordination.strategy=\"client-server\"";
 const OBJECT: &str = "coordination.client-server.returns=\"object\"";

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use super::steps::StepMatrix;
 use crate::Matrix;
-use crate::worst_case::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
+use crate::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
 
 /// A matrix over a box.
 #[derive(Clone, Debug)]

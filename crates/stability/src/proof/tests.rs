@@ -2,11 +2,15 @@
 
 use cohaptic_scene::Scene;
 
+use super::corners::{Common, Point};
 use super::discs::decide;
+use super::guarantee::Proven;
 use super::span::StepSpan;
+use super::steps::Plans;
 use super::*;
-use crate::structure::count;
-use crate::{Family, KeyRange, Matrix, Method, Unwatched, Verdict, Watch, analyse};
+
+use crate::rounding::real;
+use crate::{AnalysisError, Family, KeyRange, Matrix, Method, Unwatched, Verdict, Watch, analyse};
 
 const SCENE: &str = r#"
     scene = { duration = "1s", count = 2 }
@@ -141,7 +145,7 @@ fn steps_that_grow_without_end_are_enclosed() {
         let scene = scene(set);
         let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
         let at = |number: usize| {
-            vec![Point { nodes: structure.nodes(&scene.scaled_for(number)), weights: Matrix::from_fn(1, 1, |_, _| -1.0 / count(number - 1)) }]
+            vec![Point { nodes: structure.nodes(&scene.scaled_for(number)), weights: Matrix::from_fn(1, 1, |_, _| -1.0 / real(number - 1)) }]
         };
         // Own samples are heard with gains times 1/(N − 1), which is a constant for PD; for AP it is taken to be one here.
         let heard = |number: usize| {
@@ -160,7 +164,7 @@ fn steps_that_grow_without_end_are_enclosed() {
             let points = [heard(near), heard(times * near)].concat();
             let steps = corners::steps_of_each(&points, common).unwrap().pop().unwrap();
             assert_eq!(steps.len(), box_of_all.len());
-            let by = if growth == corners::Growth::Quadratic { count(times * times) } else { count(times) };
+            let by = if growth == corners::Growth::Quadratic { real(times * times) } else { real(times) };
             for (span, step) in box_of_all.iter().zip(&steps) {
                 for i in 0..span.mean.rows() {
                     for j in 0..span.mean.columns() {
@@ -340,7 +344,7 @@ fn agreeing(family: &Family, region: &ProvenRegion) -> usize {
     let mut decided = 0;
     for (number, one) in region.boxes.iter().enumerate().filter(|(_, one)| one.guarantee != Guarantee::Undecided) {
         // Points differ from box to box, spread by the golden ratio.
-        let share = |place: usize, irrational: f64| (count(number + 1) * (count(place) + irrational) * 0.618_033_988_749_894_9).fract();
+        let share = |place: usize, irrational: f64| (real(number + 1) * (real(place) + irrational) * 0.618_033_988_749_894_9).fract();
         let between = |[low, high]: [f64; 2], share: f64| (low + share * (high - low)).clamp(low, high);
         let inside = (0..6).map(|place| [between(one.x, share(place, 0.3)), between(one.y, share(place, 0.7))]);
         let corners = [[one.x[0], one.y[0]], [one.x[1], one.y[0]], [one.x[0], one.y[1]], [one.x[1], one.y[1]]];

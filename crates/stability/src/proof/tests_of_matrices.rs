@@ -2,13 +2,13 @@
 
 use proptest::prelude::*;
 
-use super::Proven;
+use super::guarantee::Proven;
 use super::mutation::{Mutation, with};
 use super::span::{FrameSpan, StepSpan};
 use super::steps::StepMatrix;
 use super::tests::proven;
 use crate::Matrix;
-use crate::structure::count;
+use crate::rounding::real;
 
 /// Samples that move on and are forgotten: all eigenvalues are zero, with a single eigenvector.
 #[test]
@@ -21,7 +21,7 @@ fn a_matrix_without_eigenvalues_but_zero_is_stable() {
 /// Squares of the entries of a frame that grows as much are no numbers.
 #[test]
 fn a_matrix_whose_squares_overflow_is_unstable() {
-    let of = Matrix::from_fn(3, 3, |i, j| if i <= j { 1e180 / count(1 + i + j) } else { 1e170 });
+    let of = Matrix::from_fn(3, 3, |i, j| if i <= j { 1e180 / real(1 + i + j) } else { 1e170 });
     assert_eq!(proven(&StepSpan::constant(of, 1)), Some(Proven::Unstable));
 }
 

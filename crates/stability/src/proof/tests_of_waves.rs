@@ -2,13 +2,15 @@
 
 use cohaptic_scene::{FromScene, Scene};
 
+use super::corners::Point;
 use super::waves::{Part, Waves, with_shares};
 use super::*;
 use crate::full::{Trust, full_along};
+use crate::lifted::Node;
 use crate::network::NominalNetwork;
 use crate::paper_scene::PAPER;
 use crate::structure::Contacts;
-use crate::{Family, KeyRange, Method, Unwatched, Verdict, analyse};
+use crate::{Family, KeyRange, Matrix, Method, Unwatched, Verdict, analyse};
 
 const WAVE: &str = "coordination.strategy=\"wave\"";
 const HOLD: &str = "coordination.wave.on-loss=\"hold\"";

@@ -18,8 +18,8 @@ use cohaptic_peer::Gains;
 use cohaptic_peer::coordination::{Coordination, LawValue};
 use cohaptic_scene::Scene;
 
-use super::ProofError;
 use super::corners::Point;
+use super::error::ProofError;
 use super::program::{NamedFrame, Operation, Program, Register, Sum};
 use super::pushed::{Pushed, copy, coupling, device, moved, negative};
 use crate::Matrix;
@@ -27,9 +27,9 @@ use crate::lifted::Node;
 use crate::lifted::node::Scale;
 use crate::linear_form::{LawRow, LinearLaw};
 use crate::network::NominalNetwork;
-use crate::structure::{Contacts, Structure, count, has_equal_clocks};
+use crate::rounding::real;
+use crate::structure::{Contacts, Structure, has_equal_clocks};
 use crate::timetable::{Event, NodeClock, Timetable, UseOfHeld};
-use crate::worst_case::rounding::real;
 
 /// Coordination by waves over equal links.
 #[derive(Clone, Debug)]
@@ -116,7 +116,7 @@ impl<'a> Part<'a> {
 
     /// The sizes of all classes in units of the size of the class whose P follows.
     pub(super) fn shares(&self) -> Vec<f64> {
-        let size = |class: usize| count(self.structure.classes[class].len());
+        let size = |class: usize| real(self.structure.classes[class].len());
         (0..self.structure.classes.len()).map(|class| size(class) / size(self.rest)).collect()
     }
 }

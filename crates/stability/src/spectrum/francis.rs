@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::hessenberg::TINY_SQUARE;
 use super::square::Square;
-use super::triangle::precise;
+use crate::rounding::real;
 
 /// Sweeps for one eigenvalue before the iteration is given up. Two to four are usual; several eigenvalues near zero in a badly scaled matrix took 150.
 const SWEEPS: u32 = 400;
@@ -35,7 +35,7 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
             let beside = matrix.at(first - 1, first - 1).abs() + matrix.at(first, first).abs();
             // Beside the eigenvalues that it stands between, first. Several eigenvalues at zero never let it sink so far, so later beside the matrix,
             // which is no larger an error than those of the reduction.
-            let beside = if sweeps >= PATIENCE || beside == 0.0 { beside.max(norm / precise(size)) } else { beside };
+            let beside = if sweeps >= PATIENCE || beside == 0.0 { beside.max(norm / real(size)) } else { beside };
             if below <= f64::EPSILON * 0.5 * beside {
                 matrix.put(first, first - 1, 0.0);
                 break;

@@ -17,11 +17,12 @@ mod tests;
 
 use num_complex::Complex64;
 
+use crate::rounding::real;
 use crate::{Matrix, Radius};
 use enclosure::{Enclosure, Interval};
 pub(crate) use schur::Schur;
 use square::{balance, exponent_of, power_of_two};
-use triangle::{Triangle, precise};
+use triangle::Triangle;
 pub(crate) use vectors::eigenvector;
 
 /// The backward error of reduction and iteration as a multiple of n·ε·|A|, |A| Frobenius'. The proven constants are larger (Higham 2002, Section 19.3,
@@ -181,14 +182,14 @@ impl Workspace {
             let exponent = exponent_of(largest).min(1000);
             let down = power_of_two(-exponent);
             // What underflows is lost: less than the least normal number of each entry.
-            let lost = precise(size) * f64::MIN_POSITIVE;
+            let lost = real(size) * f64::MIN_POSITIVE;
             return self.bounded_radius(&matrix.scaled(down), perturbation * down + lost).scaled(power_of_two(exponent));
         }
         let norm = matrix.frobenius_norm();
         if norm < 1e-100 {
             return Radius { value: 0.0, error: norm + perturbation };
         }
-        let own = BACKWARD_ERROR * precise(size) * f64::EPSILON;
+        let own = BACKWARD_ERROR * real(size) * f64::EPSILON;
         let mut found = self.enclosed(matrix, perturbation + own * norm);
         // The matrix may be badly scaled: balanced, rounding hurts less, but the perturbation may grow by the ratio of the scales, and no eigenvalue gets
         // better by more than that ratio. So there is nothing to gain where the perturbation is what counts: radii far above 1 took twice as long.

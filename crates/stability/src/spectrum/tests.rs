@@ -112,7 +112,7 @@ fn nilpotent_chains_are_zero_within_their_bound() {
         // With ε in the corner the eigenvalues are the roots of z^n = ε.
         let mut bent = chain.clone();
         bent[(size - 1, 0)] += 1e-13;
-        let truth = libm::pow(1e-13, 1.0 / precise(size));
+        let truth = libm::pow(1e-13, 1.0 / real(size));
         assert_contains(bounded_radius(&chain, 1e-13), truth);
         assert_contains(bounded_radius(&bent, 0.0), truth);
         // A chain beside an eigenvalue near 1 does not blur it.
@@ -160,11 +160,11 @@ fn jordan_blocks_stay_inside_their_bound_when_they_split() {
             });
             let mut bent = jordan.clone();
             bent[(size - 1, 0)] = epsilon;
-            let truth = 0.75 + libm::pow(epsilon, 1.0 / precise(size));
+            let truth = 0.75 + libm::pow(epsilon, 1.0 / real(size));
             let found = bounded_radius(&jordan, epsilon);
             assert_contains(found, truth);
             // Not absurdly wide: within a factor of the root of what this and rounding make.
-            let scale = libm::pow(epsilon + 1e-14, 1.0 / precise(size));
+            let scale = libm::pow(epsilon + 1e-14, 1.0 / real(size));
             assert!(found.error < 6.0 * scale, "{found:?} for a block of {size} and {epsilon}");
             assert_contains(bounded_radius(&numbers.similar(&jordan), 0.0), 0.75);
         }
@@ -180,7 +180,7 @@ fn perturbed_matrices_stay_inside_the_bound() {
         let inner = Matrix::from_fn(size, size, |row, column| {
             let place = if case % 3 == 0 { row / 3 } else { row };
             if row == column {
-                1.0 - 0.125 * precise(place)
+                1.0 - 0.125 * real(place)
             } else if column > row {
                 numbers.whole(1.0)
             } else {

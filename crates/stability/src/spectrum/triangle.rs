@@ -4,6 +4,7 @@ use num_complex::Complex64;
 
 use super::francis::pair;
 use super::square::Square;
+use crate::rounding::real;
 
 /// The relative rounding error of one complex product, sum or quotient, generously: √5 half-units for a product (Brent, Percival & Zimmermann 2007),
 /// about twice that for a quotient (Higham 2002, Lemma 3.5).
@@ -222,7 +223,7 @@ impl Triangle {
     fn divide(&mut self, place: usize, value: Complex64, carried: f64, magnitude: f64, difference: Complex64) -> f64 {
         let scale = 1.0 / difference.norm_sqr();
         let quotient = value * difference.conj() * scale;
-        let terms = precise(self.size);
+        let terms = real(self.size);
         let doubt = (carried + terms * COMPLEX_ROUNDING * magnitude) * scale.sqrt() + COMPLEX_ROUNDING * quotient.l1_norm();
         self.solution[place] = quotient;
         self.doubt[place] = doubt;
@@ -278,10 +279,4 @@ impl Triangle {
         }
         rows.sqrt() * columns.sqrt()
     }
-}
-
-/// A count as a number.
-#[expect(clippy::cast_precision_loss, reason = "sizes of matrices are far below 2^53")]
-pub(super) fn precise(count: usize) -> f64 {
-    count as f64
 }

@@ -2,10 +2,10 @@
 
 use num_complex::Complex64;
 
-use super::triangle::precise;
 use crate::Matrix;
 use crate::factorisation::Lu;
 use crate::matrix::ComplexMatrix;
+use crate::rounding::real;
 
 /// Solves for one vector: the first leads into the space of the eigenvalue, the second makes up for a start that was nearly orthogonal to it.
 const STEPS: usize = 2;
@@ -33,7 +33,7 @@ pub(crate) fn eigenvector(matrix: &Matrix, value: Complex64, place: usize) -> Op
 /// A vector without a pattern, another for each place: the fractions of multiples of the golden ratio.
 fn start(size: usize, place: usize) -> Vec<Complex64> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
-    let entry = |row: usize| precise((row + 1) * (place + 1)) * GOLDEN;
+    let entry = |row: usize| real((row + 1) * (place + 1)) * GOLDEN;
     (0..size).map(|row| Complex64::from(entry(row) - entry(row).floor() + 0.5)).collect()
 }
 
@@ -56,7 +56,7 @@ mod tests {
                 let vector = eigenvector(&matrix, value, place).unwrap();
                 let left = residual(&matrix, value, &vector);
                 // The eigenvalue is that of a matrix within n·ε·|A|, and so is the solution.
-                assert!(left < 1e-14 * precise(size) * matrix.frobenius_norm(), "{size}: {left} for {value}");
+                assert!(left < 1e-14 * real(size) * matrix.frobenius_norm(), "{size}: {left} for {value}");
             }
         }
     }

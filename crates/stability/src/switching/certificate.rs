@@ -4,7 +4,7 @@
 
 use cohaptic_peer::Gains;
 
-use super::Asked;
+use super::asked::Asked;
 use crate::inequality::Solution;
 use crate::lifted::{Node, Sampling};
 use crate::proof::digits;

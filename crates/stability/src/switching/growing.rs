@@ -5,7 +5,7 @@
 
 use super::contact_frame::ContactFrame;
 use crate::Watch;
-use crate::worst_case::rounding::real;
+use crate::rounding::real;
 
 /// A motion that grows.
 #[derive(Clone, Copy, PartialEq, Debug)]

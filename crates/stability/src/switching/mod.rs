@@ -35,14 +35,18 @@
 //!
 //! V and the multipliers are checked with bounds of all rounding errors. Where there are none a motion that grows is looked for.
 
+mod along;
+mod asked;
 mod certificate;
 mod contact_frame;
+mod error;
 mod growing;
 mod products;
 #[cfg(test)]
 mod tests;
 
 pub use certificate::{PushCertificate, SwitchingCertificate};
+pub use error::SwitchingError;
 pub use growing::GrowingMotion;
 
 use std::time::Duration;
@@ -51,17 +55,15 @@ use cohaptic_peer::{Contact as ContactKind, Gains};
 use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
-use self::contact_frame::{Contact, ContactFrame, Kind};
-use self::products::{Group, PartFrame, inequality};
-use crate::inequality::{Inequality, rate, search};
-use crate::lifted::{Lifted, Node, Sampling};
+use self::along::Along;
+use self::asked::Asked;
+use self::contact_frame::ContactFrame;
+use crate::inequality::{rate, search};
+use crate::lifted::Node;
 use crate::network::NominalNetwork;
-use crate::parts::lifted_part;
 use crate::pieces::{Piece, pieces};
-use crate::proof::{PartCertificate, stable_difference};
-use crate::structure::{Contacts, Structure, check_laws, count};
-use crate::timetable::Timetable;
-use crate::{AnalysisError, Guarantee, Matrix, Method, PartKind, Watch};
+use crate::structure::{Structure, check_laws};
+use crate::{AnalysisError, Guarantee, Watch};
 
 /// The answer of [`prove_switching`].
 #[derive(Clone, PartialEq, Debug)]
@@ -89,46 +91,6 @@ pub struct SwitchingMotion {
     pub certificate: Option<SwitchingCertificate>,
 }
 
-/// Why nothing can be said of contacts that switch.
-#[derive(Clone, PartialEq, Debug, thiserror::Error)]
-pub enum SwitchingError {
-    /// The scene cannot be analysed.
-    #[error(transparent)]
-    Analysis(#[from] AnalysisError),
-    /// Nothing opens or closes.
-    #[error(
-        "no contact of this scene opens or closes: expected contact = {{ push = … }} or an enclosure; the verdict without this option is all there is to say"
-    )]
-    NoContact,
-    /// Something is left to chance.
-    #[error(
-        "links leave something to chance, and a guarantee is about one sequence of events: expected links without jitter and loss, such as --set link.loss=0 --set link.jitter=0s"
-    )]
-    Chance,
-    /// A spring of a contact is none.
-    #[error("the contact of {what} has no stiffness: expected one above 0")]
-    NoSpring {
-        /// Whose.
-        what: String,
-    },
-    /// The inequality is too large.
-    #[error(
-        "a frame of {ticks} ticks of contacts and {states} states makes an inequality of {rows} rows: expected at most {most}; take a shorter update, slower clocks or more peers that are equal"
-    )]
-    TooLarge {
-        /// The ticks of all contacts in a frame.
-        ticks: usize,
-        /// The states of a frame.
-        states: usize,
-        /// The rows.
-        rows: usize,
-        /// The most.
-        most: usize,
-    },
-}
-
-/// The most rows of an inequality, which takes some ten seconds.
-const MOST_ROWS: usize = 150;
 /// The most states of a frame, each peer by itself, of which motions are followed.
 const MOST_FOLLOWED: usize = 400;
 
@@ -186,60 +148,6 @@ fn axes<'p, 's>(piece: &'p Piece<'s>) -> Vec<(&'p Piece<'s>, usize, String)> {
     axes.into_iter().filter(|_| has_contacts).map(|axis| (piece, axis, name(axis))).collect()
 }
 
-/// The contacts of a scene along one axis.
-struct Along<'a> {
-    scene: &'a Scene,
-    axis: usize,
-    contacts: Contacts,
-}
-
-impl<'a> Along<'a> {
-    fn new(piece: &'a Piece<'_>, axis: usize) -> Self {
-        let scene: &Scene = &piece.scene;
-        let touches = |spec: &cohaptic_scene::PeerSpec| match spec.contact {
-            ContactKind::Grasp => true,
-            ContactKind::None => false,
-            ContactKind::Push(direction) => direction.axis == axis,
-        };
-        let touching = scene.peers.iter().map(touches).collect();
-        Self { scene, axis, contacts: Contacts { touching, at_wall: false, absent: piece.absent.clone() } }
-    }
-
-    /// The direction in which a peer pushes.
-    fn pushes(&self, peer: usize) -> Option<bool> {
-        match self.scene.peers[peer].contact {
-            ContactKind::Push(direction) if direction.axis == self.axis => Some(direction.positive),
-            ContactKind::Push(_) | ContactKind::Grasp | ContactKind::None => None,
-        }
-    }
-
-    /// Ties the structure by the arms alone that hold on to the object whatever happens.
-    fn tied(&self, mut structure: Structure) -> Structure {
-        let holds = |class: &Vec<usize>| {
-            self.contacts.touching[class[0]] && self.pushes(class[0]).is_none() && self.scene.device_plant(class[0]).stiffness > 0.0
-        };
-        structure.tied = structure.silent || structure.classes.iter().any(holds);
-        structure
-    }
-
-    /// The contacts of a class, which is that node.
-    fn of_class(&self, structure: &Structure, class: usize, node: usize, walls: bool) -> Result<Vec<Contact>, SwitchingError> {
-        let peer = structure.classes[class][0];
-        let mut all = Vec::new();
-        if let Some(positive) = self.pushes(peer) {
-            let armed = self.scene.device_plant(peer).stiffness > 0.0;
-            all.push(Contact { node, kind: Kind::Push { positive }, gains: self.scene.coupling(peer), armed });
-        }
-        if let Some(wall) = self.scene.object.enclosure.filter(|_| walls) {
-            all.push(Contact { node, kind: Kind::Wall, gains: Gains { stiffness: wall.stiffness, damping: wall.damping }, armed: false });
-        }
-        if all.iter().any(|contact| contact.gains.stiffness <= 0.0) {
-            return Err(SwitchingError::NoSpring { what: self.scene.peers[peer].name.clone() });
-        }
-        Ok(all)
-    }
-}
-
 /// The verdict along an axis, and whether it takes contacts to be open at rest.
 fn of_axis(
     piece: &Piece<'_>,
@@ -273,90 +181,6 @@ fn of_axis(
 fn walled(along: &Along<'_>, nodes: Vec<Node>) -> Vec<Node> {
     let wall = along.scene.object.enclosure.map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
     nodes.into_iter().map(|node| Node { wall, ..node }).collect()
-}
-
-/// The part of a scene along an axis that is looked at.
-struct Asked {
-    groups: Vec<Group>,
-    /// The frames of the parts that have contacts, the groups of these, and whether it is about differences.
-    frames: Vec<(ContactFrame, Vec<usize>, bool)>,
-    /// Of each of these parts, which class its differences are of, and of each of its classes how many numbers of samples of earlier frames it has.
-    parts: Vec<(Option<usize>, Vec<usize>)>,
-    sampling: Sampling,
-    time: f64,
-    tied: bool,
-    /// Whether every part without contacts is stable.
-    rest_is_stable: bool,
-    /// The certificates of these parts, of those that have one.
-    rest: Vec<PartCertificate>,
-}
-
-impl Asked {
-    fn of(along: &Along<'_>, structure: &Structure, nodes: &[Node], watch: &dyn Watch) -> Result<Self, SwitchingError> {
-        let quotient = structure.quotient(along.scene, nodes);
-        let (mut contacts, mut groups) = (Vec::new(), Vec::new());
-        let ticks = quotient.ticks();
-        for (class, members) in structure.classes.iter().enumerate() {
-            for contact in along.of_class(structure, class, class, true)? {
-                let is_wall = contact.kind == Kind::Wall;
-                let has_rest = structure.tied && (is_wall || contact.armed);
-                groups.push(Group { ticks: ticks[class], members: count(members.len()), is_wall, has_rest });
-                contacts.push(contact);
-            }
-        }
-        let history: usize = structure.timetable.depth.iter().sum::<usize>() * quotient.sampling.channels();
-        let states = nodes.iter().map(Node::states).sum::<usize>() + history;
-        let ticks = groups.iter().map(|group| group.ticks).sum::<usize>();
-        let rows = states + 2 * ticks + groups.len();
-        if rows > MOST_ROWS {
-            return Err(SwitchingError::TooLarge { ticks, states, rows, most: MOST_ROWS });
-        }
-        let history = |timetable: &Timetable| timetable.depth.iter().map(|depth| depth * quotient.sampling.channels()).collect::<Vec<_>>();
-        let mut asked = Self {
-            frames: vec![(ContactFrame::new(&quotient, contacts.clone()), (0..groups.len()).collect(), false)],
-            parts: vec![(None, history(&structure.timetable))],
-            groups,
-            rest_is_stable: true,
-            rest: Vec::new(),
-            sampling: quotient.sampling,
-            time: quotient.time,
-            tied: structure.tied,
-        };
-        for class in 0..structure.classes.len() {
-            let Some(timetable) = &structure.apart[class] else { continue };
-            let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-            let lifted = Lifted { nodes: &nodes[class..=class], weights: &weight, timetable, tied: true, ..quotient };
-            let own: Vec<usize> = (0..contacts.len()).filter(|contact| contacts[*contact].node == class).collect();
-            if own.is_empty() {
-                let part = lifted_part(&lifted, PartKind::Apart { peer: structure.classes[class][0] }, 1, Method::Reduced, watch)?;
-                asked.rest_is_stable &= part.radius.value + part.radius.error < 1.0;
-                asked.rest.extend(stable_difference(
-                    &structure.classes[class],
-                    &nodes[class],
-                    structure.difference_weight(),
-                    timetable,
-                    quotient.time,
-                ));
-                continue;
-            }
-            let at_zero = own.iter().map(|contact| Contact { node: 0, ..contacts[*contact] }).collect();
-            asked.frames.push((ContactFrame::new(&lifted, at_zero), own, true));
-            asked.parts.push((Some(class), history(timetable)));
-        }
-        Ok(asked)
-    }
-
-    /// Whether contacts are taken to be open at rest.
-    fn takes_rest(&self) -> bool {
-        self.groups.iter().any(|group| group.has_rest)
-    }
-
-    /// The inequality of all parts that have contacts; `None` if another is not stable.
-    fn inequality(&self) -> Option<Inequality> {
-        let parts: Vec<PartFrame<'_>> =
-            self.frames.iter().map(|(frame, groups, is_apart)| PartFrame { frame, groups, is_apart: *is_apart }).collect();
-        self.rest_is_stable.then(|| inequality(&parts, &self.groups)).flatten()
-    }
 }
 
 /// A motion that grows, each peer by itself and away from walls.

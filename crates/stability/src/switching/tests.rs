@@ -2,9 +2,11 @@
 
 use cohaptic_scene::Scene;
 
+use super::contact_frame::{Contact, Kind};
 use super::*;
-use crate::inequality::{Measured, Part, Row, Solution};
-use crate::{Unwatched, Verdict, analyse};
+use crate::inequality::{Inequality, Measured, Part, Row, Solution};
+use crate::rounding::real;
+use crate::{Matrix, Method, Unwatched, Verdict, analyse};
 
 const PUSHED: &str = r#"
     scene        = { duration = "1s", count = 3 }
@@ -94,7 +96,7 @@ fn beyond(contact: &Contact, depth: f64, gap: f64) -> f64 {
 /// The unknowns of a part in each frame of a motion, with contacts that open and close as they do.
 fn motion(part: &Part, frame: &ContactFrame, beginning: f64) -> Vec<Vec<f64>> {
     let dot = |row: &[f64], values: &[f64]| row.iter().zip(values).map(|(by, value)| by * value).sum::<f64>();
-    let some = |place: usize| 0.1 * libm::sin(1.0 + beginning * (1.0 + count(place)));
+    let some = |place: usize| 0.1 * libm::sin(1.0 + beginning * (1.0 + real(place)));
     let states: Vec<usize> = (0..frame.next.rows()).filter(|row| !frame.loose.contains(row)).chain(frame.next.rows()..frame.next.columns()).collect();
     let mut values: Vec<f64> = (0..frame.next.columns()).map(some).collect();
     let (mut reference, mut seen) = (0.01, Vec::new());
@@ -105,7 +107,7 @@ fn motion(part: &Part, frame: &ContactFrame, beginning: f64) -> Vec<Vec<f64>> {
             let rows = &frame.contacts[place];
             let apart = if frame.reference.is_some() && rows.contact.kind == Kind::Wall { reference } else { 0.0 };
             // Any gap of a device is as good as another.
-            beyond(&rows.contact, dot(&rows.depths[tick], values) + apart, 0.001 * count(place))
+            beyond(&rows.contact, dot(&rows.depths[tick], values) + apart, 0.001 * real(place))
         };
         for place in &frame.order {
             let (rows, tick) = (&frame.contacts[*place], pressed[*place].len());

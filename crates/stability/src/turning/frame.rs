@@ -3,10 +3,11 @@
 use cohaptic_peer::Motion;
 
 use super::algebra::apply;
+use super::displacement::Displacement;
 use super::node::Node;
-use super::rigid::Displacement;
 use crate::cost::{PartCost, pushed_operations};
-use crate::structure::count;
+use crate::rounding::real;
+
 use crate::timetable::{Event, Instants, Timetable};
 use crate::{Matrix, Watch};
 
@@ -64,7 +65,7 @@ impl Turning<'_> {
         }
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
         // As for the general path of objects that do not turn: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
-        let error = 10.0 * f64::EPSILON * count(ticks) * growth * growth * count(kept.len()).sqrt();
+        let error = 10.0 * f64::EPSILON * real(ticks) * growth * growth * real(kept.len()).sqrt();
         Some((matrix, error))
     }
 

@@ -13,7 +13,7 @@ pub(super) fn zero<P>(start: P, size: usize, residual: impl Fn(&P) -> Vec<f64>, 
     let mut damping = 1e-6;
     for _ in 0..MOST_STEPS {
         // Of a residual of some lengths of a metre, rounding leaves this much.
-        if norm(&left) <= 1e-15 * crate::structure::count(size) {
+        if norm(&left) <= 1e-15 * crate::rounding::real(size) {
             break;
         }
         let slope = slope(&place, size, left.len(), &residual, &moved);
@@ -27,7 +27,7 @@ pub(super) fn zero<P>(start: P, size: usize, residual: impl Fn(&P) -> Vec<f64>, 
         let reached = residual(&next);
         if norm(&reached) < norm(&left) {
             (place, left, damping) = (next, reached, (0.1 * damping).max(1e-14));
-        } else if norm(&step) <= f64::EPSILON * crate::structure::count(size) {
+        } else if norm(&step) <= f64::EPSILON * crate::rounding::real(size) {
             break;
         } else {
             damping = (10.0 * damping).min(1e6);

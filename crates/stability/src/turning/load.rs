@@ -18,8 +18,9 @@ use cohaptic_scene::Scene;
 use super::algebra::{IDENTITY, add, apply, cross, product, skew, sum, trace_less, transposed, twice_axial, unit};
 use super::levenberg::zero;
 use super::node::Node;
+use super::stress::{Stress, Twist};
 use crate::AnalysisError;
-use crate::structure::count;
+use crate::rounding::real;
 
 /// Where a copy and its device are.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -74,27 +75,6 @@ struct Forces {
     twist: Triple,
 }
 
-/// How a load changes the equations of a node, in the units of its states.
-#[derive(Clone, Debug)]
-pub(super) struct Stress {
-    /// The torque on the copy by its own turn, but for that of the device.
-    pub(super) own: Matrix3,
-    /// For each peer, the torque on the copy by the turn of its samples and by their angular velocity.
-    pub(super) heard: Vec<[Matrix3; 2]>,
-    pub(super) twist: Option<Twist>,
-}
-
-/// The torque τC and what becomes of it on a device that turns.
-#[derive(Clone, Debug)]
-pub(super) struct Twist {
-    /// δτC by the turn of the copy and of the device, by their angular velocities.
-    pub(super) by: [Matrix3; 4],
-    /// The torque on the device by δτC, by the turn of the copy and by its own.
-    pub(super) back: [Matrix3; 3],
-    /// The torque of the hand by the turn of the device.
-    pub(super) hand: Matrix3,
-}
-
 impl<'a> Loaded<'a> {
     pub(super) fn new(scene: &'a Scene, nodes: &'a [Node]) -> Result<Self, AnalysisError> {
         Ok(Self { scene, nodes, loads: (0..nodes.len()).map(|place| Load::of(scene, place)).collect::<Result<_, _>>()? })
@@ -113,7 +93,7 @@ impl<'a> Loaded<'a> {
 
     /// M̄ of the others.
     fn mean(&self, poses: &[Pose], place: usize) -> Matrix3 {
-        let weight = 1.0 / count(poses.len() - 1);
+        let weight = 1.0 / real(poses.len() - 1);
         let others = || poses.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, pose)| pose.attitude.matrix());
         std::array::from_fn(|row| std::array::from_fn(|column| others().map(|matrix| weight * matrix[row][column]).sum()))
     }
@@ -130,7 +110,7 @@ impl<'a> Loaded<'a> {
 
     fn forces(&self, poses: &[Pose], place: usize) -> Forces {
         let (node, load, pose) = (&self.nodes[place], &self.loads[place], &poses[place]);
-        let (matrix, others) = (pose.attitude.matrix(), count(poses.len() - 1));
+        let (matrix, others) = (pose.attitude.matrix(), real(poses.len() - 1));
         let arm = apply(&matrix, node.grasp);
         let coupling = if node.touching { node.coupling[0].stiffness } else { 0.0 };
         let force: Triple = std::array::from_fn(|axis| coupling * (pose.device[axis] - pose.centre[axis] - arm[axis]));

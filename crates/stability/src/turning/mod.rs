@@ -11,6 +11,7 @@
 //! map of one axis. Angles are multiplied by √(tr J/3m), so that all states are lengths. Peers that are equal, in their grasps too, are taken together.
 
 mod algebra;
+mod displacement;
 mod frame;
 mod levenberg;
 mod load;
@@ -18,28 +19,28 @@ mod node;
 mod peers;
 mod rigid;
 mod spin;
+mod stress;
 #[cfg(test)]
 mod tests;
+mod together;
 
 use std::time::Duration;
 
-use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 
 pub(crate) use self::frame::Turning;
 use self::load::{Loaded, Pose};
-pub(crate) use self::node::Node;
-use self::rigid::Displacement;
 use self::spin::Spin;
-use crate::analysis::{Analysis, ContactMode, combine};
-use crate::cost::{PartCost, eigenvalue_operations};
+pub(crate) use self::together::{Together, allowed, contacts};
+use crate::analysis::combine;
+use crate::cost::eigenvalue_operations;
 use crate::network::NominalNetwork;
 use crate::parts::radius_of;
-use crate::scene_radius::worse;
+use crate::radius::worse;
 use crate::spectrum::{Workspace, bounded_radius};
-use crate::structure::{Contacts, Structure, common_time, linear_law};
+use crate::structure::Structure;
 use crate::timetable::Timetable;
-use crate::{AnalysisError, Matrix, Method, Part, PartKind, Radius, UNLOADED, Unwatched, Watch};
+use crate::{Analysis, AnalysisError, ContactMode, Matrix, Method, Part, PartKind, Radius, UNLOADED, Unwatched, Watch};
 
 /// Analyses an object that turns. [`Method::Full`] takes each peer by itself.
 pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
@@ -140,53 +141,6 @@ pub(crate) fn radius(together: &Together, workspace: &mut Workspace) -> Radius {
     worst
 }
 
-/// The classes of a scene that turns, and what of them moves.
-#[derive(Clone, Debug)]
-pub(crate) struct Together {
-    pub(crate) structure: Structure,
-    nodes: Vec<Node>,
-    time: f64,
-    free: Vec<Displacement>,
-}
-
-impl Together {
-    pub(crate) fn new(scene: &Scene, structure: Structure) -> Self {
-        let nodes: Vec<Node> = structure.classes.iter().map(|class| Node::of(scene, class[0])).collect();
-        let peers = structure.classes.iter().zip(&structure.touching).map(|(class, touching)| (class[0], *touching));
-        let time = common_time(scene, structure.timetable.frame, structure.law(scene, 0).held_by(), peers, false);
-        let free = if structure.silent { Vec::new() } else { rigid::displacements(&nodes) };
-        Self { structure, nodes, time, free }
-    }
-
-    /// With one peer in a class of its own.
-    pub(crate) fn with_alone(scene: &Scene, network: &NominalNetwork, alone: usize, watch: &dyn Watch) -> Result<Self, AnalysisError> {
-        let structure = Structure::with_alone(&[scene], network, &contacts(scene)?, Some(alone))?;
-        allowed(&structure, watch)?;
-        Ok(Self::new(scene, structure))
-    }
-
-    /// The system of the classes' averages.
-    pub(crate) fn turning(&self) -> Turning<'_> {
-        let Self { structure, nodes, time, free } = self;
-        Turning { nodes, weights: &structure.weights, timetable: &structure.timetable, time: *time, free: free.clone() }
-    }
-
-    /// How the members of a class differ.
-    fn apart<'t>(&'t self, class: usize, timetable: &'t Timetable, weight: &'t Matrix) -> Turning<'t> {
-        Turning { nodes: &self.nodes[class..=class], weights: weight, timetable, time: self.time, free: Vec::new() }
-    }
-
-    /// The node of a class.
-    pub(crate) fn node(&self, class: usize) -> &Node {
-        &self.nodes[class]
-    }
-
-    /// What velocities are multiplied by \[s\].
-    pub(crate) const fn time(&self) -> f64 {
-        self.time
-    }
-}
-
 fn mode(scene: &Scene, network: &NominalNetwork, method: Method, watch: &dyn Watch) -> Result<ContactMode, AnalysisError> {
     let contacts = contacts(scene)?;
     let one_by_one = method == Method::Full;
@@ -223,11 +177,6 @@ pub(crate) fn mode_of(together: &Together, method: Method, watch: &dyn Watch) ->
     })
 }
 
-/// Refuses more samples on the way than their matrix may have, before there is room for any of them.
-pub(crate) fn allowed(structure: &Structure, watch: &dyn Watch) -> Result<(), AnalysisError> {
-    PartCost::of_eigenvalues(frame::SAMPLE * structure.timetable.depth.iter().sum::<usize>()).allowed(watch)
-}
-
 /// How many frames of a class on its own the frame of all takes.
 fn repeats(all: &Timetable, own: &Timetable) -> u32 {
     let nanos = |frame: Duration| frame.as_nanos().max(1);
@@ -245,18 +194,4 @@ fn part(turning: &Turning<'_>, kind: PartKind, copies: usize, method: Method, wa
     watch.done(eigenvalue_operations(matrix.rows()));
     let method = if method == Method::Full { Method::Full } else { Method::Reduced };
     Ok(Part { kind, size: matrix.rows(), copies, radius, method })
-}
-
-/// The peers whose devices hold the object. A finger would push along an axis of the world, and a law that looks back or remembers torques would be another state.
-pub(crate) fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
-    if linear_law(scene, 0).is_some_and(|law| law.lag > 0 || !law.memory.is_empty()) {
-        let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
-        return Err(AnalysisError::Turns { what: scene.coordination.strategy.name(), why });
-    }
-    if scene.peers.iter().any(|spec| matches!(spec.contact, Contact::Push(_))) {
-        let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
-        return Err(AnalysisError::Turns { what: "a one-sided contact", why });
-    }
-    let touching = scene.peers.iter().map(|spec| spec.contact == Contact::Grasp).collect();
-    Ok(Contacts { touching, at_wall: false, absent: vec![false; scene.peers.len()] })
 }

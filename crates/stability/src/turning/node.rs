@@ -4,7 +4,7 @@ use cohaptic_peer::rotation::{Spin, Triple};
 use cohaptic_peer::{Contact, Gains, Integrator, Plant, StepMap};
 use cohaptic_scene::Scene;
 
-use super::load::Stress;
+use super::stress::Stress;
 use crate::lifted::Body;
 use crate::structure::linear_law;
 

@@ -14,7 +14,7 @@ use super::frame::{SAMPLE, Turning};
 use super::levenberg::zero;
 use super::load::Pose;
 use super::peers::{Bases, members, slope};
-use super::{Together, allowed, contacts};
+use super::together::{Together, allowed, contacts};
 use crate::network::NominalNetwork;
 use crate::structure::Structure;
 use crate::timetable::Instants;
@@ -152,7 +152,7 @@ impl Spin {
         let samples = (0..poses.len()).map(earlier).collect();
         self.bases = Bases { poses, samples, seen_from: (turn(self.axis, rate * self.frame()), [0.0; 3]) };
         self.rate = rate;
-        let (nodes, time) = (&self.together.nodes, self.together.time);
+        let (nodes, time) = (&self.together.nodes, self.together.time());
         let body_rate = apply(&transposed(&matrix), self.axis.map(|component| rate * component));
         let mut z = Vec::new();
         for node in nodes {

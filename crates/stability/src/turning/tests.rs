@@ -5,6 +5,7 @@ use cohaptic_peer::{Hand, Signal, State};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
+use super::node::Node;
 use super::peers::{Bases, Member, members, slope};
 use super::*;
 

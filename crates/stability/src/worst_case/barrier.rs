@@ -14,10 +14,10 @@
 //! With D a change of the shapes, dS = λD_from − XᵀD_to X, W = S⁻¹, V = XW and Z = XWXᵀ, the second derivative of −ln det S is tr(W dS W dS) =
 //! λ²tr(D_from W D_from W) − 2λtr(D_from VᵀD_to V) + tr(D_to Z D_to Z).
 
-use super::lyapunov::{Component, Factors, largest_square};
+use super::component::{Component, Factors, largest_square};
 use super::norm::mirror;
-use super::rounding::real;
 use crate::factorisation::{cholesky, solve, triangle_inverse};
+use crate::rounding::real;
 use crate::{Matrix, Watch};
 
 /// How much of the distance between λ and the centre's own is kept.

@@ -27,9 +27,9 @@ use super::automaton::Automaton;
 use super::growth::{Approximate, radius_below};
 use super::norm::{Norms, Sharpness, frobenius_norm, norm_above};
 use super::pattern::Edge;
-use super::rounding::{gamma, outward, real, root_above};
 use super::verified::Certificate;
 use crate::factorisation::{cholesky, triangle_inverse};
+use crate::rounding::{gamma, outward, real, root_above};
 use crate::{Matrix, Unwatched, Watch};
 
 /// How long to search.

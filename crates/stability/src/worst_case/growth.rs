@@ -10,8 +10,8 @@
 //! every squaring, but its root of order k does not grow.
 
 use super::norm::{Sharpness, frobenius_norm, norm_above};
-use super::rounding::{UNDERFLOW, gamma, outward, real, root_above, root_below};
 use crate::Matrix;
+use crate::rounding::{UNDERFLOW, gamma, outward, real, root_above, root_below};
 
 /// Powers up to 2^36, where ln(n)/k is far below the rounding of one number.
 const MOST_SQUARINGS: u32 = 36;

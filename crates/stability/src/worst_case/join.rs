@@ -5,7 +5,7 @@
 //! bounds like this over and over is a power iteration (Gaubert & Stott 2020, "Tropical Kraus maps for optimal control of switched systems"); going half
 //! the way in every round keeps it from cycling. Of all rounds the shapes with the smallest rate are kept.
 
-use super::lyapunov::{Component, Factors, largest_square};
+use super::component::{Component, Factors, largest_square};
 use super::norm::gram;
 use crate::factorisation::{cholesky, eigen, triangle_inverse};
 use crate::{Matrix, Watch};
@@ -87,7 +87,7 @@ fn join(first: &Matrix, second: &Matrix) -> Option<Matrix> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lyapunov::Step;
+    use super::super::component::Step;
     use super::*;
 
     #[test]

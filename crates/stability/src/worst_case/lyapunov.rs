@@ -8,19 +8,15 @@
 //! unknowns allows, Newton's method on a barrier goes on from there ([`barrier`](super::barrier)).
 
 use super::automaton::Automaton;
+use super::component::{Component, Step};
 use super::norm::gram;
-use super::rounding::real;
 use super::{barrier, join};
-use crate::factorisation::{eigen, triangle_inverse};
 use crate::{Matrix, Watch};
 
 /// The most unknowns for which a barrier's Hessian, whose factorisation costs their third power, is worth it.
 const MOST_UNKNOWNS: usize = 1300;
 /// Rounds of the first iteration, whose shapes hardly change after that.
 const ROUNDS: usize = 24;
-/// Factors with a Skeel condition number (‖|R||R⁻¹|‖_F) above this are not used: products in their coordinates would lose too many digits.
-const WORST_CONDITION: f64 = 1e7;
-
 /// What a search ends with: believed, not proved.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
@@ -28,31 +24,6 @@ pub(super) struct Found {
     pub rate: f64,
     /// Per node of the pattern.
     pub shapes: Vec<Matrix>,
-}
-
-/// One strongly connected component, with nodes numbered from 0.
-#[derive(Debug)]
-pub(super) struct Component<'a> {
-    /// The number of rows of the matrices.
-    pub size: usize,
-    /// The nodes' numbers in the pattern.
-    pub nodes: Vec<usize>,
-    pub edges: Vec<Step<'a>>,
-}
-
-/// An edge of a component, by its numbering.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Step<'a> {
-    pub from: usize,
-    pub to: usize,
-    pub matrix: &'a Matrix,
-}
-
-/// Factors of the shapes of a component, and the square of the rate that they have.
-#[derive(Clone, Debug)]
-pub(super) struct Factors {
-    pub square: f64,
-    pub factors: Vec<Matrix>,
 }
 
 /// The best shapes that were found, for matrices whose entries are near 1; `None` if the watch ends it.
@@ -70,24 +41,6 @@ pub(super) fn search(automaton: &Automaton, accuracy: f64, watch: &dyn Watch) ->
         }
     }
     Some(found)
-}
-
-impl Component<'_> {
-    /// The edges in the coordinates of the factors; `None` where these are too far from round to be of use.
-    pub(super) fn images(&self, factors: &[Matrix]) -> Option<Vec<Matrix>> {
-        let inverses: Vec<Matrix> = factors.iter().map(triangle_inverse).collect();
-        let usable = factors.iter().zip(&inverses).all(|(factor, inverse)| {
-            let absolute = |of: &Matrix| Matrix::from_fn(self.size, self.size, |i, j| of[(i, j)].abs());
-            // Written so that NaN fails.
-            absolute(factor).times(&absolute(inverse)).frobenius_norm() <= WORST_CONDITION * real(self.size)
-        });
-        usable.then(|| self.edges.iter().map(|step| factors[step.to].times(&step.matrix.times(&inverses[step.from]))).collect())
-    }
-}
-
-/// The largest square of a 2-norm.
-pub(super) fn largest_square(images: &[Matrix]) -> f64 {
-    images.iter().flat_map(|image| eigen(&gram(image)).0).fold(0.0, f64::max)
 }
 
 /// The components that have an edge, by their first edge.

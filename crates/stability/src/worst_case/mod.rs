@@ -19,6 +19,7 @@
 
 mod automaton;
 mod barrier;
+mod component;
 mod gripenberg;
 mod growth;
 mod join;
@@ -26,7 +27,6 @@ mod lyapunov;
 mod norm;
 mod of_scene;
 mod pattern;
-pub(crate) mod rounding;
 #[cfg(test)]
 mod tests;
 pub(crate) mod verified;

@@ -10,8 +10,8 @@
 //! below, n = 1000 and j = 16, has δ < 10⁻⁴. From ‖G^m‖₂ <= ‖Ĝ‖_F/(1 − δⱼ) and the root of order 2m = 2^(j+1) the factor is at most 1 + 2nγₙ. The Frobenius
 //! norm itself is a sum of n² squares and good to γ₍ₙ²₊₂₎.
 
-use super::rounding::{UNDERFLOW, gamma, outward, real, root_above};
 use crate::Matrix;
+use crate::rounding::{UNDERFLOW, gamma, outward, real, root_above};
 
 /// Squarings after which n^(1/4m) is below 1 + 10⁻⁵ for every size that can be worked with.
 const MOST_SQUARINGS: u32 = 17;

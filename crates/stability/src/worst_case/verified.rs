@@ -3,20 +3,15 @@
 //! Shapes P_v > 0, one per node, with AₑᵀP_to Aₑ <= ρ²·P_from for every edge that lies on a cycle, make V(x) = xᵀP_v x shrink by ρ² or more in every
 //! step: no allowed product grows faster than ρ (Philippe, Essick, Dullerud & Jungers 2016).
 //!
-//! The check (after Rump 2006, "Verification of positive definiteness"): if the Cholesky factorisation of a symmetric matrix B runs to its end in
-//! floating point, then B + D >= 0 for some symmetric D with ‖D‖₂ <= γ₍ₙ₊₁₎/(1 − γ₍ₙ₊₁₎)·tr B, in whatever order its sums are added. So if it does for
-//! B = M − cI, computed, with c above that bound, above the error of M itself and above the rounding of the subtraction, then M > 0. For
-//! M = ρ²P_from − AᵀP_to A every entry is within γ₍₂ₙ₊₄₎·(ρ²|P_from| + |A|ᵀ|P_to||A|) of the exact one, and a symmetric error has no larger 2-norm than its
-//! largest sum of absolute values of a row. M is first scaled by powers of two, which is exact, so that its diagonal is near 1 and c is fair to
-//! quantities of very different size.
+//! Every entry of M = ρ²P_from − AᵀP_to A is within γ₍₂ₙ₊₄₎·(ρ²|P_from| + |A|ᵀ|P_to||A|) of the exact one, and M > 0 is checked with that error ([`is_positive`]).
 
 use thiserror::Error;
 
 use super::automaton::Automaton;
 use super::lyapunov;
 use super::norm::mirror;
-use super::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
-use crate::factorisation::cholesky;
+use crate::definite::is_positive;
+use crate::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
 use crate::{Matrix, Unwatched, Watch};
 
 /// A proof that no allowed product grows faster than a rate. It exists only if it was checked.
@@ -172,32 +167,6 @@ fn contracts(matrix: &Matrix, from: &Matrix, to: &Matrix, rate: f64) -> bool {
     is_positive(&difference, &error)
 }
 
-/// Whether every symmetric matrix within `error`, entry by entry, of this one is positive definite.
-pub(crate) fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
-    let size = symmetric.rows();
-    let diagonal: Vec<f64> = (0..size).map(|place| symmetric[(place, place)]).collect();
-    // Written so that NaN fails.
-    if !(diagonal.iter().all(|entry| *entry > 0.0 && entry.is_finite()) && error.is_finite()) {
-        return false;
-    }
-    // D M D with D powers of two, so that the diagonal is between 1/2 and 2.
-    let halves: Vec<f64> = diagonal.iter().map(|entry| libm::ldexp(1.0, -libm::frexp(*entry).1.div_euclid(2))).collect();
-    let scaled = |of: &Matrix| Matrix::from_fn(size, size, |i, j| of[(i, j)] * halves[i] * halves[j]);
-    let (mut matrix, error) = (scaled(symmetric), scaled(error));
-    let trace: f64 = (0..size).map(|place| matrix[(place, place)]).sum();
-    let rows = (0..size).map(|row| error.row(row).iter().sum::<f64>() + real(size) * UNDERFLOW).fold(0.0, f64::max);
-    let share = gamma(size + 1) / (1.0 - gamma(size + 1));
-    // The last terms: the diagonal's subtraction rounds once, at most at 2 + c; underflow in the factorisation (Rump 2006, eq. 2.4 bounds it by less).
-    let shift = outward(share * trace * (1.0 + gamma(size)) + rows * (1.0 + gamma(size))) + 4.0 * UNIT + 8.0 * real(size * size) * UNDERFLOW;
-    if shift >= 0.5 || shift.is_nan() {
-        return false;
-    }
-    for place in 0..size {
-        matrix[(place, place)] -= shift;
-    }
-    cholesky(&matrix).is_some()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -240,18 +209,5 @@ mod tests {
         assert_eq!(Certificate::new(&automaton, 1.0, vec![]), Err(CertificateError::Count { shapes: 0, nodes: 1 }));
         assert_eq!(Certificate::new(&automaton, 1.0, vec![Matrix::identity(3)]), Err(CertificateError::NotSymmetric { node: 0 }));
         assert!(matches!(Certificate::new(&automaton, f64::NAN, vec![Matrix::identity(2)]), Err(CertificateError::Rate { .. })));
-    }
-
-    /// Determinants of 1e-12 and −1e-12: both factorise, or fail to, by the last digits alone.
-    #[test]
-    fn positive_definite_is_told_from_indefinite_near_singular() {
-        let near = |d: f64| Matrix::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 1.0 - d });
-        let none = Matrix::zeros(2, 2);
-        assert!(is_positive(&near(1e-12), &none) && !is_positive(&near(-1e-12), &none) && !is_positive(&near(0.0), &none));
-        // An error that could make it indefinite.
-        assert!(!is_positive(&near(1e-12), &Matrix::from_fn(2, 2, |_, _| 1e-12)));
-        // Entries of very different size are no obstacle.
-        let uneven = Matrix::from_fn(2, 2, |i, j| [[1e-20, 0.5e-5], [0.5e-5, 1e10]][i][j]);
-        assert!(is_positive(&uneven, &none));
     }
 }

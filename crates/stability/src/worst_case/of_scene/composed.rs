@@ -12,7 +12,7 @@
 //!
 //! What a receiver hears, H = w·S + e − c/(N − 1), has w·S rounded once and w itself once: 3·u·|w|·‖S‖ is more. Its other entries stand alone, and 1/(N − 1) rounds once.
 
-use crate::worst_case::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
+use crate::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
 
 /// A row, and a bound of the sum of the sizes of its entries' errors.
 #[derive(Clone, Debug)]

@@ -28,14 +28,18 @@ use cohaptic_scene::Scene;
 
 use super::channel::{Channel, Symbol};
 use super::composed::Composed;
+use super::error::SceneWorstCaseError;
+use super::part::{WorstPart, of_combination};
+use super::patterns::{Links, Patterns};
 use super::prepared::Prepared;
-use super::{Combination, Links, Patterns, SceneWorstCaseError, WorstPart, of_combination};
+use crate::combinations::Combination;
 use crate::inequality::{Inequality, Part, Product, Row, holds, search};
 use crate::lifted::{Autonomous, FrameMap, Lifted};
 use crate::network::NominalNetwork;
-use crate::structure::{Structure, count};
+use crate::rounding::real;
+use crate::structure::Structure;
 use crate::timetable::{Event, Timetable};
-use crate::worst_case::Effort;
+use crate::worst_case::gripenberg::Effort;
 use crate::{AnalysisError, Matrix, PartKind, Watch};
 
 /// How near the least growth that has a certificate the bound is, relative to it.
@@ -70,7 +74,7 @@ pub(super) fn bounds(
     let worst = parts.iter().filter(|part| !is_loose(part)).max_by(|one, other| one.lower.total_cmp(&other.lower)).cloned();
     let Some(worst) = worst else { return Ok(None) };
     let certified = |rate: f64| {
-        let asked = link.inequality(&frames, count(structure.peers), rate);
+        let asked = link.inequality(&frames, real(structure.peers), rate);
         search(&asked, watch, |solution| holds(&asked, solution).then_some(())).is_some()
     };
     let upper = least(worst.lower, certified, watch).ok_or(AnalysisError::Stopped)?;

@@ -47,6 +47,8 @@ mod composed;
 mod each;
 mod error;
 mod frames;
+mod part;
+mod patterns;
 mod prepared;
 #[cfg(test)]
 mod tests;
@@ -59,46 +61,15 @@ use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
 pub use self::error::SceneWorstCaseError;
+pub use self::part::WorstPart;
+pub use self::patterns::{Links, Patterns};
 
-use self::channel::{Channel, Link};
-use self::prepared::{Prepared, Search};
+use self::part::of_combination;
 use super::gripenberg::Effort;
-use crate::analysis::{Combination, notes, pairs};
-use crate::network::NominalNetwork;
+use crate::analysis::notes;
+use crate::combinations::pairs;
 use crate::pieces::pieces;
-use crate::{AnalysisError, Part, PartKind, Unwatched, Watch};
-
-/// What the network may do.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Patterns {
-    /// The most samples in a row that are lost on a link.
-    pub losses_in_a_row: u32,
-    /// Every sample takes any time between these two, which differ by less than the period of sending, whatever the scene's links do. `None`: the delays
-    /// of the scene's links.
-    pub delay: Option<(Duration, Duration)>,
-    /// Which links share their fate.
-    pub links: Links,
-}
-
-/// Which links share their fate.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Links {
-    /// In every frame all links lose the samples that are due, or none does, and all delay it alike: an outage of something that they share.
-    Together,
-    /// Each link in each direction on its own. For up to three peers, or any number of equal ones.
-    Each,
-}
-
-impl Links {
-    /// The word in JSON: `together` or `each`.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Together => "together",
-            Self::Each => "each",
-        }
-    }
-}
+use crate::{Unwatched, Watch};
 
 /// What bounds say about the worst case.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -142,31 +113,6 @@ pub struct SceneWorstCase {
     pub part: usize,
     /// The parts that are left out, in words.
     pub notes: Vec<String>,
-}
-
-/// The worst case of a part of a scene.
-#[derive(Clone, PartialEq, Debug)]
-pub struct WorstPart {
-    /// What moves.
-    pub kind: PartKind,
-    /// Which contacts are closed, in words; empty for a linear scene.
-    pub contacts: String,
-    /// How many states it has, held samples and those on the way among them.
-    pub dimension: usize,
-    /// As for the whole.
-    pub lower: f64,
-    /// As for the whole.
-    pub upper: f64,
-    /// The rate of a quadratic certificate.
-    pub certificate: Option<f64>,
-    /// The pattern that attains the lower bound when repeated for ever, in words; empty if the lower bound is zero or nothing the network does matters.
-    pub sequence: String,
-    /// How many steps that pattern has.
-    pub period: usize,
-    /// How many products of matrices were looked at.
-    pub products: u64,
-    /// A bound of the errors of the frames' matrices, as the largest sum of sizes of a row.
-    pub rounding: f64,
 }
 
 /// Bounds that are no farther apart than by this factor count as one number.
@@ -219,7 +165,7 @@ pub fn worst_case(scene: &Scene, patterns: &Patterns, effort: &Effort) -> Result
 ///
 /// # Errors
 ///
-/// As for [`worst_case`], and [`AnalysisError::Stopped`] if the watch ends it.
+/// As for [`worst_case`], and [`AnalysisError::Stopped`](crate::AnalysisError::Stopped) if the watch ends it.
 pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, watch: &dyn Watch) -> Result<SceneWorstCase, SceneWorstCaseError> {
     let pieces = pieces(scene, "the worst case")?;
     let network = patterns.network(scene)?;
@@ -255,73 +201,4 @@ pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, w
     }
     let notes = notes(&said, combines, scene);
     Ok(SceneWorstCase { lower, upper, certificate, links: patterns.links, step: scene.coordination.update, parts, part, notes })
-}
-
-impl Patterns {
-    /// The least delays.
-    fn network(&self, scene: &Scene) -> Result<NominalNetwork, SceneWorstCaseError> {
-        let update = scene.coordination.update;
-        match self.delay {
-            None => Ok(NominalNetwork::of(scene)?),
-            Some((least, most)) if least > most => Err(SceneWorstCaseError::Delays { least, most }),
-            Some((least, most)) if most - least >= update => Err(SceneWorstCaseError::Overtaking { least, most, update }),
-            Some((least, _)) => Ok(NominalNetwork::uniform(least)),
-        }
-    }
-
-    /// Whether they leave the network anything to choose.
-    fn choose(&self) -> bool {
-        self.losses_in_a_row > 0 || !self.width().is_zero()
-    }
-
-    /// How far delays may differ.
-    fn width(&self) -> Duration {
-        self.delay.map_or(Duration::ZERO, |(least, most)| most.saturating_sub(least))
-    }
-}
-
-/// The worst cases of the parts of a linear scene.
-fn of_combination(
-    scene: &Scene,
-    network: &NominalNetwork,
-    combination: &Combination,
-    patterns: &Patterns,
-    (effort, watch): (&Effort, &dyn Watch),
-) -> Result<Vec<WorstPart>, SceneWorstCaseError> {
-    let structure = prepared::structure(scene, network, &combination.contacts, patterns)?;
-    let Prepared { channels, searches, devices } = Prepared::of(scene, network, &structure, patterns)?;
-    let peer = |class: usize| scene.peers[structure.classes[class][0]].name.as_str();
-    let name = |channel: &Channel| channel.links.first().map(|link: &Link| format!("{} to {}", peer(link.from), peer(link.to))).unwrap_or_default();
-    let searched = |search: &Search| {
-        let found = search.automaton.worst_case_watched(effort, watch).ok_or(AnalysisError::Stopped)?;
-        let certificate = found.certificate.as_ref().map(super::Certificate::rate);
-        Ok(WorstPart {
-            kind: search.kind,
-            contacts: combination.name(),
-            dimension: search.automaton.size(),
-            lower: found.lower,
-            upper: certificate.map_or(found.upper, |rate| found.upper.min(rate)),
-            certificate,
-            sequence: words::sequence(&found.cycle, &channels, patterns.delay.map(|(least, _)| least), name),
-            period: found.cycle.len(),
-            products: found.products,
-            rounding: search.rounding,
-        })
-    };
-    let alone = |device: &Part| {
-        let (lower, upper) = ((device.radius.value - device.radius.error).max(0.0), device.radius.value + device.radius.error);
-        WorstPart {
-            kind: device.kind,
-            contacts: combination.name(),
-            dimension: device.size,
-            lower,
-            upper,
-            certificate: Some(upper),
-            sequence: String::new(),
-            period: 0,
-            products: 0,
-            rounding: device.radius.error,
-        }
-    };
-    searches.par_iter().map(searched).chain(devices.par_iter().map(|device| Ok(alone(device)))).collect()
 }

@@ -4,11 +4,12 @@ use std::time::Duration;
 
 use cohaptic_scene::Scene;
 
+use super::channel::Channel;
 use super::prepared::{Prepared, structure};
 use super::*;
 use crate::structure::Structure;
 use crate::worst_case::{Automaton, Certificate};
-use crate::{AnalysisError, Matrix, Method, analyse, radius};
+use crate::{AnalysisError, Matrix, Method, PartKind, analyse, radius};
 
 const PAPER: &str = r#"
     scene        = { duration = "1s", count = 2 }
@@ -35,7 +36,7 @@ fn patterns(losses_in_a_row: u32, delay: Option<(u64, u64)>, links: Links) -> Pa
 /// The switched systems of a linear scene; of each peer by itself, if not `reduced`.
 fn prepared(scene: &Scene, patterns: &Patterns, reduced: bool) -> Prepared {
     let network = patterns.network(scene).unwrap();
-    let contacts = crate::analysis::whole(scene).unwrap().swap_remove(0).contacts;
+    let contacts = crate::combinations::whole(scene).unwrap().swap_remove(0).contacts;
     let structure =
         if reduced { structure(scene, &network, &contacts, patterns).unwrap() } else { Structure::of_each(scene, &network, &contacts).unwrap() };
     Prepared::of(scene, &network, &structure, patterns).unwrap()
@@ -224,7 +225,7 @@ fn each_link_on_its_own_is_bounded_as_by_all_kinds_of_frame() {
         let effort = Effort { accuracy: 1e-2, products: 2_000 };
         let exact = worst_case(&scene, &patterns, &effort).unwrap();
         let network = patterns.network(&scene).unwrap();
-        let combination = crate::analysis::whole(&scene).unwrap().swap_remove(0);
+        let combination = crate::combinations::whole(&scene).unwrap().swap_remove(0);
         let bounds = each::bounds(&scene, &network, &combination, &patterns, (&effort, &Unwatched)).unwrap().unwrap();
         let bound = &bounds[0];
         assert!(bound.lower <= exact.upper && exact.lower <= bound.upper, "{overrides:?}: {bound:?} {exact:?}");

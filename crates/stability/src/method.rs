@@ -1,0 +1,26 @@
+//! The ways to a verdict.
+
+/// How a verdict is reached.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Method {
+    /// Peers that are equal are treated together: see [`Part`](crate::Part). For scenes with the strategies of this workspace.
+    #[default]
+    Reduced,
+    /// As [`Method::Reduced`], and where samples are on their way for frames, the roots of a small determinant instead of the eigenvalues of a large
+    /// matrix. Chosen where the matrix would be large.
+    Determinant,
+    /// Unit vectors of the whole state are pushed through the code that simulates. For any linear strategy.
+    Full,
+}
+
+impl Method {
+    /// The word in JSON.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Reduced => "reduced",
+            Self::Determinant => "determinant",
+            Self::Full => "full",
+        }
+    }
+}
