@@ -13,7 +13,8 @@ use cohaptic_benches::effort::Effort;
 use cohaptic_benches::machine::{median, process_time, time};
 use cohaptic_benches::verdicts::{eight_different, equal, family, figure_3};
 use cohaptic_peer::Gains;
-use cohaptic_stability::{Family, FamilyScratch, Grid, Guarantee, Map, Method, ProvenRegion, Radius, Unwatched, analyse};
+use cohaptic_proofs::{Guarantee, ProvenRegion};
+use cohaptic_stability::{Family, FamilyScratch, Grid, Map, Method, Radius, Unwatched, analyse};
 
 /// How much is measured.
 #[derive(Clone, Copy)]

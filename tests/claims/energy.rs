@@ -14,8 +14,9 @@
 use cohaptic_harness::Model;
 use cohaptic_peer::coordination::Pull;
 use cohaptic_peer::{Contact, Coordination, Direction, Gains, Hand};
+use cohaptic_proofs::{Effort, Links, Patterns, WorstVerdict, worst_case};
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Effort, Links, Method, Patterns, Verdict, WorstVerdict, analyse, worst_case};
+use cohaptic_stability::{Method, Verdict, analyse};
 use cohaptic_tests::{Draft, DraftHand, Log, Tick, links, run};
 use cohaptic_units::Instant;
 use proptest::collection::vec;

@@ -6,7 +6,8 @@
 
 use std::path::Path;
 
-use cohaptic_stability::{Family, Guarantee, KeyRange, ProvenRegion, Unwatched};
+use cohaptic_proofs::{Guarantee, ProvenRegion};
+use cohaptic_stability::{Family, KeyRange, Unwatched};
 
 /// A scene of Figs. 3 and 4: average-position, BT = BC = 5 N·s/m.
 fn figure(peers: usize, touching: usize, split_mass: bool, delay_ms: usize) -> String {

@@ -7,7 +7,7 @@ use crate::house::metadata::{Tree, metadata};
 use crate::house::{files, name, root};
 
 /// Packages that use nothing of Linux.
-const PORTABLE: [&str; 15] = [
+const PORTABLE: [&str; 16] = [
     "units",
     "files",
     "wan",
@@ -17,6 +17,7 @@ const PORTABLE: [&str; 15] = [
     "scene",
     "harness",
     "stability",
+    "proofs",
     "answers",
     "measure",
     "campaign",

@@ -4,8 +4,9 @@ use core::convert::Infallible;
 use std::path::Path;
 
 use cohaptic_harness::{Model, Observer, Simulation, TickRow};
+use cohaptic_proofs::{Guarantee, SwitchingError, prove_switching};
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Guarantee, Method, SwitchingError, Unwatched, Verdict, analyse, prove_switching};
+use cohaptic_stability::{Method, Unwatched, Verdict, analyse};
 
 use crate::properties::count;
 

@@ -96,7 +96,7 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
 pub const CHANGES_LEFT_OUT: &str = "changing between them is not covered";
 
 /// What a verdict leaves out, in addition to the notes so far.
-pub(crate) fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
+pub fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
     let mut notes = said.to_vec();
     if combines {
         notes.push(format!(

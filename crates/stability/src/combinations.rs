@@ -9,8 +9,9 @@ use crate::structure::Contacts;
 
 /// Contacts that are closed together, and for how many axes they stand.
 #[derive(Clone, Debug)]
-pub(crate) struct Combination {
-    pub(crate) contacts: Contacts,
+pub struct Combination {
+    /// Which contacts are closed.
+    pub contacts: Contacts,
     pub(crate) axes: usize,
     /// See [`ContactMode::motion`](crate::ContactMode::motion).
     pub(crate) motion: String,
@@ -18,8 +19,9 @@ pub(crate) struct Combination {
 }
 
 impl Combination {
-    /// The motion and the contacts, in words.
-    pub(crate) fn name(&self) -> String {
+    /// Returns the motion and the contacts, in words; empty for a linear scene.
+    #[must_use]
+    pub fn name(&self) -> String {
         let between = if self.motion.is_empty() || self.words.is_empty() { "" } else { ": " };
         format!("{}{between}{}", self.motion, self.words)
     }
@@ -73,8 +75,12 @@ pub(crate) fn combinations(piece: &Piece<'_>) -> Result<Vec<Combination>, Analys
     Ok(all)
 }
 
-/// The pieces, each with its combinations of contacts; `combines` becomes true if any has several.
-pub(crate) fn pairs<'p, 's>(pieces: &'p [Piece<'s>], combines: &mut bool) -> Result<Vec<(&'p Piece<'s>, Combination)>, AnalysisError> {
+/// Returns the pieces, each with its combinations of contacts; `combines` becomes true if any has several.
+///
+/// # Errors
+///
+/// [`AnalysisError::TooManyModes`] for more combinations than are looked at.
+pub fn pairs<'p, 's>(pieces: &'p [Piece<'s>], combines: &mut bool) -> Result<Vec<(&'p Piece<'s>, Combination)>, AnalysisError> {
     let mut pairs = Vec::new();
     for piece in pieces {
         let combinations = combinations(piece)?;

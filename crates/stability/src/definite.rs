@@ -11,7 +11,7 @@ use crate::factorisation::cholesky;
 use crate::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
 
 /// Whether every symmetric matrix within `error`, entry by entry, of this one is positive definite.
-pub(crate) fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
+pub fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
     let size = symmetric.rows();
     let diagonal: Vec<f64> = (0..size).map(|place| symmetric[(place, place)]).collect();
     // Written so that NaN fails.

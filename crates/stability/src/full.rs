@@ -27,7 +27,7 @@ use crate::{AnalysisError, Matrix, StateName, Watch};
 
 /// What the general path finds: the matrix of one frame in relative coordinates.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct FullMap {
+pub struct FullMap {
     pub(crate) monodromy: Matrix,
     /// A bound of the error of its entries, in the largest sum of sizes of a row.
     pub(crate) error: f64,
@@ -45,7 +45,7 @@ pub(crate) struct FullMap {
 
 impl FullMap {
     /// The part of the matrix that bodies feel, and the bound of the error of its entries.
-    pub(crate) fn felt(self) -> (Matrix, f64) {
+    pub fn felt(self) -> (Matrix, f64) {
         let Some(forces) = &self.forces else { return (self.monodromy, self.error) };
         let (felt, rounded) = felt(&self.monodromy, forces, &self.states);
         (felt, self.error + rounded)
@@ -54,15 +54,19 @@ impl FullMap {
 
 /// The facts about a strategy that are known before anything is pushed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Trust {
+pub enum Trust {
     /// One of this workspace: linear by its tests. Looking again would push a quarter as many vectors more.
     Linear,
     /// Nothing: it is looked at.
     Nothing,
 }
 
-/// [`full`] along this number of axes.
-pub(crate) fn full_along(
+/// Pushes every unit vector of a scene through a frame, along this number of axes.
+///
+/// # Errors
+///
+/// [`AnalysisError`] as for [`analyse_with`](crate::analyse_with).
+pub fn full_along(
     axes: usize,
     scene: &Scene,
     network: &NominalNetwork,

@@ -85,7 +85,7 @@ pub enum GraphError {
 }
 
 /// Why a scene with a topology is refused.
-pub(crate) fn on_this_topology(error: GraphError) -> AnalysisError {
+pub fn on_this_topology(error: GraphError) -> AnalysisError {
     match error {
         GraphError::Analysis(error) => error,
         GraphError::Unequal { .. }
@@ -161,7 +161,11 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
 }
 
 /// The node that stands for equal peers of which each hears that number or weight of others, if all hear as much.
-pub(crate) fn node_on(scene: &Scene, structure: &Structure, degree: Option<f64>) -> Result<Node, GraphError> {
+///
+/// # Errors
+///
+/// [`GraphError::Irregular`] for a law whose force is a sum over those that a peer hears, if not all hear as much.
+pub fn node_on(scene: &Scene, structure: &Structure, degree: Option<f64>) -> Result<Node, GraphError> {
     let mut node = structure.node(scene, 0);
     let pulls = [scene.coordination.strategy.pull(), scene.coordination.pull];
     for _ in pulls.into_iter().filter(|pull| *pull == Pull::Sum) {
@@ -199,7 +203,7 @@ impl From<&Topology> for Graph {
 }
 
 /// The weights between peers, a row a peer.
-pub(crate) fn weights_of(topology: &Topology) -> Matrix {
+pub fn weights_of(topology: &Topology) -> Matrix {
     let mut weights = Matrix::zeros(topology.peers(), topology.peers());
     for (from, to) in topology.pairs() {
         weights[(from, to)] = topology.weight(from, to);

@@ -5,7 +5,9 @@
 //! One frame of a linear scene, from one common sampling to the next, multiplies its state by a constant matrix, the *monodromy matrix*. The scene is
 //! stable if and only if every eigenvalue of that matrix is inside the unit circle, once the motion of everything together is left out: space has no
 //! origin. This crate builds that matrix from the same plants and strategies that the simulator steps (lifting: Araki & Yamamoto 1986; Rakhsha &
-//! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer.
+//! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer. The crate `cohaptic-proofs` stands above it and has
+//! verdicts on sets of scenes.
+//!
 //! ```
 //! use cohaptic_scene::Scene;
 //! use cohaptic_stability::{Method, Verdict, analyse};
@@ -36,9 +38,9 @@ mod determinant;
 mod error;
 mod factorisation;
 mod family;
+pub mod frames;
 mod full;
 mod graph;
-mod inequality;
 mod judgement;
 mod kind;
 mod lifted;
@@ -47,13 +49,14 @@ mod map;
 mod matrix;
 mod mean_square;
 mod method;
+pub mod moments;
 mod monodromy;
 mod network;
+pub mod numerics;
 #[cfg(test)]
 mod paper_scene;
 mod parts;
 mod pieces;
-mod proof;
 mod radius;
 mod rounding;
 mod scene_radius;
@@ -61,12 +64,10 @@ mod spectrum;
 mod stack_frame;
 mod state_name;
 mod structure;
-mod switching;
 mod timetable;
 mod turning;
 mod unseen;
 mod watch;
-mod worst_case;
 
 pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, PushedAxis, admittance, ideal};
 pub use analyse::{analyse, analyse_loaded, analyse_spinning, analyse_watched, analyse_with};
@@ -87,17 +88,7 @@ pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square,
 pub use method::Method;
 pub use monodromy::{Monodromy, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
-pub use proof::{
-    BoxCertificate, EveryNumber, FrameState, FreeCircle, Guarantee, KnownPieces, MOST_FOLLOWED, MOST_HALVINGS, MomentCertificate, Nearness,
-    NumberCertificate, NumberProof, NumberSpan, Openness, PartCertificate, ProofError, ProvenBox, ProvenLine, ProvenRegion, ProvenStretch,
-    SharedProof, TopologyCertificate, prove_every_number,
-};
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
 pub use state_name::{StateKind, StateName};
-pub use switching::{GrowingMotion, PushCertificate, Switching, SwitchingCertificate, SwitchingError, SwitchingMotion, prove_switching};
 pub use watch::{Limits, Unwatched, Watch};
-pub use worst_case::{
-    Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Links, Pattern, PatternError, Patterns, SceneWorstCase,
-    SceneWorstCaseError, WorstCase, WorstPart, WorstVerdict, worst_case, worst_case_watched,
-};

@@ -94,24 +94,30 @@ impl Mul for Form {
 ///
 /// own·(x, v) + past·(x, v)(L ticks ago) − heard·(x̄, v̄) − ahead·lead + Σ memory·m, with x̄, v̄ and the lead of an [`Observation`].
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct LawRow {
-    pub(crate) own: Gains,
-    pub(crate) past: Gains,
-    pub(crate) heard: Gains,
-    pub(crate) ahead: f64,
+pub struct LawRow {
+    /// Gains towards the own state of now.
+    pub own: Gains,
+    /// Gains towards the own state of L ticks ago.
+    pub past: Gains,
+    /// Gains towards the mean of the samples held.
+    pub heard: Gains,
+    /// What the lead is multiplied by: by how much more the velocity of a sample counts for each second of its age \[N/m\].
+    pub ahead: f64,
     /// What each number that the law remembered is multiplied by.
-    pub(crate) memory: Vec<f64>,
+    pub memory: Vec<f64>,
 }
 
 /// A coordination law in linear form.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct LinearLaw {
-    pub(crate) force: LawRow,
-    pub(crate) memory: Vec<LawRow>,
+pub struct LinearLaw {
+    /// The row of FT.
+    pub force: LawRow,
+    /// The rows of the numbers that the law remembers, in their order.
+    pub memory: Vec<LawRow>,
     /// Up to which age \[s\] samples are extrapolated; `None` if they are taken as they are.
-    pub(crate) horizon: Option<f64>,
+    pub horizon: Option<f64>,
     /// L, how many ticks the law looks back. If any, it remembers nothing else.
-    pub(crate) lag: usize,
+    pub lag: usize,
 }
 
 impl LawRow {
@@ -176,13 +182,13 @@ impl LinearLaw {
     }
 
     /// No force at all.
-    pub(crate) const fn none() -> Self {
+    pub const fn none() -> Self {
         let none = Gains { stiffness: 0.0, damping: 0.0 };
         Self { force: LawRow { own: none, past: none, heard: none, ahead: 0.0, memory: Vec::new() }, memory: Vec::new(), horizon: None, lag: 0 }
     }
 
     /// FT, and then what the law remembers.
-    pub(crate) fn rows(&self) -> impl Iterator<Item = &LawRow> {
+    pub fn rows(&self) -> impl Iterator<Item = &LawRow> {
         std::iter::once(&self.force).chain(&self.memory)
     }
 
@@ -191,7 +197,7 @@ impl LinearLaw {
     }
 
     /// How stiffly and with which damping FT holds the own copy, now or later.
-    pub(crate) fn held_by(&self) -> Gains {
+    pub fn held_by(&self) -> Gains {
         let LawRow { own, past, .. } = &self.force;
         Gains { stiffness: own.stiffness + past.stiffness, damping: own.damping + past.damping }
     }
@@ -204,7 +210,7 @@ impl LinearLaw {
     }
 
     /// The law with everything that it sees multiplied by a factor.
-    pub(crate) fn scaled(&self, factor: f64) -> Self {
+    pub fn scaled(&self, factor: f64) -> Self {
         let memory = self.memory.iter().map(|row| row.scaled(factor)).collect();
         Self { force: self.force.scaled(factor), memory, ..self.clone() }
     }

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 pub type Matrix = Dense<f64>;
 
 /// A dense complex matrix, stored row by row.
-pub(crate) type ComplexMatrix = Dense<Complex64>;
+pub type ComplexMatrix = Dense<Complex64>;
 
 /// A dense matrix of numbers `T`, stored row by row. Users see real ones: [`Matrix`].
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -173,7 +173,7 @@ impl Matrix {
 
 impl ComplexMatrix {
     /// The product of the two.
-    pub(crate) fn times(&self, other: &Self) -> Self {
+    pub fn times(&self, other: &Self) -> Self {
         product(self, other)
     }
 }

@@ -134,7 +134,11 @@ const FEW: usize = 32;
 const MOST_SIGNALS: usize = 1024;
 
 /// The part of a scene that a lifted system is.
-pub(crate) fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
+///
+/// # Errors
+///
+/// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if it ends the analysis.
+pub fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
     let Sizes { states: size, history, signals } = lifted.sizes();
     let asked = method == Method::Determinant && history > 0 && signals <= MOST_SIGNALS;
     let long = asked || size > LARGE && signals <= FEW;
@@ -162,7 +166,7 @@ pub(crate) fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, me
 }
 
 /// The devices of a class if there are any that touch nothing, and how many rigid-body modes they have along one axis.
-pub(crate) fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) -> Option<(Part, usize)> {
+pub fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) -> Option<(Part, usize)> {
     let members = &structure.classes[class];
     structure.has_loose_devices(class).then(|| {
         let (radius, size) = loose_device(structure, scene, class);

@@ -8,14 +8,15 @@ use crate::AnalysisError;
 
 /// A scene that moves apart from all others.
 #[derive(Clone, Debug)]
-pub(crate) struct Piece<'a> {
-    pub(crate) scene: Cow<'a, Scene>,
+pub struct Piece<'a> {
+    /// The scene.
+    pub scene: Cow<'a, Scene>,
     /// Along how many equal axes it moves.
-    pub(crate) axes: usize,
+    pub axes: usize,
     /// Of an object that turns, the components of its motion; otherwise empty.
-    pub(crate) motion: String,
+    pub motion: String,
     /// The peers that have no device in it.
-    pub(crate) absent: Vec<bool>,
+    pub absent: Vec<bool>,
 }
 
 /// The pieces of a scene; what does not split has none, and the error says why.
@@ -33,14 +34,22 @@ pub(crate) fn split(scene: &Scene) -> Result<Vec<Piece<'_>>, &'static str> {
     Ok(parts.into_iter().map(piece).collect())
 }
 
-/// [`split`] for an analysis of pieces alone.
-pub(crate) fn pieces<'a>(scene: &'a Scene, what: &'static str) -> Result<Vec<Piece<'a>>, AnalysisError> {
+/// Returns the pieces of a scene, for an analysis of pieces alone.
+///
+/// # Errors
+///
+/// [`AnalysisError`] if the scene has a topology, or an object whose motion does not split.
+pub fn pieces<'a>(scene: &'a Scene, what: &'static str) -> Result<Vec<Piece<'a>>, AnalysisError> {
     refuse_topology(scene, what)?;
     split(scene).map_err(|why| AnalysisError::Unsplit { what, why })
 }
 
 /// Refuses a topology, for an analysis that does not follow it.
-pub(crate) fn refuse_topology(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
+///
+/// # Errors
+///
+/// [`AnalysisError::Topology`].
+pub fn refuse_topology(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
     if scene.topology.is_some() { Err(AnalysisError::Topology { what }) } else { Ok(()) }
 }
 

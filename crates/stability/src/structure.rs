@@ -20,41 +20,46 @@ use crate::{AnalysisError, Matrix};
 
 /// Which parts of a scene that is not linear are in force: one linear scene.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Contacts {
+pub struct Contacts {
     /// For each peer, whether its device and its copy are coupled.
-    pub(crate) touching: Vec<bool>,
+    pub touching: Vec<bool>,
     /// Whether every copy is at a wall of the enclosure.
-    pub(crate) at_wall: bool,
+    pub at_wall: bool,
     /// For each peer, whether it has no device at all.
-    pub(crate) absent: Vec<bool>,
+    pub absent: Vec<bool>,
 }
 
 /// The classes of a scene and what happens among them in a frame.
 #[derive(Clone, Debug)]
-pub(crate) struct Structure {
+pub struct Structure {
     /// The members of each class, in order; classes in the order of their first members.
-    pub(crate) classes: Vec<Vec<usize>>,
+    pub classes: Vec<Vec<usize>>,
     /// For each class, whether its members touch the object.
-    pub(crate) touching: Vec<bool>,
+    pub touching: Vec<bool>,
     /// For each class, whether its members have no device.
     pub(crate) absent: Vec<bool>,
     pub(crate) at_wall: bool,
     /// A frame of the classes' averages.
-    pub(crate) timetable: Timetable,
+    pub timetable: Timetable,
     /// For each class of more than one member, a frame of a single node that hears itself.
-    pub(crate) apart: Vec<Option<Timetable>>,
+    pub apart: Vec<Option<Timetable>>,
     /// The weight of each class's average (column) in the target of each class (row).
-    pub(crate) weights: Matrix,
+    pub weights: Matrix,
     /// Whether something ties the object to ground: an arm's stiffness, a wall, or a peer that holds forever what it began with.
-    pub(crate) tied: bool,
+    pub tied: bool,
     /// Whether some peer holds forever what it began with.
-    pub(crate) silent: bool,
-    pub(crate) peers: usize,
+    pub silent: bool,
+    /// How many peers there are.
+    pub peers: usize,
 }
 
 impl Structure {
     /// The classes of peers that are equal in every one of the scenes, which differ in numbers only.
-    pub(crate) fn of(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+    ///
+    /// # Errors
+    ///
+    /// Those of [`check_laws`], and [`AnalysisError::NoFrame`] or [`AnalysisError::FrameTooLong`] where clocks do not meet soon enough.
+    pub fn of(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
         Self::with_apart(scenes, network, contacts, |_, _| false)
     }
 
@@ -63,8 +68,12 @@ impl Structure {
         Self::with_apart(scenes, network, contacts, |one, other| Some(one) == alone || Some(other) == alone)
     }
 
-    /// The same where some pairs of peers are in one class in no case.
-    pub(crate) fn with_apart(
+    /// Like [`Structure::of`], where some pairs of peers are in one class in no case.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Structure::of`].
+    pub fn with_apart(
         scenes: &[&Scene],
         network: &NominalNetwork,
         contacts: &Contacts,
@@ -76,8 +85,12 @@ impl Structure {
         Self::of_any_law(scenes, network, contacts, apart)
     }
 
-    /// The same for laws of any kind, whose nodes are the caller's.
-    pub(crate) fn of_any_law(
+    /// Like [`Structure::with_apart`], for laws of any kind, whose nodes are the caller's.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Structure::of`], but for those of laws.
+    pub fn of_any_law(
         scenes: &[&Scene],
         network: &NominalNetwork,
         contacts: &Contacts,
@@ -87,7 +100,11 @@ impl Structure {
     }
 
     /// Every peer by itself, whether or not it is like another.
-    pub(crate) fn of_each(scene: &Scene, network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+    ///
+    /// # Errors
+    ///
+    /// As for [`Structure::of`].
+    pub fn of_each(scene: &Scene, network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
         check_laws(scene)?;
         Self::of_classes(scene, (0..scene.peers.len()).map(|peer| vec![peer]).collect(), network, contacts)
     }
@@ -121,7 +138,7 @@ impl Structure {
     }
 
     /// The nodes of all classes.
-    pub(crate) fn nodes(&self, scene: &Scene) -> Vec<Node> {
+    pub fn nodes(&self, scene: &Scene) -> Vec<Node> {
         (0..self.classes.len()).map(|class| self.node(scene, class)).collect()
     }
 
@@ -137,12 +154,12 @@ impl Structure {
     }
 
     /// The node that stands for a class.
-    pub(crate) fn node(&self, scene: &Scene, class: usize) -> Node {
+    pub fn node(&self, scene: &Scene, class: usize) -> Node {
         self.node_with(scene, class, self.law(scene, class))
     }
 
     /// The node that stands for a class, with a law in place of its own.
-    pub(crate) fn node_with(&self, scene: &Scene, class: usize, law: LinearLaw) -> Node {
+    pub fn node_with(&self, scene: &Scene, class: usize, law: LinearLaw) -> Node {
         let place = self.classes[class][0];
         let spec = &scene.peers[place];
         Node {
@@ -157,7 +174,7 @@ impl Structure {
     }
 
     /// The largest class with more members than one, the last of those that are as large.
-    pub(crate) fn largest_equal(&self) -> Option<usize> {
+    pub fn largest_equal(&self) -> Option<usize> {
         (0..self.classes.len()).filter(|class| self.apart[*class].is_some()).max_by_key(|class| self.classes[*class].len())
     }
 
@@ -167,18 +184,18 @@ impl Structure {
     }
 
     /// The weight with which a difference within a class comes back: −1/(N−1).
-    pub(crate) fn difference_weight(&self) -> f64 {
+    pub fn difference_weight(&self) -> f64 {
         -1.0 / real(self.peers - 1)
     }
 
     /// The common time of the classes, of which those are the nodes \[s\].
-    pub(crate) fn time(&self, scene: &Scene, nodes: &[Node]) -> f64 {
+    pub fn time(&self, scene: &Scene, nodes: &[Node]) -> f64 {
         let peers = self.classes.iter().zip(&self.touching).map(|(class, touching)| (class[0], *touching));
         common_time(scene, self.timetable.frame, nodes[0].law.held_by(), peers, self.at_wall)
     }
 
     /// The system of the classes' averages.
-    pub(crate) fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
+    pub fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
         Lifted {
             nodes,
             weights: &self.weights,
@@ -196,7 +213,7 @@ pub(crate) fn linear_law(scene: &Scene, peer: usize) -> Option<LinearLaw> {
 }
 
 /// Whether all peers have the same tick, offset and drift.
-pub(crate) fn has_equal_clocks(scene: &Scene) -> bool {
+pub fn has_equal_clocks(scene: &Scene) -> bool {
     scene.peers.iter().all(|spec| spec.clock == scene.peers[0].clock)
 }
 
@@ -206,7 +223,11 @@ pub(crate) fn has_one_drift(scene: &Scene) -> bool {
 }
 
 /// Refuses laws that have no linear form, and laws that use the ages of samples between clocks that drift apart: ages then do not repeat from frame to frame.
-pub(crate) fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
+///
+/// # Errors
+///
+/// [`AnalysisError`] that names the law.
+pub fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     let strategy = scene.coordination.strategy.name();
     let (first, peers) = (&scene.peers[0], scene.peers.len());
     // Of equal ticks the laws are equal.
@@ -242,7 +263,7 @@ pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, p
 }
 
 /// The classes of peers that are equal in every one of the scenes, but for pairs that are in one class in no case.
-pub(crate) fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, apart: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
+pub fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, apart: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let mut classes: Vec<Vec<usize>> = Vec::new();
     for place in 0..scenes[0].peers.len() {
         let found = classes.iter().position(|class| {
@@ -266,12 +287,12 @@ pub(crate) fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Co
 }
 
 /// The clock of each class.
-pub(crate) fn clocks(classes: &[Vec<usize>], scene: &Scene) -> Vec<NodeClock> {
+pub fn clocks(classes: &[Vec<usize>], scene: &Scene) -> Vec<NodeClock> {
     classes.iter().map(|class| NodeClock::of(scene, class[0])).collect()
 }
 
 /// How samples of each class (first) get to each class (second), but for those of a class of one to itself.
-pub(crate) fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(usize, usize, LinkTiming)> {
+pub fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(usize, usize, LinkTiming)> {
     let mut links = Vec::new();
     for (to, receivers) in classes.iter().enumerate() {
         for (from, senders) in classes.iter().enumerate() {

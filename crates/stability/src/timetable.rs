@@ -17,15 +17,19 @@ const MOST_EVENTS: u128 = 20_000_000;
 
 /// When a node ticks and samples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct NodeClock {
-    pub(crate) clock: Clock,
+pub struct NodeClock {
+    /// When the node ticks.
+    pub clock: Clock,
     /// It samples at ticks k with (k − phase) a multiple of `every`.
     pub(crate) phase: u64,
-    pub(crate) every: u64,
+    /// How many ticks there are from one sample to the next.
+    pub every: u64,
 }
 
 impl NodeClock {
-    pub(crate) fn of(scene: &Scene, place: usize) -> Self {
+    /// Returns the clock of the peer in that place of a scene.
+    #[must_use]
+    pub fn of(scene: &Scene, place: usize) -> Self {
         let spec = &scene.peers[place];
         let every = scene.coordination.update.as_nanos() / spec.clock.tick.as_nanos();
         Self { clock: spec.clock, phase: spec.phase, every: u64::try_from(every).unwrap_or(u64::MAX) }
@@ -33,7 +37,7 @@ impl NodeClock {
 
     /// At which tick of `to`, counted from its first one in the frame, the first sample of the frame is there if it takes `delay`; and the longest
     /// delay for which it is there at that tick.
-    pub(crate) fn arrival(&self, to: &Self, delay: Duration) -> (usize, Duration) {
+    pub fn arrival(&self, to: &Self, delay: Duration) -> (usize, Duration) {
         let (phase, every) = (i128::from(self.phase), i128::from(self.every));
         let sent = self.instant(phase + self.first_number() * every);
         let tick = to.first_tick(sent.saturating_add(i128::try_from(delay.as_nanos()).unwrap_or(i128::MAX)));
@@ -92,13 +96,24 @@ impl NodeClock {
 
 /// Something that happens.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Event {
+pub enum Event {
     /// The node samples its copy and sends. Samples of this frame are numbered from 0.
-    Sample { node: usize },
+    Sample {
+        /// The node.
+        node: usize,
+    },
     /// From now on `to` holds that sample of `from`: from 0 if it is of this frame, −1 is the last one of the frame before.
-    Deliver { from: usize, to: usize, sample: i64 },
+    Deliver {
+        /// The sender.
+        from: usize,
+        /// The receiver.
+        to: usize,
+        /// The number of the sample.
+        sample: i64,
+    },
     /// The node computes its forces and moves to its next tick.
     Tick {
+        /// The node.
         node: usize,
         /// The instant after the frame's beginning \[ns\].
         at: u64,
@@ -109,23 +124,24 @@ pub(crate) enum Event {
 
 /// One frame.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Timetable {
-    pub(crate) frame: Duration,
-    /// In order.
-    pub(crate) events: Vec<Event>,
+pub struct Timetable {
+    /// How long the frame is.
+    pub frame: Duration,
+    /// What happens in it, in order.
+    pub events: Vec<Event>,
     /// How many samples each node sends in a frame.
-    pub(crate) sent: Vec<usize>,
+    pub sent: Vec<usize>,
     /// How many samples of the frames before are still needed of each node.
-    pub(crate) depth: Vec<usize>,
+    pub depth: Vec<usize>,
     /// What each node holds of each other at the beginning of the frame, if it is used before the first delivery: (to, from, sample).
-    pub(crate) held: Vec<(usize, usize, i64)>,
+    pub held: Vec<(usize, usize, i64)>,
     /// The clocks of the nodes.
-    pub(crate) clocks: Vec<NodeClock>,
+    pub clocks: Vec<NodeClock>,
 }
 
 /// At which events nodes use the samples that they hold.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum UseOfHeld {
+pub enum UseOfHeld {
     /// When they compute forces.
     Ticks,
     /// Also when they sample, before the deliveries of the same instant.
@@ -140,12 +156,20 @@ impl Timetable {
     }
 
     /// The frame of nodes that send to each other over those links: (from, to, timing).
-    pub(crate) fn new(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)]) -> Result<Self, AnalysisError> {
+    ///
+    /// # Errors
+    ///
+    /// [`AnalysisError::NoFrame`] or [`AnalysisError::FrameTooLong`] where clocks do not meet soon enough.
+    pub fn new(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)]) -> Result<Self, AnalysisError> {
         Self::with_use_of_held(clocks, links, UseOfHeld::Ticks)
     }
 
     /// [`Timetable::new`] for nodes that use what they hold at those events.
-    pub(crate) fn with_use_of_held(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)], uses: UseOfHeld) -> Result<Self, AnalysisError> {
+    ///
+    /// # Errors
+    ///
+    /// As for [`Timetable::new`].
+    pub fn with_use_of_held(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)], uses: UseOfHeld) -> Result<Self, AnalysisError> {
         let frame = frame(clocks, links)?;
         let end = i128::try_from(frame).map_err(|_| AnalysisError::NoFrame)?;
         let mut events: Vec<(i128, u8, usize, usize, i64, Event)> = Vec::new();
@@ -210,14 +234,16 @@ impl Timetable {
 
 /// When each node samples and ticks in a frame \[ns\].
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Instants {
+pub struct Instants {
     pub(crate) sends: Vec<Vec<u64>>,
     pub(crate) ticks: Vec<Vec<u64>>,
     pub(crate) clocks: Vec<NodeClock>,
 }
 
 impl Instants {
-    pub(crate) fn of(timetable: &Timetable) -> Self {
+    /// Returns those of a frame.
+    #[must_use]
+    pub fn of(timetable: &Timetable) -> Self {
         let nodes = timetable.clocks.len();
         let (mut sends, mut ticks) = (vec![Vec::new(); nodes], vec![Vec::new(); nodes]);
         let mut sampled = vec![false; nodes];
@@ -240,7 +266,7 @@ impl Instants {
     /// The age of a sample at an instant of the frame at which its holder ticks \[s\]: what the clock of the holder shows less what that of the sender showed,
     /// and at least zero. Clocks of one drift show the same ages in every frame.
     #[expect(clippy::cast_precision_loss, reason = "a span of at most some frames is far below 2^53 ns")]
-    pub(crate) fn age(&self, (to, from): (usize, usize), sample: i64, at: u64, frame: Duration) -> f64 {
+    pub fn age(&self, (to, from): (usize, usize), sample: i64, at: u64, frame: Duration) -> f64 {
         let now = self.local(to, i64::try_from(at).unwrap_or(i64::MAX));
         now.saturating_sub(self.local(from, self.sent_at(from, sample, frame))).max(0) as f64 * 1e-9
     }

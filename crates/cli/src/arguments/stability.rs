@@ -166,7 +166,7 @@ pub(crate) struct MapArguments {
     pub(crate) grid: Option<GridSize>,
     /// In place of a grid, prove boxes of gains, masses, dampings or a delay stable or unstable throughout; sides are halved at most this number of
     /// times
-    #[arg(long, value_name = "HALVINGS", num_args = 0..=1, default_missing_value = "8", conflicts_with = "grid", value_parser = integer::<u32>(0, cohaptic_stability::MOST_HALVINGS.into()))]
+    #[arg(long, value_name = "HALVINGS", num_args = 0..=1, default_missing_value = "8", conflicts_with = "grid", value_parser = integer::<u32>(0, cohaptic_proofs::MOST_HALVINGS.into()))]
     pub(crate) prove: Option<u32>,
     /// With --prove, for every number of equal peers from 2 on, or FROM.., or FROM..TO
     #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, requires = "prove", conflicts_with = "grid")]

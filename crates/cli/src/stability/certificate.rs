@@ -1,9 +1,10 @@
 //! Files of certificates: all by which verdicts on sets of scenes can be checked without this program.
 
-use cohaptic_stability::{
-    BoxCertificate, FrameState, FreeCircle, Guarantee, KeyRange, MomentCertificate, NumberCertificate, PartCertificate, Switching,
-    SwitchingCertificate, TopologyCertificate,
+use cohaptic_proofs::{
+    BoxCertificate, FrameState, FreeCircle, Guarantee, MomentCertificate, NumberCertificate, PartCertificate, Switching, SwitchingCertificate,
+    TopologyCertificate,
 };
+use cohaptic_stability::KeyRange;
 use serde::Serialize;
 
 use crate::document_schema::{DocumentSchema, document};

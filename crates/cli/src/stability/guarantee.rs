@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use cohaptic_stability::{AnalysisError, FamilyError, ProofError, Watch};
+use cohaptic_proofs::ProofError;
+use cohaptic_stability::{AnalysisError, FamilyError, Watch};
 use cohaptic_units::print::Counted;
 
 use crate::failure::{Failure, not_analysed};

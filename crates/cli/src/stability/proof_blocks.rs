@@ -7,7 +7,8 @@ use std::sync::{Mutex, PoisonError};
 
 use cohaptic_campaign::Shard;
 use cohaptic_files::OwnFolder;
-use cohaptic_stability::{Family, Guarantee, KnownPieces, ProofError, SharedProof, Watch};
+use cohaptic_proofs::{Guarantee, KnownPieces, ProofError, SharedProof};
+use cohaptic_stability::{Family, Watch};
 
 use super::guarantee::PieceWatch;
 use super::rows_file::{Kept, Row, RowsFile};

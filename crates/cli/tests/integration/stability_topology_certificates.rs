@@ -14,9 +14,9 @@ link = { delay = "8ms" }
 "#;
 const PD: &str = "--set coordination.strategy=proportional-derivative";
 /// Weights of five of which none hears as much as another.
-const UNEVEN: &str = include_str!("../../../stability/tests/weights/uneven.csv");
+const UNEVEN: &str = include_str!("../../../proofs/tests/weights/uneven.csv");
 /// The corners of a cube, three of whose eigenvalues are alike, and three others.
-const CUBE: &str = include_str!("../../../stability/tests/weights/cube.csv");
+const CUBE: &str = include_str!("../../../proofs/tests/weights/cube.csv");
 
 fn desk(topology: &str) -> Desk {
     let desk = Desk::with("scene.toml", &format!("topology = {topology}\n{EQUAL}"));

@@ -4,7 +4,7 @@ use crate::Matrix;
 
 /// An orthonormal basis, as columns, of the vectors of `size` entries that are orthogonal to all given ones. Given vectors may depend on each other: a part of one that the
 /// others do not span counts as nothing if its length is at most `least`.
-pub(crate) fn orthogonal_complement(mut vectors: Vec<Vec<f64>>, size: usize, least: f64) -> Matrix {
+pub fn orthogonal_complement(mut vectors: Vec<Vec<f64>>, size: usize, least: f64) -> Matrix {
     let mut reflectors: Vec<Vec<f64>> = Vec::new();
     while reflectors.len() < size {
         let done = reflectors.len();

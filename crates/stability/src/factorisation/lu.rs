@@ -7,9 +7,7 @@ use num_complex::Complex64;
 use crate::matrix::Dense;
 
 /// A number in a matrix that is factorised.
-pub(crate) trait Entry:
-    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + From<f64>
-{
+pub trait Entry: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + From<f64> {
     /// How large it is: the sum of the sizes of its parts, within √2 of its modulus.
     fn size(self) -> f64;
 }
@@ -30,7 +28,7 @@ impl Entry for Complex64 {
 ///
 /// Solutions are those of a matrix that differs from A by a small multiple of n·ε·|L|·|U| (Higham 2002, Theorem 9.4). Of a singular matrix they are not finite, or very large.
 #[derive(Clone, Debug)]
-pub(crate) struct Lu<T> {
+pub struct Lu<T> {
     /// L below the diagonal, U on and above it.
     factors: Dense<T>,
     /// For each row of the factors, that of A.
@@ -39,7 +37,8 @@ pub(crate) struct Lu<T> {
 
 impl<T: Entry> Lu<T> {
     /// Factorises a square matrix.
-    pub(crate) fn of(matrix: &Dense<T>) -> Self {
+    #[must_use]
+    pub fn of(matrix: &Dense<T>) -> Self {
         Self::with_least_pivot(matrix, T::default())
     }
 
@@ -106,7 +105,7 @@ impl<T: Entry> Lu<T> {
     }
 
     /// X with A·X = B.
-    pub(crate) fn solve_all(&self, right: &Dense<T>) -> Dense<T> {
+    pub fn solve_all(&self, right: &Dense<T>) -> Dense<T> {
         let mut solutions = Dense::zeros(right.rows(), right.columns());
         for column in 0..right.columns() {
             let entries: Vec<T> = (0..right.rows()).map(|row| right[(row, column)]).collect();
@@ -118,7 +117,7 @@ impl<T: Entry> Lu<T> {
     }
 
     /// A⁻¹.
-    pub(crate) fn inverse(&self) -> Dense<T> {
+    pub fn inverse(&self) -> Dense<T> {
         let size = self.rows.len();
         self.solve_all(&Dense::from_fn(size, size, |row, column| T::from(if row == column { 1.0 } else { 0.0 })))
     }

@@ -4,6 +4,6 @@ mod complement;
 mod lu;
 mod symmetric;
 
-pub(crate) use complement::orthogonal_complement;
-pub(crate) use lu::Lu;
-pub(crate) use symmetric::{cholesky, eigen, solve, triangle_inverse};
+pub use complement::orthogonal_complement;
+pub use lu::{Entry, Lu};
+pub use symmetric::{cholesky, eigen, solve, triangle_inverse};

@@ -3,7 +3,7 @@
 use crate::Matrix;
 
 /// The upper triangle R with RᵀR = A (Cholesky), from the upper triangle of A; `None` if a pivot is not above zero.
-pub(crate) fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
+pub fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
     let size = symmetric.rows();
     let mut factor = Matrix::from_fn(size, size, |i, j| if i <= j { symmetric[(i, j)] } else { 0.0 });
     for pivot in 0..size {
@@ -28,7 +28,9 @@ pub(crate) fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
     Some(factor)
 }
 
-pub(crate) fn triangle_inverse(upper: &Matrix) -> Matrix {
+/// Returns the inverse of an upper triangle.
+#[must_use]
+pub fn triangle_inverse(upper: &Matrix) -> Matrix {
     let size = upper.rows();
     let mut inverse = Matrix::zeros(size, size);
     for row in (0..size).rev() {
@@ -49,7 +51,7 @@ pub(crate) fn triangle_inverse(upper: &Matrix) -> Matrix {
 }
 
 /// Solves RᵀR·x = b.
-pub(crate) fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
+pub fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
     let size = upper.rows();
     let mut x = right.to_vec();
     for row in 0..size {
@@ -67,7 +69,7 @@ pub(crate) fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
 }
 
 /// Eigenvalues and, as rows, eigenvectors of a symmetric matrix by Jacobi's rotations, in no order.
-pub(crate) fn eigen(symmetric: &Matrix) -> (Vec<f64>, Matrix) {
+pub fn eigen(symmetric: &Matrix) -> (Vec<f64>, Matrix) {
     const SWEEPS: u32 = 30;
     let size = symmetric.rows();
     let mut a = symmetric.clone();

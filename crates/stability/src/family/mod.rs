@@ -135,7 +135,11 @@ impl Family {
     }
 
     /// The scene with those values of its keys: of equal peers the first alone has those that are learned.
-    pub(crate) fn written(&self, values: &[f64]) -> Result<Scene, FamilyError> {
+    ///
+    /// # Errors
+    ///
+    /// As for [`Family::scene`].
+    pub fn written(&self, values: &[f64]) -> Result<Scene, FamilyError> {
         let prepared = self.prepared(values)?;
         if !prepared.is_varied() {
             return self.scene(values);

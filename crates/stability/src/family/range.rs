@@ -95,7 +95,7 @@ impl KeyRange {
     }
 
     /// A value inside that is no round number and is at another place for every key, to see where values land.
-    pub(crate) fn odd(&self, number: usize) -> f64 {
+    pub fn odd(&self, number: usize) -> f64 {
         let share = if number == 0 { 0.618_033_988_749_894_9 } else { 0.414_213_562_373_095_1 };
         self.low + (self.high - self.low) * share
     }

@@ -9,16 +9,20 @@ use crate::rounding::real;
 
 /// The eigenvalues of an averaging matrix but for 1, which each connected part has once.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct EnclosedSpectrum {
+pub struct EnclosedSpectrum {
     /// Intervals in rising order, each with one eigenvalue or several.
-    pub(crate) others: Vec<[f64; 2]>,
+    pub others: Vec<[f64; 2]>,
     /// How many, or how much weight, each peer hears, if all hear exactly as much.
-    pub(crate) degree: Option<f64>,
+    pub degree: Option<f64>,
 }
 
 impl Graph {
     /// The eigenvalues of the averaging matrix of the peers of a scene.
-    pub(crate) fn enclosed_spectrum(&self, scene: &Scene) -> Result<EnclosedSpectrum, GraphError> {
+    ///
+    /// # Errors
+    ///
+    /// [`GraphError`] if the graph makes no sense for that number of peers.
+    pub fn enclosed_spectrum(&self, scene: &Scene) -> Result<EnclosedSpectrum, GraphError> {
         let (spectrum, degree) = self.spectrum(scene)?;
         let is_pair = scene.peers.len() == 2;
         let error = match self {
@@ -88,7 +92,7 @@ fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
 }
 
 /// The eigenvectors of D⁻¹W, nearly: columns x with xᵀDx = 1 for a connected graph, but for that of the eigenvalue 1. `None` if they were not found.
-pub(crate) fn eigenvectors(weights: &Matrix) -> Option<Matrix> {
+pub fn eigenvectors(weights: &Matrix) -> Option<Matrix> {
     let (a, degrees) = symmetric(weights)?;
     let (values, rows) = eigen(&a);
     let mut order: Vec<usize> = (0..values.len()).collect();

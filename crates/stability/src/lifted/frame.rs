@@ -7,7 +7,7 @@ use crate::timetable::{Event, Instants};
 use crate::{Matrix, Unwatched, Watch};
 
 /// The inputs and outputs within a frame.
-pub(crate) trait Instrument {
+pub trait Instrument {
     /// How many inputs there are, each a column more.
     fn inputs(&self) -> usize {
         0
@@ -29,7 +29,8 @@ pub(crate) trait Instrument {
 }
 
 /// Nothing is pushed or looked at.
-pub(crate) struct Autonomous;
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Autonomous;
 
 impl Instrument for Autonomous {}
 
@@ -38,23 +39,23 @@ impl Instrument for Autonomous {}
 /// The unknowns, one column each: the states at the beginning, but for the reference; then the samples of earlier frames that are used; then inputs.
 /// A sample is one number or two, as [`Sampling`] says, each with a place of its own: with c numbers a sample, number i of sample s has the place c·s + i.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct FrameMap {
+pub struct FrameMap {
     /// The states at the end, one row each, the reference among them, in positions as they are.
-    pub(crate) states: Matrix,
+    pub states: Matrix,
     /// How far a translation by 1 moves each of the rows: 1 for positions.
     displacements: Vec<f64>,
     /// The row of the position that all others are relative to.
     reference: Option<usize>,
     /// The samples sent in the frame: for each node, its rows in `sent`.
-    pub(crate) sent: Matrix,
+    pub sent: Matrix,
     first_sent: Vec<usize>,
     /// The samples of earlier frames that are used: of which node, how many samples before this frame's first.
-    pub(crate) used: Vec<(usize, usize)>,
+    pub used: Vec<(usize, usize)>,
     depth: Vec<usize>,
     /// How far a translation by 1 moves each number of a sample.
     translations: Vec<f64>,
     /// A bound of the rounding errors of all rows, in the largest sum of sizes of a row.
-    pub(crate) error: f64,
+    pub error: f64,
 }
 
 /// After how many entries that are worked on it is asked whether to go on: some ten milliseconds.
@@ -62,7 +63,8 @@ const LOOK: usize = 1_000_000;
 
 impl Lifted<'_> {
     /// Steps through the frame with all unknowns at once.
-    pub(crate) fn frame(&self, instrument: &mut impl Instrument) -> FrameMap {
+    #[expect(clippy::missing_panics_doc, reason = "nothing ends what nobody watches")]
+    pub fn frame(&self, instrument: &mut impl Instrument) -> FrameMap {
         self.frame_watched(instrument, &Unwatched).expect("without a watch nothing ends it")
     }
 
@@ -237,12 +239,12 @@ impl Lifted<'_> {
 impl FrameMap {
     /// The matrix that one frame multiplies the relative state by: states but for the reference, then for each node the samples of earlier frames, the
     /// newest first.
-    pub(crate) fn monodromy(&self) -> Matrix {
+    pub fn monodromy(&self) -> Matrix {
         self.driven(0)
     }
 
     /// The same with a column for each of the first `inputs` inputs behind.
-    pub(crate) fn driven(&self, inputs: usize) -> Matrix {
+    pub fn driven(&self, inputs: usize) -> Matrix {
         let count = self.states.rows();
         let kept: Vec<usize> = (0..count).filter(|row| Some(*row) != self.reference).collect();
         let states = kept.len();
@@ -282,7 +284,7 @@ impl FrameMap {
     }
 
     /// How far a translation by 1 moves a number of a sample that has that place before the first of the frame.
-    pub(crate) fn translation(&self, age: usize) -> f64 {
+    pub fn translation(&self, age: usize) -> f64 {
         let channels = self.translations.len();
         self.translations[(channels - age % channels) % channels]
     }
@@ -293,33 +295,33 @@ impl FrameMap {
     }
 
     /// The rows of `sent` that a node sent, in order of time and then of the numbers of a sample.
-    pub(crate) fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
+    pub fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
         let end = self.first_sent.get(node + 1).copied().unwrap_or_else(|| self.sent.rows());
         self.first_sent[node]..end
     }
 
     /// How many unknowns are states.
-    pub(crate) fn state_unknowns(&self) -> usize {
+    pub fn state_unknowns(&self) -> usize {
         self.states.rows() - usize::from(self.reference.is_some())
     }
 
     /// The row of the position that all others are relative to.
-    pub(crate) const fn reference(&self) -> Option<usize> {
+    pub const fn reference(&self) -> Option<usize> {
         self.reference
     }
 
     /// A translation leaves a row as it is: that of a body which something ties to ground and nothing to the others.
-    pub(crate) fn tie(&mut self, row: usize) {
+    pub fn tie(&mut self, row: usize) {
         self.displacements[row] = 0.0;
     }
 
     /// How far a translation by 1 moves a row.
-    pub(crate) fn displacement(&self, row: usize) -> f64 {
+    pub fn displacement(&self, row: usize) -> f64 {
         self.displacements[row]
     }
 
     /// Where the unknowns of the frame, and of this number of inputs, stand among the columns of [`FrameMap::driven`]; and where the samples of each node do.
-    pub(crate) fn places(&self, inputs: usize) -> (Vec<usize>, Vec<usize>) {
+    pub fn places(&self, inputs: usize) -> (Vec<usize>, Vec<usize>) {
         let states = self.state_unknowns();
         let mut first = Vec::with_capacity(self.depth.len());
         let mut size = states;

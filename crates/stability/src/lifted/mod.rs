@@ -11,8 +11,9 @@ mod rounding;
 mod sampling;
 mod system;
 
-pub(crate) use frame::{Autonomous, FrameMap, Instrument};
-pub(crate) use node::{Body, Node};
+pub use frame::{Autonomous, FrameMap, Instrument};
+pub use node::{Body, Node};
 pub(crate) use rounding::{Rounding, closer_of};
-pub(crate) use sampling::Sampling;
-pub(crate) use system::{Lifted, Sizes};
+pub use sampling::Sampling;
+pub use system::Lifted;
+pub(crate) use system::Sizes;

@@ -13,7 +13,7 @@ use crate::linear_form::{LawRow, LinearLaw};
 
 /// A body's step maps for the spans between its ticks.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Body {
+pub struct Body {
     short: (Duration, StepMap),
     long: StepMap,
     /// Rounding of the coefficients, where it is more than a tick's own operations round.
@@ -55,12 +55,12 @@ impl Body {
     }
 
     /// The step map, if all spans between ticks are equal.
-    pub(crate) fn only_map(&self) -> Option<StepMap> {
+    pub fn only_map(&self) -> Option<StepMap> {
         (self.long == self.short.1).then_some(self.long)
     }
 
     /// With another step map over every span.
-    pub(crate) fn with_map(&self, map: StepMap) -> Self {
+    pub fn with_map(&self, map: StepMap) -> Self {
         Self { short: (self.short.0, map), long: map, ..*self }
     }
 
@@ -81,7 +81,7 @@ impl Body {
     }
 
     /// The step map for velocities multiplied by `time` \[s\]; its forces stay in newtons.
-    pub(crate) fn scaled_map(&self, span: Duration, time: f64) -> StepMap {
+    pub fn scaled_map(&self, span: Duration, time: f64) -> StepMap {
         let (e, g) = self.map(span).coefficients();
         StepMap::new([[e[0][0], e[0][1] / time], [e[1][0] * time, e[1][1]]], [g[0], g[1] * time])
     }
@@ -89,74 +89,76 @@ impl Body {
 
 /// A node: what of a peer takes part in the linear motion of one axis.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Node {
+pub struct Node {
     /// The device and the arm that holds it; `None` where it touches nothing.
-    pub(crate) device: Option<Body>,
-    pub(crate) object: Body,
+    pub device: Option<Body>,
+    /// The copy of the object.
+    pub object: Body,
     /// KC and BC.
-    pub(crate) coupling: Gains,
+    pub coupling: Gains,
     /// The coordination law.
-    pub(crate) law: LinearLaw,
+    pub law: LinearLaw,
     /// A spring and a damper that tie the copy to ground.
-    pub(crate) wall: Option<Gains>,
+    pub wall: Option<Gains>,
     /// Whether forces are applied one tick after they were computed.
-    pub(crate) compute_delay: bool,
+    pub compute_delay: bool,
     /// Whether position and velocity of the own states of the past are states each, and not only the combination that the law takes of them.
-    pub(crate) keeps_whole_past: bool,
+    pub keeps_whole_past: bool,
 }
 
 /// Where a node's states stand among the rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Rows {
+pub struct Rows {
     /// Position and velocity of the device, if it takes part.
-    pub(crate) device: Option<usize>,
+    pub device: Option<usize>,
     /// Position and velocity of the copy.
-    pub(crate) object: usize,
+    pub object: usize,
     /// The forces that were computed and act next: on the copy and, in the row after it, on the device.
-    pub(crate) pending: Option<usize>,
+    pub pending: Option<usize>,
     /// The first of the numbers that the law remembers.
-    pub(crate) memory: usize,
+    pub memory: usize,
     /// Where the law looks back: what it takes of the own states of the latest ticks, or position and velocity of each, the newest first.
-    pub(crate) past: usize,
+    pub past: usize,
 }
 
 /// The units of the states.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Scale {
+pub struct Scale {
     /// What velocities are multiplied by \[s\].
-    pub(crate) time: f64,
+    pub time: f64,
     /// What forces are multiplied by [m/N].
-    pub(crate) compliance: f64,
+    pub compliance: f64,
 }
 
 impl Scale {
     /// Gains towards a velocity that is multiplied by the common time.
-    pub(crate) fn gains(self, gains: Gains) -> Gains {
+    pub fn gains(self, gains: Gains) -> Gains {
         Gains { stiffness: gains.stiffness, damping: gains.damping / self.time }
     }
 }
 
 /// Forces of a tick that do not follow from the states, each a function of the unknowns \[N\].
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct External<'a> {
+pub struct External<'a> {
     /// The force of the hand on the device.
-    pub(crate) hand: Option<&'a [f64]>,
+    pub hand: Option<&'a [f64]>,
     /// In place of the coupling's.
-    pub(crate) coupling: Option<&'a [f64]>,
+    pub coupling: Option<&'a [f64]>,
     /// On the copy, in place of the wall's.
-    pub(crate) wall: Option<&'a [f64]>,
+    pub wall: Option<&'a [f64]>,
 }
 
 /// Rows that a tick works with, kept from tick to tick.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Scratch {
+pub struct Scratch {
     coupling: Vec<f64>,
     on_object: Vec<f64>,
     memory: Matrix,
 }
 
 impl Scratch {
-    pub(crate) fn resize(&mut self, columns: usize) {
+    /// Makes room for rows of this number of columns.
+    pub fn resize(&mut self, columns: usize) {
         self.coupling.resize(columns, 0.0);
         self.on_object.resize(columns, 0.0);
     }
@@ -164,7 +166,7 @@ impl Scratch {
 
 impl Node {
     /// How many rows its states take.
-    pub(crate) fn states(&self) -> usize {
+    pub fn states(&self) -> usize {
         let bodies = if self.device.is_some() { 2 } else { 1 };
         2 * bodies + if self.compute_delay { bodies } else { 0 } + self.law.memory.len() + self.past_rows()
     }
@@ -175,19 +177,19 @@ impl Node {
     }
 
     /// How many ticks the law looks back, where it does anything with what it sees there.
-    pub(crate) fn looks_back(&self) -> usize {
+    pub fn looks_back(&self) -> usize {
         let Gains { stiffness, damping } = self.law.force.past;
         if stiffness + damping > 0.0 { self.law.lag } else { 0 }
     }
 
     /// What a combination (K·x + B·v)/(K + B/time) of an own state is divided by to be a length, of the gains K and B by which the law takes the past [N/m].
-    pub(crate) fn past_unit(&self, time: f64) -> f64 {
+    pub fn past_unit(&self, time: f64) -> f64 {
         let Gains { stiffness, damping } = self.law.force.past;
         stiffness + damping / time
     }
 
     /// How far a translation of everything by 1 moves each of its rows, where it stands at `rows`.
-    pub(crate) fn displacement(&self, rows: Rows, row: usize, time: f64) -> f64 {
+    pub fn displacement(&self, rows: Rows, row: usize, time: f64) -> f64 {
         if row == rows.object || Some(row) == rows.device {
             1.0
         } else if row >= rows.past && self.keeps_whole_past {
@@ -200,7 +202,7 @@ impl Node {
     }
 
     /// Its rows, from `first` on.
-    pub(crate) fn rows(&self, first: usize) -> Rows {
+    pub fn rows(&self, first: usize) -> Rows {
         let device = self.device.map(|_| first);
         let object = first + if self.device.is_some() { 2 } else { 0 };
         let past = first + self.states() - self.past_rows();
@@ -208,7 +210,7 @@ impl Node {
     }
 
     /// The compliance that makes the node's forces lengths: how far a force moves the copy within the common time.
-    pub(crate) fn compliance(&self, time: f64) -> f64 {
+    pub fn compliance(&self, time: f64) -> f64 {
         self.object.short.1.coefficients().1[1] * time
     }
 
@@ -219,7 +221,7 @@ impl Node {
     }
 
     /// The same where samples are extrapolated without end, and none is older than `oldest` \[s\].
-    pub(crate) fn step_norm_up_to(&self, scale: Scale, oldest: f64) -> f64 {
+    pub fn step_norm_up_to(&self, scale: Scale, oldest: f64) -> f64 {
         let gain = |gains: Gains| gains.stiffness.abs() + gains.damping.abs() / scale.time;
         let wall = self.wall.map_or(0.0, gain);
         // Samples are used up to the horizon at most.
@@ -244,7 +246,7 @@ impl Node {
     }
 
     /// What a number that the law remembers is multiplied by to be a length: by how far its part of the force moves the copy within the common time.
-    pub(crate) fn memory_unit(&self, place: usize, scale: Scale) -> f64 {
+    pub fn memory_unit(&self, place: usize, scale: Scale) -> f64 {
         let by = self.law.force.memory[place].abs();
         // A force that is remembered acts for that long, where one that waits acts for a tick.
         let ticks = scale.time / self.object.short.0.as_secs_f64();
@@ -254,7 +256,7 @@ impl Node {
     /// One tick: forces from the rows as they are, `heard` what each row of the law hears of the samples held \[N\], FT's first, which pulls the copy there;
     /// `external` what else acts. Every row is a linear function of the same unknowns, one column each.
     #[expect(clippy::too_many_arguments, reason = "what a tick needs, each of its own kind")]
-    pub(crate) fn tick<'a>(
+    pub fn tick<'a>(
         &self,
         z: &mut Matrix,
         rows: Rows,
@@ -375,7 +377,7 @@ impl Node {
     }
 
     /// What the rows of the law hear of a unit of that number of a sample of that age \[s\], FT's first \[N\].
-    pub(crate) fn heard(&self, sampling: Sampling, channel: usize, age: f64, time: f64) -> impl Iterator<Item = f64> {
+    pub fn heard(&self, sampling: Sampling, channel: usize, age: f64, time: f64) -> impl Iterator<Item = f64> {
         let age = self.law.horizon.map_or(0.0, |horizon| age.min(horizon));
         self.law.rows().map(move |row| sampling.heard(row, channel, age, time))
     }
@@ -383,7 +385,7 @@ impl Node {
 
 impl Sampling {
     /// One number if that is all that the laws of the nodes use; of laws that hear nothing too.
-    pub(crate) fn of(nodes: &[Node]) -> Self {
+    pub fn of(nodes: &[Node]) -> Self {
         let heard = |row: &LawRow| (row.heard.stiffness != 0.0 || row.heard.damping != 0.0).then_some(row.heard);
         let rows = || nodes.iter().flat_map(|node| node.law.rows());
         let gains = rows().find_map(heard).unwrap_or(Gains { stiffness: 0.0, damping: 0.0 });

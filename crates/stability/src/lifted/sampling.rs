@@ -6,7 +6,7 @@ use crate::linear_form::LawRow;
 
 /// Which numbers of a sample are unknowns of their own.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum Sampling {
+pub enum Sampling {
     /// (K·x + B·v)/(K + B/time), a length, of these gains K and B.
     Combined(Gains),
     /// Position, and velocity multiplied by the common time.
@@ -15,7 +15,7 @@ pub(crate) enum Sampling {
 
 impl Sampling {
     /// How many numbers of a sample there are.
-    pub(crate) const fn channels(self) -> usize {
+    pub const fn channels(self) -> usize {
         match self {
             Self::Combined(_) => 1,
             Self::Whole => 2,
@@ -23,12 +23,12 @@ impl Sampling {
     }
 
     /// Whether samples have no part in the motion.
-    pub(crate) fn is_silent(self, time: f64) -> bool {
+    pub fn is_silent(self, time: f64) -> bool {
         self.unit(time) <= 0.0
     }
 
     /// What position and velocity of a copy are multiplied by in that number of a sample, where velocities are multiplied by `time`.
-    pub(crate) fn shares(self, channel: usize, time: f64) -> (f64, f64) {
+    pub fn shares(self, channel: usize, time: f64) -> (f64, f64) {
         match (self, channel) {
             (Self::Combined(_), _) if self.is_silent(time) => (0.0, 0.0),
             (Self::Combined(Gains { stiffness, damping }), _) => {
@@ -41,7 +41,7 @@ impl Sampling {
     }
 
     /// As [`Sampling::shares`], of a combined number before it is divided to be a length \[N\].
-    pub(crate) fn gains(self, channel: usize, time: f64) -> (f64, f64) {
+    pub fn gains(self, channel: usize, time: f64) -> (f64, f64) {
         match self {
             Self::Combined(Gains { stiffness, damping }) => (stiffness, damping / time),
             Self::Whole => self.shares(channel, time),
@@ -55,12 +55,12 @@ impl Sampling {
     }
 
     /// How far a translation of everything by 1 moves that number of a sample.
-    pub(crate) fn translation(self, channel: usize, time: f64) -> f64 {
+    pub fn translation(self, channel: usize, time: f64) -> f64 {
         self.shares(channel, time).0
     }
 
     /// What that number of a sample of that age \[s\] is multiplied by in what a row of a law hears \[N\].
-    pub(crate) fn heard(self, row: &LawRow, channel: usize, age: f64, time: f64) -> f64 {
+    pub fn heard(self, row: &LawRow, channel: usize, age: f64, time: f64) -> f64 {
         match (self, channel) {
             (Self::Combined(gains), _) if row.heard == gains => self.unit(time),
             (Self::Combined(gains), _) if gains.stiffness != 0.0 => self.unit(time) * (row.heard.stiffness / gains.stiffness),

@@ -7,18 +7,20 @@ use crate::timetable::{Event, Timetable};
 
 /// Nodes that are coupled through samples.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lifted<'a> {
-    pub(crate) nodes: &'a [Node],
+pub struct Lifted<'a> {
+    /// The nodes.
+    pub nodes: &'a [Node],
     /// The weight of each node's samples (column) in each node's target (row).
-    pub(crate) weights: &'a Matrix,
-    pub(crate) timetable: &'a Timetable,
+    pub weights: &'a Matrix,
+    /// What happens in a frame of them.
+    pub timetable: &'a Timetable,
     /// Which numbers of a sample the laws of the nodes use.
-    pub(crate) sampling: Sampling,
+    pub sampling: Sampling,
     /// What velocities are multiplied by \[s\].
-    pub(crate) time: f64,
+    pub time: f64,
     /// Whether something ties the motion to ground. If not, the whole may be moved without a force, and positions are taken relative to the first
     /// node's copy.
-    pub(crate) tied: bool,
+    pub tied: bool,
 }
 
 /// How large the matrix of a frame is.
@@ -45,7 +47,7 @@ impl Lifted<'_> {
     }
 
     /// The rows of each node.
-    pub(crate) fn rows(&self) -> Vec<Rows> {
+    pub fn rows(&self) -> Vec<Rows> {
         let mut count = 0;
         let rows = self.nodes.iter().map(|node| {
             let rows = node.rows(count);
@@ -56,7 +58,7 @@ impl Lifted<'_> {
     }
 
     /// How often each node ticks in a frame.
-    pub(crate) fn ticks(&self) -> Vec<usize> {
+    pub fn ticks(&self) -> Vec<usize> {
         let mut ticks = vec![0; self.nodes.len()];
         for event in &self.timetable.events {
             if let Event::Tick { node, .. } = event {

@@ -24,9 +24,9 @@ pub(crate) trait Arrival {
 
 /// When the samples of a link may be taken in, in a frame that repeats.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Hazards {
+pub struct Hazards {
     /// For each tick of the receiver: the samples and their hazards, oldest first; samples are numbered from the first of this frame.
-    pub(crate) at: Vec<Vec<Hazard>>,
+    pub at: Vec<Vec<Hazard>>,
     /// How many places there are; one if no sample overtakes another.
     pub(crate) places: usize,
     /// Whether a sample has more than one tick at which it may arrive.
@@ -42,9 +42,11 @@ pub(crate) struct Hazards {
 
 /// A sample that may be taken in at a tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Hazard {
-    pub(crate) sample: i64,
-    pub(crate) hazard: f64,
+pub struct Hazard {
+    /// The number of the sample, counted from the first of the frame.
+    pub sample: i64,
+    /// The probability that the sample is taken in at the tick, if it was not before.
+    pub hazard: f64,
 }
 
 /// The samples that matter at a tick.
@@ -139,7 +141,7 @@ impl Hazards {
     }
 
     /// How many samples of earlier frames may be taken in.
-    pub(crate) fn depth(&self) -> usize {
+    pub fn depth(&self) -> usize {
         self.at.iter().flatten().map(|hazard| usize::try_from(-hazard.sample).unwrap_or(0)).max().unwrap_or(0)
     }
 

@@ -409,17 +409,22 @@ impl Followed {
 
 /// When samples of equal peers arrive over equal links that lose independently, and on which nothing overtakes.
 #[derive(Clone, Debug)]
-pub(crate) struct Independent {
+pub struct Independent {
     /// Of one peer, without deliveries.
-    pub(crate) timetable: Timetable,
-    pub(crate) hazards: Hazards,
+    pub timetable: Timetable,
+    /// When its samples may arrive.
+    pub hazards: Hazards,
     /// The probability, per frame, that nothing arrives on a link.
-    pub(crate) held: Radius,
+    pub held: Radius,
 }
 
 impl Independent {
     /// `None` if peers or links differ, or links do something else.
-    pub(crate) fn of(scene: &Scene, network: &NominalNetwork, structure: &Structure) -> Result<Option<Self>, AnalysisError> {
+    ///
+    /// # Errors
+    ///
+    /// Those of [`mean_square`] for a link whose chance has no moments.
+    pub fn of(scene: &Scene, network: &NominalNetwork, structure: &Structure) -> Result<Option<Self>, AnalysisError> {
         if random_links(scene)?.is_empty() || !alike(scene, structure) {
             return Ok(None);
         }

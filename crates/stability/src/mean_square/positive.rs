@@ -22,7 +22,7 @@ use crate::rounding::{gamma, outward};
 use crate::{Matrix, Radius, Watch};
 
 /// An operator on symmetric matrices, or tuples of them, that maps positive ones to positive ones. Elements are vectors of coordinates.
-pub(crate) trait Positive: Sync {
+pub trait Positive: Sync {
     /// How many coordinates there are.
     fn unknowns(&self) -> usize;
     /// A positive definite element of norm about 1.
@@ -56,7 +56,7 @@ const BREAKDOWN: f64 = 1e-14;
 /// power of two, which is exact; where that does not help either, nothing is known.
 ///
 /// One image takes a number of `operations`; `None` if the watch ends it.
-pub(crate) fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Watch) -> Option<Radius> {
+pub fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Watch) -> Option<Radius> {
     let watched = Images { operator, factor: 1.0, operations, watch };
     match within_range(&watched, watch) {
         Ok(radius) => Some(radius),
@@ -75,7 +75,7 @@ pub(crate) fn radius_watched(operator: &impl Positive, operations: f64, watch: &
 }
 
 /// γ as it is chosen for a spectral radius, nearly that of the operator, and some Y for which γY − L(Y) is nearly the base; whether it is has to be checked.
-pub(crate) fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> Option<(f64, Vec<f64>)> {
+pub fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> Option<(f64, Vec<f64>)> {
     let mut krylov = Krylov::new(operator.base());
     let most = MOST_STEPS.min(operator.unknowns());
     let mut next = 8;
@@ -94,7 +94,7 @@ pub(crate) fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> 
 }
 
 /// Whether γY − L(Y) is positive definite whatever was rounded.
-pub(crate) fn leaves_less(operator: &impl Positive, factor: f64, solution: &[f64]) -> bool {
+pub fn leaves_less(operator: &impl Positive, factor: f64, solution: &[f64]) -> bool {
     let image = operator.apply(solution);
     let left: Vec<f64> = solution.iter().zip(&image).map(|(solution, image)| factor * solution - image).collect();
     let absolute: Vec<f64> = solution.iter().map(|entry| entry.abs()).collect();
@@ -351,12 +351,14 @@ fn dot(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
-pub(crate) fn is_definite(matrices: &[Matrix]) -> bool {
+/// Returns whether all matrices are shown to be positive definite.
+#[must_use]
+pub fn is_definite(matrices: &[Matrix]) -> bool {
     matrices.iter().all(|matrix| is_positive(matrix, &Matrix::zeros(matrix.rows(), matrix.columns())))
 }
 
 /// Whether a diagonal has an entry below zero: eᵀYe < 0.
-pub(crate) fn is_indefinite(matrices: &[Matrix]) -> bool {
+pub fn is_indefinite(matrices: &[Matrix]) -> bool {
     matrices.iter().any(|matrix| (0..matrix.rows()).any(|place| matrix[(place, place)] < 0.0))
 }
 

@@ -32,7 +32,7 @@ use crate::timetable::Event;
 
 /// One frame of equal peers.
 #[derive(Clone, Debug)]
-pub(crate) struct Symmetric {
+pub struct Symmetric {
     peers: f64,
     count: usize,
     steps: Vec<Step>,
@@ -73,7 +73,7 @@ struct Moment {
 
 impl Symmetric {
     /// The frame of this number of peers like the only node of `lifted`, whose timetable has no deliveries: those are in `hazards`.
-    pub(crate) fn new(peers: usize, lifted: &Lifted<'_>, hazards: &Hazards) -> Self {
+    pub fn new(peers: usize, lifted: &Lifted<'_>, hazards: &Hazards) -> Self {
         let node = &lifted.nodes[0];
         let scale = Scale { time: lifted.time, compliance: node.compliance(lifted.time) };
         let rows = node.rows(0);
@@ -126,7 +126,7 @@ impl Symmetric {
     }
 
     /// How many operations an image is: at each step two blocks go from one side and from the other through its matrix.
-    pub(crate) fn operations(&self) -> f64 {
+    pub fn operations(&self) -> f64 {
         let of = |step: &Step| match step {
             Step::Move { map: Map { own, .. }, .. } => 4.0 * real(own.rows()) * real(own.columns()) * (real(own.rows()) + real(own.columns())),
             Step::Deliver { .. } => 4.0 * real(self.size) * real(self.size),

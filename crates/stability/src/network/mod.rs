@@ -19,7 +19,7 @@ use cohaptic_scene::Scene;
 use cohaptic_units::Bytes;
 use cohaptic_wan::{AccessLine, LinkConfig, Network, NetworkConfig, NodeId, PacketInfo};
 
-pub(crate) use timing::LinkTiming;
+pub use timing::LinkTiming;
 
 use self::nominal::Nominal;
 use self::probe::{MOST_SAMPLES, NoPattern, Probe, RatedLine};
@@ -32,12 +32,12 @@ const MOST_SHARING: usize = 256;
 
 /// What the links of a scene do with nothing left to chance.
 #[derive(Clone, Debug)]
-pub(crate) struct NominalNetwork {
+pub struct NominalNetwork {
     /// The different timings, each used.
     timings: Vec<LinkTiming>,
     places: Places,
     /// The nominal parts, in words.
-    pub(crate) notes: Vec<String>,
+    pub notes: Vec<String>,
 }
 
 /// Which timing a link has.
@@ -63,7 +63,7 @@ impl NominalNetwork {
     /// # Errors
     ///
     /// [`AnalysisError`] if what becomes of samples never repeats: a queue that is offered more than it carries, periods that do not meet.
-    pub(crate) fn of(scene: &Scene) -> Result<Self, AnalysisError> {
+    pub fn of(scene: &Scene) -> Result<Self, AnalysisError> {
         refuse_topology(scene, "this analysis")?;
         if scene.coordination.send_when.is_some() {
             return Err(AnalysisError::DeadBands);
@@ -89,13 +89,13 @@ impl NominalNetwork {
     }
 
     /// Every link takes that long and does nothing else.
-    pub(crate) fn uniform(delay: Duration) -> Self {
+    pub fn uniform(delay: Duration) -> Self {
         let places = Places::Each { peers: 0, places: Vec::new() };
         Self { timings: vec![LinkTiming::Constant(delay)], places, notes: Vec::new() }
     }
 
     /// The timing of a link, by the places of its ends; for a peer with itself the answer has no meaning.
-    pub(crate) fn timing(&self, from: usize, to: usize) -> &LinkTiming {
+    pub fn timing(&self, from: usize, to: usize) -> &LinkTiming {
         if self.is_uniform() {
             return &self.timings[0];
         }
@@ -109,7 +109,7 @@ impl NominalNetwork {
     }
 
     /// Whether all links have one timing.
-    pub(crate) const fn is_uniform(&self) -> bool {
+    pub const fn is_uniform(&self) -> bool {
         self.timings.len() == 1
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 /// How long the n-th sample of a sender takes on a link.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(crate) enum LinkTiming {
+pub enum LinkTiming {
     /// All the same.
     Constant(Duration),
     /// The n-th sample takes the entry n modulo the length; `None`: it never arrives.

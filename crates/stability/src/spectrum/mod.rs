@@ -23,7 +23,7 @@ use enclosure::{Enclosure, Interval};
 pub(crate) use schur::Schur;
 use square::{balance, exponent_of, power_of_two};
 use triangle::Triangle;
-pub(crate) use vectors::eigenvector;
+pub use vectors::eigenvector;
 
 /// The backward error of reduction and iteration as a multiple of n·ε·|A|, |A| Frobenius'. The proven constants are larger (Higham 2002, Section 19.3,
 /// gives a multiple of n² for n reflections of length n, all errors pointing the same way); errors that were seen are below 1.

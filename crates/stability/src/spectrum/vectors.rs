@@ -12,7 +12,7 @@ const STEPS: usize = 2;
 
 /// An eigenvector of length 1 of a matrix for one of its eigenvalues as computed, or nearly one: of an eigenvalue that is not simple some vector of its space, another for each `place`.
 /// `None` where numbers overflow.
-pub(crate) fn eigenvector(matrix: &Matrix, value: Complex64, place: usize) -> Option<Vec<Complex64>> {
+pub fn eigenvector(matrix: &Matrix, value: Complex64, place: usize) -> Option<Vec<Complex64>> {
     let size = matrix.rows();
     let shifted = ComplexMatrix::from_fn(size, size, |row, column| matrix[(row, column)] - if row == column { value } else { Complex64::ZERO });
     // With a pivot of zero the value is an eigenvalue to the last digit: a division by the size of a rounding error leads to its vector all the same.

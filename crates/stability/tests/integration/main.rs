@@ -6,7 +6,9 @@
 mod admittance;
 mod anchors;
 mod bursts;
+mod cases;
 mod client_server;
+mod ends;
 mod graphs;
 mod laws;
 mod mean_square;

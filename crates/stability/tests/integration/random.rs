@@ -5,42 +5,11 @@
 //! | `spectral radius … +- …` of `stability point` and `admittance` | a bound of rounding | [`no_spectral_radius_is_farther_off_than_it_says`] |
 //! | `a spring of`, `a viscosity of`, `an inertia of … +- …` of `admittance` | a bound of extrapolation and rounding | [`no_limit_is_farther_off_than_it_says`] |
 //! | crossings of `stability boundary` within a tolerance | half the tolerance | [`a_boundary_is_where_the_radius_is_one`] |
-//! | `growth … between … and …`, `a quadratic certificate` of a worst case | bounds | [`the_worst_case_is_nominal_where_nothing_is_left_to_choose`], `worst_case/tests.rs` |
+//! | `growth … between … and …`, `a quadratic certificate` of a worst case | bounds | `the_worst_case_is_nominal_where_nothing_is_left_to_choose`, `worst_case/tests.rs` of `cohaptic-proofs` |
 
-use cohaptic_scene::Scene;
-use cohaptic_stability::{
-    Admittance, Boundary, BoundaryOptions, Effort, Estimate, Family, KeyRange, Links, Method, Patterns, Radius, Verdict, analyse, worst_case,
-};
-use serde_json::Value;
+use cohaptic_stability::{Admittance, Boundary, BoundaryOptions, Estimate, Family, KeyRange, Method, Radius, Verdict, analyse};
 
-struct Case {
-    name: String,
-    text: String,
-    scene: Scene,
-    radius: f64,
-    rigid_modes: u64,
-    /// The place of a peer, and what its hand feels: a spring, a damper and a mass.
-    felt: Option<(usize, [f64; 3])>,
-}
-
-fn cases() -> Vec<Case> {
-    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/random.json")).unwrap();
-    let entries: Vec<Value> = serde_json::from_str(&text).unwrap();
-    let number = |entry: &Value, key: &str| entry[key].as_str().unwrap().parse::<f64>().unwrap();
-    let case = |entry: &Value| {
-        let name = entry["name"].as_str().unwrap().to_owned();
-        let text = entry["scene"].as_str().unwrap().to_owned();
-        let scene = Scene::parse(&text, name.as_ref(), &[]).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let felt = entry["peer"].as_str().map(|peer| {
-            let place = scene.peers.iter().position(|other| other.name == peer).unwrap();
-            (place, ["stiffness", "viscosity", "inertia"].map(|key| number(entry, key)))
-        });
-        Case { radius: number(entry, "radius"), rigid_modes: entry["rigid_modes"].as_u64().unwrap(), felt, scene, text, name }
-    };
-    let cases: Vec<Case> = entries.iter().map(case).collect();
-    assert!(cases.len() >= 180, "{}", cases.len());
-    cases
-}
+use crate::cases::cases;
 
 /// A bound is one: of all these scenes none may be outside. The reference is a double, half a unit in the last place from the truth.
 #[test]
@@ -136,30 +105,4 @@ fn a_boundary_is_where_the_radius_is_one() {
         }
     }
     assert!(found >= 10, "{found} crossings");
-}
-
-/// With nothing lost and no delay that varies there is one frame, and the growth a period lies between the bounds: it is the radius over a frame of one
-/// period, known to fifty digits.
-#[test]
-#[ignore = ".ci/nightly runs it: it takes long"]
-fn the_worst_case_is_nominal_where_nothing_is_left_to_choose() {
-    let mut compared = 0;
-    for case in cases().iter().filter(|case| case.felt.is_some()) {
-        let patterns = Patterns { losses_in_a_row: 0, delay: None, links: Links::Together };
-        let effort = Effort { products: 2000, ..Effort::default() };
-        let Ok(found) = worst_case(&case.scene, &patterns, &effort) else { continue };
-        let rounding = found.parts.iter().map(|part| part.rounding).fold(0.0, f64::max);
-        // The bounds are those of the matrices as computed, whose errors move the radius as the bound of the nominal radius says.
-        let nominal = analyse(&case.scene, Method::Reduced).unwrap().radius.error.max(rounding);
-        assert!(
-            found.lower <= case.radius + nominal && case.radius <= found.upper + nominal,
-            "{}: {} to {}, but it is {}",
-            case.name,
-            found.lower,
-            found.upper,
-            case.radius
-        );
-        compared += 1;
-    }
-    assert!(compared > 40, "{compared}");
 }

@@ -1,14 +1,14 @@
 //! A watch sees the progress of an analysis and may end it; an analysis that would take too long is refused before it is begun.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Admittance, AdmittanceError, AnalysisError, Boundary, BoundaryOptions, Effort, Family, FamilyError, Graph, GraphError, Grid, KeyRange, Limits,
-    Links, MOST_MEMORY, Map, Method, PartCost, Patterns, SceneWorstCaseError, Unwatched, Watch, analyse_on_watched, analyse_watched, judge_watched,
-    mean_square_watched, worst_case_watched,
+    Admittance, AdmittanceError, AnalysisError, Boundary, BoundaryOptions, Family, FamilyError, Graph, GraphError, Grid, KeyRange, Limits,
+    MOST_MEMORY, Map, Method, PartCost, Unwatched, Watch, analyse_on_watched, analyse_watched, judge_watched, mean_square_watched,
 };
+
+use crate::ends::{Ends, ends_wherever_it_is_asked};
 
 const THREE: &str = r#"
     scene        = { duration = "1s", count = 3 }
@@ -21,38 +21,6 @@ const THREE: &str = r#"
 fn three(overrides: &[&str]) -> Scene {
     let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
     Scene::parse(THREE, "three.toml".as_ref(), &overrides).unwrap()
-}
-
-/// Counts how often it is asked, and ends the work at the n-th time.
-struct Ends {
-    at: usize,
-    asked: AtomicUsize,
-    /// The operations that are expected, and those that are done.
-    operations: Mutex<(f64, f64)>,
-}
-
-impl Ends {
-    fn at(at: usize) -> Self {
-        Self { at, asked: AtomicUsize::new(0), operations: Mutex::new((0.0, 0.0)) }
-    }
-
-    fn asked(&self) -> usize {
-        self.asked.load(Ordering::Relaxed)
-    }
-}
-
-impl Watch for Ends {
-    fn expects(&self, operations: f64) {
-        self.operations.lock().unwrap().0 += operations;
-    }
-
-    fn done(&self, operations: f64) {
-        self.operations.lock().unwrap().1 += operations;
-    }
-
-    fn stops(&self) -> bool {
-        self.asked.fetch_add(1, Ordering::Relaxed) + 1 >= self.at
-    }
 }
 
 fn limits(watch: &Ends) -> Limits<'_> {
@@ -184,21 +152,6 @@ fn an_admittance_that_is_ended_has_its_first_points() {
     assert_eq!(ended.points, whole.points[..ended.points.len()]);
 }
 
-/// Each analysis is gone through once to count how often it asks; ended at the first question, in the middle and at the last, it says so and asks no more
-/// than a few times after that (each of its threads may be at a question of its own).
-#[track_caller]
-fn ends_wherever_it_is_asked(least: usize, run: impl Fn(&Ends) -> bool) {
-    let whole = Ends::at(usize::MAX);
-    assert!(!run(&whole), "it ends by itself");
-    let asked = whole.asked();
-    assert!(asked >= least, "asked {asked} times");
-    for at in [1, asked / 2, asked] {
-        let ends = Ends::at(at);
-        assert!(run(&ends), "ended at {at} of {asked}");
-        assert!(ends.asked() <= at + 16, "{} questions, though it was ended at {at}", ends.asked());
-    }
-}
-
 const LOSS: &str = "link.loss=5%";
 
 /// Equal peers over links that lose independently: an image of the second moment takes microseconds here, and there is a question for each.
@@ -209,21 +162,6 @@ fn the_second_moment_of_equal_peers_ends() {
         Err(AnalysisError::Stopped) => true,
         found => {
             assert_eq!(found.unwrap().method.word(), "symmetric");
-            false
-        }
-    });
-}
-
-/// There is a question for each product of matrices.
-#[test]
-fn a_worst_case_ends() {
-    let scene = three(&["link.loss=0%"]);
-    let patterns = Patterns { losses_in_a_row: 2, delay: None, links: Links::Together };
-    let effort = Effort { accuracy: 1e-9, products: 2000 };
-    ends_wherever_it_is_asked(2000, |ends| match worst_case_watched(&scene, &patterns, &effort, ends) {
-        Err(SceneWorstCaseError::Analysis(AnalysisError::Stopped)) => true,
-        found => {
-            found.unwrap();
             false
         }
     });

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use cohaptic_stability::{BoundaryError, Guarantee, ProofError, ProvenLine, ProvenStretch, SharedProof, TopologyCertificate};
+use cohaptic_proofs::{Guarantee, ProofError, ProvenLine, ProvenStretch, SharedProof, TopologyCertificate};
+use cohaptic_stability::BoundaryError;
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 

@@ -7,7 +7,7 @@ use std::time::Instant as Clock;
 
 use cohaptic_answers::axis_of;
 use cohaptic_picture::{Fill, Panel, Picture, Region};
-use cohaptic_stability::{Guarantee, ProofError, ProvenBox, ProvenRegion, SharedProof, TopologyCertificate};
+use cohaptic_proofs::{Guarantee, ProofError, ProvenBox, ProvenRegion, SharedProof, TopologyCertificate};
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 

@@ -1,10 +1,9 @@
 //! A verdict as a JSON document and in words.
 
 use cohaptic_answers::notes;
+use cohaptic_proofs::{SceneWorstCase, WorstVerdict};
 use cohaptic_scene::Scene;
-use cohaptic_stability::{
-    Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, VerdictKind, WorstVerdict, nominal_head,
-};
+use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, Verdict, VerdictKind, nominal_head};
 use cohaptic_units::print::Span;
 use serde::Serialize;
 

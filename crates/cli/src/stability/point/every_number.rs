@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use cohaptic_proofs::{EveryNumber, Guarantee, MOST_FOLLOWED, Nearness, NumberProof, NumberSpan, Openness, ProofError};
 use cohaptic_scene::Scene;
-use cohaptic_stability::{EveryNumber, Guarantee, MOST_FOLLOWED, Nearness, NumberProof, NumberSpan, Openness, ProofError};
 use serde::Serialize;
 
 use crate::arguments::PointArguments;

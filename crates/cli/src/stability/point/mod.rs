@@ -10,10 +10,11 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use cohaptic_answers::notes;
+use cohaptic_proofs::SceneWorstCase;
 use cohaptic_scene::{Scene, read_weights};
 use cohaptic_stability::{
-    Analysis, AnalysisError, CHANGES_LEFT_OUT, Graph, GraphError, Judgement, Limits, Matrix, SceneWorstCase, analyse_loaded, analyse_on_watched,
-    analyse_spinning, has_chance, judge_watched,
+    Analysis, AnalysisError, CHANGES_LEFT_OUT, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, analyse_spinning,
+    has_chance, judge_watched,
 };
 
 use crate::analysis_watch::AnalysisWatch;

@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use cohaptic_proofs::{Guarantee, Switching, SwitchingError, SwitchingMotion, prove_switching};
 use cohaptic_scene::Scene;
-use cohaptic_stability::{AnalysisError, Guarantee, Switching, SwitchingError, SwitchingMotion, prove_switching};
+use cohaptic_stability::AnalysisError;
 use cohaptic_units::print::Span;
 use serde::Serialize;
 

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use cohaptic_proofs::{Effort, Links, Patterns, SceneWorstCase, SceneWorstCaseError, worst_case_watched};
 use cohaptic_scene::Scene;
-use cohaptic_stability::{AnalysisError, Effort, Links, Patterns, SceneWorstCase, SceneWorstCaseError, worst_case_watched};
+use cohaptic_stability::AnalysisError;
 use serde::Serialize;
 
 use super::ended;

@@ -1,0 +1,369 @@
+//! Boxes of numbers: lifted systems between whose corners every step matrix is multi-affine.
+//!
+//! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of them is monotone in m and in b. So
+//! the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box. But of a damping b that stays, a force f keeps the velocity f/b,
+//! so that two of them follow from the others: e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h.
+
+use std::borrow::Cow;
+
+use cohaptic_peer::{Gains, StepMap};
+use cohaptic_stability::Matrix;
+use cohaptic_stability::frames::{Body, Node, Sampling, Scale, Timetable};
+
+use super::error::ProofError;
+use super::span::{FrameSpan, StepSpan};
+use super::steps::{FrameState, Numbers, Plan, Plans, StepMatrix};
+
+/// The numbers of a part of a scene at a corner of a box.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Point {
+    pub(super) nodes: Vec<Node>,
+    pub(super) weights: Matrix,
+}
+
+/// What the corners of a box have in common.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Common<'a> {
+    pub(super) timetable: &'a Timetable,
+    /// The plans of that timetable.
+    pub(super) plans: &'a Plans,
+    pub(super) tied: bool,
+    /// What velocities are multiplied by \[s\].
+    pub(super) time: f64,
+}
+
+/// More numbers than this that vary are refused: a box has two corners to the power of them. Two dampings are four coefficients of a step map each, of bodies that
+/// are equal in all peers; beside them there is room for the weight with which a peer hears others, and for one number more.
+const MOST_NUMBERS: usize = 10;
+
+/// Parts of the computation that all points share.
+struct Frame<'a> {
+    plan: &'a Plan,
+    sampling: Sampling,
+    scale: Scale,
+    tied: bool,
+    /// Whether the own states of the past are states as a whole, since the corners take different combinations of them.
+    whole_past: bool,
+}
+
+impl<'a> Frame<'a> {
+    fn of(points: &[Point], common: Common<'a>) -> Result<Self, ProofError> {
+        let all: Vec<Node> = points.iter().flat_map(|point| point.nodes.iter().cloned()).collect();
+        let sampling = Sampling::of(&all);
+        let scale = Scale { time: common.time, compliance: points[0].nodes[0].compliance(common.time) };
+        check_units(points, scale)?;
+        let whole_past = !takes_one_past(points, scale);
+        let ages = all.iter().any(|node| node.law.horizon.is_some());
+        Ok(Self { plan: common.plans.of(common.timetable, !sampling.is_silent(scale.time), ages), sampling, scale, tied: common.tied, whole_past })
+    }
+
+    fn matrices(&self, point: &Point) -> Vec<StepMatrix> {
+        let nodes = self.nodes(point);
+        self.plan.matrices(Numbers { nodes: &nodes, weights: &point.weights, sampling: self.sampling, scale: self.scale, tied: self.tied })
+    }
+
+    fn nodes<'p>(&self, point: &'p Point) -> Cow<'p, [Node]> {
+        if !self.whole_past {
+            return Cow::Borrowed(&point.nodes);
+        }
+        Cow::Owned(point.nodes.iter().map(|node| Node { keeps_whole_past: true, ..node.clone() }).collect())
+    }
+}
+
+/// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set. Bodies are between those of `ends`, whatever those of
+/// the points are.
+pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<FrameSpan, ProofError> {
+    let frame = Frame::of(points, common)?;
+    let kinds = enclosed(points, ends, |point| frame.matrices(point))?;
+    #[cfg(test)]
+    let kinds = super::mutation::of_steps(kinds);
+    Ok(FrameSpan { kinds, order: frame.plan.kinds().to_vec() })
+}
+
+/// Matrices over the box that points enclose, from those at each corner. Bodies are between those of `ends`, whatever those of the points are.
+pub(super) fn enclosed(points: &[Point], ends: &[Vec<Node>], matrices: impl Fn(&Point) -> Vec<StepMatrix>) -> Result<Vec<StepSpan>, ProofError> {
+    let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(matrices).collect();
+    Ok((0..corners[0].len()).map(|step| StepSpan::of(corners.iter().map(|steps| &steps[step]))).collect())
+}
+
+/// The states of a frame over the box that points enclose.
+pub(super) fn states(points: &[Point], common: Common<'_>) -> Result<States, ProofError> {
+    let frame = Frame::of(points, common)?;
+    let names = frame.plan.states(&frame.nodes(&points[0]), frame.sampling.channels(), frame.tied);
+    let heard = match frame.sampling {
+        Sampling::Combined(gains) => Some(gains),
+        Sampling::Whole => None,
+    };
+    Ok(States { names, heard })
+}
+
+/// The states of a frame.
+pub(super) struct States {
+    /// In the order of rows and columns.
+    pub(super) names: Vec<FrameState>,
+    /// The gains with which a sample is one number for those that hear it; `None`: position and velocity.
+    pub(super) heard: Option<Gains>,
+}
+
+/// The steps of a frame whose numbers grow without a limit with N, each divided by N/N₀ for `growing` of two numbers that do: points at N₀, 2·N₀ and 3·N₀.
+///
+/// With one, steps are affine in N, T = A + N·B, so that N₀/N·T = u·A + N₀·B, u = N₀/N from 0 to 1, lies between T(N₀) and N₀·B = T(2·N₀) − T(N₀).
+/// With two, T = A + N·B + N²·C, and (N₀/N)²·T = u²·A + u·L + Q with L = N₀·B and Q = N₀²·C lies between the four where u² and u are 0 or 1.
+pub(super) fn steps_beyond(at: [&[Point]; 3], growing: Growth, common: Common<'_>) -> Result<FrameSpan, ProofError> {
+    let all: Vec<Point> = at.iter().flat_map(|points| points.iter().cloned()).collect();
+    let frame = Frame::of(&all, common)?;
+    let [near, far, third] = at.map(|points| points.iter().map(|point| frame.matrices(point)).collect::<Vec<_>>());
+    // Sums of a dozen of them at most, whose own roundings are small beside the errors.
+    let sum = |of: [&StepMatrix; 3], by: [f64; 3]| {
+        let matrix =
+            Matrix::from_fn(of[0].matrix.rows(), of[0].matrix.columns(), |i, j| of.iter().zip(by).map(|(step, by)| by * step.matrix[(i, j)]).sum());
+        StepMatrix { matrix, error: 32.0 * of.iter().map(|step| step.error).fold(0.0, f64::max) }
+    };
+    // By what T at N₀, 2·N₀ and 3·N₀ are multiplied at each corner but the last, which is T(N₀).
+    let corners: &[[f64; 3]] = match growing {
+        Growth::Linear => &[[-1.0, 1.0, 0.0]],
+        // Q = (T₃ − 2·T₂ + T₁)/2, L = T₂ − T₁ − 3·Q: Q, Q + A = T₁ − L, and Q + L.
+        Growth::Quadratic => &[[0.5, -1.0, 0.5], [3.5, -4.0, 1.5], [-2.0, 3.0, -1.0]],
+    };
+    let span = |step: usize| {
+        let of = |by: &[f64; 3]| {
+            near.iter().zip(&far).zip(&third).map(|((near, far), third)| sum([&near[step], &far[step], &third[step]], *by)).collect::<Vec<_>>()
+        };
+        let limits: Vec<StepMatrix> = corners.iter().flat_map(of).collect();
+        StepSpan::of(limits.iter().chain(near.iter().map(|steps| &steps[step])))
+    };
+    Ok(FrameSpan { kinds: (0..near[0].len()).map(span).collect(), order: frame.plan.kinds().to_vec() })
+}
+
+/// How the steps of a frame grow with the number of peers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Growth {
+    /// As N: the gains of the law, or the effects of a force on a copy.
+    Linear,
+    /// As N²: both.
+    Quadratic,
+}
+
+/// The kinds of steps of a frame at each point, in the units of the first.
+#[cfg(test)]
+pub(super) fn steps_of_each(points: &[Point], common: Common<'_>) -> Result<Vec<Vec<StepMatrix>>, ProofError> {
+    let frame = Frame::of(points, common)?;
+    Ok(points.iter().map(|point| frame.matrices(point)).collect())
+}
+
+/// The points, each at the lower end of one more number and then each at its upper end.
+pub(super) fn doubled(points: &[Point], at: impl Fn(&Point, bool) -> Point) -> Vec<Point> {
+    [false, true].into_iter().flat_map(|upper| points.iter().map(move |point| (point, upper))).map(|(point, upper)| at(point, upper)).collect()
+}
+
+/// Refuses laws whose states mean something else at each corner: numbers that are remembered in units of gains that vary.
+pub(super) fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
+    let units = |point: &Point| -> Vec<u64> {
+        let of = |node: &Node| (0..node.law.memory.len()).map(|place| node.memory_unit(place, scale).to_bits()).collect::<Vec<_>>();
+        point.nodes.iter().flat_map(of).collect()
+    };
+    if points.iter().any(|point| units(point) != units(&points[0])) {
+        return Err(ProofError::Remembered);
+    }
+    Ok(())
+}
+
+/// Whether at each corner laws take the same combination of the own states of the past, but for some roundings, which the bounds of a step have room for.
+pub(super) fn takes_one_past(points: &[Point], scale: Scale) -> bool {
+    let shares = |point: &Point| -> Vec<f64> {
+        let of = |node: &Node| (node.looks_back() > 0).then(|| node.law.force.past.stiffness / node.past_unit(scale.time));
+        point.nodes.iter().filter_map(of).collect()
+    };
+    let first = shares(&points[0]);
+    let is_first = |share: (&f64, &f64)| (share.0 - share.1).abs() <= 8.0 * f64::EPSILON;
+    points.iter().map(shares).all(|shares| shares.len() == first.len() && shares.iter().zip(&first).all(is_first))
+}
+
+/// A body at each end, and the nodes that have it.
+type EqualBodies = (Vec<Body>, Vec<(usize, BodyOf)>);
+
+/// The points with one more number for each coefficient of a step map that varies between the ends. Bodies that are equal at all ends vary together: their coefficients are the same functions of what varies.
+fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, ProofError> {
+    let mut groups: Vec<EqualBodies> = Vec::new();
+    for node in 0..points[0].nodes.len() {
+        for body in [BodyOf::Copy, BodyOf::Device] {
+            let found: Vec<Body> = ends.iter().filter_map(|nodes| body.of(&mut nodes[node].clone()).copied()).collect();
+            if found.iter().all(|other| *other == found[0]) {
+                continue;
+            }
+            match groups.iter_mut().find(|(bodies, _)| *bodies == found) {
+                Some((_, places)) => places.push((node, body)),
+                None => groups.push((found, vec![(node, body)])),
+            }
+        }
+    }
+    let mut varying = Vec::new();
+    for (found, bodies) in groups {
+        let ranges = ranges(&found)?;
+        varying.push((bodies, ranges, together(&ranges, &found)));
+    }
+    let mut all = points.to_vec();
+    for (bodies, ranges, _) in &varying {
+        for point in &mut all {
+            for (node, body) in bodies {
+                if let Some(place) = body.of(&mut point.nodes[*node]) {
+                    *place = place.with_map(map_of(ranges.map(|(low, _)| low)));
+                }
+            }
+        }
+    }
+    // A key that changes bodies alone counts by their coefficients, and no more by itself.
+    let mut all = without_idle_numbers(all);
+    let numbers = all.len().trailing_zeros() as usize;
+    let coefficients_of_bodies: usize = varying.iter().map(|(_, _, together)| together.len()).sum();
+    if numbers + coefficients_of_bodies > MOST_NUMBERS {
+        return Err(ProofError::Numerous { coefficients: coefficients_of_bodies, others: numbers, most: MOST_NUMBERS });
+    }
+    for (bodies, ranges, together) in varying {
+        let set = |point: &Point, values: &dyn Fn([f64; 6]) -> [f64; 6]| {
+            let mut point = point.clone();
+            for (node, body) in &bodies {
+                if let Some(place) = body.of(&mut point.nodes[*node]) {
+                    *place = place.with_map(map_of(values(coefficients(&place.only_map().unwrap_or_else(|| map_of([0.0; 6]))))));
+                }
+            }
+            point
+        };
+        for places in together {
+            all = doubled(&all, |point, upper| {
+                let at = |mut values: [f64; 6]| {
+                    places.iter().for_each(|(place, falls)| values[*place] = if upper == *falls { ranges[*place].0 } else { ranges[*place].1 });
+                    values
+                };
+                set(point, &at)
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// The points without the numbers that change none of them.
+fn without_idle_numbers(mut points: Vec<Point>) -> Vec<Point> {
+    let mut number = 0;
+    while points.len() > 1 << number {
+        let bit = 1 << number;
+        let is_idle = (0..points.len()).filter(|place| place & bit == 0).all(|place| points[place] == points[place | bit]);
+        if is_idle {
+            let mut place = 0;
+            points.retain(|_| {
+                place += 1;
+                (place - 1) & bit == 0
+            });
+        } else {
+            number += 1;
+        }
+    }
+    points
+}
+
+/// Which body of a node.
+#[derive(Clone, Copy)]
+enum BodyOf {
+    Copy,
+    Device,
+}
+
+impl BodyOf {
+    const fn of(self, node: &mut Node) -> Option<&mut Body> {
+        match self {
+            Self::Copy => Some(&mut node.object),
+            Self::Device => node.device.as_mut(),
+        }
+    }
+}
+
+fn coefficients(map: &StepMap) -> [f64; 6] {
+    let ([[e00, e01], [e10, e11]], [g0, g1]) = map.coefficients();
+    [e00, e01, e10, e11, g0, g1]
+}
+
+const fn map_of([e00, e01, e10, e11, g0, g1]: [f64; 6]) -> StepMap {
+    StepMap::new([[e00, e01], [e10, e11]], [g0, g1])
+}
+
+/// Between which values each coefficient of the step maps of bodies lies.
+fn ranges(bodies: &[Body]) -> Result<[(f64, f64); 6], ProofError> {
+    let values = bodies.iter().map(|body| body.only_map().map(|map| coefficients(&map)).ok_or(ProofError::Drift)).collect::<Result<Vec<_>, _>>()?;
+    let range = |place: usize| {
+        let of = values.iter().map(|values| values[place]);
+        (of.clone().fold(f64::INFINITY, f64::min), of.fold(f64::NEG_INFINITY, f64::max))
+    };
+    let ranges: [(f64, f64); 6] = std::array::from_fn(range);
+    if [0, 2].iter().any(|place| ranges[*place].0 < ranges[*place].1) { Err(ProofError::TiedBody) } else { Ok(ranges) }
+}
+
+/// Coefficients that are affine in one number, and whether each falls as that grows.
+type Together = &'static [(usize, bool)];
+
+/// Which coefficients vary, those together that are affine in one number: without a change of the damping over the mass, both effects of a force; without a change of the damping, the effects of a velocity and of a force.
+fn together(ranges: &[(f64, f64); 6], bodies: &[Body]) -> Vec<Together> {
+    let varies = |place: usize| ranges[place].0 < ranges[place].1;
+    let groups: &[Together] = if !varies(1) && !varies(3) {
+        &[&[(4, false), (5, false)]]
+    } else if keep_their_damping(bodies) {
+        &[&[(1, false), (4, true)], &[(3, false), (5, true)]]
+    } else {
+        &[&[(1, false)], &[(3, false)], &[(4, false)], &[(5, false)]]
+    };
+    groups.iter().copied().filter(|places| places.iter().any(|(place, _)| varies(*place))).collect()
+}
+
+/// Whether bodies that nothing ties to ground have one damping, but for roundings.
+fn keep_their_damping(bodies: &[Body]) -> bool {
+    let of = |body: &Body| {
+        let [e00, e01, e10, e11, g0, g1] = coefficients(&body.only_map()?);
+        let damping = -e11 / g1;
+        (e00 == 0.0 && e10 == 0.0 && damping > 0.0).then_some((damping, e01 + damping * g0))
+    };
+    let is_near = |one: f64, other: f64| (one - other).abs() <= 8.0 * f64::EPSILON * other;
+    let Some(found) = bodies.iter().map(of).collect::<Option<Vec<_>>>() else { return false };
+    found.iter().all(|(damping, span)| is_near(*damping, found[0].0) && is_near(*span, found[0].1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paper_scene::PAPER;
+    use cohaptic_stability::frames::NominalNetwork;
+    use cohaptic_stability::frames::{Contacts, Structure};
+
+    /// A mass with a damping that stays is two numbers: steps of every mass between the ends are where these say, but for the radius.
+    #[test]
+    fn a_mass_beside_a_damping_that_stays_is_two_numbers() {
+        let at = |mass: f64, damping: f64| {
+            let overrides = [format!("object.mass={mass:?}"), format!("object.damping={damping:?}")];
+            let scene = cohaptic_scene::Scene::parse(PAPER, "paper.toml".as_ref(), &overrides).unwrap();
+            let contacts = Contacts { touching: vec![true; 3], at_wall: false, absent: vec![false; 3] };
+            let structure = Structure::of(&[&scene], &NominalNetwork::of(&scene).unwrap(), &contacts).unwrap();
+            (structure.nodes(&scene), structure)
+        };
+        let weights = || Matrix::from_fn(1, 1, |_, _| -0.5);
+        let point = |nodes: &[Node]| Point { nodes: nodes.to_vec(), weights: weights() };
+        let of_copy = |nodes: &[Node]| coefficients(&nodes[0].object.only_map().unwrap());
+        let ([low, high], structure) = ([at(0.3, 20.0).0, at(0.6, 20.0).0], at(0.3, 20.0).1);
+        let common = Common { timetable: structure.apart[0].as_ref().unwrap(), plans: &Plans::default(), tied: true, time: 0.01 };
+        let span = steps(&[point(&low)], &[low.clone(), high.clone()], common).unwrap();
+        assert!(span.kinds.iter().all(|step| step.slopes.len() == 2));
+        for mass in [0.3, 0.35, 0.45, 0.6] {
+            let inside = at(mass, 20.0).0;
+            // In the units of the box.
+            let exact = steps_of_each(&[point(&low), point(&inside)], common).unwrap().swap_remove(1);
+            let [first, last, here] = [&low, &high, &inside].map(|nodes| of_copy(nodes));
+            let shares = [1, 3].map(|place| (2.0 * here[place] - first[place] - last[place]) / (first[place] - last[place]).abs());
+            for (step, exact) in span.kinds.iter().zip(&exact) {
+                for (i, j) in (0..step.mean.rows()).flat_map(|i| (0..step.mean.columns()).map(move |j| (i, j))) {
+                    let near = step.slopes.iter().zip(shares).map(|(slope, share)| share * slope[(i, j)]).sum::<f64>() + step.mean[(i, j)];
+                    assert!((exact.matrix[(i, j)] - near).abs() <= step.radius[(i, j)] + 1e-13, "{mass} kg, {i} {j}");
+                }
+            }
+        }
+        // A damping that varies too is taken apart.
+        let both = steps(&[point(&low)], &[low.clone(), at(0.6, 21.0).0], common).unwrap();
+        assert!(both.kinds.iter().all(|step| step.slopes.len() == 4));
+    }
+}

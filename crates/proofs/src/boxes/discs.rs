@@ -1,0 +1,192 @@
+//! Where the eigenvalues of all matrices of a box are: discs around the eigenvalues of the mean that move with the numbers.
+//!
+//! In coordinates V that nearly diagonalise the mean, A(z, s) = W·(z·I − M(s))·V with W near V⁻¹ is nearly diagonal for every s of the box. Let dᵢ > 0. Where on a circle |z| = ρ
+//!
+//! ```text
+//! |z·(WV)ᵢᵢ − (WMV)ᵢᵢ|·dᵢ > Σ_{j≠i} |z·(WV)ᵢⱼ − (WMV)ᵢⱼ|·dⱼ          for all i and s,                              (1)
+//! ```
+//!
+//! A is diagonally dominant, so that no M(s) has an eigenvalue on the circle (Gershgorin 1931; V and W need no property at all). It stays so while the entries off the diagonal shrink to
+//! zero, so that as many eigenvalues lie inside as diagonal entries do. With ρ = 1 and all of them inside, every M(s) is **stable**, and (1) holds for larger |z| too; with ρ ≥ 1 and one of them outside for
+//! all s, every M(s) is **unstable**. So it is if (1) holds on a circle around one diagonal entry that moves along with it, outside of the unit circle and away from the others.
+//!
+//! cᵢ(s) = (WMV)ᵢᵢ goes linearly with s but for a radius, so that how near it comes to the circle is known to first order; entries off the diagonal are of first order and count by the products of two. For the dᵢ are chosen as well as can be: those for which the comparison matrix of (1) times d is 1.
+
+use cohaptic_stability::Matrix;
+use cohaptic_stability::numerics::{ComplexMatrix, gamma, outward, real};
+use num_complex::Complex64;
+
+use super::basis::{Basis, solved};
+use super::guarantee::Proven;
+use super::span::{StepSpan, absolute};
+
+/// A verdict on all matrices of a box, and the numbers by which anybody can check it.
+pub(super) struct Decision {
+    pub(super) proven: Proven,
+    pub(super) witness: Witness,
+}
+
+/// By which numbers (1) holds; W is the inverse of V.
+#[derive(Clone, Debug)]
+pub(super) struct Witness {
+    /// V.
+    pub(super) coordinates: ComplexMatrix,
+    /// d.
+    pub(super) weights: Vec<f64>,
+    pub(super) circle: FreeCircle,
+}
+
+/// The circle on which no matrix of a box has an eigenvalue.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum FreeCircle {
+    /// Around zero, with that radius.
+    AroundZero(f64),
+    /// Around the diagonal entry of that place, with that radius.
+    AroundEntry(usize, f64),
+}
+
+/// The verdict on all matrices of a box.
+pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
+    let near = NearlyDiagonal::of(span)?;
+    #[cfg(test)]
+    let near = super::mutation::of_discs(near);
+    let reaches: Vec<(f64, f64)> =
+        (0..near.size()).map(|place| near.reach(near.mean[(place, place)], |slope| slope[(place, place)], near.wide[(place, place)])).collect();
+    let (proven, circle, weights) = if reaches.iter().all(|(_, high)| *high < 1.0) {
+        (Proven::Stable, FreeCircle::AroundZero(1.0), near.free_of(1.0, &reaches)?)
+    } else {
+        let by_circle = circle(&reaches).and_then(|circle| Some((FreeCircle::AroundZero(circle), near.free_of(circle, &reaches)?)));
+        let (circle, weights) = by_circle.or_else(|| near.one_outside(&reaches))?;
+        (Proven::Unstable, circle, weights)
+    };
+    Some(Decision { proven, witness: Witness { coordinates: near.coordinates, weights, circle } })
+}
+
+/// W·M·V over a box, nearly diagonal, and W·V, nearly 1.
+pub(super) struct NearlyDiagonal {
+    /// V.
+    coordinates: ComplexMatrix,
+    mean: ComplexMatrix,
+    pub(super) slopes: Vec<ComplexMatrix>,
+    /// How far an entry of W·M·V may be from its mean and slopes.
+    pub(super) wide: Matrix,
+    /// How far an entry of W·V may be from that of 1.
+    off_unit: Matrix,
+}
+
+impl NearlyDiagonal {
+    fn of(span: &StepSpan) -> Option<Self> {
+        let Basis { right: v, left: w } = Basis::of(&span.mean)?;
+        let size = span.mean.rows();
+        let sizes = |of: &ComplexMatrix| Matrix::from_fn(size, size, |i, j| modulus(of[(i, j)]));
+        let (v_size, w_size) = (sizes(&v), sizes(&w));
+        let through =
+            |matrix: &Matrix| -> ComplexMatrix { w.times(&ComplexMatrix::from_fn(size, size, |i, j| Complex64::from(matrix[(i, j)]))).times(&v) };
+        let (mean, unit) = (through(&span.mean), w.times(&v));
+        let slopes: Vec<ComplexMatrix> = span.slopes.iter().map(through).collect();
+        // Two complex products each of mean and slopes, and W·V: eight roundings a term and those of the sums.
+        let rounding = gamma(8 * size + 32) * real(2 + span.slopes.len());
+        let (radius, whole) = (w_size.times(&span.radius).times(&v_size), w_size.times(&span.largest()).times(&v_size));
+        let unit_sizes = w_size.times(&v_size);
+        let one = |i: usize, j: usize| Complex64::new(if i == j { 1.0 } else { 0.0 }, 0.0);
+        Some(Self {
+            mean,
+            slopes,
+            wide: Matrix::from_fn(size, size, |i, j| outward(outward(radius[(i, j)] + rounding * whole[(i, j)]))),
+            off_unit: Matrix::from_fn(size, size, |i, j| outward(modulus(unit[(i, j)] - one(i, j)) + rounding * unit_sizes[(i, j)])),
+            coordinates: v,
+        })
+    }
+
+    fn size(&self) -> usize {
+        self.mean.rows()
+    }
+
+    /// Between which sizes a number stays that is `centre` in the mean, moves with the slopes and is within `wide` of that.
+    fn reach(&self, centre: Complex64, slope: impl Fn(&ComplexMatrix) -> Complex64, wide: f64) -> (f64, f64) {
+        let size = modulus(centre);
+        let direction = if size > 0.0 { Complex64::new(centre.re / size, -centre.im / size) } else { Complex64::new(1.0, 0.0) };
+        let (mut along, mut across) = (0.0, 0.0);
+        for matrix in &self.slopes {
+            let turned = slope(matrix) * direction;
+            along += turned.re.abs();
+            across += turned.im.abs();
+        }
+        let wide = wide + 16.0 * f64::EPSILON * (size + along + across);
+        (size - along - wide, libm::hypot(size + along, across) + wide)
+    }
+
+    /// The largest size of an entry off the diagonal, of z·W·V − W·M·V with |z| at most `largest`.
+    fn beside(&self, i: usize, j: usize, largest: f64) -> f64 {
+        let moving: f64 = self.slopes.iter().map(|slope| modulus(slope[(i, j)])).sum();
+        outward(outward(modulus(self.mean[(i, j)]) + moving + self.wide[(i, j)] + self.off_unit[(i, j)] * largest))
+    }
+
+    /// A d for which (1) holds on the circle of that radius around zero.
+    fn free_of(&self, circle: f64, reaches: &[(f64, f64)]) -> Option<Vec<f64>> {
+        let entry = |i: usize, j: usize| {
+            let (low, high) = reaches[i];
+            let apart = if high < circle { circle - high } else { low - circle };
+            if i == j { apart - outward(self.off_unit[(i, i)] * circle) } else { -self.beside(i, j, circle) }
+        };
+        dominated(&Matrix::from_fn(self.size(), self.size(), entry))
+    }
+
+    /// A circle outside of the unit circle around one diagonal entry, which moves along with it and has no other within, and a d for which (1) holds on it.
+    fn one_outside(&self, reaches: &[(f64, f64)]) -> Option<(FreeCircle, Vec<f64>)> {
+        let mut outside: Vec<usize> = (0..self.size()).filter(|place| reaches[*place].0 > 1.0 && self.mean[(*place, *place)].im >= 0.0).collect();
+        outside.sort_by(|one, other| reaches[*other].0.total_cmp(&reaches[*one].0));
+        outside.into_iter().take(MOST_TRIED).find_map(|centre| {
+            let between = |place: usize| {
+                let difference = self.mean[(place, place)] - self.mean[(centre, centre)];
+                let wide = self.wide[(place, place)] + self.wide[(centre, centre)];
+                self.reach(difference, |slope| slope[(place, place)] - slope[(centre, centre)], wide).0
+            };
+            let apart: Vec<f64> = (0..self.size()).map(|place| if place == centre { f64::INFINITY } else { between(place) }).collect();
+            let nearest = apart.iter().copied().fold(f64::INFINITY, f64::min);
+            let radius = (reaches[centre].0 - 1.0).min(0.5 * nearest);
+            let largest = reaches[centre].1 + radius;
+            let entry = |i: usize, j: usize| {
+                let apart = if i == centre { radius - self.wide[(i, i)] } else { apart[i] - radius };
+                if i == j { apart - outward(self.off_unit[(i, i)] * largest) } else { -self.beside(i, j, largest) }
+            };
+            let weights = if radius > 0.0 { dominated(&Matrix::from_fn(self.size(), self.size(), entry)) } else { None };
+            Some((FreeCircle::AroundEntry(centre, radius), weights?))
+        })
+    }
+}
+
+/// How many diagonal entries outside of the unit circle are tried.
+const MOST_TRIED: usize = 3;
+
+fn modulus(value: Complex64) -> f64 {
+    libm::hypot(value.re, value.im) * (1.0 + 4.0 * f64::EPSILON)
+}
+
+/// The widest free circle, not within the unit circle, that has some diagonal entries outside; `None` if there is none.
+fn circle(reaches: &[(f64, f64)]) -> Option<f64> {
+    let mut free = None;
+    for (low, _) in reaches.iter().filter(|(low, _)| *low > 1.0) {
+        let inner = reaches.iter().filter(|(other, _)| other < low).map(|(_, high)| *high).fold(1.0, f64::max);
+        let gap = low - inner;
+        if gap > 0.0 && free.is_none_or(|(widest, _)| gap > widest) {
+            free = Some((gap, inner.midpoint(*low)));
+        }
+    }
+    free.map(|(_, circle)| circle)
+}
+
+/// For a matrix with no entry above zero off its diagonal some d > 0 with C·d > 0, rounding included; `None` if there is none, or none was found.
+fn dominated(comparison: &Matrix) -> Option<Vec<f64>> {
+    let size = comparison.rows();
+    if !comparison.is_finite() || (0..size).any(|place| comparison[(place, place)] <= 0.0) {
+        return None;
+    }
+    let d = solved(comparison, &Matrix::from_fn(size, 1, |_, _| 1.0))?;
+    let column: Vec<f64> = (0..size).map(|place| d[(place, 0)]).collect();
+    let sizes = absolute(comparison).times_column(&column);
+    // Written so that NaN fails.
+    let holds = column.iter().all(|entry| *entry > 0.0)
+        && comparison.times_column(&column).iter().zip(&sizes).all(|(sum, size_of)| *sum > outward(gamma(size + 2) * size_of));
+    holds.then_some(column)
+}

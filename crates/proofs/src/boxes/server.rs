@@ -1,0 +1,199 @@
+//! Frames of a server and its clients, which send each other more than the states of copies.
+//!
+//! As for other laws, averages of classes of equal peers and differences within a class do not mix. The server is a class of its own. Clients send it the states of their devices, and get the
+//! forces of their couplings or the object; a client has no copy. Of differences within a class of clients the server feels nothing, and they nothing of the object. Forces are counted as lengths: multiplied by the
+//! compliance of the object.
+
+use std::time::Duration;
+
+use cohaptic_peer::Gains;
+use cohaptic_peer::coordination::{Coordination, LawValue};
+use cohaptic_scene::Scene;
+use cohaptic_stability::Matrix;
+use cohaptic_stability::frames::{Contacts, Event, LinearLaw, Node, NominalNetwork, Scale, Structure, Timetable};
+use cohaptic_stability::numerics::real;
+
+use super::corners::Point;
+use super::error::ProofError;
+use super::heard::Heard;
+use super::program::{NamedFrame, Operation, Program, Register, Sum};
+use super::pushed::{Pushed, StateRegisters, coupling, device, moved, negative, state};
+
+/// The coordination of a server with its clients.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Server {
+    /// Its class.
+    class: usize,
+    /// Whether clients hear the forces of their couplings, and not the object.
+    returns_forces: bool,
+}
+
+/// The place of the parameter `returns`, and that of its word `force`.
+const RETURNS: usize = 1;
+const FORCE: usize = 0;
+
+impl Server {
+    /// The server of scenes that differ in numbers only, and the classes of their peers; `None` if they have none.
+    pub(super) fn structure(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Option<(Structure, Self)>, ProofError> {
+        let coordination = &scenes[0].coordination;
+        if coordination.strategy != Coordination::ClientServer {
+            return Ok(None);
+        }
+        if scenes[0].object.enclosure.is_some() {
+            return Err(ProofError::WallLeftOut { strategy: coordination.strategy.name() });
+        }
+        let server = scenes[0].server().unwrap_or(0);
+        let structure = Structure::of_any_law(scenes, network, contacts, |one, other| one == server || other == server)?;
+        let class = structure.classes.iter().position(|class| class[0] == server).unwrap_or(0);
+        let returns = coordination.settings.of(coordination.strategy).get(RETURNS);
+        Ok(Some((structure, Self { class, returns_forces: matches!(returns, LawValue::Word(FORCE)) })))
+    }
+
+    /// The nodes of all classes.
+    pub(super) fn nodes(self, structure: &Structure, scene: &Scene) -> Vec<Node> {
+        let mut nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node_with(scene, class, LinearLaw::none())).collect();
+        // A client has no copy of its own: the unit of forces is that of the object.
+        let object = nodes[self.class].object;
+        nodes.iter_mut().for_each(|node| node.object = object);
+        nodes
+    }
+
+    /// Whether the members of a class can differ in a way that a device feels.
+    pub(super) fn has_differences(structure: &Structure, class: usize) -> bool {
+        structure.classes[class].len() > 1 && structure.touching[class]
+    }
+
+    /// A frame over a box, of the averages of classes or of how the members of one differ. `ends`: the nodes of that part at the corners of the box.
+    pub(super) fn frame(self, structure: &Structure, ends: &[Vec<Node>], apart: Option<usize>, time: f64) -> Result<NamedFrame, ProofError> {
+        // Of each class, how many members send to the server.
+        let sizes = Matrix::from_fn(1, structure.classes.len(), |_, class| real(structure.classes[class].len()));
+        let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: sizes.clone() }).collect();
+        let scale = Scale { time, compliance: ends[0][0].compliance(time) };
+        let heard = Heard::new(&structure.timetable);
+        let program = |point: &Point| {
+            let frame = Frame { server: self, apart, point, scale, heard: &heard };
+            // Of differences there is nothing that all have in common.
+            frame.program(&structure.timetable, structure.tied || apart.is_some())
+        };
+        NamedFrame::of(&points, ends, apart, scale, program)
+    }
+}
+
+/// A frame of a part of a scene with the numbers of a point: nodes of all classes, or of the one whose members differ.
+struct Frame<'a> {
+    server: Server,
+    apart: Option<usize>,
+    point: &'a Point,
+    scale: Scale,
+    heard: &'a Heard,
+}
+
+impl Frame<'_> {
+    fn program(&self, timetable: &Timetable, tied: bool) -> Program {
+        let classes = timetable.sent.len();
+        let (mut ticks, mut sent) = (vec![0_i64; classes], vec![0_i64; classes]);
+        // Samples, and ticks of one instant, are a step each.
+        let mut steps: Vec<(Option<u64>, Vec<Operation>)> = Vec::new();
+        for event in &timetable.events {
+            let (at, operations) = match *event {
+                Event::Deliver { .. } => continue,
+                Event::Sample { node } => {
+                    let operation = self.sample(node, sent[node], ticks[node]);
+                    sent[node] += 1;
+                    (None, vec![operation])
+                }
+                Event::Tick { node, at, span } => {
+                    let operations = self.tick(node, ticks[node], span);
+                    ticks[node] += 1;
+                    (Some(at), operations)
+                }
+            };
+            match steps.last_mut() {
+                Some((last, step)) if *last == at => step.extend(operations),
+                _ => steps.push((at, operations)),
+            }
+        }
+        let steps = steps.into_iter().map(|(_, step)| step).filter(|step| step.iter().any(|operation| !operation.is_empty())).collect();
+        let object = Register::Body { class: self.server.class, of_copy: true, velocity: false };
+        Program { steps, sent: timetable.sent.clone(), references: vec![(!tied).then_some(object); classes] }
+    }
+
+    /// The node of a class; `None` if it has no part in a difference.
+    fn node(&self, class: usize) -> Option<&Node> {
+        match self.apart {
+            None => self.point.nodes.get(class),
+            Some(apart) => self.point.nodes.first().filter(|_| class == apart),
+        }
+    }
+
+    /// The node of a class whose device is held to the object.
+    fn touching(&self, class: usize) -> Option<&Node> {
+        self.node(class).filter(|node| node.device.is_some())
+    }
+
+    /// The object, if it has a part here.
+    fn object(&self) -> Option<StateRegisters> {
+        let class = self.server.class;
+        self.node(class).map(|_| state(|velocity| Register::Body { class, of_copy: true, velocity }))
+    }
+
+    /// The state that one class holds of another at a tick of its own.
+    fn held(&self, from: usize, to: usize, tick: i64) -> Option<StateRegisters> {
+        self.heard.at(from, to, tick).map(|number| state(|velocity| Register::Sample { class: from, number, velocity }))
+    }
+
+    /// A sample of a class, taken before its tick of that number.
+    fn sample(&self, class: usize, number: i64, tick: i64) -> Operation {
+        let Server { class: server, returns_forces } = self.server;
+        let of = |bodies: StateRegisters| -> Operation {
+            let registers = state(|velocity| Register::Sample { class, number, velocity });
+            registers.into_iter().zip(bodies).map(|(register, body)| (register, vec![(body, 1.0)])).collect()
+        };
+        if class != server {
+            return self.touching(class).map(|_| of(device(class))).unwrap_or_default();
+        }
+        if !returns_forces {
+            return self.object().map(of).unwrap_or_default();
+        }
+        let returned = |client: usize| {
+            let node = self.touching(client).filter(|_| client != server)?;
+            // By what was held before this instant: deliveries count for its tick.
+            let force = self.coupling(node.coupling, self.held(client, server, tick - 1), self.object());
+            Some((Register::Returned { server, class: client, number }, force))
+        };
+        (0..self.point.weights.columns()).filter_map(returned).collect()
+    }
+
+    fn coupling(&self, gains: Gains, device: Option<StateRegisters>, object: Option<StateRegisters>) -> Sum {
+        coupling(gains, device, object, self.scale)
+    }
+
+    fn tick(&self, class: usize, tick: i64, span: Duration) -> Vec<Operation> {
+        let Some(node) = self.node(class) else { return Vec::new() };
+        let Server { class: server, returns_forces } = self.server;
+        // The force of its coupling on the object.
+        let coupling = self.touching(class).map(|_| {
+            if class == server {
+                self.coupling(node.coupling, Some(device(class)), self.object())
+            } else if returns_forces {
+                self.heard.at(server, class, tick).map(|number| (Register::Returned { server, class, number }, 1.0)).into_iter().collect()
+            } else {
+                self.coupling(node.coupling, Some(device(class)), self.object().and_then(|_| self.held(server, class, tick)))
+            }
+        });
+        let mut bodies: Vec<Pushed> = Vec::new();
+        if class == server {
+            let mut force = coupling.clone().unwrap_or_default();
+            for client in (0..self.point.weights.columns()).filter(|client| *client != server) {
+                let Some(other) = self.touching(client) else { continue };
+                let of_one = self.coupling(other.coupling, self.held(client, server, tick), self.object());
+                force.extend(of_one.into_iter().map(|(register, by)| (register, by * self.point.weights[(0, client)])));
+            }
+            bodies.push(Pushed { body: node.object, is_copy: true, force });
+        }
+        if let Some((device, force)) = node.device.zip(coupling) {
+            bodies.push(Pushed { body: device, is_copy: false, force: negative(force) });
+        }
+        moved(class, &bodies, node.compute_delay, span, self.scale)
+    }
+}

@@ -1,0 +1,198 @@
+//! Contacts that switch: whether a scene is stable however its one-sided contacts and walls open and close.
+//!
+//! Each combination of open and closed contacts may be stable and changing between them not ([`analyse`](cohaptic_stability::analyse) says nothing of it). Here the force of a contact is an
+//! unknown of which only this is used, at each tick: with δ the depth of the contact (of a push, the device's position relative to its copy in the direction of
+//! the push), δ' its velocity, τ = B/K and
+//!
+//! ```text
+//! p = max(0, δ)      f = max(0, δ + τ·δ') while δ > 0, otherwise 0      b = p − δ >= 0
+//! ```
+//!
+//! (K·f is the force), for all ticks k and l
+//!
+//! ```text
+//! (a)  f·(f − p − τ·δ') = 0              closed: f = p + τ·δ'; open: f = 0
+//! (b)  p·(f − p − τ·δ') >= 0             δ > 0: f >= δ + τ·δ'
+//! (c)  f_k·(b_l − b_k) >= 0              f_k·b_k = 0, f_k >= 0, b_l >= 0
+//! (d)  p_k·(b_l − b_k) >= 0              p_k·b_k = 0
+//! ```
+//!
+//! Of b only differences occur, in which a position that all have, or that of a device that lies somewhere, cancels: it does not matter where things rest. With
+//! the forces as inputs a frame is linear. Take V > 0 and multipliers, those of (a) of any sign, others not negative. Let the quadratic form
+//! V(after) − V(before) + Σ multiplier·product be below zero for all values of states y, forces and depths. The products are not below zero, so
+//! V(after) < V(before): V(y, p₀), a norm of motion and springs, shrinks in every frame by a factor below 1, whatever opens and closes. Motion and
+//! forces then die out, and devices come to lie somewhere. Forces of hands that stay bounded move a scene by a bounded amount: with an input
+//! more the form is below −ε·(all squares) + C·(input)².
+//!
+//! (a) to (d) hold at walls on both sides of an axis too, with δ the position of the copy, b = p − δ + (the place of the wall), and f and p below zero at the
+//! lower end: −b is the position, cut off at the ends, which is largest or smallest where f and p are not zero. Copies i and j have the same walls, so
+//! p_i·(b_j − b_i) >= 0 too, and f_i·(b_j − b_i) >= 0.
+//! Where an arm ties the scene, depths are measured from its rest, and if no contact presses there, p·(δ − p) >= 0 and f·(δ − p) >= 0.
+//!
+//! *Equal peers.* All this is the same for equal peers, and sums over them of products u_i·v_i are n·ū·v̄ plus those of the differences from the average. So the
+//! inequality splits as a frame does ([`Structure`]), into one for the averages and one for differences, with common multipliers; its size
+//! does not depend on N. Nothing is lost: an inequality with equal peers that has a solution has the average of all its permutations as one.
+//!
+//! V and the multipliers are checked with bounds of all rounding errors. Where there are none a motion that grows is looked for.
+
+mod along;
+mod asked;
+mod certificate;
+mod contact_frame;
+mod error;
+mod growing;
+mod products;
+#[cfg(test)]
+mod tests;
+
+pub use certificate::{PushCertificate, SwitchingCertificate};
+pub use error::SwitchingError;
+pub use growing::GrowingMotion;
+
+use std::time::Duration;
+
+use cohaptic_peer::{Contact as ContactKind, Gains};
+use cohaptic_scene::Scene;
+use cohaptic_stability::frames::{Node, NominalNetwork, Piece, Structure, check_laws, notes, pieces};
+use cohaptic_stability::{AnalysisError, Watch, has_chance};
+use rayon::prelude::*;
+
+use self::along::Along;
+use self::asked::Asked;
+use self::contact_frame::ContactFrame;
+use crate::boxes::Guarantee;
+use crate::inequality::{rate, search};
+
+/// The answer of [`prove_switching`].
+#[derive(Clone, PartialEq, Debug)]
+pub struct Switching {
+    /// One for each motion along an axis that has contacts, apart from all others.
+    pub motions: Vec<SwitchingMotion>,
+    /// What the verdict takes for granted, in words.
+    pub notes: Vec<String>,
+}
+
+/// The answer about the contacts along one axis.
+#[derive(Clone, PartialEq, Debug)]
+pub struct SwitchingMotion {
+    /// Which motion, in words; empty if there is but one.
+    pub name: String,
+    /// Stable is proven; unstable means that a motion that grows was found.
+    pub guarantee: Guarantee,
+    /// The factor by which a quadratic norm of relative motion and contact forces is proven to shrink in a frame at least.
+    pub rate: Option<f64>,
+    /// The motion that grows.
+    pub growing: Option<GrowingMotion>,
+    /// How long a frame is.
+    pub frame: Duration,
+    /// Of a motion that is proven stable, the numbers by which that can be checked.
+    pub certificate: Option<SwitchingCertificate>,
+}
+
+/// The most states of a frame, each peer by itself, of which motions are followed.
+const MOST_FOLLOWED: usize = 400;
+
+impl Switching {
+    /// The worst verdict of all motions.
+    #[must_use]
+    pub fn guarantee(&self) -> Guarantee {
+        let any = |guarantee: Guarantee| self.motions.iter().any(|motion| motion.guarantee == guarantee);
+        if any(Guarantee::Unstable) {
+            Guarantee::Unstable
+        } else if any(Guarantee::Undecided) {
+            Guarantee::Undecided
+        } else {
+            Guarantee::Stable
+        }
+    }
+}
+
+/// Looks whether the scene, as it begins, is stable however its one-sided contacts and walls open and close: proves it, or else looks for a motion that grows.
+///
+/// # Errors
+///
+/// [`SwitchingError`] if nothing opens or closes, if links leave something to chance, and for what has no frame of equal axes.
+pub fn prove_switching(scene: &Scene, watch: &dyn Watch) -> Result<Switching, SwitchingError> {
+    if has_chance(scene) {
+        return Err(SwitchingError::Chance);
+    }
+    let pieces = pieces(scene, "the proof of contacts that switch")?;
+    let network = NominalNetwork::of(scene)?;
+    // A law without a verdict is refused before contacts are asked for.
+    check_laws(scene)?;
+    let axes: Vec<(&Piece<'_>, usize, String)> = pieces.iter().flat_map(axes).collect();
+    if axes.is_empty() {
+        return Err(SwitchingError::NoContact);
+    }
+    let motions = axes.par_iter().map(|(piece, axis, name)| of_axis(piece, *axis, name, &network, watch)).collect::<Result<Vec<_>, _>>()?;
+    let mut notes = notes(&network.notes, false, scene);
+    if motions.iter().any(|(_, takes_rest)| *takes_rest) {
+        notes.push("an arm ties the scene: contacts are taken to be open where it rests".to_owned());
+    }
+    Ok(Switching { motions: motions.into_iter().map(|(motion, _)| motion).collect(), notes })
+}
+
+/// The axes of a piece that have contacts.
+fn axes<'p, 's>(piece: &'p Piece<'s>) -> Vec<(&'p Piece<'s>, usize, String)> {
+    let count = piece.scene.axes.count();
+    let pushes = |axis: usize| piece.scene.peers.iter().any(|spec| matches!(spec.contact, ContactKind::Push(direction) if direction.axis == axis));
+    let differ = (0..count).any(pushes);
+    let axes = if differ { (0..count).filter(|axis| pushes(*axis) || piece.scene.object.enclosure.is_some()).collect() } else { vec![0] };
+    let has_contacts = differ || piece.scene.object.enclosure.is_some();
+    let name = |axis: usize| {
+        let along = if differ && count > 1 { format!("along {}", ["x", "y", "z"][axis]) } else { String::new() };
+        [piece.motion.clone(), along].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+    };
+    axes.into_iter().filter(|_| has_contacts).map(|axis| (piece, axis, name(axis))).collect()
+}
+
+/// The verdict along an axis, and whether it takes contacts to be open at rest.
+fn of_axis(
+    piece: &Piece<'_>,
+    axis: usize,
+    name: &str,
+    network: &NominalNetwork,
+    watch: &dyn Watch,
+) -> Result<(SwitchingMotion, bool), SwitchingError> {
+    let along = Along::new(piece, axis);
+    let structure = Structure::with_apart(&[along.scene], network, &along.contacts, |one, other| along.pushes(one) != along.pushes(other))?;
+    let structure = along.tied(structure);
+    let nodes = walled(&along, structure.nodes(along.scene));
+    let asked = Asked::of(&along, &structure, &nodes, watch)?;
+    let takes_rest = asked.takes_rest();
+    let proven = asked.inequality().and_then(|inequality| search(&inequality, watch, |solution| rate(&inequality, solution)));
+    if watch.stops() {
+        return Err(AnalysisError::Stopped.into());
+    }
+    let frame = structure.timetable.frame;
+    let motion = |guarantee, rate, growing| SwitchingMotion { name: name.to_owned(), guarantee, rate, growing, frame, certificate: None };
+    if let Some((solution, rate)) = proven {
+        let certificate = asked.certificate(axis, &structure, &nodes, &solution, rate);
+        return Ok((SwitchingMotion { certificate: Some(certificate), ..motion(Guarantee::Stable, Some(rate), None) }, takes_rest));
+    }
+    let growing = grows(&along, network, watch)?;
+    let guarantee = if growing.is_some() { Guarantee::Unstable } else { Guarantee::Undecided };
+    Ok((motion(guarantee, None, growing), false))
+}
+
+/// Nodes with the gains of their walls, which the bound of rounding errors counts.
+fn walled(along: &Along<'_>, nodes: Vec<Node>) -> Vec<Node> {
+    let wall = along.scene.object.enclosure.map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
+    nodes.into_iter().map(|node| Node { wall, ..node }).collect()
+}
+
+/// A motion that grows, each peer by itself and away from walls.
+fn grows(along: &Along<'_>, network: &NominalNetwork, watch: &dyn Watch) -> Result<Option<GrowingMotion>, SwitchingError> {
+    let structure = along.tied(Structure::of_each(along.scene, network, &along.contacts)?);
+    let nodes = structure.nodes(along.scene);
+    let quotient = structure.quotient(along.scene, &nodes);
+    let mut contacts = Vec::new();
+    for class in 0..structure.classes.len() {
+        contacts.extend(along.of_class(&structure, class, class, false)?);
+    }
+    if nodes.iter().map(Node::states).sum::<usize>() > MOST_FOLLOWED {
+        return Ok(None);
+    }
+    let found = growing::search(&ContactFrame::new(&quotient, contacts), watch);
+    if watch.stops() { Err(AnalysisError::Stopped.into()) } else { Ok(found) }
+}

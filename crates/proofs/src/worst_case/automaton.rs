@@ -1,0 +1,174 @@
+//! A pattern together with the matrices that its symbols stand for.
+
+use cohaptic_stability::Matrix;
+use thiserror::Error;
+
+use super::pattern::{Edge, Pattern, PatternError};
+
+/// A switched linear system: along an infinite path of its pattern, every step multiplies the state by the matrix of its symbol.
+///
+/// The matrices are square, of one size, and finite.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Automaton {
+    pattern: Pattern,
+    matrices: Vec<Matrix>,
+    size: usize,
+}
+
+/// Why a pattern and matrices are no automaton.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+pub enum AutomatonError {
+    /// The graph is no pattern.
+    #[error(transparent)]
+    Pattern(#[from] PatternError),
+    /// There are not as many matrices as symbols.
+    #[error("the pattern has {symbols} symbols, but there are {matrices} matrices")]
+    Count {
+        /// The symbols of the pattern.
+        symbols: usize,
+        /// The matrices given.
+        matrices: usize,
+    },
+    /// A matrix has not the size of the first, is not square, or is empty.
+    #[error("matrix {matrix} is {rows} by {columns}, not {size} by {size}")]
+    Shape {
+        /// Which matrix, from 0.
+        matrix: usize,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+        /// The size expected, at least 1.
+        size: usize,
+    },
+    /// A matrix has an entry that is infinite or not a number.
+    #[error("matrix {matrix} has an entry that is not a finite number")]
+    NotFinite {
+        /// Which matrix, from 0.
+        matrix: usize,
+    },
+}
+
+impl Automaton {
+    /// A pattern whose symbol s stands for `matrices[s]`.
+    ///
+    /// # Errors
+    ///
+    /// If there are not as many matrices as symbols, if they are not square and of one size, or if one has an entry that is not finite.
+    pub fn new(pattern: Pattern, matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
+        if pattern.symbols() != matrices.len() {
+            return Err(AutomatonError::Count { symbols: pattern.symbols(), matrices: matrices.len() });
+        }
+        let size = matrices.first().map_or(1, Matrix::rows).max(1);
+        for (matrix, entries) in matrices.iter().enumerate() {
+            let (rows, columns) = (entries.rows(), entries.columns());
+            if (rows, columns) != (size, size) {
+                return Err(AutomatonError::Shape { matrix, rows, columns, size });
+            }
+            if !entries.is_finite() {
+                return Err(AutomatonError::NotFinite { matrix });
+            }
+        }
+        Ok(Self { pattern, matrices, size })
+    }
+
+    /// A graph with its matrices: [`Pattern::of`] and [`Automaton::new`].
+    ///
+    /// # Errors
+    ///
+    /// Those of both.
+    pub fn of(nodes: usize, edges: Vec<Edge>, matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
+        Self::new(Pattern::of(nodes, edges, matrices.len())?, matrices)
+    }
+
+    /// Every matrix at every time: [`Pattern::free`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Pattern::free`] and [`Automaton::new`].
+    pub fn free(matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
+        Self::new(Pattern::free(matrices.len())?, matrices)
+    }
+
+    /// Every matrix at every time, but number `hit` at most `most` times in a row: [`Pattern::runs`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Pattern::runs`] and [`Automaton::new`].
+    pub fn runs(matrices: Vec<Matrix>, hit: usize, most: u32) -> Result<Self, AutomatonError> {
+        Self::new(Pattern::runs(matrices.len(), hit, most)?, matrices)
+    }
+
+    /// Several links, none of which knows of the others, acting on one state: [`Pattern::product`], with one matrix for every joint symbol.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Pattern::product`] and [`Automaton::new`].
+    pub fn product(links: &[Pattern], matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
+        Self::new(Pattern::product(links)?, matrices)
+    }
+
+    /// Which sequences are allowed.
+    #[must_use]
+    pub const fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// The matrices, by symbol.
+    #[must_use]
+    pub fn matrices(&self) -> &[Matrix] {
+        &self.matrices
+    }
+
+    /// The number of rows of every matrix.
+    #[must_use]
+    pub const fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The edges on cycles, which alone decide how fast products grow.
+    pub(super) fn recurrent(&self) -> impl Iterator<Item = &Edge> {
+        self.pattern.edges().iter().filter(|edge| self.pattern.recurs(edge))
+    }
+
+    /// The same automaton with every matrix times 2^`exponent`, which is exact as long as nothing underflows.
+    pub(super) fn scaled(&self, exponent: i32) -> Self {
+        let factor = libm::ldexp(1.0, exponent);
+        let matrices = self.matrices.iter().map(|matrix| matrix.scaled(factor)).collect();
+        Self { pattern: self.pattern.clone(), matrices, size: self.size }
+    }
+
+    /// The power of two that brings the largest entry of a matrix on a cycle to between a half and 1; 0 if they are all zero.
+    pub(super) fn exponent(&self) -> i32 {
+        let largest = self.recurrent().map(|edge| self.matrices[edge.symbol].largest()).fold(0.0, f64::max);
+        // Kept where both the factor and its inverse are ordinary numbers.
+        if largest > 0.0 { (-libm::frexp(largest).1).clamp(-1000, 1000) } else { 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn matrices_must_be_square_of_one_size_finite_and_as_many_as_symbols() {
+        let square = Matrix::identity(2);
+        assert_eq!(Automaton::free(vec![]), Err(AutomatonError::Pattern(PatternError::NoSymbol)));
+        assert_eq!(Automaton::new(Pattern::free(2).unwrap(), vec![square.clone()]), Err(AutomatonError::Count { symbols: 2, matrices: 1 }));
+        let wide = Matrix::zeros(2, 3);
+        assert_eq!(Automaton::free(vec![square.clone(), wide]), Err(AutomatonError::Shape { matrix: 1, rows: 2, columns: 3, size: 2 }));
+        assert_eq!(Automaton::free(vec![Matrix::zeros(0, 0)]), Err(AutomatonError::Shape { matrix: 0, rows: 0, columns: 0, size: 1 }));
+        assert_eq!(Automaton::free(vec![square.clone(), square.scaled(f64::NAN)]), Err(AutomatonError::NotFinite { matrix: 1 }));
+        assert_eq!(Automaton::runs(vec![square.clone(), square.clone()], 1, 3).unwrap().pattern().nodes(), 4);
+        let links = [Pattern::runs(2, 1, 1).unwrap(), Pattern::runs(2, 1, 2).unwrap()];
+        assert_eq!(Automaton::product(&links, vec![square; 4]).unwrap().pattern().nodes(), 6);
+    }
+
+    #[test]
+    fn scaling_by_a_power_of_two_is_exact() {
+        let automaton = Automaton::free(vec![Matrix::identity(2).scaled(3e-200)]).unwrap();
+        let scaled = automaton.scaled(automaton.exponent());
+        assert!((0.5..1.0).contains(&scaled.matrices()[0].largest()));
+        assert_eq!(scaled.scaled(-automaton.exponent()), automaton);
+    }
+}

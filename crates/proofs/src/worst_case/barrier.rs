@@ -1,0 +1,201 @@
+//! Shapes by Newton's method on a logarithmic barrier.
+//!
+//! The smallest λ = ρ² for which λP_from − AᵀP_to A > 0 on every edge is a generalised eigenvalue problem; the method of centres solves it (Boyd & El Ghaoui
+//! 1993). For a λ above the one of the present shapes, the centre is the minimum of
+//!
+//! ```text
+//! φ(P) = Σ_v c_v·tr P_v − Σ_e ln det S_e          S_e = λP_from − XᵀP_to X
+//! ```
+//!
+//! whose linear term replaces a constraint on the size of the shapes, which means nothing. The centre's own λ is smaller, and the next stage's goes most of
+//! the way towards it. Every stage takes coordinates in which the shapes are round, so that nothing depends on the units of the state, and c_v is the
+//! number of edges from v, which is where they would stay if λ were large.
+//!
+//! With D a change of the shapes, dS = λD_from − XᵀD_to X, W = S⁻¹, V = XW and Z = XWXᵀ, the second derivative of −ln det S is tr(W dS W dS) =
+//! λ²tr(D_from W D_from W) − 2λtr(D_from VᵀD_to V) + tr(D_to Z D_to Z).
+
+use cohaptic_stability::numerics::{cholesky, real, solve, triangle_inverse};
+use cohaptic_stability::{Matrix, Watch};
+
+use super::component::{Component, Factors, largest_square};
+use super::norm::mirror;
+
+/// How much of the distance between λ and the centre's own is kept.
+const KEPT: f64 = 0.15;
+/// Centres, each of which takes a handful of Newton's steps.
+const STAGES: u32 = 60;
+/// Newton's steps for one centre.
+const STEPS: u32 = 30;
+/// Newton's decrement below which a centre is near enough.
+const CENTRED: f64 = 0.3;
+/// Squares of rates below this, for matrices with entries near 1, are as good as zero.
+const NOTHING: f64 = 1e-14;
+
+/// Shapes with a smaller rate than those given, until a stage lowers it by less than the relative `accuracy`; `None` if the watch ends it.
+pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64, watch: &dyn Watch) -> Option<Factors> {
+    let mut best = start;
+    let Some(mut images) = component.images(&best.factors) else { return Some(best) };
+    let mut square = 1.3 * best.square;
+    for _ in 0..STAGES {
+        if !(best.square > NOTHING && best.square.is_finite()) {
+            break;
+        }
+        let Some(centre) = centre(component, &images, square, watch) else { break };
+        let changes: Option<Vec<Matrix>> = centre.iter().map(cholesky).collect();
+        let Some(changes) = changes else { break };
+        // One common size, which no rate depends on, so that hundreds of stages would not overflow.
+        let factors: Vec<Matrix> = changes.iter().zip(&best.factors).map(|(change, factor)| change.times(factor)).collect();
+        let largest = factors.iter().map(Matrix::largest).fold(0.0, f64::max);
+        let factors: Vec<Matrix> = factors.iter().map(|factor| factor.scaled(1.0 / largest)).collect();
+        let Some(next) = component.images(&factors) else { break };
+        let reached = largest_square(&next);
+        if reached >= square || reached.is_nan() {
+            break;
+        }
+        let gap = square - reached;
+        images = next;
+        best = Factors { square: reached, factors };
+        square = reached + KEPT * gap;
+        // λ is the square of the rate.
+        if gap < accuracy.max(1e-9) * reached {
+            break;
+        }
+    }
+    if watch.stops() { None } else { Some(best) }
+}
+
+/// The barrier's minimum near the round shapes, as shapes; `None` if rounding got the better of it, or the watch ends it.
+fn centre(component: &Component<'_>, images: &[Matrix], square: f64, watch: &dyn Watch) -> Option<Vec<Matrix>> {
+    let barrier = Barrier::new(component, images, square);
+    let mut shapes = vec![Matrix::identity(component.size); component.nodes.len()];
+    let mut value = barrier.value(&shapes)?;
+    for _ in 0..STEPS {
+        if watch.stops() {
+            return None;
+        }
+        let (gradient, hessian) = barrier.derivatives(&shapes)?;
+        let factor = cholesky(&hessian)?;
+        let direction = solve(&factor, &gradient);
+        let decrease: f64 = gradient.iter().zip(&direction).map(|(a, b)| a * b).sum();
+        let decrement = decrease.max(0.0).sqrt();
+        // The whole step if it goes well, otherwise shorter ones; 1/(1 + δ) always goes well, but for rounding (Nesterov & Nemirovskii 1994).
+        let damped = 1.0 / (1.0 + decrement);
+        let mut length = 1.0;
+        loop {
+            let moved = barrier.moved(&shapes, &direction, -length);
+            let reached = barrier.value(&moved).filter(|reached| *reached <= value - 0.1 * length * decrease || length <= damped);
+            if let Some(reached) = reached {
+                (shapes, value) = (moved, reached);
+                break;
+            }
+            if length <= damped {
+                return None;
+            }
+            length = (0.5 * length).max(damped);
+        }
+        if decrement < CENTRED {
+            break;
+        }
+    }
+    Some(shapes)
+}
+
+/// φ at one λ.
+struct Barrier<'a> {
+    component: &'a Component<'a>,
+    images: &'a [Matrix],
+    square: f64,
+    /// c_v.
+    weights: Vec<f64>,
+    /// The places (i, j), i <= j, of a symmetric matrix, with the weight that makes the basis orthonormal for the trace's inner product.
+    places: Vec<(usize, usize, f64)>,
+}
+
+impl<'a> Barrier<'a> {
+    fn new(component: &'a Component<'a>, images: &'a [Matrix], square: f64) -> Self {
+        let weight = |node| real(component.edges.iter().filter(|step| step.from == node).count());
+        let place = |i, j| (i, j, if i == j { 1.0 } else { std::f64::consts::SQRT_2 });
+        Self {
+            component,
+            images,
+            square,
+            weights: (0..component.nodes.len()).map(weight).collect(),
+            places: (0..component.size).flat_map(|i| (i..component.size).map(move |j| place(i, j))).collect(),
+        }
+    }
+
+    /// S of an edge, factorised; `None` if it is not positive definite.
+    fn slack(&self, shapes: &[Matrix], edge: usize) -> Option<Matrix> {
+        let (step, image) = (&self.component.edges[edge], &self.images[edge]);
+        let reached = image.transposed().times(&shapes[step.to].times(image));
+        let from = &shapes[step.from];
+        cholesky(&Matrix::from_fn(from.rows(), from.columns(), |i, j| self.square * from[(i, j)] - reached[(i, j)]))
+    }
+
+    /// φ; `None` outside its domain.
+    fn value(&self, shapes: &[Matrix]) -> Option<f64> {
+        let trace = |of: &Matrix| (0..of.rows()).map(|place| of[(place, place)]).sum::<f64>();
+        let size: f64 = shapes.iter().zip(&self.weights).map(|(shape, weight)| weight * trace(shape)).sum();
+        (0..self.images.len()).try_fold(size, |sum, edge| {
+            let factor = self.slack(shapes, edge)?;
+            Some(sum - 2.0 * (0..factor.rows()).map(|place| libm::log(factor[(place, place)])).sum::<f64>())
+        })
+    }
+
+    fn moved(&self, shapes: &[Matrix], direction: &[f64], length: f64) -> Vec<Matrix> {
+        let mut moved = shapes.to_vec();
+        for (shape, part) in moved.iter_mut().zip(direction.chunks(self.places.len())) {
+            for ((i, j, weight), entry) in self.places.iter().zip(part) {
+                // B_ij has ones, or 1/√2 off the diagonal, twice.
+                shape[(*i, *j)] += length * entry / weight;
+            }
+            mirror(shape);
+        }
+        moved
+    }
+
+    /// The gradient and the upper triangle of the Hessian.
+    fn derivatives(&self, shapes: &[Matrix]) -> Option<(Vec<f64>, Matrix)> {
+        let count = self.places.len();
+        let mut gradient = vec![0.0; count * shapes.len()];
+        for (part, weight) in gradient.chunks_mut(count).zip(&self.weights) {
+            for ((i, j, _), entry) in self.places.iter().zip(part) {
+                *entry = if i == j { *weight } else { 0.0 };
+            }
+        }
+        let mut hessian = Matrix::zeros(gradient.len(), gradient.len());
+        for (edge, (step, image)) in self.component.edges.iter().zip(self.images).enumerate() {
+            let inverse = triangle_inverse(&self.slack(shapes, edge)?);
+            let w = inverse.times(&inverse.transposed());
+            let v = image.times(&w);
+            let z = v.times(&image.transposed());
+            let (from, to) = (step.from * count, step.to * count);
+            for (place, (i, j, weight)) in self.places.iter().enumerate() {
+                gradient[from + place] -= self.square * weight * w[(*i, *j)];
+                gradient[to + place] += weight * z[(*i, *j)];
+            }
+            self.add(&mut hessian, from, from, &w, self.square * self.square);
+            self.add(&mut hessian, to, to, &z, 1.0);
+            // Rows by what D_to has, columns by D_from, and its mirror image; only what falls on the upper triangle is read.
+            if to <= from {
+                self.add(&mut hessian, to, from, &v, -self.square);
+            }
+            if from <= to {
+                self.add(&mut hessian, from, to, &v.transposed(), -self.square);
+            }
+        }
+        Some((gradient, hessian))
+    }
+
+    /// Adds `factor`·tr(B_kl MᵀB_ij M) to the block's entry of row ij and column kl. With the unit matrices E_ij that is M_il·M_jk, here made symmetric.
+    fn add(&self, hessian: &mut Matrix, row: usize, column: usize, m: &Matrix, factor: f64) {
+        for (place, (i, j, weight)) in self.places.iter().enumerate() {
+            let share = 0.5 * factor * weight;
+            let (upper, lower) = (m.row(*i), m.row(*j));
+            let entries = &mut hessian.row_mut(row + place)[column..column + self.places.len()];
+            for (entry, (k, l, other)) in entries.iter_mut().zip(&self.places) {
+                *entry += share * other * (upper[*k] * lower[*l] + upper[*l] * lower[*k]);
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The matrix of one frame in which something happens to samples.
+//!
+//! A frame is that of the nominal analysis: the same nodes, ticks and samplings. Only what a receiver is given, and when, follows from the symbol; and what
+//! it holds at the beginning is an unknown of its own, because it may be of any age. The state is that of the nominal analysis, the newest samples of each
+//! node first, with the sample held on each link after it.
+
+use cohaptic_stability::Matrix;
+use cohaptic_stability::frames::{Autonomous, Event, Lifted, Timetable};
+
+use super::channel::{Channel, Link};
+
+/// One part of a scene: nodes, and the links between them that can lose and delay.
+pub(super) struct Block<'a> {
+    /// With the timetable of a frame in which deliveries do not matter.
+    pub lifted: Lifted<'a>,
+    /// For each channel, the place of each of its links that is in this part, and the nodes at its ends.
+    pub links: Vec<Vec<(usize, Link)>>,
+}
+
+/// The sample that a link delivers.
+struct Delivery {
+    from: usize,
+    to: usize,
+    tick: usize,
+    /// How many frames before it was sent.
+    age: usize,
+}
+
+impl Block<'_> {
+    /// One matrix for each joint symbol of the channels, the first channel's as the most significant digit; and a bound of the errors of their entries, as the
+    /// largest sum over a row.
+    pub(super) fn matrices(&self, channels: &[Channel]) -> (Vec<Matrix>, f64) {
+        let count: usize = channels.iter().map(|channel| channel.symbols.len()).product();
+        let mut error = 0.0_f64;
+        let matrix = |joint: usize| {
+            let (matrix, own) = self.matrix(channels, joint);
+            error = error.max(own);
+            matrix
+        };
+        let matrices = (0..count).map(matrix).collect();
+        (matrices, error)
+    }
+
+    fn matrix(&self, channels: &[Channel], joint: usize) -> (Matrix, f64) {
+        let links: Vec<Link> = self.links.iter().flatten().map(|(_, link)| *link).collect();
+        let mut depth = vec![0; self.lifted.nodes.len()];
+        for link in &links {
+            depth[link.from] = depth[link.from].max(link.oldest);
+        }
+        let (mut deliveries, mut rest) = (Vec::new(), joint);
+        for (channel, own) in channels.iter().zip(&self.links).rev() {
+            let symbol = &channel.symbols[rest % channel.symbols.len()];
+            rest /= channel.symbols.len();
+            for (place, link) in own {
+                let delivery = |tick: usize, age: usize| Delivery { from: link.from, to: link.to, tick, age };
+                // The older one first, should both come at one tick.
+                deliveries.extend(symbol.late[*place].map(|tick| delivery(tick, link.age + 1)));
+                deliveries.extend(symbol.now[*place].map(|tick| delivery(tick, link.age)));
+            }
+        }
+        // The sample held at the beginning stands with the samples of its sender, as if of an age beyond all that are used.
+        let timetable = timetable(self.lifted.timetable, &links, &deliveries, &depth);
+        let frame = Lifted { timetable: &timetable, ..self.lifted }.frame(&mut Autonomous);
+        if self.lifted.sampling.is_silent(self.lifted.time) {
+            // Samples are not used at all.
+            return (frame.monodromy(), frame.error);
+        }
+
+        let states = frame.state_unknowns();
+        let mut first = Vec::with_capacity(depth.len());
+        let mut size = states;
+        for depth in &depth {
+            first.push(size);
+            size += depth;
+        }
+        let held = size;
+        size += links.len();
+        let unknown = |column: usize| -> Option<usize> {
+            if column < states {
+                return Some(column);
+            }
+            let (node, age) = *frame.used.get(column - states)?;
+            if age <= depth[node] {
+                return Some(first[node] + age - 1);
+            }
+            links.iter().position(|link| link.from == node && link.to == age - depth[node] - 1).map(|place| held + place)
+        };
+        let columns: Vec<usize> = (0..states + frame.used.len()).map_while(unknown).collect();
+        let mut matrix = Matrix::zeros(size, size);
+        // A row: a combination of the unknowns, less how far the reference moved; or an unknown as it was.
+        let mut put = |row: usize, source: &[f64], same: Option<usize>, moved: f64| {
+            for (column, entry) in columns.iter().zip(source) {
+                matrix[(row, *column)] += entry;
+            }
+            if let Some(reference) = frame.reference() {
+                for (column, entry) in columns.iter().zip(frame.states.row(reference)) {
+                    matrix[(row, *column)] -= moved * entry;
+                }
+            }
+            if let Some(same) = same {
+                matrix[(row, same)] += 1.0;
+            }
+        };
+        let kept = (0..frame.states.rows()).filter(|row| Some(*row) != frame.reference());
+        for (row, source) in kept.enumerate() {
+            put(row, frame.states.row(source), None, frame.displacement(source));
+        }
+        for (node, depth) in depth.iter().enumerate() {
+            for age in 1..=*depth {
+                let row = first[node] + age - 1;
+                match age {
+                    1 => put(row, frame.sent.row(frame.sent_by(node).start), None, frame.translation(1)),
+                    _ => put(row, &[], Some(row - 1), frame.translation(1)),
+                }
+            }
+        }
+        for (place, link) in links.iter().enumerate() {
+            let newest = deliveries.iter().filter(|delivery| (delivery.from, delivery.to) == (link.from, link.to)).map(|delivery| delivery.age).min();
+            match newest {
+                Some(0) => put(held + place, frame.sent.row(frame.sent_by(link.from).start), None, frame.translation(1)),
+                Some(age) => put(held + place, &[], Some(first[link.from] + age - 1), frame.translation(1)),
+                None => put(held + place, &[], Some(held + place), frame.translation(1)),
+            }
+        }
+        (matrix, frame.error)
+    }
+}
+
+/// The frame with those deliveries instead of its own.
+fn timetable(nominal: &Timetable, links: &[Link], deliveries: &[Delivery], depth: &[usize]) -> Timetable {
+    let number = |age: usize| -i64::try_from(age).unwrap_or(i64::MAX);
+    let mut ticks = vec![0; nominal.sent.len()];
+    let mut events = Vec::with_capacity(nominal.events.len() + deliveries.len());
+    for event in &nominal.events {
+        match *event {
+            Event::Sample { .. } => events.push(*event),
+            Event::Deliver { .. } => {}
+            // A delivery matters from the receiver's next tick on.
+            Event::Tick { node, .. } => {
+                let now = deliveries.iter().filter(|delivery| delivery.to == node && delivery.tick == ticks[node]);
+                events.extend(now.map(|delivery| Event::Deliver { from: delivery.from, to: node, sample: number(delivery.age) }));
+                events.push(*event);
+                ticks[node] += 1;
+            }
+        }
+    }
+    let held = links.iter().map(|link| (link.to, link.from, number(depth[link.from] + 1 + link.to))).collect();
+    Timetable { frame: nominal.frame, events, sent: nominal.sent.clone(), depth: depth.to_vec(), held, clocks: nominal.clocks.clone() }
+}
