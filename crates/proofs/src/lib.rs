@@ -24,6 +24,7 @@
 
 mod boxes;
 mod inequality;
+mod newton;
 #[cfg(test)]
 #[path = "../../stability/src/paper_scene.rs"]
 mod paper_scene;

@@ -8,35 +8,33 @@
 //!
 //! for a growing η (Nesterov & Nemirovskii 1994). With W = S⁻¹, the derivatives of −ln det S along sums of (u·vᵀ + v·uᵀ)/2 take nothing but the numbers uᵀWv.
 
-use cohaptic_stability::numerics::{cholesky, real, solve, triangle_inverse};
+use cohaptic_stability::numerics::{cholesky, real, triangle_inverse};
 use cohaptic_stability::{Matrix, Watch};
 
 use super::parts::{Inequality, Measured, Part, Solution};
+use crate::newton::{Barrier, Shortest, Steps, centre, log_determinant, upper};
 
 /// By how much η grows from one centre to the next.
 const STEP: f64 = 4.0;
-/// Newton's steps for a centre.
-const STEPS: u32 = 40;
-/// Newton's decrement below which a centre is near enough.
-const CENTRED: f64 = 0.2;
+const STEPS: Steps = Steps { most: 40, centred: 0.2, shortest: Shortest::Share(1e-6) };
 /// Once the margin can be no more than this, for shapes of about 1, there is none.
 const NOTHING: f64 = 1e-7;
 
 /// Searches until `checked` accepts; `None` if the watch ends it or nothing is left to find.
 pub(crate) fn search<T>(inequality: &Inequality, watch: &dyn Watch, checked: impl Fn(&Solution) -> Option<T>) -> Option<(Solution, T)> {
-    let barrier = Barrier::new(inequality);
+    let mut barrier = Margin::new(inequality);
     let mut point = barrier.start();
-    let mut pull = 1.0;
-    while barrier.parameter / pull > NOTHING {
-        point = barrier.centre(point, pull, watch)?;
+    while barrier.parameter / barrier.pull > NOTHING {
+        // Rounding may get the better of a centre; the next is looked for from where that left it.
+        point = centre(&barrier, point, STEPS, watch)?.point;
         if point.margin > 0.0 {
             if let Some(found) = checked(&point.solution) {
                 return Some((point.solution, found));
             }
-        } else if point.margin + barrier.parameter / pull < NOTHING {
+        } else if point.margin + barrier.parameter / barrier.pull < NOTHING {
             return None;
         }
-        pull *= STEP;
+        barrier.pull *= STEP;
     }
     None
 }
@@ -51,7 +49,8 @@ struct Point {
 /// A symmetric matrix as a sum of products of rows, which an unknown multiplies: weight, and the two rows.
 type Slope = Vec<(f64, usize, usize)>;
 
-struct Barrier<'a> {
+/// The margin, with a barrier for all that must not be below zero.
+struct Margin<'a> {
     inequality: &'a Inequality,
     /// For each part its unknowns: their number among all, and how M depends on them.
     slopes: Vec<Vec<(usize, Slope)>>,
@@ -63,14 +62,11 @@ struct Barrier<'a> {
     bound: f64,
     /// By how much the optimum may be better than a centre, times η.
     parameter: f64,
+    /// η.
+    pull: f64,
 }
 
-/// The places of the upper triangle.
-fn upper(size: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..size).flat_map(move |i| (i..size).map(move |j| (i, j)))
-}
-
-impl<'a> Barrier<'a> {
+impl<'a> Margin<'a> {
     fn new(inequality: &'a Inequality) -> Self {
         let mut first = Vec::new();
         let mut next = 0;
@@ -101,7 +97,7 @@ impl<'a> Barrier<'a> {
         let sizes: usize = inequality.parts.iter().map(|part| part.unknowns).sum::<usize>() + shapes;
         let signed = inequality.free.iter().filter(|free| !**free).count();
         let unknowns = multipliers + inequality.free.len() + 1;
-        Self { inequality, slopes, first, multipliers, unknowns, bound: 2.0 * real(shapes + signed), parameter: real(sizes + signed + 1) }
+        Self { inequality, slopes, first, multipliers, unknowns, bound: 2.0 * real(shapes + signed), parameter: real(sizes + signed + 1), pull: 1.0 }
     }
 
     fn start(&self) -> Point {
@@ -147,15 +143,47 @@ impl<'a> Barrier<'a> {
         self.bound - solution.shapes.iter().map(trace).sum::<f64>() - signed.sum::<f64>()
     }
 
-    /// The function; `None` outside its domain.
-    fn value(&self, point: &Point, pull: f64) -> Option<f64> {
-        let logarithm = |factor: &Matrix| 2.0 * (0..factor.rows()).map(|place| libm::log(factor[(place, place)])).sum::<f64>();
-        let mut value = -pull * point.margin;
+    /// Adds what −ln det(−M − t·I) of a part has, with the inverse of its triangle.
+    fn of_slack(&self, number: usize, part: &Part, inverse: &Matrix, gradient: &mut [f64], hessian: &mut Matrix) {
+        let last = self.unknowns - 1;
+        // With R⁻¹ = Z, uᵀWv is the product of Zᵀu and Zᵀv.
+        let rows = Matrix::from_fn(part.rows.len(), part.unknowns, |row, column| part.rows[row].entries[column]);
+        let along = rows.times(inverse);
+        let once = along.times(&along.transposed());
+        let w = inverse.times(&inverse.transposed());
+        let twice = {
+            let along = rows.times(&w);
+            along.times(&along.transposed())
+        };
+        for (place, (unknown, slope)) in self.slopes[number].iter().enumerate() {
+            gradient[*unknown] += slope.iter().map(|(by, i, j)| by * once[(*i, *j)]).sum::<f64>();
+            hessian[(*unknown, last)] += slope.iter().map(|(by, i, j)| by * twice[(*i, *j)]).sum::<f64>();
+            for (other, with) in &self.slopes[number][place..] {
+                let mut second = 0.0;
+                for (by, i, j) in slope {
+                    for (of, k, l) in with {
+                        second += 0.5 * by * of * (once[(*i, *k)] * once[(*j, *l)] + once[(*i, *l)] * once[(*j, *k)]);
+                    }
+                }
+                hessian[(*unknown.min(other), *unknown.max(other))] += second;
+            }
+        }
+        let trace: f64 = (0..w.rows()).map(|place| w[(place, place)]).sum();
+        gradient[last] += trace;
+        hessian[(last, last)] += w.entries().iter().map(|entry| entry * entry).sum::<f64>();
+    }
+}
+
+impl Barrier for Margin<'_> {
+    type Point = Point;
+
+    fn value(&self, point: &Point) -> Option<f64> {
+        let mut value = -self.pull * point.margin;
         for part in 0..self.inequality.parts.len() {
-            value -= logarithm(&self.slack(part, point)?);
+            value -= log_determinant(&self.slack(part, point)?);
         }
         for shape in &point.solution.shapes {
-            value -= logarithm(&cholesky(shape)?);
+            value -= log_determinant(&cholesky(shape)?);
         }
         let signed = self.inequality.free.iter().zip(&point.solution.multipliers).filter(|(free, _)| !**free).map(|(_, multiplier)| *multiplier);
         for positive in signed.chain([self.left(&point.solution)]) {
@@ -168,57 +196,11 @@ impl<'a> Barrier<'a> {
         Some(value)
     }
 
-    /// The minimum for one η, or near it; `None` if the watch ends it or rounding got the better of it before the first step.
-    fn centre(&self, mut point: Point, pull: f64, watch: &dyn Watch) -> Option<Point> {
-        let mut value = self.value(&point, pull)?;
-        for _ in 0..STEPS {
-            if watch.stops() {
-                return None;
-            }
-            let Some((gradient, hessian)) = self.derivatives(&point, pull) else { break };
-            let Some(factor) = cholesky(&hessian) else { break };
-            let direction = solve(&factor, &gradient);
-            let decrease: f64 = gradient.iter().zip(&direction).map(|(a, b)| a * b).sum();
-            let decrement = decrease.max(0.0).sqrt();
-            let mut length = 1.0;
-            let moved = loop {
-                let moved = self.moved(&point, &direction, -length);
-                match self.value(&moved, pull) {
-                    Some(reached) if reached <= value - 0.1 * length * decrease => break Some((moved, reached)),
-                    _ if length < 1e-6 => break None,
-                    _ => length *= 0.5,
-                }
-            };
-            let Some((moved, reached)) = moved else { break };
-            (point, value) = (moved, reached);
-            if decrement < CENTRED {
-                break;
-            }
-        }
-        Some(point)
-    }
-
-    fn moved(&self, point: &Point, direction: &[f64], length: f64) -> Point {
-        let mut moved = point.clone();
-        for (shape, first) in moved.solution.shapes.iter_mut().zip(&self.first) {
-            for (number, (i, j)) in upper(shape.rows()).enumerate() {
-                shape[(i, j)] += length * direction[first + number];
-                shape[(j, i)] = shape[(i, j)];
-            }
-        }
-        for (multiplier, change) in moved.solution.multipliers.iter_mut().zip(&direction[self.multipliers..]) {
-            *multiplier += length * change;
-        }
-        moved.margin += length * direction[self.unknowns - 1];
-        moved
-    }
-
-    /// The gradient and the upper triangle of the Hessian.
-    fn derivatives(&self, point: &Point, pull: f64) -> Option<(Vec<f64>, Matrix)> {
+    fn derivatives(&self, point: &Point) -> Option<(Vec<f64>, Matrix)> {
         let last = self.unknowns - 1;
         let mut gradient = vec![0.0; self.unknowns];
         let mut hessian = Matrix::zeros(self.unknowns, self.unknowns);
-        gradient[last] = -pull;
+        gradient[last] = -self.pull;
         for (number, part) in self.inequality.parts.iter().enumerate() {
             let inverse = triangle_inverse(&self.slack(number, point)?);
             self.of_slack(number, part, &inverse, &mut gradient, &mut hessian);
@@ -263,33 +245,18 @@ impl<'a> Barrier<'a> {
         Some((gradient, hessian))
     }
 
-    /// Adds what −ln det(−M − t·I) of a part has, with the inverse of its triangle.
-    fn of_slack(&self, number: usize, part: &Part, inverse: &Matrix, gradient: &mut [f64], hessian: &mut Matrix) {
-        let last = self.unknowns - 1;
-        // With R⁻¹ = Z, uᵀWv is the product of Zᵀu and Zᵀv.
-        let rows = Matrix::from_fn(part.rows.len(), part.unknowns, |row, column| part.rows[row].entries[column]);
-        let along = rows.times(inverse);
-        let once = along.times(&along.transposed());
-        let w = inverse.times(&inverse.transposed());
-        let twice = {
-            let along = rows.times(&w);
-            along.times(&along.transposed())
-        };
-        for (place, (unknown, slope)) in self.slopes[number].iter().enumerate() {
-            gradient[*unknown] += slope.iter().map(|(by, i, j)| by * once[(*i, *j)]).sum::<f64>();
-            hessian[(*unknown, last)] += slope.iter().map(|(by, i, j)| by * twice[(*i, *j)]).sum::<f64>();
-            for (other, with) in &self.slopes[number][place..] {
-                let mut second = 0.0;
-                for (by, i, j) in slope {
-                    for (of, k, l) in with {
-                        second += 0.5 * by * of * (once[(*i, *k)] * once[(*j, *l)] + once[(*i, *l)] * once[(*j, *k)]);
-                    }
-                }
-                hessian[(*unknown.min(other), *unknown.max(other))] += second;
+    fn moved(&self, point: &Point, direction: &[f64], length: f64) -> Point {
+        let mut moved = point.clone();
+        for (shape, first) in moved.solution.shapes.iter_mut().zip(&self.first) {
+            for (number, (i, j)) in upper(shape.rows()).enumerate() {
+                shape[(i, j)] += length * direction[first + number];
+                shape[(j, i)] = shape[(i, j)];
             }
         }
-        let trace: f64 = (0..w.rows()).map(|place| w[(place, place)]).sum();
-        gradient[last] += trace;
-        hessian[(last, last)] += w.entries().iter().map(|entry| entry * entry).sum::<f64>();
+        for (multiplier, change) in moved.solution.multipliers.iter_mut().zip(&direction[self.multipliers..]) {
+            *multiplier += length * change;
+        }
+        moved.margin += length * direction[self.unknowns - 1];
+        moved
     }
 }

@@ -14,20 +14,18 @@
 //! With D a change of the shapes, dS = λD_from − XᵀD_to X, W = S⁻¹, V = XW and Z = XWXᵀ, the second derivative of −ln det S is tr(W dS W dS) =
 //! λ²tr(D_from W D_from W) − 2λtr(D_from VᵀD_to V) + tr(D_to Z D_to Z).
 
-use cohaptic_stability::numerics::{cholesky, real, solve, triangle_inverse};
+use cohaptic_stability::numerics::{cholesky, real, triangle_inverse};
 use cohaptic_stability::{Matrix, Watch};
 
 use super::component::{Component, Factors, largest_square};
 use super::norm::mirror;
+use crate::newton::{Barrier, Shortest, Steps, centre, log_determinant, upper};
 
 /// How much of the distance between λ and the centre's own is kept.
 const KEPT: f64 = 0.15;
 /// Centres, each of which takes a handful of Newton's steps.
 const STAGES: u32 = 60;
-/// Newton's steps for one centre.
-const STEPS: u32 = 30;
-/// Newton's decrement below which a centre is near enough.
-const CENTRED: f64 = 0.3;
+const STEPS: Steps = Steps { most: 30, centred: 0.3, shortest: Shortest::Damped };
 /// Squares of rates below this, for matrices with entries near 1, are as good as zero.
 const NOTHING: f64 = 1e-14;
 
@@ -40,8 +38,10 @@ pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64, 
         if !(best.square > NOTHING && best.square.is_finite()) {
             break;
         }
-        let Some(centre) = centre(component, &images, square, watch) else { break };
-        let changes: Option<Vec<Matrix>> = centre.iter().map(cholesky).collect();
+        let round = vec![Matrix::identity(component.size); component.nodes.len()];
+        let reached = centre(&Rate::new(component, &images, square), round, STEPS, watch).filter(|reached| !reached.is_stuck);
+        let Some(centre) = reached else { break };
+        let changes: Option<Vec<Matrix>> = centre.point.iter().map(cholesky).collect();
         let Some(changes) = changes else { break };
         // One common size, which no rate depends on, so that hundreds of stages would not overflow.
         let factors: Vec<Matrix> = changes.iter().zip(&best.factors).map(|(change, factor)| change.times(factor)).collect();
@@ -64,44 +64,8 @@ pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64, 
     if watch.stops() { None } else { Some(best) }
 }
 
-/// The barrier's minimum near the round shapes, as shapes; `None` if rounding got the better of it, or the watch ends it.
-fn centre(component: &Component<'_>, images: &[Matrix], square: f64, watch: &dyn Watch) -> Option<Vec<Matrix>> {
-    let barrier = Barrier::new(component, images, square);
-    let mut shapes = vec![Matrix::identity(component.size); component.nodes.len()];
-    let mut value = barrier.value(&shapes)?;
-    for _ in 0..STEPS {
-        if watch.stops() {
-            return None;
-        }
-        let (gradient, hessian) = barrier.derivatives(&shapes)?;
-        let factor = cholesky(&hessian)?;
-        let direction = solve(&factor, &gradient);
-        let decrease: f64 = gradient.iter().zip(&direction).map(|(a, b)| a * b).sum();
-        let decrement = decrease.max(0.0).sqrt();
-        // The whole step if it goes well, otherwise shorter ones; 1/(1 + δ) always goes well, but for rounding (Nesterov & Nemirovskii 1994).
-        let damped = 1.0 / (1.0 + decrement);
-        let mut length = 1.0;
-        loop {
-            let moved = barrier.moved(&shapes, &direction, -length);
-            let reached = barrier.value(&moved).filter(|reached| *reached <= value - 0.1 * length * decrease || length <= damped);
-            if let Some(reached) = reached {
-                (shapes, value) = (moved, reached);
-                break;
-            }
-            if length <= damped {
-                return None;
-            }
-            length = (0.5 * length).max(damped);
-        }
-        if decrement < CENTRED {
-            break;
-        }
-    }
-    Some(shapes)
-}
-
 /// φ at one λ.
-struct Barrier<'a> {
+struct Rate<'a> {
     component: &'a Component<'a>,
     images: &'a [Matrix],
     square: f64,
@@ -111,7 +75,7 @@ struct Barrier<'a> {
     places: Vec<(usize, usize, f64)>,
 }
 
-impl<'a> Barrier<'a> {
+impl<'a> Rate<'a> {
     fn new(component: &'a Component<'a>, images: &'a [Matrix], square: f64) -> Self {
         let weight = |node| real(component.edges.iter().filter(|step| step.from == node).count());
         let place = |i, j| (i, j, if i == j { 1.0 } else { std::f64::consts::SQRT_2 });
@@ -120,7 +84,7 @@ impl<'a> Barrier<'a> {
             images,
             square,
             weights: (0..component.nodes.len()).map(weight).collect(),
-            places: (0..component.size).flat_map(|i| (i..component.size).map(move |j| place(i, j))).collect(),
+            places: upper(component.size).map(|(i, j)| place(i, j)).collect(),
         }
     }
 
@@ -132,30 +96,33 @@ impl<'a> Barrier<'a> {
         cholesky(&Matrix::from_fn(from.rows(), from.columns(), |i, j| self.square * from[(i, j)] - reached[(i, j)]))
     }
 
-    /// φ; `None` outside its domain.
-    fn value(&self, shapes: &[Matrix]) -> Option<f64> {
+    /// Adds `factor`·tr(B_kl MᵀB_ij M) to the block's entry of row ij and column kl. With the unit matrices E_ij that is M_il·M_jk, here made symmetric.
+    fn add(&self, hessian: &mut Matrix, row: usize, column: usize, m: &Matrix, factor: f64) {
+        for (place, (i, j, weight)) in self.places.iter().enumerate() {
+            let share = 0.5 * factor * weight;
+            let (upper, lower) = (m.row(*i), m.row(*j));
+            let entries = &mut hessian.row_mut(row + place)[column..column + self.places.len()];
+            for (entry, (k, l, other)) in entries.iter_mut().zip(&self.places) {
+                *entry += share * other * (upper[*k] * lower[*l] + upper[*l] * lower[*k]);
+            }
+        }
+    }
+}
+
+impl Barrier for Rate<'_> {
+    /// Shapes.
+    type Point = Vec<Matrix>;
+
+    fn value(&self, shapes: &Self::Point) -> Option<f64> {
         let trace = |of: &Matrix| (0..of.rows()).map(|place| of[(place, place)]).sum::<f64>();
         let size: f64 = shapes.iter().zip(&self.weights).map(|(shape, weight)| weight * trace(shape)).sum();
         (0..self.images.len()).try_fold(size, |sum, edge| {
             let factor = self.slack(shapes, edge)?;
-            Some(sum - 2.0 * (0..factor.rows()).map(|place| libm::log(factor[(place, place)])).sum::<f64>())
+            Some(sum - log_determinant(&factor))
         })
     }
 
-    fn moved(&self, shapes: &[Matrix], direction: &[f64], length: f64) -> Vec<Matrix> {
-        let mut moved = shapes.to_vec();
-        for (shape, part) in moved.iter_mut().zip(direction.chunks(self.places.len())) {
-            for ((i, j, weight), entry) in self.places.iter().zip(part) {
-                // B_ij has ones, or 1/√2 off the diagonal, twice.
-                shape[(*i, *j)] += length * entry / weight;
-            }
-            mirror(shape);
-        }
-        moved
-    }
-
-    /// The gradient and the upper triangle of the Hessian.
-    fn derivatives(&self, shapes: &[Matrix]) -> Option<(Vec<f64>, Matrix)> {
+    fn derivatives(&self, shapes: &Self::Point) -> Option<(Vec<f64>, Matrix)> {
         let count = self.places.len();
         let mut gradient = vec![0.0; count * shapes.len()];
         for (part, weight) in gradient.chunks_mut(count).zip(&self.weights) {
@@ -187,15 +154,15 @@ impl<'a> Barrier<'a> {
         Some((gradient, hessian))
     }
 
-    /// Adds `factor`·tr(B_kl MᵀB_ij M) to the block's entry of row ij and column kl. With the unit matrices E_ij that is M_il·M_jk, here made symmetric.
-    fn add(&self, hessian: &mut Matrix, row: usize, column: usize, m: &Matrix, factor: f64) {
-        for (place, (i, j, weight)) in self.places.iter().enumerate() {
-            let share = 0.5 * factor * weight;
-            let (upper, lower) = (m.row(*i), m.row(*j));
-            let entries = &mut hessian.row_mut(row + place)[column..column + self.places.len()];
-            for (entry, (k, l, other)) in entries.iter_mut().zip(&self.places) {
-                *entry += share * other * (upper[*k] * lower[*l] + upper[*l] * lower[*k]);
+    fn moved(&self, shapes: &Self::Point, direction: &[f64], length: f64) -> Self::Point {
+        let mut moved = shapes.clone();
+        for (shape, part) in moved.iter_mut().zip(direction.chunks(self.places.len())) {
+            for ((i, j, weight), entry) in self.places.iter().zip(part) {
+                // B_ij has ones, or 1/√2 off the diagonal, twice.
+                shape[(*i, *j)] += length * entry / weight;
             }
+            mirror(shape);
         }
+        moved
     }
 }

@@ -36,6 +36,7 @@ use super::part::{WorstPart, of_combination};
 use super::patterns::{Links, Patterns};
 use super::prepared::Prepared;
 use crate::inequality::{Inequality, Part, Product, Row, holds, search};
+use crate::newton::upper;
 use crate::worst_case::gripenberg::Effort;
 
 /// How near the least growth that has a certificate the bound is, relative to it.
@@ -279,11 +280,6 @@ impl Link {
         }
         part
     }
-}
-
-/// The places of the upper triangle.
-fn upper(size: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..size).flat_map(move |i| (i..size).map(move |j| (i, j)))
 }
 
 /// How often an entry of the upper triangle stands in a symmetric matrix.
