@@ -38,6 +38,6 @@ pub use boxes::{
 };
 pub use switching::{GrowingMotion, PushCertificate, Switching, SwitchingCertificate, SwitchingError, SwitchingMotion, prove_switching};
 pub use worst_case::{
-    Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Links, Pattern, PatternError, Patterns, SceneWorstCase,
-    SceneWorstCaseError, WorstCase, WorstPart, WorstVerdict, worst_case, worst_case_watched,
+    AutomatonError, Effort, Links, PatternError, Patterns, SceneWorstCase, SceneWorstCaseError, WorstPart, WorstVerdict, worst_case,
+    worst_case_watched,
 };

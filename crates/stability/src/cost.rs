@@ -55,7 +55,7 @@ impl std::fmt::Display for Memory {
 impl PartCost {
     /// The eigenvalues of a part.
     #[must_use]
-    pub fn of_eigenvalues(states: usize) -> Self {
+    pub(crate) fn of_eigenvalues(states: usize) -> Self {
         let bytes = 8.0 * MATRICES * real(states).powi(2);
         Self { states, bytes, operations: eigenvalue_operations(states) }
     }
@@ -68,15 +68,15 @@ impl PartCost {
 
 /// The sizes of a frame in which a second moment is followed event by event.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct FrameCost {
+pub(crate) struct FrameCost {
     /// Samplings, arrivals and ticks of a frame.
-    pub events: usize,
+    pub(crate) events: usize,
     /// The numbers that describe the scene at an instant of it: states, samples of the frame and of earlier ones, samples held.
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// The joint states of the chains of all links; at least 1.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// Moments that deliveries on links that remember add up in a frame, each from one joint state to another.
-    pub sums: usize,
+    pub(crate) sums: usize,
 }
 
 /// How often a frame is gone through: by the iteration, and for the bounds that are tried.
@@ -91,7 +91,7 @@ const TO_PREPARE: f64 = 2e3;
 impl FrameCost {
     /// How many operations the spectral radius takes.
     #[must_use]
-    pub fn operations(&self) -> f64 {
+    pub(crate) fn operations(&self) -> f64 {
         TO_PREPARE * real(self.events) + PASSES * self.of_a_pass()
     }
 
@@ -104,14 +104,14 @@ impl FrameCost {
 
     /// How many numbers are kept at once within the frame.
     #[must_use]
-    pub fn numbers(&self) -> f64 {
+    pub(crate) fn numbers(&self) -> f64 {
         real(self.joint) * real(self.rows) * real(self.rows)
     }
 }
 
 /// The operations that it takes to push unit vectors through the events of a frame along all axes, and then to find the eigenvalues.
 #[must_use]
-pub fn full_operations(states: usize, events: usize, axes: usize) -> f64 {
+pub(crate) fn full_operations(states: usize, events: usize, axes: usize) -> f64 {
     pushed_operations(events, axes) * real(states) + eigenvalue_operations(states)
 }
 
@@ -122,7 +122,7 @@ pub(crate) fn pushed_operations(events: usize, axes: usize) -> f64 {
 
 /// How many operations the eigenvalues of a matrix of that size take: 10·n³ (Golub & Van Loan 2013, Section 7.5.6).
 #[must_use]
-pub fn eigenvalue_operations(size: usize) -> f64 {
+pub(crate) fn eigenvalue_operations(size: usize) -> f64 {
     10.0 * real(size).powi(3)
 }
 

@@ -8,6 +8,7 @@ use crate::cost::Memory;
 
 /// Why a scene cannot be analysed.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AnalysisError {
     /// Its clocks never come back to where they were.
     #[error("the clocks of this scene have no common period: expected ticks, updates and drifts whose multiples meet within 584 years")]
@@ -167,7 +168,7 @@ pub enum AnalysisError {
          the scene with several seeds instead"
     )]
     TooManyOperations {
-        /// By the estimate ([`FrameCost`](crate::FrameCost)).
+        /// How many it takes, by an estimate that is good to a factor of about three.
         operations: f64,
         /// How many are allowed.
         most: f64,

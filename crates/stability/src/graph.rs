@@ -38,6 +38,7 @@ pub enum Graph {
 
 /// Why peers cannot be analysed on a graph.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum GraphError {
     /// The scene cannot be analysed at all.
     #[error(transparent)]

@@ -40,7 +40,7 @@ impl Judgement {
 pub const NOMINAL: &str = "the verdict is nominal: ";
 
 /// Whether a scene is stable: with links that leave something to chance, in the mean square, as long as that takes no more than `most` unknowns (see
-/// [`crate::mean_square_within`]).
+/// [`Limits::unknowns`]).
 ///
 /// # Errors
 ///

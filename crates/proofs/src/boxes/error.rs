@@ -4,6 +4,7 @@ use cohaptic_stability::{AnalysisError, FamilyError};
 
 /// Why nothing can be proven of a set of scenes.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProofError {
     /// The scene cannot be analysed.
     #[error(transparent)]

@@ -9,7 +9,7 @@ use super::pattern::{Edge, Pattern, PatternError};
 ///
 /// The matrices are square, of one size, and finite.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Automaton {
+pub(crate) struct Automaton {
     pattern: Pattern,
     matrices: Vec<Matrix>,
     size: usize,
@@ -17,6 +17,7 @@ pub struct Automaton {
 
 /// Why a pattern and matrices are no automaton.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum AutomatonError {
     /// The graph is no pattern.
     #[error(transparent)]
@@ -55,7 +56,7 @@ impl Automaton {
     /// # Errors
     ///
     /// If there are not as many matrices as symbols, if they are not square and of one size, or if one has an entry that is not finite.
-    pub fn new(pattern: Pattern, matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
+    pub(crate) fn new(pattern: Pattern, matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
         if pattern.symbols() != matrices.len() {
             return Err(AutomatonError::Count { symbols: pattern.symbols(), matrices: matrices.len() });
         }
@@ -72,57 +73,61 @@ impl Automaton {
         Ok(Self { pattern, matrices, size })
     }
 
+    #[cfg(test)]
     /// A graph with its matrices: [`Pattern::of`] and [`Automaton::new`].
     ///
     /// # Errors
     ///
     /// Those of both.
-    pub fn of(nodes: usize, edges: Vec<Edge>, matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
+    pub(crate) fn of(nodes: usize, edges: Vec<Edge>, matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
         Self::new(Pattern::of(nodes, edges, matrices.len())?, matrices)
     }
 
+    #[cfg(test)]
     /// Every matrix at every time: [`Pattern::free`].
     ///
     /// # Errors
     ///
     /// Those of [`Pattern::free`] and [`Automaton::new`].
-    pub fn free(matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
+    pub(crate) fn free(matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
         Self::new(Pattern::free(matrices.len())?, matrices)
     }
 
+    #[cfg(test)]
     /// Every matrix at every time, but number `hit` at most `most` times in a row: [`Pattern::runs`].
     ///
     /// # Errors
     ///
     /// Those of [`Pattern::runs`] and [`Automaton::new`].
-    pub fn runs(matrices: Vec<Matrix>, hit: usize, most: u32) -> Result<Self, AutomatonError> {
+    pub(crate) fn runs(matrices: Vec<Matrix>, hit: usize, most: u32) -> Result<Self, AutomatonError> {
         Self::new(Pattern::runs(matrices.len(), hit, most)?, matrices)
     }
 
+    #[cfg(test)]
     /// Several links, none of which knows of the others, acting on one state: [`Pattern::product`], with one matrix for every joint symbol.
     ///
     /// # Errors
     ///
     /// Those of [`Pattern::product`] and [`Automaton::new`].
-    pub fn product(links: &[Pattern], matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
+    pub(crate) fn product(links: &[Pattern], matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
         Self::new(Pattern::product(links)?, matrices)
     }
 
     /// Which sequences are allowed.
     #[must_use]
-    pub const fn pattern(&self) -> &Pattern {
+    pub(crate) const fn pattern(&self) -> &Pattern {
         &self.pattern
     }
 
     /// The matrices, by symbol.
     #[must_use]
-    pub fn matrices(&self) -> &[Matrix] {
+    pub(crate) fn matrices(&self) -> &[Matrix] {
         &self.matrices
     }
 
     /// The number of rows of every matrix.
     #[must_use]
-    pub const fn size(&self) -> usize {
+    pub(crate) const fn size(&self) -> usize {
         self.size
     }
 

@@ -24,7 +24,7 @@ use std::cmp::Ordering;
 use std::collections::{BTreeSet, BinaryHeap};
 
 use cohaptic_stability::numerics::{cholesky, gamma, outward, real, triangle_inverse};
-use cohaptic_stability::{Matrix, Unwatched, Watch};
+use cohaptic_stability::{Matrix, Watch};
 
 use super::automaton::Automaton;
 use super::growth::{Approximate, radius_below};
@@ -54,34 +54,34 @@ impl Default for Effort {
 ///
 /// The joint spectral radius is zero where no infinite path exists.
 #[derive(Clone, PartialEq, Debug)]
-pub struct WorstCase {
+pub(crate) struct WorstCase {
     /// The joint spectral radius is at least this.
-    pub lower: f64,
+    pub(crate) lower: f64,
     /// The joint spectral radius is at most this; infinite if numbers overflowed.
-    pub upper: f64,
+    pub(crate) upper: f64,
     /// The matrices whose product, in this order of time and repeated for ever, grows by the lower bound per step; empty if that is zero.
-    pub cycle: Vec<usize>,
+    pub(crate) cycle: Vec<usize>,
     /// How many products were looked at.
-    pub products: u64,
+    pub(crate) products: u64,
     /// Whether the bounds are as close as was asked for.
-    pub complete: bool,
+    pub(crate) complete: bool,
     /// The quadratic certificate in whose norms the search began; `None` if numbers overflowed.
-    pub certificate: Option<Certificate>,
+    pub(crate) certificate: Option<Certificate>,
 }
 
 impl Automaton {
+    #[cfg(test)]
     /// Bounds of the joint spectral radius: how fast a state can grow per step along allowed sequences of any length.
     ///
     /// The bounds hold whatever the effort; they differ by at most its accuracy if [`WorstCase::complete`].
     #[must_use]
-    #[expect(clippy::missing_panics_doc, reason = "nothing ends what nobody watches")]
-    pub fn worst_case(&self, effort: &Effort) -> WorstCase {
-        self.worst_case_watched(effort, &Unwatched).expect("without a watch nothing ends it")
+    pub(crate) fn worst_case(&self, effort: &Effort) -> WorstCase {
+        self.worst_case_watched(effort, &cohaptic_stability::Unwatched).expect("without a watch nothing ends it")
     }
 
     /// [`Automaton::worst_case`], watched: it is asked before each product, and in each round of the search for a certificate; `None` if the watch ends it.
     #[must_use]
-    pub fn worst_case_watched(&self, effort: &Effort, watch: &dyn Watch) -> Option<WorstCase> {
+    pub(crate) fn worst_case_watched(&self, effort: &Effort, watch: &dyn Watch) -> Option<WorstCase> {
         watch.expects(real_of(effort.products) * self.product_operations());
         let exponent = self.exponent();
         let scaled = self.scaled(exponent);
@@ -406,9 +406,9 @@ mod tests {
         let automaton = Automaton::runs(matrices.to_vec(), 1, 2).unwrap();
         let bounds = |room: usize| {
             let certificate = Certificate::find(&automaton, 1e-2).unwrap();
-            let mut search = Search::new(&automaton, Some(&certificate), 1e-6, &Unwatched).unwrap();
+            let mut search = Search::new(&automaton, Some(&certificate), 1e-6, &cohaptic_stability::Unwatched).unwrap();
             search.room = room;
-            search.run(3_000, &Unwatched).unwrap();
+            search.run(3_000, &cohaptic_stability::Unwatched).unwrap();
             (search.lower, search.upper(), search.products)
         };
         let (lower, upper, products) = bounds(MOST_KEPT);

@@ -1,8 +1,8 @@
 //! The worst case over patterns that are bounded but otherwise unknown: "at most m losses in a row", "a delay anywhere in this range".
 //!
-//! A frame multiplies the state by one of a few matrices, depending on what the network did in it. A [`Pattern`] says which sequences the network can
+//! A frame multiplies the state by one of a few matrices, depending on what the network did in it. A [`Pattern`](pattern::Pattern) says which sequences the network can
 //! produce; with the matrices it is an [`Automaton`], and the fastest growth over all its sequences is its *joint spectral radius*: below 1, every
-//! allowed pattern lets disturbances die out; above 1, some allowed pattern, which [`WorstCase::cycle`] shows, makes them grow.
+//! allowed pattern lets disturbances die out; above 1, some allowed pattern, which [`WorstCase::cycle`](gripenberg::WorstCase::cycle) shows, makes them grow.
 //!
 //! ```text
 //!            certified from below                     certified from above
@@ -30,10 +30,9 @@ mod pattern;
 mod root;
 #[cfg(test)]
 mod tests;
-pub(crate) mod verified;
+mod verified;
 
-pub use automaton::{Automaton, AutomatonError};
-pub use gripenberg::{Effort, WorstCase};
+pub use automaton::AutomatonError;
+pub use gripenberg::Effort;
 pub use of_scene::{Links, Patterns, SceneWorstCase, SceneWorstCaseError, WorstPart, WorstVerdict, worst_case, worst_case_watched};
-pub use pattern::{Edge, Pattern, PatternError};
-pub use verified::{Certificate, CertificateError};
+pub use pattern::PatternError;

@@ -7,20 +7,20 @@ const MOST_EDGES: usize = 1 << 20;
 
 /// One allowed step.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub struct Edge {
+pub(crate) struct Edge {
     /// The node before it, from 0.
-    pub from: usize,
+    pub(crate) from: usize,
     /// The node after it, from 0.
-    pub to: usize,
+    pub(crate) to: usize,
     /// What happens in it: the index of a matrix, once there are matrices.
-    pub symbol: usize,
+    pub(crate) symbol: usize,
 }
 
 /// The sequences of symbols that a network can produce: those along the infinite paths of a graph, which may begin anywhere.
 ///
 /// Nodes that lie on no cycle do no harm: an infinite path leaves them behind.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Pattern {
+pub(crate) struct Pattern {
     nodes: usize,
     symbols: usize,
     edges: Vec<Edge>,
@@ -30,6 +30,7 @@ pub struct Pattern {
 
 /// Why a graph is not a pattern.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum PatternError {
     /// There is no node.
     #[error("a pattern needs at least one node")]
@@ -69,7 +70,7 @@ impl Pattern {
     /// # Errors
     ///
     /// A [`PatternError`] if there is no node or symbol, if an edge names one that does not exist, or if there are more than 2²⁰ edges or nodes.
-    pub fn of(nodes: usize, edges: Vec<Edge>, symbols: usize) -> Result<Self, PatternError> {
+    pub(crate) fn of(nodes: usize, edges: Vec<Edge>, symbols: usize) -> Result<Self, PatternError> {
         if nodes == 0 {
             return Err(PatternError::NoNode);
         }
@@ -91,12 +92,13 @@ impl Pattern {
         Ok(Self { nodes, symbols, edges, component })
     }
 
+    #[cfg(test)]
     /// Every symbol at every time.
     ///
     /// # Errors
     ///
     /// If there is no symbol, or more than 2²⁰.
-    pub fn free(symbols: usize) -> Result<Self, PatternError> {
+    pub(crate) fn free(symbols: usize) -> Result<Self, PatternError> {
         Self::of(1, (0..symbols.min(MOST_EDGES + 1)).map(|symbol| Edge { from: 0, to: 0, symbol }).collect(), symbols)
     }
 
@@ -108,7 +110,7 @@ impl Pattern {
     /// # Errors
     ///
     /// If there is no symbol, if `hit` is none of them, or if there are more than 2²⁰ edges.
-    pub fn runs(symbols: usize, hit: usize, most: u32) -> Result<Self, PatternError> {
+    pub(crate) fn runs(symbols: usize, hit: usize, most: u32) -> Result<Self, PatternError> {
         if hit >= symbols {
             return Err(if symbols == 0 { PatternError::NoSymbol } else { PatternError::Symbol { symbol: hit, symbols } });
         }
@@ -130,7 +132,7 @@ impl Pattern {
     /// # Errors
     ///
     /// If there is no pattern, or if the product has more than 2²⁰ edges.
-    pub fn product(patterns: &[Self]) -> Result<Self, PatternError> {
+    pub(crate) fn product(patterns: &[Self]) -> Result<Self, PatternError> {
         let (first, others) = patterns.split_first().ok_or(PatternError::NoNode)?;
         let too_large = PatternError::TooLarge { most: MOST_EDGES };
         others.iter().try_fold(first.clone(), |all, next| {
@@ -151,25 +153,25 @@ impl Pattern {
 
     /// The number of nodes.
     #[must_use]
-    pub const fn nodes(&self) -> usize {
+    pub(crate) const fn nodes(&self) -> usize {
         self.nodes
     }
 
     /// The number of symbols, whether they occur or not.
     #[must_use]
-    pub const fn symbols(&self) -> usize {
+    pub(crate) const fn symbols(&self) -> usize {
         self.symbols
     }
 
     /// All edges, in the order given.
     #[must_use]
-    pub fn edges(&self) -> &[Edge] {
+    pub(crate) fn edges(&self) -> &[Edge] {
         &self.edges
     }
 
     /// Whether an edge lies on a cycle. An infinite path has only finitely many others.
     #[must_use]
-    pub fn recurs(&self, edge: &Edge) -> bool {
+    pub(crate) fn recurs(&self, edge: &Edge) -> bool {
         self.component[edge.from] == self.component[edge.to]
     }
 

@@ -3,7 +3,10 @@
 use cohaptic_stability::Matrix;
 use proptest::prelude::*;
 
-use super::*;
+use super::automaton::Automaton;
+use super::gripenberg::{Effort, WorstCase};
+use super::pattern::{Edge, Pattern};
+use super::verified::Certificate;
 
 fn of(rows: &[&[f64]]) -> Matrix {
     Matrix::from_fn(rows.len(), rows.len(), |i, j| rows[i][j])

@@ -6,7 +6,7 @@
 //! Every entry of M = ρ²P_from − AᵀP_to A is within γ₍₂ₙ₊₄₎·(ρ²|P_from| + |A|ᵀ|P_to||A|) of the exact one, and M > 0 is checked with that error ([`is_positive`]).
 
 use cohaptic_stability::numerics::{UNDERFLOW, UNIT, gamma, is_positive, outward, real};
-use cohaptic_stability::{Matrix, Unwatched, Watch};
+use cohaptic_stability::{Matrix, Watch};
 use thiserror::Error;
 
 use super::automaton::Automaton;
@@ -15,14 +15,14 @@ use super::norm::mirror;
 
 /// A proof that no allowed product grows faster than a rate. It exists only if it was checked.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Certificate {
+pub(crate) struct Certificate {
     rate: f64,
     shapes: Vec<Matrix>,
 }
 
 /// Why shapes and a rate are no certificate.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
-pub enum CertificateError {
+pub(crate) enum CertificateError {
     /// The rate is negative, infinite or not a number.
     #[error("a rate is a finite number and not negative, not {rate}")]
     Rate {
@@ -67,7 +67,7 @@ impl Certificate {
     /// # Errors
     ///
     /// A [`CertificateError`] says what could not be shown.
-    pub fn new(automaton: &Automaton, rate: f64, shapes: Vec<Matrix>) -> Result<Self, CertificateError> {
+    pub(crate) fn new(automaton: &Automaton, rate: f64, shapes: Vec<Matrix>) -> Result<Self, CertificateError> {
         if !(rate >= 0.0 && rate.is_finite()) {
             return Err(CertificateError::Rate { rate });
         }
@@ -96,6 +96,7 @@ impl Certificate {
         Ok(Self { rate, shapes })
     }
 
+    #[cfg(test)]
     /// Searches for the smallest rate and checks what it found.
     ///
     /// The search stops when a step of it improves the rate by less than the relative `accuracy`; it does not promise the smallest rate that a
@@ -104,9 +105,8 @@ impl Certificate {
     /// # Errors
     ///
     /// If nothing that was found could be checked, since numbers overflow.
-    #[expect(clippy::missing_panics_doc, reason = "nothing ends what nobody watches")]
-    pub fn find(automaton: &Automaton, accuracy: f64) -> Result<Self, CertificateError> {
-        Self::find_watched(automaton, accuracy, &Unwatched).expect("without a watch nothing ends it")
+    pub(crate) fn find(automaton: &Automaton, accuracy: f64) -> Result<Self, CertificateError> {
+        Self::find_watched(automaton, accuracy, &cohaptic_stability::Unwatched).expect("without a watch nothing ends it")
     }
 
     /// [`Certificate::find`], watched; `None` if the watch ends it.
@@ -135,13 +135,13 @@ impl Certificate {
 
     /// The rate ρ: the joint spectral radius is at most this.
     #[must_use]
-    pub const fn rate(&self) -> f64 {
+    pub(crate) const fn rate(&self) -> f64 {
         self.rate
     }
 
     /// The shapes P, by node.
     #[must_use]
-    pub fn shapes(&self) -> &[Matrix] {
+    pub(crate) fn shapes(&self) -> &[Matrix] {
         &self.shapes
     }
 }

@@ -23,6 +23,7 @@ pub(super) struct Term {
 
 /// Why matrices make no loop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DelayedLoopError {
     /// Not all matrices are square and of one size.
     #[error("a matrix of a delayed loop has {rows} rows and {columns} columns, expected {size} of each, at least 1")]

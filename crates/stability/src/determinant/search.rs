@@ -30,7 +30,7 @@ impl DelayedLoop {
 
     /// [`DelayedLoop::bounded_radius`], watched: it is asked at each point of each circle; `None` if the watch ends it.
     #[must_use]
-    pub fn bounded_radius_watched(&self, perturbation: f64, watch: &dyn Watch) -> Option<Radius> {
+    pub(crate) fn bounded_radius_watched(&self, perturbation: f64, watch: &dyn Watch) -> Option<Radius> {
         let radius = self.searched(perturbation, watch);
         // A count that was ended tells nothing, like one that is too near to a root: what came of it is no answer.
         (!watch.stops()).then_some(radius)

@@ -18,6 +18,7 @@ pub struct KeyRange {
 
 /// Why a text is no range of a key.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum KeyRangeError {
     /// There is no `=`, or nothing before it.
     #[error("no key in \"{text}\": expected KEY=LOW..HIGH such as coordination.stiffness=0..6000 or link.delay=0ms..50ms")]

@@ -37,7 +37,7 @@ impl Instrument for Autonomous {}
 /// Where a frame leads.
 ///
 /// The unknowns, one column each: the states at the beginning, but for the reference; then the samples of earlier frames that are used; then inputs.
-/// A sample is one number or two, as [`Sampling`] says, each with a place of its own: with c numbers a sample, number i of sample s has the place c·s + i.
+/// A sample is one number or two, as [`Sampling`](super::Sampling) says, each with a place of its own: with c numbers a sample, number i of sample s has the place c·s + i.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FrameMap {
     /// The states at the end, one row each, the reference among them, in positions as they are.

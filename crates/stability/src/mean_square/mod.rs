@@ -41,7 +41,7 @@ use self::positive::{Positive, radius_watched};
 use self::symmetric::Symmetric;
 use crate::analysis::{CHANGES_LEFT_OUT, UNLOADED};
 use crate::combinations::{Combination, pairs};
-use crate::cost::PASSES;
+use crate::cost::{FrameCost, PASSES};
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
@@ -49,7 +49,7 @@ use crate::pieces::{refuse_topology, split};
 use crate::rounding::real;
 use crate::structure::{Contacts, Structure, has_equal_clocks, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
-use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, PartCost, Radius, Verdict, Watch};
+use crate::{AnalysisError, Limits, Matrix, Method, PartCost, Radius, Verdict, Watch};
 
 /// More unknowns of the second moment than this are refused, whatever the caller allows: they take minutes.
 const MOST_UNKNOWNS: usize = 1 << 20;
@@ -120,16 +120,7 @@ impl MeanSquare {
 ///
 /// [`AnalysisError`] as [`analyse`](crate::analyse), and if a link does at random what has no second moment here, or there are too many joint states.
 pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
-    mean_square_within(scene, MOST_UNKNOWNS)
-}
-
-/// [`mean_square`], refused if it takes more than this number of unknowns; of many joint states, 2^17 unknowns take seconds and 2^20 minutes.
-///
-/// # Errors
-///
-/// As for [`mean_square`].
-pub fn mean_square_within(scene: &Scene, most: usize) -> Result<MeanSquare, AnalysisError> {
-    mean_square_watched(scene, &Limits::of_unknowns(most))
+    mean_square_watched(scene, &Limits::of_unknowns(MOST_UNKNOWNS))
 }
 
 /// [`mean_square`] within limits, watched.

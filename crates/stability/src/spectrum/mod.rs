@@ -52,7 +52,7 @@ macro_rules! on_the_stack {
 ///
 /// A result does not depend on earlier ones.
 #[derive(Debug, Default)]
-pub struct Workspace {
+pub(crate) struct Workspace {
     eigenvalues: Vec<Complex64>,
     scratch: Matrix,
     triangle: Triangle,
@@ -74,7 +74,7 @@ pub fn eigenvalues(matrix: &Matrix) -> Vec<Complex64> {
 
 /// The spectral radius, without a bound of its error; 0 for the empty matrix, NaN if an entry is NaN, infinite if one is infinite.
 ///
-/// For many matrices use [`Workspace::radius`] or [`radius_small`].
+/// For many small matrices use [`radius_small`].
 ///
 /// # Panics
 ///
@@ -125,7 +125,7 @@ impl Workspace {
     /// # Panics
     ///
     /// If the matrix is not square.
-    pub fn eigenvalues(&mut self, matrix: &Matrix) -> &[Complex64] {
+    pub(crate) fn eigenvalues(&mut self, matrix: &Matrix) -> &[Complex64] {
         assert_eq!(matrix.rows(), matrix.columns(), "a matrix with eigenvalues is square");
         self.eigenvalues.clear();
         if matrix.rows() == 0 || !matrix.is_finite() {
@@ -156,7 +156,7 @@ impl Workspace {
     /// # Panics
     ///
     /// If the matrix is not square.
-    pub fn radius(&mut self, matrix: &Matrix) -> f64 {
+    pub(crate) fn radius(&mut self, matrix: &Matrix) -> f64 {
         assert_eq!(matrix.rows(), matrix.columns(), "a matrix with eigenvalues is square");
         on_the_stack!(matrix, array => radius_small(&mut array)).unwrap_or_else(|| self.large_radius(matrix))
     }
@@ -166,7 +166,7 @@ impl Workspace {
     /// # Panics
     ///
     /// If the matrix is not square.
-    pub fn bounded_radius(&mut self, matrix: &Matrix, perturbation: f64) -> Radius {
+    pub(crate) fn bounded_radius(&mut self, matrix: &Matrix, perturbation: f64) -> Radius {
         assert_eq!(matrix.rows(), matrix.columns(), "a matrix with eigenvalues is square");
         let size = matrix.rows();
         if size == 0 {

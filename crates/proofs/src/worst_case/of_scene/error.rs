@@ -11,6 +11,7 @@ use super::super::pattern::PatternError;
 
 /// Why the worst case of a scene cannot be bounded.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneWorstCaseError {
     /// The scene cannot be analysed at all.
     #[error(transparent)]

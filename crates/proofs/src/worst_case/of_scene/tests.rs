@@ -9,7 +9,8 @@ use cohaptic_stability::{AnalysisError, Matrix, Method, PartKind, analyse, radiu
 use super::channel::Channel;
 use super::prepared::{Prepared, structure};
 use super::*;
-use crate::worst_case::{Automaton, Certificate};
+use crate::worst_case::automaton::Automaton;
+use crate::worst_case::verified::Certificate;
 
 const PAPER: &str = r#"
     scene        = { duration = "1s", count = 2 }
