@@ -1,9 +1,13 @@
-//! What runs, checks, explanations and verdicts of scenes answer, as values, as JSON documents and as pictures.
+//! What runs, checks, explanations, verdicts, campaigns and comparisons answer, as values, as JSON documents, in words and as pictures.
 //!
 //! You need it if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
 //!
 //! [`run()`] is a run, [`explanation()`] the model of a scene, [`check()`] a scene and its expectations, where [`quick_verdict()`] tells first whether the
-//! scene is stable. [`methods()`] lists the methods that a scene can choose between, and [`measure()`] says what each costs and how wrong it is. [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
+//! scene is stable. [`methods()`] lists the methods that a scene can choose between, and [`measure()`] says what each costs and how wrong it is.
+//! [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
+//!
+//! The commands that have a module of their own have their answer in its function `document`, and the text for people in its function `words`: [`campaign`] and
+//! [`compare`].
 //!
 //! Nothing here reads a clock or prints: [`measure()`] is given a clock.
 //!
@@ -26,7 +30,9 @@
 //! ```
 #![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
 
+pub mod campaign;
 mod check;
+pub mod compare;
 mod document;
 mod explanation;
 mod methods;
@@ -35,6 +41,7 @@ mod parts;
 mod pictures;
 mod quick_verdict;
 mod run;
+mod words;
 
 pub use check::{Answered, OutcomeDocument, check};
 pub use explanation::explanation;
@@ -47,3 +54,4 @@ pub use pictures::{
 };
 pub use quick_verdict::{OPERATIONS_A_SECOND, Quick, quick_verdict};
 pub use run::run;
+pub use words::{length, nominal};

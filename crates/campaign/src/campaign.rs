@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::compare::{Comparison, MOST_NUMBERS_COMPARED, measured};
+use crate::compare::{Comparison, compared};
 use crate::error::CampaignError;
 use crate::folder::{Folder, Manifest, hash};
 use crate::plan::{Accepted, CampaignPlan, Parts, Refused};
@@ -175,7 +175,7 @@ impl Campaign {
     /// Whether the table is there.
     #[must_use]
     pub fn is_finished(&self) -> bool {
-        self.folder.table(self.plan.format()).exists()
+        self.table_file().exists()
     }
 
     /// Judges the combinations that are not judged yet, on all threads of the pool that it is called in. Each judgement is kept as soon as it is known.
@@ -205,6 +205,18 @@ impl Campaign {
     /// Those of [`Campaign::judge`].
     pub fn judge_apart(&self, by: &dyn Judge, watch: &dyn Watch) -> Result<Result<Vec<Judgement>, u64>, CampaignError> {
         self.judged(&self.folder.stability(), by, watch)
+    }
+
+    /// The file of the table, which is there once the campaign is finished.
+    #[must_use]
+    pub fn table_file(&self) -> PathBuf {
+        self.folder.table(self.plan.format())
+    }
+
+    /// The file of [`Campaign::judge`]; `None` of a plan without verdicts.
+    #[must_use]
+    pub fn verdicts_file(&self) -> Option<PathBuf> {
+        self.plan.has_verdicts().then(|| self.folder.verdicts())
     }
 
     /// The file of [`Campaign::judge_apart`].
@@ -324,12 +336,8 @@ impl Campaign {
     /// [`CampaignError::File`] if the table cannot be read, [`CampaignError::Damaged`] if it is not as it was written, [`CampaignError::Size`] if it has more than
     /// [`MOST_NUMBERS_COMPARED`] numbers.
     pub fn compare(&self) -> Result<Comparison, CampaignError> {
-        let measures = measured(&self.columns);
-        let numbers = self.runs().saturating_mul(measures.len() as u64);
-        if numbers > MOST_NUMBERS_COMPARED {
-            return Err(CampaignError::Size(format!("{numbers} numbers to compare: expected at most {MOST_NUMBERS_COMPARED}, runs times measures")));
-        }
-        let path = self.folder.table(self.plan.format());
+        let measures = compared(&self.columns, self.runs())?;
+        let path = self.table_file();
         let file = File::open(&path).map_err(|error| CampaignError::File { verb: "read", path: path.clone(), error })?;
         let names: Vec<&str> = measures.iter().map(|measure| measure.name.as_str()).collect();
         let columns = self.plan.format().read_columns(file, &names).map_err(|error| unread(&path, error, TABLE_WAY_OUT))?;
@@ -346,7 +354,7 @@ impl Campaign {
 
     /// Sums the table up.
     fn report(&self, computed: u64) -> Result<Report, CampaignError> {
-        let path = self.folder.table(self.plan.format());
+        let path = self.table_file();
         let file = File::open(&path).map_err(|error| CampaignError::File { verb: "read", path: path.clone(), error })?;
         let mut tally = Tally::new(self.plan.runs_of_each(), self.plan.combinations(), &self.accepted);
         let read = self.plan.format().read_gists(file, &mut |gist| tally.add(gist));
@@ -356,17 +364,8 @@ impl Campaign {
             return Err(CampaignError::Damaged { path, message: format!("{found} rows: expected {runs}"), way_out: TABLE_WAY_OUT });
         }
         let (combinations, quantiles) = tally.finish();
-        let verdicts = self.plan.has_verdicts().then(|| self.folder.verdicts());
-        Ok(Report {
-            file: path,
-            verdicts,
-            runs,
-            computed,
-            combinations,
-            quantiles,
-            judgements: self.judgements.clone(),
-            refused: self.manifest.refused.clone(),
-        })
+        let (judgements, refused) = (self.judgements.clone(), self.manifest.refused.clone());
+        Ok(Report { runs, computed, combinations, quantiles, judgements, refused })
     }
 }
 

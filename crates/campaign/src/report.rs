@@ -1,6 +1,5 @@
 //! What a campaign comes to, and the quantiles of the runs of a combination.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::plan::{Accepted, Refused};
@@ -10,10 +9,6 @@ use crate::verdicts::Judgement;
 /// What a campaign comes to, taken from its table.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Report {
-    /// The table.
-    pub file: PathBuf,
-    /// The table of verdicts, if they are asked for.
-    pub verdicts: Option<PathBuf>,
     /// How many runs it has.
     pub runs: u64,
     /// How many of them were done this time; the others were there already.
@@ -203,16 +198,7 @@ mod tests {
         assert_eq!(*first, expected);
         assert_eq!(*second, CombinationReport { runs: 3, diverged: 3, ..CombinationReport::default() });
         assert_eq!((third.worst_run, third.mean_discrepancy), (Some(6), Some(4.0)));
-        let report = Report {
-            file: PathBuf::new(),
-            verdicts: None,
-            runs: 7,
-            computed: 7,
-            combinations,
-            quantiles,
-            judgements: Arc::from([]),
-            refused: Refused::new(),
-        };
+        let report = Report { runs: 7, computed: 7, combinations, quantiles, judgements: Arc::from([]), refused: Refused::new() };
         assert_eq!((report.diverged(), report.worst().and_then(|worst| worst.worst_run)), (4, Some(2)), "of equal ones the first");
     }
 

@@ -1,20 +1,38 @@
 //! A campaign whose runs its caller spreads over processes: each asks for the rows of some runs, and nothing is written.
 
 use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::campaign::Watch;
+use crate::compare::{Comparison, compared};
 use crate::error::CampaignError;
-use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts};
-use crate::table::{Column, Roster, Row, columns};
+use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts, Refused};
+use crate::report::{Report, Tally};
+use crate::table::{Column, Roster, Row, TableError, columns, gists, run_columns};
 use crate::vary::Variation;
+use crate::verdicts::{Judge, Judgement};
 use crate::work::{Chunk, Scenes, Work};
 
 /// The table of a plan, any rows of which can be had in any process: they are those of [`Campaign::run`](crate::Campaign::run).
 #[derive(Clone, Debug)]
 pub struct SpreadCampaign {
     plan: CampaignPlan,
-    roster: Roster,
+    found: Found,
+    accepted: Accepted,
     columns: Vec<Column>,
+}
+
+/// What the check of a plan finds, which other processes are told.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Found {
+    roster: Roster,
+    /// The combinations that are left out.
+    #[serde(default, skip_serializing_if = "Refused::is_empty")]
+    refused: Refused,
 }
 
 impl SpreadCampaign {
@@ -22,11 +40,10 @@ impl SpreadCampaign {
     ///
     /// # Errors
     ///
-    /// Of the first combination that is refused; [`CampaignError::Stopped`] if the watch ended it; [`CampaignError::Size`] of a plan that has verdicts or leaves
-    /// combinations out.
+    /// Of the first combination that is refused; [`CampaignError::Stopped`] if the watch ended it; [`CampaignError::Size`] of a plan that has verdicts.
     pub fn check(plan: CampaignPlan, watch: &dyn Watch) -> Result<Self, CampaignError> {
-        let roster = plan.check(watch)?.roster;
-        Self::new(plan, roster)
+        let checked = plan.check(watch)?;
+        Self::new(plan, Found { roster: checked.roster, refused: checked.refused })
     }
 
     /// The same in another process, which does not check the plan again. `roster`: [`SpreadCampaign::roster`] of the one that was checked.
@@ -35,22 +52,29 @@ impl SpreadCampaign {
     ///
     /// [`CampaignError::Size`] if the roster is none.
     pub fn with_roster(plan: CampaignPlan, roster: &str) -> Result<Self, CampaignError> {
-        let roster = serde_json::from_str(roster).map_err(|error| CampaignError::Size(format!("no roster of a campaign: {error}")))?;
-        Self::new(plan, roster)
+        let found = serde_json::from_str(roster).map_err(|error| CampaignError::Size(format!("no roster of a campaign: {error}")))?;
+        Self::new(plan, found)
     }
 
-    fn new(plan: CampaignPlan, roster: Roster) -> Result<Self, CampaignError> {
-        if plan.has_verdicts() || plan.may_leave_out() {
-            return Err(CampaignError::Size("a campaign that is spread has no verdicts and leaves nothing out".to_owned()));
+    fn new(plan: CampaignPlan, found: Found) -> Result<Self, CampaignError> {
+        if plan.has_verdicts() {
+            return Err(CampaignError::Size("the rows of a campaign that is spread have no verdicts: expected a plan without them".to_owned()));
         }
-        let columns = columns(plan.variations(), false, &roster);
-        Ok(Self { plan, roster, columns })
+        let columns = columns(plan.variations(), false, &found.roster);
+        let accepted = Accepted::new(plan.combinations(), plan.runs_of_each(), found.refused.keys().copied());
+        Ok(Self { plan, found, accepted, columns })
     }
 
-    /// The peers of all runs, as a text for [`SpreadCampaign::with_roster`].
+    /// The plan.
+    #[must_use]
+    pub const fn plan(&self) -> &CampaignPlan {
+        &self.plan
+    }
+
+    /// The peers of all runs and the combinations that are left out, as a text for [`SpreadCampaign::with_roster`].
     #[must_use]
     pub fn roster(&self) -> String {
-        serde_json::to_string(&self.roster).unwrap_or_default()
+        serde_json::to_string(&self.found).unwrap_or_default()
     }
 
     /// The columns of the table.
@@ -65,10 +89,10 @@ impl SpreadCampaign {
         self.plan.variations()
     }
 
-    /// How many rows the table has.
+    /// The number of rows of the table: combinations that are left out have none.
     #[must_use]
     pub const fn runs(&self) -> u64 {
-        self.plan.runs()
+        self.accepted.runs()
     }
 
     /// The rows of some runs, counted from 0, on one thread.
@@ -80,9 +104,9 @@ impl SpreadCampaign {
         if runs.end > self.runs() {
             return Err(CampaignError::Size(format!("run {} of {}: expected one of the campaign", runs.end, self.runs())));
         }
-        let accepted = Accepted::new(self.plan.combinations(), self.plan.runs_of_each(), std::iter::empty());
         let parts = Parts { runs: self.runs(), size: self.runs() };
-        let work = Work { plan: &self.plan, roster: &self.roster, judgements: &[], accepted: &accepted, parts, watch, keep: &|_, _| Ok(()) };
+        let (plan, roster, accepted) = (&self.plan, &self.found.roster, &self.accepted);
+        let work = Work { plan, roster, judgements: &[], accepted, parts, watch, keep: &|_, _| Ok(()) };
         let scenes = Scenes::default();
         let mut rows = Vec::new();
         let mut start = runs.start;
@@ -96,4 +120,63 @@ impl SpreadCampaign {
         }
         Ok(rows)
     }
+
+    /// Judges every combination, on all threads of the pool that it is called in: the judgements of [`Campaign::judge_apart`](crate::Campaign::judge_apart).
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError::Scene`] if a scene is refused here, [`CampaignError::Stopped`] if the watch or the judge ended it.
+    pub fn judge(&self, by: &dyn Judge, watch: &dyn Watch) -> Result<Vec<Judgement>, CampaignError> {
+        let judge = |combination: u64| {
+            if let Some(reason) = self.found.refused.get(&combination) {
+                return Ok(Judgement::Refused(reason.as_str().into()).in_one_line());
+            }
+            if !watch.keep_going() {
+                return Err(CampaignError::Stopped);
+            }
+            let judgement = by.judge(&self.plan.scene(combination)?).ok_or(CampaignError::Stopped)?;
+            watch.judged(1);
+            Ok(judgement.in_one_line())
+        };
+        // In order, and the first error in order: the number of threads changes nothing.
+        (0..self.plan.combinations()).into_par_iter().map(judge).collect::<Vec<_>>().into_iter().collect()
+    }
+
+    /// Sums up the rows of all runs, in their order, as [`Campaign::run`](crate::Campaign::run) sums up the table. `judgements` has one for each combination, or none.
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError::Size`] if there are not as many rows as runs.
+    pub fn report(&self, rows: &[Row], judgements: Vec<Judgement>) -> Result<Report, CampaignError> {
+        self.has_all(rows)?;
+        let mut tally = Tally::new(self.plan.runs_of_each(), self.plan.combinations(), &self.accepted);
+        gists(&self.columns, rows).map_err(|error| not_of_this(&error))?.for_each(|gist| tally.add(gist));
+        let (combinations, quantiles) = tally.finish();
+        let (runs, refused) = (self.runs(), self.found.refused.clone());
+        Ok(Report { runs, computed: runs, combinations, quantiles, judgements: Arc::from(judgements), refused })
+    }
+
+    /// Compares the values of the first key, which are [`Strategies`](crate::Strategies), by the rows of all runs, in their order, as
+    /// [`Campaign::compare`](crate::Campaign::compare) does by the table.
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError::Size`] if there are not as many rows as runs, or more than [`MOST_NUMBERS_COMPARED`](crate::MOST_NUMBERS_COMPARED) numbers.
+    pub fn compare(&self, rows: &[Row]) -> Result<Comparison, CampaignError> {
+        self.has_all(rows)?;
+        let measures = compared(&self.columns, self.runs())?;
+        let names: Vec<&str> = measures.iter().map(|measure| measure.name.as_str()).collect();
+        let columns = run_columns(&self.columns, rows, &names).map_err(|error| not_of_this(&error))?;
+        Ok(Comparison::of(&self.plan, &self.accepted, &self.found.refused, measures, &columns))
+    }
+
+    fn has_all(&self, rows: &[Row]) -> Result<(), CampaignError> {
+        let (found, runs) = (rows.len() as u64, self.runs());
+        if found == runs { Ok(()) } else { Err(CampaignError::Size(format!("{found} rows of a campaign of {runs} runs: expected all of them"))) }
+    }
+}
+
+/// A table without the columns that every campaign has.
+fn not_of_this(error: &TableError) -> CampaignError {
+    CampaignError::Size(format!("no table of a campaign: {error}"))
 }

@@ -7,9 +7,10 @@
 //! A run that [diverged](cohaptic_harness::Summary::has_diverged) counts for no mean: a mean over 10³⁰ m says nothing.
 
 use super::interval::{Estimate, Share};
-use super::measured::MeasuredColumn;
+use super::measured::{MeasuredColumn, measured};
+use crate::error::CampaignError;
 use crate::plan::{Accepted, CampaignPlan, Refused};
-use crate::table::RunColumns;
+use crate::table::{Column, RunColumns};
 
 /// The most numbers that are compared, runs times measures: 800 MB.
 pub const MOST_NUMBERS_COMPARED: u64 = 100_000_000;
@@ -43,6 +44,20 @@ pub struct Figures {
     pub mean: Option<Estimate>,
     /// The mean difference to the baseline over the seeds of which both runs did; `None` if there are none, and of the baseline itself.
     pub difference: Option<Estimate>,
+}
+
+/// Returns the columns that are compared, in the order of the table of so many runs.
+///
+/// # Errors
+///
+/// [`CampaignError::Size`] if they have more than [`MOST_NUMBERS_COMPARED`] numbers.
+pub(crate) fn compared(columns: &[Column], runs: u64) -> Result<Vec<MeasuredColumn>, CampaignError> {
+    let measures = measured(columns);
+    let numbers = runs.saturating_mul(measures.len() as u64);
+    if numbers > MOST_NUMBERS_COMPARED {
+        return Err(CampaignError::Size(format!("{numbers} numbers to compare: expected at most {MOST_NUMBERS_COMPARED}, runs times measures")));
+    }
+    Ok(measures)
 }
 
 impl Comparison {

@@ -5,9 +5,8 @@ mod interval;
 mod measured;
 mod strategies;
 
+pub(crate) use comparison::compared;
 pub use comparison::{Cell, Comparison, Figures, MOST_NUMBERS_COMPARED};
 pub use interval::{Estimate, Share};
 pub use measured::MeasuredColumn;
 pub use strategies::{Strategies, StrategiesError};
-
-pub(crate) use measured::measured;

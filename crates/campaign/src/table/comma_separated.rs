@@ -5,7 +5,7 @@ use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write};
 
 use cohaptic_files::WholeFile;
 
-use super::format::{COMPLETE, GIST, Gist, Gists, OpenPart, RunColumns, TableError};
+use super::format::{COMPLETE, DIVERGED, GIST, Gist, Gists, OpenPart, RunColumns, TableError};
 use super::{Column, Row, Value};
 
 pub(super) fn write(to: &mut impl Write, columns: &[Column], rows: &[Row]) -> io::Result<()> {
@@ -79,7 +79,7 @@ pub(super) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> 
     while reader.read_record(&mut record).map_err(unread)? {
         let discrepancy = record.get(discrepancy).unwrap_or_default();
         let max_discrepancy = discrepancy.parse().map_err(|_| TableError::Content(format!("{discrepancy:?} is no number")))?;
-        each(Gist { diverged: record.get(ending) == Some("diverged"), max_discrepancy });
+        each(Gist { diverged: record.get(ending) == Some(DIVERGED), max_discrepancy });
     }
     Ok(())
 }

@@ -113,6 +113,9 @@ impl RunColumns {
 /// What the column `ending` says of a run that came to its end.
 pub(super) const COMPLETE: &str = "complete";
 
+/// What the column `ending` says of a run that diverged.
+pub(super) const DIVERGED: &str = "diverged";
+
 /// The names of the columns that a [`Gist`] comes from.
 pub(super) const GIST: [&str; 2] = ["ending", "max_discrepancy_m"];
 

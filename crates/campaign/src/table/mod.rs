@@ -3,6 +3,7 @@
 mod columns;
 mod comma_separated;
 mod format;
+mod memory;
 mod parquet_file;
 mod row;
 
@@ -12,6 +13,7 @@ pub(crate) use columns::{Roster, columns};
 pub(crate) use comma_separated::{number_text, text as value_text};
 pub use format::Format;
 pub(crate) use format::{Gist, Head, OpenPart, RunColumns, TableError};
+pub(crate) use memory::{gists, run_columns};
 pub(crate) use row::{RunId, row};
 
 /// What a column holds.

@@ -51,6 +51,14 @@ impl Judgement {
             Self::Refused(_) => None,
         }
     }
+
+    /// The same judgement with a reason of one line, as a line of a journal keeps it.
+    pub(crate) fn in_one_line(self) -> Self {
+        match self {
+            Self::Refused(reason) if reason.contains(['\n', '\r']) => Self::Refused(reason.replace(['\n', '\r'], " ").into()),
+            other @ (Self::Known(_) | Self::Refused(_)) => other,
+        }
+    }
 }
 
 /// Words that were seen: verdicts are millions, and their words few.
@@ -68,10 +76,9 @@ impl Words {
     }
 
     fn all(&mut self, judgement: Judgement) -> Judgement {
-        match judgement {
+        match judgement.in_one_line() {
             Judgement::Known(verdict) => Judgement::Known(Verdict { word: self.one(&verdict.word), judged: self.one(&verdict.judged), ..verdict }),
-            // A line of the journal is one line.
-            Judgement::Refused(reason) => Judgement::Refused(self.one(&reason.replace(['\n', '\r'], " "))),
+            Judgement::Refused(reason) => Judgement::Refused(self.one(&reason)),
         }
     }
 }

@@ -2,7 +2,9 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use cohaptic_campaign::{Campaign, CampaignError, CampaignPlan, Comparison, Format, Judge, Judgement, NoWatch, Outcome, Strategies, Verdict, Watch};
+use cohaptic_campaign::{
+    Campaign, CampaignError, CampaignPlan, Comparison, Format, Judge, Judgement, NoWatch, Outcome, Row, SpreadCampaign, Strategies, Verdict, Watch,
+};
 use cohaptic_scene::Scene;
 
 use crate::bench::{Bench, StopAfter, comma_separated, finished};
@@ -152,4 +154,34 @@ fn verdicts_apart_are_kept_as_they_are_made_and_leave_the_table_alone() {
     }
     let read = |name: &str| std::fs::read(bench.path(name)).unwrap();
     assert_eq!(read("parts/stability.csv"), read("whole/stability.csv"));
+}
+
+/// Gives each scene a verdict of its own, so that two of them in each other's place are seen.
+struct Numbered;
+
+impl Judge for Numbered {
+    fn judge(&self, scene: &Scene) -> Option<Judgement> {
+        let radius = f64::from(u32::try_from(scene.clone().fingerprint().get() % 1_000_003).unwrap());
+        Some(Judgement::Known(Verdict { word: "stable".into(), judged: "test".into(), radius, error: 0.0 }))
+    }
+}
+
+/// Rows in memory are judged, summed up and compared as the table in a folder is, whichever process made them.
+#[test]
+fn a_comparison_in_memory_is_that_of_the_folder() {
+    let bench = bench(&REFUSING);
+    let mut campaign = open(&bench, "out").unwrap();
+    let stability = campaign.judge_apart(&Numbered, &NoWatch).unwrap().unwrap();
+    let report = finished(campaign.run(&NoWatch).unwrap());
+    let first = SpreadCampaign::check(plan(&bench).unwrap(), &NoWatch).unwrap();
+    let other = SpreadCampaign::with_roster(plan(&bench).unwrap(), &first.roster()).unwrap();
+    assert_eq!((first.runs(), other.runs()), (30, 30));
+    let rows: Vec<Row> = [0..7, 7..30].into_iter().flat_map(|runs| other.rows(runs, &NoWatch).unwrap()).collect();
+    for spread in [&first, &other] {
+        assert_eq!(spread.report(&rows, Vec::new()).unwrap(), report);
+        assert_eq!(spread.compare(&rows).unwrap(), campaign.compare().unwrap());
+        assert_eq!(spread.judge(&Numbered, &NoWatch).unwrap(), stability);
+    }
+    assert!(first.report(&rows[1..], Vec::new()).is_err() && first.compare(&rows[1..]).is_err());
+    assert!(matches!(first.judge(&Numbered, &StopAfter::runs(0)), Err(CampaignError::Stopped)));
 }

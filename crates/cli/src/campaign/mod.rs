@@ -1,8 +1,5 @@
 //! `cohaptic campaign`.
 
-mod answer;
-mod judge;
-pub(crate) mod picture;
 pub(crate) mod sharing;
 
 use std::io::Write as _;
@@ -11,35 +8,26 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
+use cohaptic_answers::campaign::{ByAnalysis, Drawn, Finished, Written};
 use cohaptic_campaign::{
     Campaign, CampaignError, CampaignPlan, Format, Judge, Judgement, Outcome, PlanSpec, Report, SharedCampaign, Variation, Watch,
 };
 use cohaptic_scene::{Diagnostic, Scene};
 
+use crate::analysis_watch::Interruptible;
 use crate::arguments::{CampaignArguments, TableFormat};
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
+use crate::file::write_into;
 use crate::progress::Progress;
 use crate::shard::Sharing;
 use crate::{input, interrupt, output, shard};
-use judge::ByAnalysis;
-use picture::Drawn;
 
 /// The program, as a campaign remembers it.
 pub(crate) const PROGRAM: &str = concat!("cohaptic ", env!("CARGO_PKG_VERSION"));
 
-/// A campaign that is finished, and what it took.
-struct Finished {
-    plan: CampaignPlan,
-    title: String,
-    report: Report,
-    /// Of this time.
-    wall_s: f64,
-    /// The simplifications of verdicts, and the pictures that are not drawn.
-    notes: Vec<String>,
-    /// All that are there: the table, verdicts, pictures.
-    files: Vec<PathBuf>,
-}
+/// Judges until the user asks for the end.
+const JUDGE: ByAnalysis<'static> = ByAnalysis(&Interruptible);
 
 /// Does the runs that are missing, all or those of a shard, and says what came out.
 pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failure> {
@@ -50,7 +38,7 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     match sharing {
         Sharing::Whole(_) | Sharing::Merge(_) => {}
         Sharing::Shard(shard, out) => {
-            let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge(shard, &ByAnalysis, watch);
+            let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge(shard, &JUDGE, watch);
             let done = pool(arguments.threads, || sharing::shard(plan, shard, out, judge))?;
             return shard::answer(arguments.json, &done.map_err(|ended| ended.unwrap_or_else(refused))?);
         }
@@ -58,18 +46,24 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     }
     let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
-    let report = pool(arguments.threads, || execute(sharing, out, plan.clone()))?.map_err(|ended| ended.unwrap_or_else(refused))?;
+    let done = pool(arguments.threads, || execute(sharing, out, plan.clone()))?;
+    let (report, paths) = done.map_err(|ended| ended.unwrap_or_else(refused))?;
     let wall_s = start.elapsed().as_secs_f64();
     let title = plan.scene(0).map_or_else(|_| output::path(input::named(scene)), |scene| scene.title);
-    let notes = judge::notes(&report);
-    let files = std::iter::once(report.file.clone()).chain(report.verdicts.clone()).collect();
-    let mut finished = Finished { plan, title, report, wall_s, notes, files };
+    let notes = cohaptic_answers::campaign::notes(&report);
+    let mut finished = Finished { plan, title, report, notes };
+    let mut files: Vec<String> = paths.iter().map(|file| output::path(file)).collect();
     if !arguments.no_plot {
-        let Drawn { files, notes } = picture::write(&finished, out, arguments.pictures.size())?;
-        finished.files.extend(files);
+        let Drawn { pictures, notes } = cohaptic_answers::campaign::pictures(&finished, arguments.pictures.size());
+        for (name, picture) in pictures {
+            files.push(write_into(out, name, picture.svg())?);
+        }
         finished.notes.extend(notes);
     }
-    output::answer(arguments.json, DocumentSchema::CAMPAIGN, &answer::of(&finished, out), || answer::describe(&finished), &finished.files)?;
+    let written = Written { wall_s, out: output::path(out), files };
+    let document = cohaptic_answers::campaign::document(&finished, Some(&written));
+    let words = || cohaptic_answers::campaign::words(&finished, wall_s);
+    output::answer(arguments.json, DocumentSchema::CAMPAIGN, &document, words, &written.files)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -110,18 +104,20 @@ fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignP
     Ok(if arguments.verdicts { plan.with_verdicts() } else { plan })
 }
 
-fn execute(sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<Report, Ended> {
+/// The figures of the campaign, with its table of runs and its table of verdicts, if it has one.
+fn execute(sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<(Report, Vec<PathBuf>), Ended> {
     let combinations = plan.combinations();
     let mut campaign = open(sharing, plan, out)?;
     let judging = Shown::judging(combinations);
-    let by: &dyn Judge = if matches!(sharing, Sharing::Merge(_)) { &Nobody } else { &ByAnalysis };
+    let by: &dyn Judge = if matches!(sharing, Sharing::Merge(_)) { &Nobody } else { &JUDGE };
     let missing = campaign.judge(by, &judging);
     judging.clear();
     let missing = missing.map_err(Ended::Error)?;
     if missing > 0 {
         return Err(Ended::Said(not_all_judged(sharing, combinations - missing, combinations, out)));
     }
-    run_to_end(&mut campaign, out)
+    let report = run_to_end(&mut campaign, out)?;
+    Ok((report, std::iter::once(campaign.table_file()).chain(campaign.verdicts_file()).collect()))
 }
 
 /// Judges nothing: verdicts are those that shards made.

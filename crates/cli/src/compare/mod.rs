@@ -1,45 +1,29 @@
 //! `cohaptic compare`.
 
-mod answer;
-mod figures;
-mod judge;
 mod page;
 mod preset;
-mod rows_file;
-mod words;
 
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_campaign::{
-    CampaignError, CampaignPlan, Comparison, Format, Judge, Judgement, PlanSpec, Report, SharedCampaign, Strategies, Variation, Watch,
-};
+use cohaptic_answers::campaign::Written;
+use cohaptic_answers::compare::{ByAnalysisOrRuns, Finished};
+use cohaptic_campaign::{CampaignError, CampaignPlan, Format, Judge, PlanSpec, SharedCampaign, Strategies, Variation, Watch};
 
+use crate::analysis_watch::Interruptible;
 use crate::arguments::{CompareArguments, MeasureArguments, TableFormat};
 use crate::campaign::{self, PROGRAM, Shown};
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::file::write_file;
+use crate::file::write_into;
 use crate::shard::Sharing;
 use crate::{input, output, shard};
-use judge::ByAnalysisOrRuns;
 use preset::Asked;
 
-/// A comparison that is finished, and what it took.
-struct Finished {
-    plan: CampaignPlan,
-    title: String,
-    report: Report,
-    comparison: Comparison,
-    /// One for each combination.
-    stability: Vec<Judgement>,
-    /// Of this time.
-    wall_s: f64,
-    /// All that are there: the table of runs, verdicts, the table of figures, the page.
-    files: Vec<PathBuf>,
-}
+/// Judges until the user asks for the end.
+const JUDGE: ByAnalysisOrRuns<'static> = ByAnalysisOrRuns(&Interruptible);
 
 /// Does the runs that are missing, and sets the strategies side by side.
 pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure> {
@@ -51,7 +35,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
     match sharing {
         Sharing::Whole(_) | Sharing::Merge(_) => {}
         Sharing::Shard(shard, out) => {
-            let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge_apart(shard, &ByAnalysisOrRuns, watch);
+            let judge = |shared: &mut SharedCampaign, watch: &dyn Watch| shared.judge_apart(shard, &JUDGE, watch);
             let done = campaign::pool(arguments.threads, || campaign::sharing::shard(plan, shard, out, judge))?;
             return shard::answer(arguments.scene.json, &done.map_err(|error| error.unwrap_or_else(refused))?);
         }
@@ -62,15 +46,18 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
     let out = sharing.folder().unwrap_or_else(|| Path::new("."));
     let start = Clock::now();
     let finished = campaign::pool(arguments.threads, || execute(arguments, sharing, out, plan))?;
-    let mut finished = finished.map_err(|error| error.unwrap_or_else(refused))?;
-    finished.wall_s = start.elapsed().as_secs_f64();
-    for (name, content) in [("compare.csv", rows_file::text(&finished)), ("compare.html", page::html(arguments, &finished)?)] {
-        let path = out.join(name);
-        write_file(&path, content)?;
-        finished.files.push(path);
+    let (finished, paths) = finished.map_err(|error| error.unwrap_or_else(refused))?;
+    let wall_s = start.elapsed().as_secs_f64();
+    let scene = input::text(&arguments.scene.scene)?;
+    let html = cohaptic_answers::compare::html(&finished, &page::source(arguments, &finished, &scene)?);
+    let mut files: Vec<String> = paths.iter().map(|file| output::path(file)).collect();
+    for (name, content) in [("compare.csv", cohaptic_answers::compare::csv(&finished)), ("compare.html", html)] {
+        files.push(write_into(out, name, content)?);
     }
-    let words = || words::describe(&finished);
-    output::answer(arguments.scene.json, DocumentSchema::COMPARE, &answer::of(&finished, out), words, &finished.files)?;
+    let written = Written { wall_s, out: output::path(out), files };
+    let document = cohaptic_answers::compare::document(&finished, Some(&written));
+    let words = || cohaptic_answers::compare::words(&finished, wall_s);
+    output::answer(arguments.scene.json, DocumentSchema::COMPARE, &document, words, &written.files)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -106,12 +93,13 @@ fn plan(arguments: &CompareArguments, asked: &Asked) -> Result<CampaignPlan, cam
     Ok(plan.map_err(campaign::Ended::Error)?.leaving_out(Strategies::fallback()))
 }
 
-fn execute(arguments: &CompareArguments, sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<Finished, campaign::Ended> {
+/// The comparison, with the table of runs and the table of verdicts.
+fn execute(arguments: &CompareArguments, sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<(Finished, [PathBuf; 2]), campaign::Ended> {
     let failed = campaign::Ended::Error;
     let combinations = plan.combinations();
     let mut campaign = campaign::open(sharing, plan, out)?;
     let judging = Shown::judging(combinations);
-    let by: &dyn Judge = if matches!(sharing, Sharing::Merge(_)) { &campaign::Nobody } else { &ByAnalysisOrRuns };
+    let by: &dyn Judge = if matches!(sharing, Sharing::Merge(_)) { &campaign::Nobody } else { &JUDGE };
     let judged = campaign.judge_apart(by, &judging);
     judging.clear();
     let stability = match judged.map_err(failed)? {
@@ -123,29 +111,6 @@ fn execute(arguments: &CompareArguments, sharing: Sharing<'_>, out: &Path, plan:
     let plan = campaign.plan().clone();
     let first = (0..combinations).find(|combination| !report.refused.contains_key(combination)).unwrap_or_default();
     let title = plan.scene(first).map_or_else(|_| output::path(input::named(&arguments.scene.scene)), |scene| scene.title);
-    let files = vec![report.file.clone(), campaign.stability_file()];
-    Ok(Finished { plan, title, report, comparison, stability, wall_s: 0.0, files })
-}
-
-impl Finished {
-    /// The keys that vary beside the strategy.
-    fn keys(&self) -> &[Variation] {
-        &self.plan.variations()[1..]
-    }
-
-    /// Which value of each of [`Finished::keys`] a combination of them has.
-    fn places(&self, other: usize) -> Vec<usize> {
-        // Of the baseline, whose combinations come first.
-        self.plan.places(other as u64).split_off(1)
-    }
-
-    /// The values of a combination of the other keys, as they are written.
-    fn values(&self, other: usize) -> Vec<String> {
-        self.keys().iter().zip(self.places(other)).map(|(key, place)| key.value_text(place).to_owned()).collect()
-    }
-
-    /// The judgement of a strategy at a combination of the other keys.
-    fn judgement(&self, strategy: usize, other: usize) -> Option<&Judgement> {
-        self.stability.get(strategy * self.comparison.others() + other)
-    }
+    let files = [campaign.table_file(), campaign.stability_file()];
+    Ok((Finished { plan, title, report, comparison, stability }, files))
 }

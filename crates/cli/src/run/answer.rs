@@ -1,5 +1,6 @@
 //! A run as a JSON document and in words.
 
+pub(crate) use cohaptic_answers::length;
 use cohaptic_harness::{DIVERGED_DISTANCE, Ending, LinkQuantiles, Summary};
 use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
@@ -70,10 +71,6 @@ pub(crate) fn diverged(summary: &Summary) -> Option<String> {
         Ending::Diverged(at) => Some(format!("at {at} a position or a velocity is not finite")),
         Ending::Complete | Ending::Interrupted(_) => summary.has_diverged().then(|| format!("two copies were more than {DIVERGED_DISTANCE} m apart")),
     }
-}
-
-pub(crate) fn length(metres: f64) -> String {
-    if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }
 }
 
 pub(crate) fn angle_text(radians: f64) -> String {

@@ -73,18 +73,6 @@ pub(crate) fn judged(kind: VerdictKind, count: usize, stable_fraction: f64) -> i
     document! { judged: kind.word(), count: count, stable_fraction: stable_fraction }
 }
 
-/// The chance that a number of radii leave out, because the second moment cannot be followed there; `None` if there are none. Of one and of several it is said in other
-/// words: "cell is", "cells are".
-pub(crate) fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
-    (count > 0).then(|| {
-        format!(
-            "{count} {} nominal: the second moment cannot be followed there, and the radius is the square of the spectral radius with every delay its mean and \
-             nothing lost; stability point says why",
-            if count == 1 { one } else { several }
-        )
-    })
-}
-
 /// The scene with every open key at its lower end; it does not know the name of its file.
 pub(super) fn at_low(family: &Family) -> Result<Scene, FamilyError> {
     let low: Vec<f64> = family.keys().iter().map(|range| range.low).collect();

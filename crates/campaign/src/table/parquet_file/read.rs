@@ -14,16 +14,13 @@ use parquet::file::statistics::Statistics;
 use parquet::schema::types::SchemaDescriptor;
 
 use super::index::IndexReader;
-use crate::table::format::{COMPLETE, GIST, Gist, Gists, RunColumns, TableError};
+use crate::table::format::{COMPLETE, DIVERGED, GIST, Gist, Gists, RunColumns, TableError};
 
 /// The columns of a row group.
 fn row_group<'a>(file: &Arc<File>, group: &'a RowGroupMetaData) -> Result<SerializedRowGroupReader<'a, File>, ParquetError> {
     let properties = Arc::new(ReaderProperties::builder().build());
     SerializedRowGroupReader::new(file.clone(), group, RowGroupPageIndex::new(0, None), properties)
 }
-
-/// What the column `ending` says of a run that diverged.
-const DIVERGED: &[u8] = b"diverged";
 
 /// The text of every row of a column in a row group, if its statistics say that there is one only: most runs are complete, and a text takes longer to read than all
 /// numbers that are summed up.
@@ -53,7 +50,7 @@ pub(in crate::table) fn read_gists(file: File, each: Gists<'_>) -> Result<(), Ta
         let mut discrepancies = Vec::new();
         discrepancy.read_records(rows, None, None, &mut discrepancies)?;
         if let Some(text) = only_text(group.metadata().column(ending)) {
-            let diverged = text == DIVERGED;
+            let diverged = text == DIVERGED.as_bytes();
             discrepancies.into_iter().for_each(|max_discrepancy| each(Gist { diverged, max_discrepancy }));
             continue;
         }
@@ -61,7 +58,7 @@ pub(in crate::table) fn read_gists(file: File, each: Gists<'_>) -> Result<(), Ta
         let mut endings = Vec::new();
         ending.read_records(rows, None, None, &mut endings)?;
         for (ending, max_discrepancy) in endings.iter().zip(discrepancies) {
-            each(Gist { diverged: ending.data() == DIVERGED, max_discrepancy });
+            each(Gist { diverged: ending.data() == DIVERGED.as_bytes(), max_discrepancy });
         }
     }
     Ok(())

@@ -132,7 +132,7 @@ impl Order {
 
 /// What the radii leave out.
 fn notes(found: &Boundary) -> Vec<String> {
-    source::nominal(found.nominal(), ["of the values looked at is", "of the values looked at are"]).into_iter().collect()
+    cohaptic_answers::nominal(found.nominal(), ["of the values looked at is", "of the values looked at are"]).into_iter().collect()
 }
 
 /// The values of rows, and what was found there.

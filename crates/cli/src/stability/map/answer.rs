@@ -81,7 +81,7 @@ fn shares(map: &VariantMap) -> impl Serialize + use<> {
 /// The omissions of the radii of the maps.
 pub(super) fn notes(maps: &[VariantMap]) -> Vec<String> {
     let cells: usize = maps.iter().map(VariantMap::nominal_cells).sum();
-    source::nominal(cells, ["cell is", "cells are"]).into_iter().collect()
+    cohaptic_answers::nominal(cells, ["cell is", "cells are"]).into_iter().collect()
 }
 
 /// More pictures than this do not fit on a screen.

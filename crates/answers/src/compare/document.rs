@@ -1,16 +1,14 @@
 //! A comparison as a JSON document.
 
-use std::path::Path;
-
 use cohaptic_campaign::{Cell, Estimate, Figures, Judgement, MeasuredColumn};
 use serde::Serialize;
 
 use super::Finished;
-use crate::document_schema::document;
-use crate::output;
+use crate::campaign::Written;
+use crate::document;
 
-/// The answer of `cohaptic compare --json`.
-pub(super) fn of(finished: &Finished, out: &Path) -> impl Serialize {
+/// The answer of `cohaptic compare --json`. `written`: the time that the comparison took and its files, if they are said.
+pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serialize {
     let Finished { report, comparison, .. } = finished;
     let strategy = &finished.plan.variations()[0];
     let strategies = comparison.strategies.iter().enumerate().map(|(place, name)| document! { name: name.clone(), set: strategy.overrides(place) });
@@ -36,10 +34,13 @@ pub(super) fn of(finished: &Finished, out: &Path) -> impl Serialize {
         title: finished.title.as_str(),
         runs: report.runs,
         runs_computed: report.computed,
-        wall_s: finished.wall_s,
-        out: output::path(out),
-        // The table of runs, verdicts, the table of figures, the page.
-        files: finished.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
+        #[serde(flatten)]
+        written: written.map(|written| document! {
+            wall_s: written.wall_s,
+            out: written.out.as_str(),
+            // The table of runs, verdicts, the table of figures, the page.
+            files: written.files.as_slice(),
+        }),
         strategies: strategies.collect::<Vec<_>>(),
         measures: measures.collect::<Vec<_>>(),
         combinations: cells.collect::<Vec<_>>(),

@@ -1,13 +1,14 @@
 //! Whether a combination is stable: by analysis where that takes less than a second, else by two runs, of which one begins with a small disturbance.
 
-use cohaptic_answers::{Quick, quick_verdict};
+use std::fmt;
+
 use cohaptic_campaign::{Judge, Judgement, Verdict};
 use cohaptic_harness::Model;
 use cohaptic_harness::check::{Stability, stability};
 use cohaptic_scene::Scene;
+use cohaptic_stability::Watch;
 
-use crate::analysis_watch::Interruptible;
-use crate::interrupt;
+use crate::{Quick, quick_verdict};
 
 /// Two runs judge where the analysis takes longer than this, by its estimate \[s\].
 const QUICK: f64 = 0.25;
@@ -17,26 +18,33 @@ pub(super) const TWO_RUNS: &str = "two-runs";
 /// The verdict of two runs that leave it open within the duration of the scene.
 pub(super) const UNDECIDED: &str = "undecided";
 
-/// Judges until the user asks for the end.
-pub(super) struct ByAnalysisOrRuns;
+/// Judges by analysis or by two runs, until the watch ends it.
+#[derive(Clone, Copy)]
+pub struct ByAnalysisOrRuns<'a>(pub &'a dyn Watch);
 
-impl Judge for ByAnalysisOrRuns {
+impl fmt::Debug for ByAnalysisOrRuns<'_> {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        to.write_str("ByAnalysisOrRuns")
+    }
+}
+
+impl Judge for ByAnalysisOrRuns<'_> {
     fn judge(&self, scene: &Scene) -> Option<Judgement> {
-        match quick_verdict(scene, QUICK, &Interruptible) {
+        match quick_verdict(scene, QUICK, self.0) {
             Quick::Known(judgement) => {
                 let radius = judgement.mean_square.as_ref().map_or(judgement.analysis.radius, |mean_square| mean_square.radius);
                 let judged = judgement.kind().word().into();
                 Some(Judgement::Known(Verdict { word: judgement.verdict.word().into(), judged, radius: radius.value, error: radius.error }))
             }
-            Quick::Simulate(_) => by_runs(scene),
+            Quick::Simulate(_) => by_runs(scene, self.0),
             Quick::Stopped => None,
         }
     }
 }
 
 /// The verdict of two runs with the first seed, which have no radius.
-fn by_runs(scene: &Scene) -> Option<Judgement> {
-    let word = match stability(scene, Model::Least, || !interrupt::requested()) {
+fn by_runs(scene: &Scene, watch: &dyn Watch) -> Option<Judgement> {
+    let word = match stability(scene, Model::Least, || !watch.stops()) {
         Stability::Stable => cohaptic_stability::Verdict::Stable.word(),
         Stability::Unstable => cohaptic_stability::Verdict::Unstable.word(),
         Stability::Undecided { .. } => UNDECIDED,

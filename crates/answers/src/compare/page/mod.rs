@@ -7,29 +7,35 @@ mod tables;
 
 use cohaptic_picture::Picture;
 use cohaptic_picture::page::{Html, Page};
-use cohaptic_scene::scene_content_of_text;
 use cohaptic_units::print::Counted;
 
 use super::figures::Shown;
 use super::{Finished, words};
-use crate::arguments::{CompareArguments, TableFormat};
-use crate::failure::Failure;
-use crate::input;
-use crate::shell::{path, quoted};
 use layout::Layout;
 use panels::Sheet;
 use scale::Scale;
 
-/// The folder of a command on a page, which does not depend on where it was written.
-const FOLDER: &str = "FOLDER";
+/// What the page says about where its numbers come from.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PageSource<'a> {
+    /// What each strategy does, and its parameters with their values in the scene, in words.
+    pub strategies: Vec<(&'static str, String)>,
+    /// The command that makes the page.
+    pub command: String,
+    /// The command of the campaign whose table of runs is that of the comparison.
+    pub campaign: String,
+    /// The text of the scene.
+    pub scene: &'a str,
+}
 
 /// The page. It depends on the scene, the runs and the strategies alone.
-pub(super) fn html(arguments: &CompareArguments, finished: &Finished) -> Result<String, Failure> {
+#[must_use]
+pub fn html(finished: &Finished, source: &PageSource<'_>) -> String {
     let sheet = Sheet { finished, layout: Layout::of(finished.keys()) };
     let comparison = &finished.comparison;
     let strategies = comparison.strategies.len();
     let mut page = Page::new(format!("{}: {strategies} strategies side by side", finished.title)).with(Html::paragraph(sum(finished)));
-    page = page.with(Html::heading(2, "Strategies")).with(tables::strategies(finished, &defaults(arguments, finished)?));
+    page = page.with(Html::heading(2, "Strategies")).with(tables::strategies(finished, &source.strategies));
     let refusals = words::refusals(finished);
     if !refusals.is_empty() {
         let items = refusals.into_iter().map(|(reason, count)| Html::text(&format!("{reason} ({})", Counted(count, "combination"))));
@@ -39,12 +45,13 @@ pub(super) fn html(arguments: &CompareArguments, finished: &Finished) -> Result<
     page = page.with(Html::heading(2, "Stability")).with(stability(&sheet));
     page = page.with(measures(&sheet));
     page = page.with(Html::heading(2, "How the numbers are made")).with(Html::list(NOTES.map(Html::text)));
-    page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&command_line(arguments)));
-    page = page.with(Html::paragraph(Html::text("The table of runs is that of ").and(Html::code(&campaign_line(arguments, finished))).and(".")));
-    let text = input::text(&arguments.scene.scene)?;
+    page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&source.command));
+    page = page.with(Html::paragraph(Html::text("The table of runs is that of ").and(Html::code(&source.campaign)).and(".")));
     let said = "The file as it was read; overrides are not in it.";
-    page = page.with(Html::heading(2, "Scene")).with(Html::details("The text of the scene", Html::paragraph(said).and(Html::preformatted(&text))));
-    Ok(page.html())
+    page = page
+        .with(Html::heading(2, "Scene"))
+        .with(Html::details("The text of the scene", Html::paragraph(said).and(Html::preformatted(source.scene))));
+    page.html()
 }
 
 /// What stands above the table of differences.
@@ -71,29 +78,6 @@ fn sum(finished: &Finished) -> String {
         format!(" at {} of {}", Counted(finished.comparison.others(), "combination"), keys.join(" and "))
     };
     format!("{}, {each} of each strategy{over}, with the same seeds for all.", Counted(runs, "run"))
-}
-
-/// The parameters of each strategy with their values in the scene.
-fn defaults(arguments: &CompareArguments, finished: &Finished) -> Result<Vec<(&'static str, String)>, Failure> {
-    let strategies = super::preset::Asked::of(arguments).map_err(|error| Failure::Input(error.to_string()))?.strategies;
-    let all = (0..finished.comparison.strategies.len()).map(|place| {
-        let (about, parameters) = strategies.registered(place);
-        let varied = strategies.variation().overrides(place);
-        let overrides: Vec<String> = arguments.scene.overrides.set.iter().chain(&varied).cloned().collect();
-        // A scene that is refused has no content, and its overrides say enough.
-        let keys = input::with(&arguments.scene.scene, |text, file| scene_content_of_text(text, file, &overrides))
-            .map(|content| content.keys)
-            .unwrap_or_default();
-        let given = |(key, default): &(String, &str)| {
-            let own = varied.iter().rev().find_map(|text| text.strip_prefix(key.as_str())?.strip_prefix('='));
-            let value = own.or_else(|| keys.get(key).map(String::as_str)).unwrap_or(*default);
-            format!("{} {}", key.rsplit('.').next().unwrap_or_default(), value.trim_matches('"'))
-        };
-        let mut words: Vec<String> = parameters.iter().map(given).collect();
-        words.extend(varied.iter().skip(1).filter(|text| parameters.iter().all(|(key, _)| !text.starts_with(&format!("{key}=")))).cloned());
-        (about, words.join(", "))
-    });
-    Ok(all.collect())
 }
 
 /// Verdicts as a picture, and which runs diverged.
@@ -149,28 +133,4 @@ const CUT: &str = "What lies far beyond the other means is cut off.";
 fn figure(name: &str, picture: &Picture, caption: &str) -> Html {
     let content = Html::picture(&picture.svg());
     Html::figure(name, if caption.is_empty() { content } else { content.and(Html::caption(caption)) })
-}
-
-/// The command that makes this page.
-fn command_line(arguments: &CompareArguments) -> String {
-    let scene = &arguments.scene.scene;
-    let mut words = vec!["cohaptic compare".to_owned(), path(scene)];
-    words.extend(arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key))));
-    words.extend(arguments.preset.iter().map(|_| "--preset field".to_owned()));
-    words.extend(arguments.strategies.iter().map(|strategies| format!("--strategies {}", quoted(strategies))));
-    words.extend(arguments.vary.iter().map(|key| format!("--vary {}", quoted(key))));
-    words.push(format!("--runs {} --out {FOLDER}", arguments.runs));
-    words.extend((arguments.format == TableFormat::Csv).then(|| "--format csv".to_owned()));
-    if input::is_standard_input(scene) {
-        words.push("< scene.toml".to_owned());
-    }
-    words.join(" ")
-}
-
-/// The campaign whose table of runs is that of the comparison.
-fn campaign_line(arguments: &CompareArguments, finished: &Finished) -> String {
-    let set = arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key)));
-    let vary = finished.plan.variations().iter().map(|key| format!("--vary {}", quoted(key.text())));
-    let words: Vec<String> = set.chain(vary).collect();
-    format!("cohaptic campaign {} {} --runs {} --measure all --out {FOLDER}", path(&arguments.scene.scene), words.join(" "), arguments.runs)
 }

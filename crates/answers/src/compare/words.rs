@@ -14,10 +14,12 @@ const MOST_ROWS: usize = 24;
 /// What stands where there is no number.
 const NOTHING: &str = "-";
 
-pub(super) fn describe(finished: &Finished) -> String {
+/// A comparison in words, for people. `wall_s`: the time that it took \[s\].
+#[must_use]
+pub fn words(finished: &Finished, wall_s: f64) -> String {
     let comparison = &finished.comparison;
     let mut lines = vec![finished.title.clone()];
-    lines.extend(head(finished));
+    lines.extend(head(finished, wall_s));
     lines.push(String::new());
     lines.extend(table(strategies(finished)));
     for (reason, count) in refusals(finished) {
@@ -45,8 +47,8 @@ pub(super) fn describe(finished: &Finished) -> String {
 }
 
 /// How many runs there are, and what the numbers mean.
-fn head(finished: &Finished) -> Vec<String> {
-    let Finished { plan, report, comparison, wall_s, .. } = finished;
+fn head(finished: &Finished, wall_s: f64) -> Vec<String> {
+    let Finished { plan, report, comparison, .. } = finished;
     let keys: Vec<&str> = finished.keys().iter().map(cohaptic_campaign::Variation::key).collect();
     let over = if keys.is_empty() { String::new() } else { format!(" at {} of {}", Counted(comparison.others(), "combination"), keys.join(" and ")) };
     let each = plan.runs_of_each();

@@ -5,23 +5,21 @@ mod panels;
 mod scale;
 mod verdicts;
 
-use std::path::Path;
-
 use cohaptic_campaign::{CampaignPlan, MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles, Report};
 use cohaptic_picture::{Panel, Picture, Size};
 
 use super::Finished;
-use crate::failure::Failure;
-use crate::file::write_file;
 pub(crate) use arranged::Along;
 use arranged::{Arranged, Keys};
 use scale::Scale;
 
-/// Files that were written, and the notes about them.
-#[derive(Default)]
-pub(super) struct Drawn {
-    pub(super) files: Vec<std::path::PathBuf>,
-    pub(super) notes: Vec<String>,
+/// Pictures, and the notes about them.
+#[derive(Clone, Debug, Default)]
+pub struct Drawn {
+    /// The pictures by the names of their files.
+    pub pictures: Vec<(&'static str, Picture)>,
+    /// Why a picture is not drawn.
+    pub notes: Vec<String>,
 }
 
 /// What all pictures of a campaign have in common.
@@ -33,13 +31,14 @@ struct Sheet<'a> {
     size: Size,
 }
 
-/// Writes `discrepancy.svg`, and `verdicts.svg` where there are verdicts; nothing if no key has several values.
-pub(super) fn write(finished: &Finished, folder: &Path, size: Size) -> Result<Drawn, Failure> {
+/// Draws `discrepancy.svg`, and `verdicts.svg` where there are verdicts; nothing if no key has several values.
+#[must_use]
+pub fn pictures(finished: &Finished, size: Size) -> Drawn {
     let Finished { title, plan, report, .. } = finished;
     let arranged = match Arranged::new(plan) {
         Ok(Some(arranged)) => arranged,
-        Ok(None) => return Ok(Drawn::default()),
-        Err(why) => return Ok(Drawn { files: Vec::new(), notes: vec![format!("no picture is drawn: {why}")] }),
+        Ok(None) => return Drawn::default(),
+        Err(why) => return Drawn { pictures: Vec::new(), notes: vec![format!("no picture is drawn: {why}")] },
     };
     let sheet = Sheet { title, plan, report, arranged, size };
     let mut drawn = Drawn::default();
@@ -49,19 +48,12 @@ pub(super) fn write(finished: &Finished, folder: &Path, size: Size) -> Result<Dr
              of {MOST_COMBINATIONS_OF_QUANTILES} combinations"
         ));
     } else {
-        put(&mut drawn, folder, "discrepancy.svg", &sheet.discrepancy())?;
+        drawn.pictures.push(("discrepancy.svg", sheet.discrepancy()));
     }
     if !report.judgements.is_empty() {
-        put(&mut drawn, folder, "verdicts.svg", &verdicts::picture(&sheet))?;
+        drawn.pictures.push(("verdicts.svg", verdicts::picture(&sheet)));
     }
-    Ok(drawn)
-}
-
-fn put(drawn: &mut Drawn, folder: &Path, name: &str, picture: &Picture) -> Result<(), Failure> {
-    let path = folder.join(name);
-    write_file(&path, picture.svg())?;
-    drawn.files.push(path);
-    Ok(())
+    drawn
 }
 
 impl Sheet<'_> {

@@ -1,17 +1,24 @@
 //! Verdicts on combinations: each is judged as `cohaptic stability point` judges it.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::Arc;
 
 use cohaptic_campaign::{Judge, Judgement, Report, Verdict};
 use cohaptic_scene::Scene;
-use cohaptic_stability::{AnalysisError, Limits, Method, VerdictKind, judge_watched};
+use cohaptic_stability::{AnalysisError, Limits, Method, VerdictKind, Watch, judge_watched};
 
-use crate::analysis_watch::Interruptible;
-use crate::stability::source;
+use crate::nominal;
 
-/// Judges by analysis, until the user asks for the end.
-pub(super) struct ByAnalysis;
+/// Judges by analysis, until the watch ends it.
+#[derive(Clone, Copy)]
+pub struct ByAnalysis<'a>(pub &'a dyn Watch);
+
+impl fmt::Debug for ByAnalysis<'_> {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        to.write_str("ByAnalysis")
+    }
+}
 
 /// Why a scene that changes on its way has no verdict.
 const TIMELINE: &str = "its timeline changes it on its way; simulate it instead, or take the timeline away";
@@ -19,12 +26,12 @@ const TIMELINE: &str = "its timeline changes it on its way; simulate it instead,
 /// The most reasons that notes tell apart.
 const MOST_REASONS: usize = 5;
 
-impl Judge for ByAnalysis {
+impl Judge for ByAnalysis<'_> {
     fn judge(&self, scene: &Scene) -> Option<Judgement> {
         if !scene.timeline.is_empty() {
             return Some(Judgement::Refused(TIMELINE.into()));
         }
-        let limits = Limits { watch: &Interruptible, ..Limits::of_unknowns(usize::MAX) };
+        let limits = Limits { watch: self.0, ..Limits::of_unknowns(usize::MAX) };
         let judgement = match judge_watched(scene, Method::Reduced, &limits) {
             Ok(judgement) => judgement,
             Err(AnalysisError::Stopped) => return None,
@@ -59,15 +66,16 @@ fn kind(judgement: &Judgement) -> Option<VerdictKind> {
 }
 
 /// What the verdicts leave out, and how many combinations have none, by reason.
-pub(super) fn notes(report: &Report) -> Vec<String> {
-    let nominal = report.judgements.iter().filter(|judgement| is_nominal(judgement)).count();
+#[must_use]
+pub fn notes(report: &Report) -> Vec<String> {
+    let count = report.judgements.iter().filter(|judgement| is_nominal(judgement)).count();
     let mut refused: BTreeMap<&Arc<str>, usize> = BTreeMap::new();
     for judgement in report.judgements.iter() {
         if let Judgement::Refused(reason) = judgement {
             *refused.entry(reason).or_default() += 1;
         }
     }
-    let mut notes: Vec<String> = source::nominal(nominal, ["combination is", "combinations are"]).into_iter().collect();
+    let mut notes: Vec<String> = nominal(count, ["combination is", "combinations are"]).into_iter().collect();
     let said = refused.iter().take(MOST_REASONS);
     notes.extend(said.map(|(reason, count)| format!("{count} combination{} no verdict: {reason}", if *count == 1 { " has" } else { "s have" })));
     let more: usize = refused.values().skip(MOST_REASONS).sum();

@@ -1,77 +1,20 @@
-//! A campaign as a JSON document and in words.
+//! A campaign in words.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
 use cohaptic_campaign::{CombinationReport, Judgement};
 use cohaptic_units::print::Counted;
-use serde::Serialize;
 
 use super::Finished;
-use crate::document_schema::document;
-use crate::output;
-use crate::run::answer::length;
-
-/// The answer of `cohaptic campaign --json`.
-pub(super) fn of(finished: &Finished, out: &Path) -> impl Serialize {
-    let report = &finished.report;
-    let combinations = report.combinations.iter().enumerate().map(|(number, combination)| {
-        document! {
-            vary: finished.plan.varied(number as u64),
-            runs: combination.runs,
-            diverged: combination.diverged,
-            mean_discrepancy_m: combination.mean_discrepancy,
-            largest_discrepancy_m: combination.largest_discrepancy,
-            worst_run: combination.worst_run,
-            // Nothing unless verdicts are asked for.
-            #[serde(flatten)]
-            judgement: report.judgements.get(number).map(of_judgement),
-        }
-    });
-    document! {
-        title: finished.title.clone(),
-        runs: report.runs,
-        runs_computed: report.computed,
-        wall_s: finished.wall_s,
-        runs_per_s: finished.runs_per_s(),
-        out: output::path(out),
-        file: output::path(&report.file),
-        // The table, verdicts, pictures.
-        files: finished.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
-        diverged: report.diverged(),
-        combinations: combinations.collect::<Vec<_>>(),
-        notes: finished.notes.as_slice(),
-    }
-}
-
-/// All but the reason is `null` where there is no verdict.
-fn of_judgement(judgement: &Judgement) -> impl Serialize {
-    let (verdict, reason) = match judgement {
-        Judgement::Known(verdict) => (Some(verdict), None),
-        Judgement::Refused(reason) => (None, Some(&**reason)),
-    };
-    document! {
-        verdict: verdict.map(|verdict| &*verdict.word),
-        judged: verdict.map(|verdict| &*verdict.judged),
-        radius: verdict.map(|verdict| verdict.radius),
-        error_bound: verdict.map(|verdict| verdict.error),
-        reason: reason,
-    }
-}
-
-impl Finished {
-    /// Of those of this time.
-    #[expect(clippy::cast_precision_loss, reason = "fewer runs than 2^52")]
-    fn runs_per_s(&self) -> f64 {
-        self.report.computed as f64 / self.wall_s
-    }
-}
+use crate::length;
 
 /// The number of combinations that are named; all are in the table.
 const MOST_COMBINATIONS: usize = 20;
 
-pub(super) fn describe(finished: &Finished) -> String {
-    let Finished { plan, title, report, wall_s, notes, .. } = finished;
+/// A campaign in words, for people. `wall_s`: the time that it took \[s\].
+#[must_use]
+pub fn words(finished: &Finished, wall_s: f64) -> String {
+    let Finished { plan, title, report, notes } = finished;
     let (combinations, each) = (plan.combinations(), plan.runs_of_each());
     let mut text = format!("{title}\n");
     // Writing to a string does not fail.
@@ -84,7 +27,7 @@ pub(super) fn describe(finished: &Finished) -> String {
     } else {
         let before = report.runs - report.computed;
         let kept = if before > 0 { format!(", {before} {} there already", if before == 1 { "was" } else { "were" }) } else { String::new() };
-        line(&format!("  {} run in {wall_s:.3} s: {:.0} a second{kept}", report.computed, finished.runs_per_s()));
+        line(&format!("  {} run in {wall_s:.3} s: {:.0} a second{kept}", report.computed, finished.runs_per_s(wall_s)));
     }
     match report.worst() {
         Some(CombinationReport { largest_discrepancy: Some(largest), worst_run: Some(run), .. }) => {

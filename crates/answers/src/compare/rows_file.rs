@@ -9,7 +9,8 @@ use super::Finished;
 const COLUMNS: &str = "refused,runs,diverged,verdict,judged,measure,count,mean,low,high,pairs,difference,difference_low,difference_high";
 
 /// The table. Numbers have the fewest digits that read back the same, and a cell is empty where there is no number. A combination that is refused has one row.
-pub(super) fn text(finished: &Finished) -> String {
+#[must_use]
+pub fn csv(finished: &Finished) -> String {
     let comparison = &finished.comparison;
     let keys = finished.keys().iter().map(|key| csv_field(&key.column()) + ",");
     let mut text = format!("combination,strategy,{}{COLUMNS}\n", keys.collect::<String>());

@@ -1,8 +1,9 @@
 //! Which key lies along which axis, and which has a panel for each of its values.
 
-use cohaptic_answers::axis_of_key;
 use cohaptic_campaign::{CampaignPlan, Variation};
 use cohaptic_picture::{Axis, cell_edges};
+
+use crate::axis_of_key;
 
 /// The most panels beside each other.
 const MOST_PANELS: usize = 12;

@@ -6,7 +6,7 @@ use cohaptic_stability::Verdict;
 
 use super::layout::Layout;
 use super::scale::Scale;
-use crate::campaign::picture::Along;
+use crate::campaign::Along;
 use crate::compare::{Finished, judge};
 
 /// With no more values along x than this, each is marked.

@@ -2,7 +2,7 @@
 
 use cohaptic_campaign::Variation;
 
-use crate::campaign::picture::Along;
+use crate::campaign::Along;
 
 /// The most panels that a key is drawn in.
 const MOST_PANELS: usize = 16;

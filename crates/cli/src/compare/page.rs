@@ -1,0 +1,66 @@
+//! What `compare.html` says about where its numbers come from.
+
+use cohaptic_answers::compare::{Finished, PageSource};
+use cohaptic_scene::scene_content_of_text;
+
+use super::preset::Asked;
+use crate::arguments::{CompareArguments, TableFormat};
+use crate::failure::Failure;
+use crate::input;
+use crate::shell::{path, quoted};
+
+/// The folder of a command on a page, which does not depend on where it was written.
+const FOLDER: &str = "FOLDER";
+
+/// `scene`: the text of the scene.
+pub(super) fn source<'a>(arguments: &CompareArguments, finished: &Finished, scene: &'a str) -> Result<PageSource<'a>, Failure> {
+    let (command, campaign) = (command_line(arguments), campaign_line(arguments, finished));
+    Ok(PageSource { strategies: strategies(arguments, finished)?, command, campaign, scene })
+}
+
+/// The parameters of each strategy with their values in the scene.
+fn strategies(arguments: &CompareArguments, finished: &Finished) -> Result<Vec<(&'static str, String)>, Failure> {
+    let strategies = Asked::of(arguments).map_err(|error| Failure::Input(error.to_string()))?.strategies;
+    let all = (0..finished.comparison.strategies.len()).map(|place| {
+        let (about, parameters) = strategies.registered(place);
+        let varied = strategies.variation().overrides(place);
+        let overrides: Vec<String> = arguments.scene.overrides.set.iter().chain(&varied).cloned().collect();
+        // A scene that is refused has no content, and its overrides say enough.
+        let keys = input::with(&arguments.scene.scene, |text, file| scene_content_of_text(text, file, &overrides))
+            .map(|content| content.keys)
+            .unwrap_or_default();
+        let given = |(key, default): &(String, &str)| {
+            let own = varied.iter().rev().find_map(|text| text.strip_prefix(key.as_str())?.strip_prefix('='));
+            let value = own.or_else(|| keys.get(key).map(String::as_str)).unwrap_or(*default);
+            format!("{} {}", key.rsplit('.').next().unwrap_or_default(), value.trim_matches('"'))
+        };
+        let mut words: Vec<String> = parameters.iter().map(given).collect();
+        words.extend(varied.iter().skip(1).filter(|text| parameters.iter().all(|(key, _)| !text.starts_with(&format!("{key}=")))).cloned());
+        (about, words.join(", "))
+    });
+    Ok(all.collect())
+}
+
+/// The command that makes this page.
+fn command_line(arguments: &CompareArguments) -> String {
+    let scene = &arguments.scene.scene;
+    let mut words = vec!["cohaptic compare".to_owned(), path(scene)];
+    words.extend(arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key))));
+    words.extend(arguments.preset.iter().map(|_| "--preset field".to_owned()));
+    words.extend(arguments.strategies.iter().map(|strategies| format!("--strategies {}", quoted(strategies))));
+    words.extend(arguments.vary.iter().map(|key| format!("--vary {}", quoted(key))));
+    words.push(format!("--runs {} --out {FOLDER}", arguments.runs));
+    words.extend((arguments.format == TableFormat::Csv).then(|| "--format csv".to_owned()));
+    if input::is_standard_input(scene) {
+        words.push("< scene.toml".to_owned());
+    }
+    words.join(" ")
+}
+
+/// The campaign whose table of runs is that of the comparison.
+fn campaign_line(arguments: &CompareArguments, finished: &Finished) -> String {
+    let set = arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key)));
+    let vary = finished.plan.variations().iter().map(|key| format!("--vary {}", quoted(key.text())));
+    let words: Vec<String> = set.chain(vary).collect();
+    format!("cohaptic campaign {} {} --runs {} --measure all --out {FOLDER}", path(&arguments.scene.scene), words.join(" "), arguments.runs)
+}
