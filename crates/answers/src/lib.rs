@@ -1,4 +1,4 @@
-//! What runs, checks, explanations, verdicts, campaigns and comparisons answer, as values, as JSON documents, in words and as pictures.
+//! What runs, checks, explanations, verdicts, campaigns, comparisons and links answer, as values, as JSON documents, in words and as pictures.
 //!
 //! You need it if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
 //!
@@ -6,8 +6,8 @@
 //! scene is stable. [`methods()`] lists the methods that a scene can choose between, and [`measure()`] says what each costs and how wrong it is.
 //! [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
-//! The commands that have a module of their own have their answer in its function `document`, and the text for people in its function `words`: [`campaign`] and
-//! [`compare`].
+//! The commands that have a module of their own have their answer in its function `document`, and the text for people in its function `words`: [`campaign`],
+//! [`compare`] and [`mod@link`].
 //!
 //! Nothing here reads a clock or prints: [`measure()`] is given a clock.
 //!
@@ -35,6 +35,7 @@ mod check;
 pub mod compare;
 mod document;
 mod explanation;
+pub mod link;
 mod methods;
 mod notes;
 mod parts;

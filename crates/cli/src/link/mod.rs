@@ -1,23 +1,21 @@
 //! `cohaptic link`.
 
 mod spec;
-mod words;
 
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
+use cohaptic_answers::link::{Measured, Meter, Written, too_long};
 use cohaptic_files::WholeFile;
-use cohaptic_measure::achieved::{Accumulator, Achieved};
-use cohaptic_measure::comparison::{Comparison, Figure};
 use cohaptic_measure::fates::FateWriter;
 use cohaptic_measure::pcapng::CaptureWriter;
 use cohaptic_measure::steady::SteadyStream;
 use cohaptic_wan::{Link, LinkName, PacketInfo, PacketRecord};
 
 use crate::arguments::LinkArguments;
-use crate::document_schema::{DocumentSchema, document};
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::file::unwritten;
 use crate::progress::Progress;
@@ -28,71 +26,31 @@ pub(crate) use spec::link_and_keys;
 /// Without `--packets`.
 const PACKETS: u64 = 100_000;
 
-/// The most packets that figures are of. Each takes 127 bytes while figures are worked out: half a gigabyte of these.
-pub(crate) const MOST_MEASURED: u64 = 4_000_000;
-
-/// What came of the stream.
-struct Measured {
-    achieved: Achieved,
-    figures: Vec<Figure>,
-    sent: u64,
-    wanted: u64,
-    interrupted: bool,
-    packets_per_s: f64,
-    files: Vec<String>,
-}
-
 /// Drives one link and says what it was asked for and what it achieved.
 pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
-    let spec = Spec::read(arguments)?;
-    let measured = drive(arguments, &spec)?;
-    if arguments.json {
-        output::json(
-            DocumentSchema::LINK,
-            &document! {
-                asked: document! {
-                    spec: spec.said.as_str(),
-                    #[serde(flatten)]
-                    figures: &spec.asked,
-                },
-                achieved: &measured.achieved,
-                compared: measured.figures.as_slice(),
-                measured_packets: measured.sent.min(MOST_MEASURED),
-                fates: &measured.achieved.fates,
-                packets_per_s: measured.packets_per_s,
-                interrupted: measured.interrupted,
-                files: measured.files.as_slice(),
-            },
-        )?;
-    } else {
-        output::text(&words::describe(&spec, &measured))?;
-        output::wrote(&measured.files);
-    }
-    Ok(if measured.interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    let (measured, written) = drive(arguments, Spec::read(arguments)?)?;
+    let document = cohaptic_answers::link::document(&measured, Some(&written));
+    let words = || cohaptic_answers::link::words(&measured, written.packets_per_s);
+    output::answer(arguments.json, DocumentSchema::LINK, &document, words, &written.files)?;
+    Ok(if measured.is_interrupted() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
+fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), Failure> {
     let wanted = arguments.packets.map(Into::into).or(spec.packets).unwrap_or(PACKETS);
     let info = PacketInfo { size: arguments.size, ecn_capable: arguments.ecn };
     let stream = SteadyStream { packets: wanted, every: arguments.every, info };
-    // Half of all time is left for delays.
-    if stream.sent(wanted).as_nanos() > u64::MAX / 2 {
-        return Err(Failure::Input("the stream lasts longer than 292 years: expected fewer packets, or less time between them".to_owned()));
+    if let Some(why) = too_long(&stream) {
+        return Err(Failure::Input(why.to_owned()));
     }
-    let mut link = Link::new(arguments.seed, &LinkName::between("sender", "receiver"), spec.model.clone());
+    let mut link = Link::new(arguments.seed, &LinkName::between("sender", "receiver"), spec.model);
     let mut sinks = Sinks::create(arguments)?;
-    let mut accumulator = Accumulator::of_first(MOST_MEASURED);
-    let mut beside = Comparison::default();
+    let mut meter = Meter::default();
     let progress = Progress::new(wanted, "{bar:30} {percent:>3} %  {pos}/{len} packets, {eta} left");
     let start = Clock::now();
     let sent = stream.over(
         &mut link,
         |record| {
-            // Records come in the order in which things happen.
-            let _ = accumulator.record(record);
-            if record.sequence < MOST_MEASURED {
-                beside.record(record);
-            }
+            meter.record(record);
             sinks.write(record)
         },
         |sent| {
@@ -106,8 +64,7 @@ fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
     let files = sinks.finish()?;
     #[expect(clippy::cast_precision_loss, reason = "for people")]
     let packets_per_s = sent as f64 / wall_s;
-    let figures = beside.figures(&spec.asked);
-    Ok(Measured { achieved: accumulator.finish(), figures, sent, wanted, interrupted: sent < wanted, packets_per_s, files })
+    Ok((meter.finish(spec.said, spec.asked, [sent, wanted]), Written { packets_per_s, files }))
 }
 
 /// The files that are written.

@@ -2,20 +2,20 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_measure::achieved::Achieved;
 use cohaptic_measure::comparison::Figure;
 use cohaptic_units::print::Counted;
 
-use super::spec::Spec;
 use super::{MOST_MEASURED, Measured};
 
-pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
-    let mut text = format!("{}\n", spec.said);
+/// The figures of a link in words, for people. `packets_per_s`: packets that the emulator took in a second of the wall clock.
+#[must_use]
+pub fn words(measured: &Measured, packets_per_s: f64) -> String {
+    let mut text = format!("{}\n", measured.said);
     // Writing to a string does not fail.
     let mut line = |line: String| {
         let _ = writeln!(text, "{}", line.trim_end());
     };
-    if measured.interrupted {
+    if measured.is_interrupted() {
         line(format!("  INTERRUPTED after {} of {}", measured.sent, Counted(measured.wanted, "packet")));
     }
     line(format!("  {:<24}{:>18}{:>18}{:>14}", "", "asked", "achieved", "std. error"));
@@ -23,7 +23,7 @@ pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
         line(row(figure));
     }
     let compared = |name: &str| measured.figures.iter().any(|figure| figure.name == name);
-    for (name, asked, achieved, error) in others(spec, &measured.achieved) {
+    for (name, asked, achieved, error) in others(measured) {
         if !compared(name) && (asked.is_some() || achieved.is_some()) {
             let error = error.map_or_else(String::new, |error| shown(name, Some(error)));
             line(format!("  {:<24}{:>18}{:>18}{error:>14}", label(name), shown(name, asked), shown(name, achieved)));
@@ -41,7 +41,7 @@ pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
     parts.extend(counts.into_iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} {name}")));
     parts.extend(fates.dropped.iter().filter(|(_, count)| **count > 0).map(|(cause, count)| format!("{count} dropped ({cause})")));
     line(format!("  {}", parts.join(", ")));
-    line(format!("  {:.0} packets a second", measured.packets_per_s));
+    line(format!("  {packets_per_s:.0} packets a second"));
     text
 }
 
@@ -56,8 +56,9 @@ fn row(figure: &Figure) -> String {
 type Other = (&'static str, Option<f64>, Option<f64>, Option<f64>);
 
 /// The mark where nothing was compared.
-fn others(spec: &Spec, achieved: &Achieved) -> [Other; 8] {
-    let (asked, delay, loss) = (&spec.asked, achieved.delay.as_ref(), &achieved.loss);
+fn others(measured: &Measured) -> [Other; 8] {
+    let Measured { asked, achieved, .. } = measured;
+    let (delay, loss) = (achieved.delay.as_ref(), &achieved.loss);
     let first = |lags: &[f64]| lags.first().copied();
     [
         ("mean_s", asked.mean_s, delay.map(|delay| delay.mean_s), None),
