@@ -7,7 +7,7 @@
 //! [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
 //! The commands that have a module of their own have their answer in its function `document`, and the text for people in its function `words`: [`campaign`],
-//! [`compare`] and [`mod@link`].
+//! [`compare`], [`mod@link`] and [`fit`].
 //!
 //! Nothing here reads a clock or prints: [`measure()`] is given a clock.
 //!
@@ -35,6 +35,7 @@ mod check;
 pub mod compare;
 mod document;
 mod explanation;
+pub mod fit;
 pub mod link;
 mod methods;
 mod notes;

@@ -1,7 +1,7 @@
-//! The files with a link that was fitted, and the link read as a scene reads it.
+//! The link that was fitted, read as a scene reads it.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -11,38 +11,26 @@ use cohaptic_linkfile::reading::{FileReader, parse_with};
 use cohaptic_measure::fit::FittedLink;
 use cohaptic_wan::{Delay, LinkModel};
 
-use crate::failure::Failure;
-
-/// The file of delays that a link names where no law fits: beside the file with the link, so that a scene in that folder finds both.
-pub(super) struct Delays {
-    pub(super) path: PathBuf,
-    /// The content; `None` if a law fits.
-    pub(super) csv: Option<String>,
-}
-
-impl Delays {
-    pub(super) fn name(&self) -> String {
-        self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
-    }
-}
+use super::FitFailure;
 
 /// Reads the link as a scene reads it, before anything of it is written, and compares the moments of its delay with those that were found.
-pub(super) fn read_again(scene: &str, link: &FittedLink, file: &Path, delays: &Delays) -> Result<(), Failure> {
+/// `file`: the name of the file with the link. `delays`: the content of the file that the link names, if it names one.
+pub(super) fn read_again(scene: &str, link: &FittedLink, file: &Path, delays: Option<&str>) -> Result<(), FitFailure> {
     // The file that the link names is not there yet.
-    let named = |_: &Path| delays.csv.as_ref().map(|csv| csv.clone().into_bytes()).ok_or_else(|| io::Error::from(io::ErrorKind::NotFound));
+    let named = |_: &Path| delays.map(|csv| csv.as_bytes().to_vec()).ok_or_else(|| io::Error::from(io::ErrorKind::NotFound));
     let modulators = Arc::default();
     let read = parse_with(Sources { file, text: scene, overrides: &[] }, FileReader(&named), |document, context| {
         let link = document.as_table().and_then(|table| table.get("link"))?;
         read_link(&link.node, context.with_modulators(Some(&modulators)), &[])
     });
-    let delay = match read.map_err(Failure::Scene)?.whole {
+    let delay = match read.map_err(|error| FitFailure::Scene(Box::new(error)))?.whole {
         LinkModel::Fixed(config) => config.delay,
         LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => Delay::default(),
     };
     let read = [delay.mean(), delay.jitter().map_or(Duration::ZERO, |jitter| jitter.sd)].map(|span| span.as_secs_f64());
     for (what, found, read) in [("mean", link.delay_s, read[0]), ("standard deviation", link.jitter.sd_s, read[1])] {
         if (found - read).abs() > ROUNDING_S + 1e-12 * found {
-            return Err(Failure::Input(format!(
+            return Err(FitFailure::Unheld(format!(
                 "the {what} of the delays is {found} s, and {read} s in a scene: expected one that a scene can hold"
             )));
         }

@@ -1,19 +1,18 @@
 //! The clocks of the two ends: offset, steps and drift, which are taken off before a link is fitted.
 
-use cohaptic_measure::fit::{FitError, Measurements, Skew, Step};
+use cohaptic_measure::fit::{Measurements, Skew, Step};
 use serde::Serialize;
 
-use super::milliseconds;
-use crate::arguments::FitArguments;
+use super::words::milliseconds;
+use super::{Corrections, FitFailure};
 
 /// A mean delay beyond this \[s\] is more likely the offset of two clocks.
 const QUESTIONED_S: f64 = 60.0;
-const OPTIONS: &str = "--offset TIME adds a time to the clock of the receiver, --least TIME says what the least delay is";
 
-/// Corrections of the clocks.
+/// What was done to the clocks.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(super) struct Clocks {
-    /// Time that `--offset` or `--least` added to every delay \[s\].
+    /// Time that was added to every delay \[s\].
     #[serde(skip_serializing_if = "Option::is_none")]
     added_s: Option<f64>,
     /// Instants at which the least delay changed and stayed so.
@@ -35,42 +34,34 @@ struct Fitted {
 /// Measurements that one clock could have made, what was done to get them, and the drift that was looked for. If both ends have one clock, a change of the
 /// least delay and a long delay are those of the link.
 pub(super) fn settled(
-    arguments: &FitArguments,
+    asked: &Corrections,
     measurements: &Measurements,
     has_one_clock: bool,
-) -> Result<(Measurements, Clocks, Option<Skew>), String> {
-    let refused = |error: &dyn std::fmt::Display| error.to_string();
-    let mut added_s = arguments.offset;
+) -> Result<(Measurements, Clocks, Option<Skew>), FitFailure> {
+    let refused = |error: &dyn std::fmt::Display| FitFailure::Measurements(error.to_string());
+    let mut added_s = asked.offset_s;
     let shifted = added_s.map(|by| measurements.shifted(by)).transpose().map_err(|error| refused(&error))?;
     let measurements = shifted.as_ref().unwrap_or(measurements);
     let steps = if has_one_clock { Vec::new() } else { measurements.steps() };
     let longest = measurements.longest_part(&steps);
     let fitted = Fitted { first: longest.start, packets: longest.len() };
     let part = measurements.part(longest);
-    let (mut settled, skew) = if arguments.skew {
+    let (mut settled, skew) = if asked.skew {
         let (corrected, skew) = part.without_skew().map_err(|error| refused(&error))?;
         (corrected, Some(skew))
     } else {
         (part, None)
     };
-    if let (Some(least), Some(found)) = (arguments.least, settled.least_s()) {
+    if let (Some(least), Some(found)) = (asked.least, settled.least_s()) {
         let by = least.as_secs_f64() - found;
         settled = settled.shifted(by).map_err(|error| refused(&error))?;
         added_s = Some(by);
     }
-    if let Some(mean) = settled.mean_s().filter(|mean| *mean > QUESTIONED_S && added_s.is_none() && !has_one_clock) {
-        return Err(format!("the mean delay is {mean:.6} s: are the two clocks apart? {OPTIONS}; with --offset 0s the delays are taken as they are"));
+    if let Some(mean_s) = settled.mean_s().filter(|mean| *mean > QUESTIONED_S && added_s.is_none() && !has_one_clock) {
+        return Err(FitFailure::LongDelays { mean_s });
     }
     let clocks = Clocks { added_s, steps, fitted, all: measurements.packets().len() };
     Ok((settled, clocks, skew))
-}
-
-/// The message of a fit that was refused. Names the options that help where clocks are apart.
-pub(super) fn explained(error: &FitError) -> String {
-    match error {
-        FitError::NegativeDelay { .. } => format!("{error}: {OPTIONS}"),
-        FitError::NothingArrived { .. } | FitError::TooFew { .. } | FitError::ConstantDelay { .. } | FitError::OneInstant { .. } => error.to_string(),
-    }
 }
 
 /// Lines that say what was done.

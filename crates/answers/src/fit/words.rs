@@ -1,0 +1,91 @@
+//! A fitted link in words.
+
+use std::time::Duration;
+
+use cohaptic_measure::fit::{LossFit, LossModel};
+use cohaptic_units::print::{Counted, Span};
+
+use super::ends::Ends;
+use super::{Answered, clocks};
+
+/// A fitted link in words, for people: the link, what was read, and how good each law is.
+#[must_use]
+pub fn words(answered: &Answered) -> String {
+    let goodness = &answered.fitted.goodness;
+    let mut text = format!("{}\n", answered.scene);
+    let mut line = |line: String| text.push_str(&format!("{line}\n"));
+    let instants = answered.measurements.instants();
+    // The spacing is that of bursts where most gaps are zero.
+    let are_bursts = 2 * instants <= goodness.packets;
+    let (bursts, burst) = if are_bursts { (format!(" in {}", Counted(instants, "burst")), " burst") } else { (String::new(), "") };
+    let spaced = if goodness.evenly_spaced { "evenly" } else { "unevenly" };
+    line(format!(
+        "{}{bursts}, {} arrived, one{burst} every {} ({spaced}); they say as much as {:.0} independent ones",
+        Counted(goodness.packets, "packet"),
+        goodness.received,
+        milliseconds(goodness.spacing_s),
+        goodness.effective
+    ));
+    answered.matched.as_ref().map_or_else(Vec::new, Ends::describe).into_iter().for_each(&mut line);
+    clocks::describe(&answered.clocks, answered.skew.as_ref()).into_iter().for_each(&mut line);
+    let error = goodness.mean_se_s.map_or_else(String::new, |error| format!(" +- {}", milliseconds(error)));
+    line(format!(
+        "mean {}{error}, standard deviation {} +- {}, least {}, in steps of {}",
+        milliseconds(goodness.mean_s),
+        milliseconds(goodness.sd_s),
+        milliseconds(goodness.sd_se_s),
+        milliseconds(goodness.least_s),
+        step(goodness.resolution_s)
+    ));
+    line(format!("\n  {:<12}{:>14}{:>14}{:>14}{:>16}{:>12}{:>12}", "law", "mean", "sd", "floor", "AIC - best", "Kolmogorov", "p-value"));
+    let best = goodness.laws.iter().map(|law| law.aic).fold(f64::INFINITY, f64::min);
+    for law in &goodness.laws {
+        let floor = law.floor_s.map_or_else(|| "-".to_owned(), milliseconds);
+        let [mean, sd] = [law.mean_s, law.sd_s].map(milliseconds);
+        let (name, aic) = (law.distribution.name(), law.aic - best);
+        let mark = if law.fits { "" } else { "  *" };
+        line(format!("  {name:<12}{mean:>14}{sd:>14}{floor:>14}{aic:>16.1}{:>12.5}{:>12.5}{mark}", law.kolmogorov, law.p_value));
+    }
+    if goodness.laws.iter().any(|law| !law.fits) {
+        line(format!("  * does not fit: its distance from the delays (Kolmogorov) is above {:.5}", goodness.kolmogorov_limit));
+    }
+    if goodness.laws.first().is_none_or(|law| !law.fits) {
+        line("no law fits: the link draws from the measured delays, a file that --out writes beside the link".to_owned());
+    }
+    match goodness.correlation {
+        None => line("\ndelays are as good as independent".to_owned()),
+        Some(correlation) => {
+            let [time, lag] = [correlation.time_se_s.map(milliseconds), correlation.lag_one_se.map(|error| format!("{error:.5}"))]
+                .map(|error| error.map_or_else(String::new, |error| format!(" +- {error}")));
+            line(format!(
+                "\ncorrelation time {}{time}, normal scores of neighbours {:.5}{lag}",
+                milliseconds(correlation.time_s),
+                correlation.lag_one
+            ));
+        }
+    }
+    line(format!("\n  {:<60}{:>12}{:>14}", "loss", "mean", "BIC - best"));
+    let best = goodness.losses.first().map_or(0.0, |loss| loss.bic);
+    for loss in &goodness.losses {
+        line(format!("  {:<60}{:>10.5} %{:>14.1}", model(loss), loss.mean_loss * 100.0, loss.bic - best));
+    }
+    text
+}
+
+fn model(loss: &LossFit) -> String {
+    match loss.model {
+        LossModel::None => "none".to_owned(),
+        LossModel::Independent { .. } => "independent".to_owned(),
+        LossModel::GilbertElliott { p, r, h, k } => format!("Gilbert-Elliott p {p:.5} r {r:.5} h {h:.3} k {k:.5}"),
+        LossModel::GilbertElliottInTime { mean_good_s, mean_bad_s } => format!("in time, good {mean_good_s:.4} s bad {mean_bad_s:.4} s"),
+    }
+}
+
+/// A step of a clock: a round number, which a nanosecond may miss.
+fn step(seconds: f64) -> Span {
+    Span(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
+}
+
+pub(super) fn milliseconds(seconds: f64) -> String {
+    format!("{:.5} ms", seconds * 1e3)
+}
