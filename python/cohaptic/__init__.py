@@ -18,8 +18,10 @@ A scene is read from a file or a text, run in virtual time, and analysed:
 'unstable'
 """
 
-from cohaptic.campaign import campaign
+from cohaptic.campaign import Campaign, campaign
+from cohaptic.compare import Comparison, compare
 from cohaptic.errors import AnalysisError, CohapticError, SceneError, UnreadableError
+from cohaptic.fit import fit
 from cohaptic.law import Held, Law, Peer, State
 from cohaptic.link import CAUSES, Copies, Event, Link, Sent
 from cohaptic.run import Picture, Run
@@ -32,8 +34,10 @@ __all__ = [
     "Admittance",
     "AnalysisError",
     "Boundary",
+    "Campaign",
     "Check",
     "CohapticError",
+    "Comparison",
     "ContactMode",
     "Copies",
     "Crossing",
@@ -56,4 +60,6 @@ __all__ = [
     "Table",
     "UnreadableError",
     "campaign",
+    "compare",
+    "fit",
 ]

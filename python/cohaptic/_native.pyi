@@ -5,16 +5,22 @@ from _typeshed import SupportsGetItem
 from os import PathLike
 from typing import Any, SupportsFloat, SupportsIndex, final
 
-__all__ = ["Campaign", "Drawing", "Held", "Link", "Run", "Scene", "State", "Table", "admittance", "boundary", "causes", "eigenvalues", "map", "monodromy", "stability"]
+__all__ = ["Campaign", "CampaignAnswer", "Delays", "Drawing", "Held", "Link", "Run", "Scene", "State", "Table", "admittance", "boundary", "causes", "eigenvalues", "map", "monodromy", "stability"]
 
 @final
 class Campaign:
     """
-    A campaign that was checked, any runs of which can be made in any process.
+    A campaign or a comparison that was checked, any runs of which can be made in any process.
     """
-    def __new__(cls, /, text: str, file: str | PathLike[str], overrides: SupportsGetItem[int, str], vary: SupportsGetItem[int, str], runs: SupportsIndex, threads: SupportsIndex, roster: str | None = None) -> Campaign:
+    def __new__(cls, /, text: str, file: str | PathLike[str], overrides: SupportsGetItem[int, str], vary: SupportsGetItem[int, str], runs: SupportsIndex, threads: SupportsIndex, strategies: str | None = None, roster: str | None = None) -> Campaign:
         """
-        Keys are varied as by `cohaptic campaign --vary`. Without a roster, all combinations are checked.
+        Keys are varied as by `cohaptic campaign --vary`. With strategies it is a comparison of these, as by `cohaptic compare --strategies`. Without a roster, all
+        combinations are checked.
+        """
+    def answer(self, /, rows: "list[list[int | float | str | None]]", verdicts: "bool", threads: "int") -> "CampaignAnswer":
+        """
+        What the rows of all runs come to. Combinations are judged on that number of threads, 0 for one a core: those of a comparison always, those of a campaign with
+        `verdicts`.
         """
     @property
     def roster(self, /) -> str:
@@ -34,9 +40,42 @@ class Campaign:
         """
         Ends every computation of rows, now and later.
         """
-    def table(self, /, rows: "list[list[int | float | str | None]]") -> "Table":
+
+@final
+class CampaignAnswer:
+    """
+    What all runs of a campaign or of a comparison come to.
+    """
+    def picture(self, /, file: str) -> str:
         """
-        The rows of all runs as one table. The column of a key that was varied has the name of the key, and the unit of its values.
+        The picture of that file name as SVG.
+        """
+    @property
+    def summary(self, /) -> str:
+        """
+        As JSON.
+        """
+    @property
+    def table(self, /) -> Table: ...
+
+@final
+class Delays:
+    """
+    A source of measurements.
+    """
+    def fit(self, /, offset: SupportsFloat | SupportsIndex | None, least: SupportsFloat | SupportsIndex | None, skew: bool) -> str:
+        """
+        Estimates the link, and gives the document of `cohaptic fit --json`. `offset` and `least` are in seconds.
+        """
+    @staticmethod
+    def of(sent: "numpy.ndarray", delays: "numpy.ndarray") -> "Delays":
+        """
+        Delays \\[s\\] of packets sent at those instants \\[s\\]; NaN of packets that were lost.
+        """
+    @staticmethod
+    def read(file: str | PathLike[str], receiver: str | PathLike[str] | None = None, port: SupportsIndex | None = None) -> Delays:
+        """
+        Reads a table of delays or a log of fates, or the captures of both ends.
         """
 
 @final
@@ -95,6 +134,10 @@ class Link:
     def handle_packet(self, /, now: SupportsFloat | SupportsIndex, size: SupportsIndex, payload: Any, ecn: bool) -> None:
         """
         Offers a packet now \\[s\\].
+        """
+    def measure(self, /, said: str, packets: SupportsIndex, every: SupportsFloat | SupportsIndex, size: SupportsIndex, ecn: bool) -> str:
+        """
+        Sends a steady stream over a link that is new, one packet every so often \\[s\\], and gives the document of `cohaptic link --json`. `said`: the link as it was said.
         """
     @property
     def next(self, /) -> float | None:

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ThreadPoolExecutor, wait
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 from cohaptic import _native
 from cohaptic.errors import CohapticError
+from cohaptic.run import Picture
 from cohaptic.scene import Scene, _toml
 from cohaptic.table import Table
 
 _Cells = list[list[Any]]
 _Piece = tuple[int, int]
 _Work = Callable[[int, int], _Cells]
-_Plan = tuple[str, str, list[str], list[str], int, str]
+_Plan = tuple[str, str, list[str], list[str], int, str | None, str]
+
+Vary = Mapping[str, Sequence[Any]] | Iterable[str]
+"""Keys and their values, or texts as for ``--vary``."""
+
+Workers = Executor | Callable[[], Executor] | None
+"""An executor, or what makes one; ``None`` for threads of this process."""
 
 _ASKED = 3
 """How often the same runs are asked for before their worker's exception is raised."""
@@ -26,19 +34,39 @@ _PIECES = 64
 """About how many pieces a campaign is cut into: enough to keep workers busy to the end, and few enough to cost nothing."""
 
 
+class Campaign(Table):
+    """The table of :func:`campaign`, and what its runs come to."""
+
+    def __init__(self, answer: _native.CampaignAnswer) -> None:
+        super().__init__(answer.table)
+        self._answer = answer
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The document of ``cohaptic campaign --json``, without the time that the campaign took and the files."""
+        document: dict[str, Any] = json.loads(self._answer.summary)
+        return document
+
+    def plot(self, name: str = "discrepancy") -> Picture:
+        """The program's own picture: ``discrepancy``, or ``verdicts`` where combinations were judged."""
+        return Picture(self._answer.picture(name))
+
+
 def campaign(
     scene: Scene,
     *,
-    vary: Mapping[str, Sequence[Any]] | Iterable[str] = (),
+    vary: Vary = (),
     runs: int = 1,
-    executor: Executor | Callable[[], Executor] | None = None,
+    verdicts: bool = False,
+    executor: Workers = None,
     piece: int | None = None,
-) -> Table:
+) -> Campaign:
     """Runs a scene over values of keys and over seeds, and gives one row a run: the rows of ``cohaptic campaign`` for the same keys.
 
     ``vary`` maps keys to their values, or has texts as for ``--vary``, such as ``"coordination.stiffness=500..1500/3"``. Every combination is run with
     ``runs`` seeds, which count up from that of the scene. The column of a key has the name of the key, and :meth:`Table.unit` its unit, where the
-    program's table has both in one name: ``link.delay_ms``.
+    program's table has both in one name: ``link.delay_ms``. With ``verdicts`` each combination is judged as :meth:`Scene.stability` judges it, and each
+    row has the verdict of its combination.
 
     ``executor`` is any ``concurrent.futures.Executor``, whose workers have this package, or a callable that makes one; without it threads of this
     process are taken. ``piece`` runs are asked for at a time. Runs that a worker lost are asked for again, up to three times. An executor that broke is
@@ -54,11 +82,25 @@ def campaign(
     >>> table = campaign(scene, vary={"coordination.stiffness": [500, 1000]}, runs=3)
     >>> table.rows, table["seed"].tolist()
     (6, [0, 1, 2, 0, 1, 2])
+    >>> [(combination["vary"], combination["runs"]) for combination in table.summary["combinations"]]
+    [(['coordination.stiffness=500'], 3), (['coordination.stiffness=1000'], 3)]
     """
+    return Campaign(_answer(scene, vary, runs, None, verdicts, executor, piece))
+
+
+def _answer(
+    scene: Scene,
+    vary: Vary,
+    runs: int,
+    strategies: str | None,
+    verdicts: bool,
+    executor: Workers,
+    piece: int | None,
+) -> _native.CampaignAnswer:
     native = scene._native
     texts = [f"{key}={_listed(values)}" for key, values in vary.items()] if isinstance(vary, Mapping) else list(vary)
-    whole = _native.Campaign(native.text, native.file, native.overrides, texts, runs, 0)
-    plan = (native.text, native.file, native.overrides, texts, runs, whole.roster)
+    whole = _native.Campaign(native.text, native.file, native.overrides, texts, runs, 0, strategies)
+    plan = (native.text, native.file, native.overrides, texts, runs, strategies, whole.roster)
     size = piece or max(8, math.ceil(whole.runs / _PIECES))
     pieces = [(start, min(start + size, whole.runs)) for start in range(0, whole.runs, size)]
     if executor is None:
@@ -67,7 +109,7 @@ def campaign(
         rows = _gathered(partial(_rows, plan), pieces, executor, None)
     else:
         rows = _gathered(partial(_rows, plan), pieces, executor(), executor)
-    return Table(whole.table([row for place in pieces for row in rows[place]]))
+    return whole.answer([row for place in pieces for row in rows[place]], verdicts, 0)
 
 
 def _listed(values: Sequence[Any]) -> str:
@@ -76,8 +118,8 @@ def _listed(values: Sequence[Any]) -> str:
 
 def _rows(plan: _Plan, start: int, end: int) -> _Cells:
     """Some rows, in any process."""
-    text, file, overrides, vary, runs, roster = plan
-    return _native.Campaign(text, file, overrides, vary, runs, 1, roster).rows(start, end)
+    text, file, overrides, vary, runs, strategies, roster = plan
+    return _native.Campaign(text, file, overrides, vary, runs, 1, strategies, roster).rows(start, end)
 
 
 def _here(whole: _native.Campaign, pieces: list[_Piece]) -> dict[_Piece, _Cells]:

@@ -38,6 +38,11 @@ pub(crate) fn of_analysis(py: Python<'_>, error: &impl Display) -> PyErr {
     exception(py, "AnalysisError", error.to_string())
 }
 
+/// Measurements that have no link.
+pub(crate) fn of_fault(py: Python<'_>, message: &str) -> PyErr {
+    exception(py, "CohapticError", message.to_owned())
+}
+
 /// A value that makes no sense.
 pub(crate) fn of_value(error: &impl Display) -> PyErr {
     pyo3::exceptions::PyValueError::new_err(error.to_string())

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::matrix;
-use crate::campaign::unit_of;
+use crate::campaign_table::unit_of;
 use crate::drawing::Drawing;
 use crate::errors::{of_analysis, of_scene, of_value};
 use crate::interrupt::on_threads;

@@ -5,9 +5,11 @@
 mod admittance;
 mod arrays;
 mod campaign;
+mod campaign_table;
 mod drawing;
 mod errors;
 mod family;
+mod fit;
 mod interrupt;
 mod law;
 mod link;
@@ -22,11 +24,13 @@ mod _native {
     #[pymodule_export]
     use crate::admittance::admittance_of;
     #[pymodule_export]
-    use crate::campaign::Campaign;
+    use crate::campaign::{Campaign, CampaignAnswer};
     #[pymodule_export]
     use crate::drawing::Drawing;
     #[pymodule_export]
     use crate::family::{boundary_of, map_of};
+    #[pymodule_export]
+    use crate::fit::Delays;
     #[pymodule_export]
     use crate::law::{Held, State};
     #[pymodule_export]

@@ -1,8 +1,13 @@
 //! One emulated link.
 
+use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
+use cohaptic_answers::link::{Meter, document, too_long};
 use cohaptic_linkfile::link_from_keys;
+use cohaptic_measure::asked::Asked;
+use cohaptic_measure::steady::SteadyStream;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DropCause, Fate, Link as Emulated, LinkModel, LinkName, PacketInfo, PacketRecord};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
@@ -11,6 +16,7 @@ use pyo3::prelude::*;
 
 use crate::errors::of_scene;
 use crate::interrupt::{Stop, interruptible};
+use crate::scene::json;
 
 /// A link: a model, and one that runs step by step.
 #[pyclass(frozen, module = "cohaptic._native")]
@@ -146,6 +152,30 @@ impl Link {
             copies.iter().map(|record| self::cause(record.fate)).collect::<Vec<_>>().into_pyarray(py),
         );
         Ok((arrived.into_pyarray(py), cause.into_pyarray(py), marked.into_pyarray(py), damaged.into_pyarray(py), copies))
+    }
+
+    /// Sends a steady stream over a link that is new, one packet every so often \[s\], and gives the document of `cohaptic link --json`. `said`: the link as it was said.
+    fn measure(&self, py: Python<'_>, said: String, packets: u64, every: f64, size: u64, ecn: bool) -> PyResult<String> {
+        if packets == 0 {
+            return Err(PyValueError::new_err("0 packets: expected at least 1"));
+        }
+        let no_time = |_| PyValueError::new_err(format!("{every} s is no time between packets: expected seconds, from 0 on"));
+        let every = Duration::try_from_secs_f64(every).map_err(no_time)?;
+        let stream = SteadyStream { packets, every, info: PacketInfo { size: Bytes::new(size), ecn_capable: ecn } };
+        if let Some(why) = too_long(&stream) {
+            return Err(PyValueError::new_err(why));
+        }
+        interruptible(py, |stop: &Stop| {
+            let mut meter = Meter::default();
+            let mut link = Emulated::new(self.seed, &self.name, self.model.clone());
+            let record = |record: &PacketRecord| {
+                meter.record(record);
+                Ok::<(), Infallible>(())
+            };
+            let Ok(sent) = stream.over(&mut link, record, |_| !stop.is_asked());
+            let asked = Asked::of(&self.model, every, stream.info.size);
+            json(&document(&meter.finish(said, asked, [sent, packets]), None))
+        })
     }
 
     /// Offers a packet now \[s\].

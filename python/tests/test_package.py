@@ -14,7 +14,7 @@ MODULES = [
     "cohaptic",
     *(
         f"cohaptic.{name}"
-        for name in ("campaign", "errors", "gym", "law", "link", "run", "scene", "stability", "table")
+        for name in ("campaign", "compare", "errors", "fit", "gym", "law", "link", "run", "scene", "stability", "table")
     ),
 ]
 

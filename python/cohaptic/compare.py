@@ -1,0 +1,59 @@
+"""Strategies side by side, with the same seeds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from functools import cached_property
+from typing import Any
+
+from cohaptic import _native
+from cohaptic.campaign import Vary, Workers, _answer
+from cohaptic.scene import Scene
+from cohaptic.table import Table
+
+
+class Comparison(Table):
+    """The table of :func:`compare`, a row a run, and the strategies side by side."""
+
+    def __init__(self, answer: _native.CampaignAnswer) -> None:
+        super().__init__(answer.table)
+        self._answer = answer
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The document of ``cohaptic compare --json``, without the time that the comparison took and the files."""
+        document: dict[str, Any] = json.loads(self._answer.summary)
+        return document
+
+
+def compare(
+    scene: Scene,
+    strategies: str | Iterable[str],
+    *,
+    vary: Vary = (),
+    runs: int = 10,
+    executor: Workers = None,
+    piece: int | None = None,
+) -> Comparison:
+    """Sets strategies side by side over values of keys: the figures of ``cohaptic compare`` for the same strategies.
+
+    ``strategies`` is a text as for ``--strategies``, or a list of strategies: the others are compared with the first. Parameters stand in braces behind
+    the name: ``"local-damping{damping=58}"``. Every strategy has the same seeds, and all measures. Combinations that a strategy refuses are left out,
+    and the summary says why. The other parameters are those of :func:`campaign`.
+
+    >>> scene = Scene('''
+    ... scene = { duration = "200ms" }
+    ... object.mass = 0.45
+    ... coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+    ... peer = { device = { mass = 0.1 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    ... peers = [{ name = "left", hand = { force = 1.5 } }, { name = "right" }]
+    ... link = { delay = "24ms", loss = "10%" }
+    ... ''')
+    >>> comparison = compare(scene, ["average-position", "extrapolated"], runs=4)
+    >>> first, second = comparison.summary["combinations"]
+    >>> second["strategy"], second["runs"], second["verdict"]
+    ('extrapolated', 4, 'unstable')
+    """
+    names = strategies if isinstance(strategies, str) else ",".join(strategies)
+    return Comparison(_answer(scene, vary, runs, names, False, executor, piece))

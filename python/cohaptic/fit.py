@@ -1,0 +1,49 @@
+"""Links that are estimated from measurements."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cohaptic import _native
+
+
+def fit(
+    source: str | os.PathLike[str] | tuple[npt.ArrayLike, npt.ArrayLike],
+    receiver: str | os.PathLike[str] | None = None,
+    *,
+    port: int | None = None,
+    offset: float | None = None,
+    least: float | None = None,
+    skew: bool = False,
+) -> dict[str, Any]:
+    """Estimates the link that made measurements, and gives the document of ``cohaptic fit --json``.
+
+    Its ``scene`` has the link as keys of a scene, its ``goodness`` says how good the estimate is.
+
+    ``source`` is a file with one-way measurements, a file of fates, or the capture of the sender, with that of the receiver as ``receiver``, of which only
+    datagrams to the UDP ``port`` count. Or it is a pair of arrays: when each packet was sent, and its delay [s], which is NaN where the packet was lost.
+
+    ``offset`` [s] is added to the clock of the receiver, and so to every delay. ``least`` [s] says what the least delay is. ``skew`` removes the linear
+    drift of one clock against the other, where it is significant.
+
+    >>> from cohaptic import Link
+    >>> sent = np.arange(20_000) * 0.01
+    >>> delays = Link("delay 40ms 4ms distribution normal loss 2%", seed=1).send(sent).arrived - sent
+    >>> link = fit((sent, delays))["link"]
+    >>> round(link["delay_s"], 3), link["jitter"]["distribution"]
+    (0.04, 'normal')
+    """
+    if isinstance(source, tuple):
+        if receiver is not None or port is not None:
+            raise TypeError("receiver and port are for captures: expected a file beside them")
+        at, delays = (np.ascontiguousarray(numbers, dtype=np.float64).reshape(-1) for numbers in source)
+        measured = _native.Delays.of(at, delays)
+    else:
+        measured = _native.Delays.read(os.fspath(source), None if receiver is None else os.fspath(receiver), port)
+    document: dict[str, Any] = json.loads(measured.fit(offset, least, skew))
+    return document

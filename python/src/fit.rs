@@ -1,0 +1,95 @@
+//! Links that are estimated from measurements.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use cohaptic_answers::fit::{Corrections, FitFailure, Source, SourceError, document};
+use cohaptic_files::{LimitedFile, MOST_BYTES, MOST_CAPTURE_BYTES};
+use cohaptic_measure::fit::{Measurement, Measurements};
+use cohaptic_scene::SceneError;
+use numpy::PyReadonlyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::errors::{of_fault, of_scene, of_value};
+use crate::interrupt::{Stop, interruptible};
+use crate::scene::json;
+
+/// The names that `cohaptic fit` has for the file with the link and for that with the delays.
+const FILES: [&str; 2] = ["link.toml", "link.delays.csv"];
+
+fn unreadable(py: Python<'_>, path: &Path, source: std::io::Error) -> PyErr {
+    of_scene(py, &SceneError::Read { path: path.to_path_buf(), source, place: None })
+}
+
+fn named(py: Python<'_>, path: &Path, why: &dyn std::fmt::Display) -> PyErr {
+    of_fault(py, &format!("{}: {why}", path.display()))
+}
+
+fn open(py: Python<'_>, path: &Path) -> PyResult<LimitedFile> {
+    LimitedFile::open(path, MOST_CAPTURE_BYTES).map_err(|error| unreadable(py, path, error))
+}
+
+/// A source of measurements.
+#[pyclass(frozen, module = "cohaptic._native")]
+#[derive(Debug)]
+pub(crate) struct Delays {
+    source: Source,
+}
+
+#[pymethods]
+impl Delays {
+    /// Reads a table of delays or a log of fates, or the captures of both ends.
+    #[staticmethod]
+    #[pyo3(signature = (file, receiver = None, port = None))]
+    fn read(py: Python<'_>, file: PathBuf, receiver: Option<PathBuf>, port: Option<u16>) -> PyResult<Self> {
+        let from = open(py, &file)?;
+        let Some(receiver) = receiver else {
+            let source = interruptible(py, |_: &Stop| Source::read(from, |rest| rest.limited_to(MOST_BYTES)))?;
+            let source = source.map_err(|error| match error {
+                SourceError::Io(error) => unreadable(py, &file, error),
+                SourceError::NotText { .. } | SourceError::OneEnd | SourceError::Content(_) => named(py, &file, &error),
+            })?;
+            return Ok(Self { source });
+        };
+        let to = open(py, &receiver)?;
+        let source = interruptible(py, |_: &Stop| Source::between(from, to, port))?;
+        let refused = |error| of_fault(py, &format!("{}, {}: {error}", file.display(), receiver.display()));
+        Ok(Self { source: source.map_err(refused)? })
+    }
+
+    /// Delays \[s\] of packets sent at those instants \[s\]; NaN of packets that were lost.
+    #[staticmethod]
+    #[pyo3(signature = (sent: "numpy.ndarray", delays: "numpy.ndarray") -> "Delays")]
+    fn of<'py>(py: Python<'py>, sent: PyReadonlyArray1<'py, f64>, delays: PyReadonlyArray1<'py, f64>) -> PyResult<Self> {
+        let (sent, delays) = (sent.as_slice()?, delays.as_slice()?);
+        if sent.len() != delays.len() {
+            return Err(PyValueError::new_err(format!("{} instants and {} delays: expected one delay of each packet", sent.len(), delays.len())));
+        }
+        let packet = |(sent_s, delay_s): (&f64, &f64)| Measurement { sent_s: *sent_s, delay_s: Some(*delay_s).filter(|delay| !delay.is_nan()) };
+        let measurements = Measurements::new(sent.iter().zip(delays).map(packet).collect()).map_err(|error| of_fault(py, &error.to_string()))?;
+        Ok(Self { source: Source::of(measurements) })
+    }
+
+    /// Estimates the link, and gives the document of `cohaptic fit --json`. `offset` and `least` are in seconds.
+    #[pyo3(signature = (offset, least, skew))]
+    fn fit(&self, py: Python<'_>, offset: Option<f64>, least: Option<f64>, skew: bool) -> PyResult<String> {
+        let least = least.map(Duration::try_from_secs_f64).transpose().map_err(|error| of_value(&format!("least: {error}")))?;
+        if offset.is_some_and(|offset| !offset.is_finite()) {
+            return Err(PyValueError::new_err("offset: expected a finite number of seconds"));
+        }
+        let corrections = Corrections { offset_s: offset, least, skew };
+        let [file, delays] = FILES;
+        let answered = interruptible(py, |_: &Stop| self.source.fit(&corrections, Path::new(file), delays))?;
+        match answered {
+            Ok(answered) => Ok(json(&document(&answered))),
+            Err(FitFailure::Scene(error)) => Err(of_scene(py, &error)),
+            Err(error @ FitFailure::LongDelays { .. }) => {
+                Err(of_fault(py, &format!("{error} offset and least are for clocks that are; with offset=0.0 the delays are taken as they are")))
+            }
+            Err(error @ (FitFailure::Measurements(_) | FitFailure::Fit(_) | FitFailure::Unheld(_))) => {
+                Err(of_fault(py, &error.to_string()))
+            }
+        }
+    }
+}
