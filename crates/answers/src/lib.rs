@@ -7,7 +7,7 @@
 //! [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
 //! The commands that have a module of their own have their answer in its function `document`, and the text for people in its function `words`: [`campaign`],
-//! [`compare`], [`mod@link`] and [`fit`].
+//! [`compare`], [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`].
 //!
 //! Nothing here reads a clock or prints: [`measure()`] is given a clock.
 //!
@@ -30,6 +30,8 @@
 //! ```
 #![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
 
+pub mod admittance;
+pub mod boundary;
 pub mod campaign;
 mod check;
 pub mod compare;
@@ -37,12 +39,15 @@ mod document;
 mod explanation;
 pub mod fit;
 pub mod link;
+pub mod map;
 mod methods;
 mod notes;
 mod parts;
 mod pictures;
+pub mod point;
 mod quick_verdict;
 mod run;
+mod text_plot;
 mod words;
 
 pub use check::{Answered, OutcomeDocument, check};
@@ -56,4 +61,5 @@ pub use pictures::{
 };
 pub use quick_verdict::{OPERATIONS_A_SECOND, Quick, quick_verdict};
 pub use run::run;
-pub use words::{length, nominal};
+pub use text_plot::text_plot;
+pub use words::{are, figure, length, nominal};

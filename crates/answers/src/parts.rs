@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::{AccessSummary, LinkQuantiles, PeerSummary, Summary};
 use cohaptic_scene::Scene;
+use cohaptic_stability::VerdictKind;
 use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -111,4 +112,9 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
 pub fn measures_of(scene: &Scene, measured: &[MeasuredValue]) -> Option<impl Serialize + use<>> {
     let named: Map<String, Value> = measured.iter().map(|measured| (measured.name.text(scene), Value::from(measured.value))).collect();
     (!named.is_empty()).then(|| document! { measures: named })
+}
+
+/// Things of one kind that were judged: how many there are, and the share of them that is stable.
+pub(crate) fn judged(kind: VerdictKind, count: usize, stable_fraction: f64) -> impl Serialize {
+    document! { judged: kind.word(), count: count, stable_fraction: stable_fraction }
 }

@@ -1,5 +1,7 @@
 //! Words that several answers share.
 
+use cohaptic_units::print::Counted;
+
 /// Returns a length in words: `12.300 mm`, and in metres with an exponent from 10 km on.
 #[must_use]
 pub fn length(metres: f64) -> String {
@@ -17,4 +19,37 @@ pub fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
             if count == 1 { one } else { several }
         )
     })
+}
+
+/// `1 cell is`, `2 cells are`.
+#[must_use]
+pub fn are(number: usize, one: &str) -> String {
+    format!("{} {}", Counted(number, one), if number == 1 { "is" } else { "are" })
+}
+
+/// A figure with `digits` digits behind the point; in powers of ten where these would be most of it, or not enough: from 10⁶ on and below 10⁻⁴.
+#[must_use]
+pub fn figure(value: f64, digits: usize) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
+    if plain { format!("{value:.digits$}") } else { format!("{value:.digits$e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_is_and_others_are() {
+        assert_eq!([0, 1, 2].map(|number| are(number, "row")), ["0 rows are", "1 row is", "2 rows are"]);
+    }
+
+    #[test]
+    fn figures_that_are_large_or_small_have_powers_of_ten() {
+        for (value, shown) in
+            [(0.0, "0.000000"), (1.5, "1.500000"), (-999_999.0, "-999999.000000"), (1e6, "1.000000e6"), (1e-4, "0.000100"), (-2.5e-7, "-2.500000e-7")]
+        {
+            assert_eq!(figure(value, 6), shown);
+        }
+        assert_eq!(figure(f64::INFINITY, 6), "inf");
+    }
 }

@@ -46,7 +46,6 @@ mod run;
 mod shard;
 mod shell;
 mod stability;
-mod terminal_plot;
 mod texts;
 mod variants;
 

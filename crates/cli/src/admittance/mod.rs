@@ -1,11 +1,11 @@
 //! `cohaptic admittance`.
 
-mod answer;
 mod curve;
 mod files;
 
 use std::process::ExitCode;
 
+use cohaptic_answers::admittance::Curve;
 use cohaptic_units::print::{Counted, Number};
 
 use crate::analysis_watch::AnalysisWatch;
@@ -14,7 +14,6 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::file::own_folder;
 use crate::output;
-use curve::Curve;
 
 /// Says what the hand of one peer feels.
 pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Failure> {
@@ -27,7 +26,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     let highest = subjects.iter().map(|subject| subject.admittance.highest_frequency()).fold(f64::INFINITY, f64::min);
     let frequencies = frequencies(arguments, highest)?;
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
-    let curves = subjects.into_iter().map(|subject| Curve::of(subject, &frequencies, &watch));
+    let curves = subjects.into_iter().map(|subject| subject.curve(&frequencies, &watch));
     let curves = curves.collect::<Result<Vec<Curve>, Failure>>();
     watch.clear();
     let curves: Vec<Curve> = curves?.into_iter().filter(|curve| !curve.response.points.is_empty()).collect();
@@ -45,8 +44,8 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     output::answer(
         arguments.scene.json,
         DocumentSchema::ADMITTANCE,
-        &answer::of(&arguments.peer, &curves, &files, is_interrupted),
-        || answer::describe(&arguments.peer, &curves),
+        &cohaptic_answers::admittance::document(&arguments.peer, &curves, &files, is_interrupted),
+        || cohaptic_answers::admittance::words(&arguments.peer, &curves),
         &files,
     )?;
     if is_interrupted {

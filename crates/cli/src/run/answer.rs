@@ -11,7 +11,7 @@ use super::Run;
 use crate::document_schema::document;
 use crate::documents::MOST_LINKS;
 use crate::measures::measured_lines;
-use crate::{output, terminal_plot};
+use crate::output;
 
 /// The answer of `cohaptic run --json`. `otherwise`: the differences of the scene from that of the session that is replayed. `against`: the document of the
 /// variant.
@@ -34,7 +34,7 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
     let mut line = |line: String| text.push_str(&format!("{line}\n"));
     if let Some(positions) = &run.positions {
         line(format!("position of each copy of the object{}", if scene.axes.count() > 1 { ", along x" } else { "" }));
-        line(terminal_plot::draw(positions, 100.0, "cm").trim_end().to_owned());
+        line(cohaptic_answers::text_plot(positions, 100.0, "cm").trim_end().to_owned());
     }
     let simulated = Span(summary.duration);
     match summary.ending {

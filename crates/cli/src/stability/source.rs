@@ -3,11 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Family, FamilyError, KeyRange, VerdictKind};
-use serde::Serialize;
+use cohaptic_stability::{Family, FamilyError, KeyRange};
 
 use super::rows_file::fingerprint;
-use crate::document_schema::document;
 use crate::failure::{Failure, not_analysed};
 use crate::{input, output};
 
@@ -66,11 +64,6 @@ impl Said<'_> {
 /// What tells the scene at one end of all its keys from others: everything that it says, and that files say which it names.
 pub(super) fn fingerprint_of(family: &Family) -> Result<u64, FamilyError> {
     Ok(fingerprint(&format!("{:?}", at_low(family)?)))
-}
-
-/// Things of one kind that were judged, as JSON answers them: how many there are, and the share of them that is stable.
-pub(crate) fn judged(kind: VerdictKind, count: usize, stable_fraction: f64) -> impl Serialize {
-    document! { judged: kind.word(), count: count, stable_fraction: stable_fraction }
 }
 
 /// The scene with every open key at its lower end; it does not know the name of its file.

@@ -1,6 +1,5 @@
 //! `cohaptic stability boundary`.
 
-mod answer;
 mod files;
 mod prove;
 mod sharing;
@@ -10,6 +9,7 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant as Clock};
 
+use cohaptic_answers::boundary::Searched;
 use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Cell, Criterion, Family, KeyRange, Radius};
 
 use cohaptic_units::print::Counted;
@@ -82,7 +82,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     }
     let mut written = Vec::new();
     if let Some(folder) = sharing.folder() {
-        written = files::write(folder, &order, &found, arguments.pictures.size())?;
+        written = files::write(folder, &order.searched(&found), arguments.pictures.size())?;
         rows.map_or(Ok(()), RowsFile::remove)?;
     }
     say(&order, arguments, &found, &written)?;
@@ -90,8 +90,10 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
 }
 
 fn say(order: &Order, arguments: &BoundaryArguments, found: &Boundary, written: &[String]) -> Result<(), Failure> {
-    let words = || answer::describe(order, found);
-    output::answer(arguments.scene.json, DocumentSchema::STABILITY_BOUNDARY, &answer::of(order, found, written), words, written)
+    let searched = order.searched(found);
+    let words = || cohaptic_answers::boundary::words(&searched, interrupt::requested());
+    let document = cohaptic_answers::boundary::document(&searched, written);
+    output::answer(arguments.scene.json, DocumentSchema::STABILITY_BOUNDARY, &document, words, written)
 }
 
 impl Order {
@@ -128,11 +130,11 @@ impl Order {
         ];
         Ok(Self { text, title, range, options, family, header })
     }
-}
 
-/// What the radii leave out.
-fn notes(found: &Boundary) -> Vec<String> {
-    cohaptic_answers::nominal(found.nominal(), ["of the values looked at is", "of the values looked at are"]).into_iter().collect()
+    fn searched<'a>(&'a self, found: &'a Boundary) -> Searched<'a> {
+        let Self { title, range, options, family, .. } = self;
+        Searched { title, range, options: *options, family, found }
+    }
 }
 
 /// The values of rows, and what was found there.

@@ -1,15 +1,14 @@
 //! `cohaptic stability map`.
 
-mod answer;
 mod files;
 mod filling;
-mod glance;
 mod prove;
 
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_stability::{Criterion, Family, Grid, KeyRange, Kinds, Map, MapError, Verdict, VerdictKind};
+use cohaptic_answers::map::{Speed, VariantMap};
+use cohaptic_stability::{Family, Grid, KeyRange, MapError};
 
 use super::source::{self, Said};
 use crate::arguments::MapArguments;
@@ -29,34 +28,6 @@ struct Order {
     variants: Vec<Variant>,
     /// One for each variant.
     families: Vec<Family>,
-}
-
-struct VariantMap {
-    name: String,
-    overrides: Vec<String>,
-    map: Map,
-    /// By which radius it judges.
-    criterion: Criterion,
-    /// Random parts of the links that its nominal cells leave out, in words.
-    left_out: Vec<&'static str>,
-    /// Of every cell, row after row.
-    verdicts: Vec<Vec<Verdict>>,
-    /// Its table, if it was written.
-    file: Option<String>,
-}
-
-/// How fast the maps were filled.
-#[derive(Clone, Copy)]
-struct Speed {
-    wall_s: f64,
-    /// Cells computed now.
-    cells: usize,
-}
-
-impl Speed {
-    fn cells_per_s(self) -> f64 {
-        share(self.cells, 1) / self.wall_s
-    }
 }
 
 /// Fills the maps and shows or writes them.
@@ -86,11 +57,12 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         files = files::write(folder, &order, &mut maps, arguments.pictures.size())?;
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
+    let filled = cohaptic_answers::map::Filled { title: &order.title, axes: order.axes(), maps: &maps };
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_MAP,
-        &answer::of(&order, &maps, speed, &files),
-        || answer::describe(&order, &maps, speed, sharing.folder().is_none()),
+        &cohaptic_answers::map::document(&filled, speed, &files),
+        || cohaptic_answers::map::words(&filled, speed, sharing.folder().is_none()),
         &files,
     )?;
     Ok(ExitCode::SUCCESS)
@@ -132,6 +104,11 @@ impl Order {
         }
     }
 
+    /// The keys along x and y.
+    fn axes(&self) -> [&KeyRange; 2] {
+        [self.x(), self.y()]
+    }
+
     fn x(&self) -> &KeyRange {
         &self.ranges[0].1
     }
@@ -139,34 +116,4 @@ impl Order {
     fn y(&self) -> &KeyRange {
         &self.ranges[1].1
     }
-}
-
-impl VariantMap {
-    /// How many of its cells leave out what their links leave to chance.
-    fn nominal_cells(&self) -> usize {
-        self.map.nominal.iter().flatten().filter(|nominal| **nominal).count()
-    }
-
-    /// Returns the numbers of its cells, by the question that their verdicts answer.
-    fn kinds(&self) -> Kinds {
-        Kinds::of(self.criterion, self.map.nominal.iter().flatten().copied())
-    }
-
-    /// Returns the share of the cells of a kind that is stable.
-    fn stable_fraction_of(&self, kind: VerdictKind) -> f64 {
-        let all = self.verdicts.iter().flatten().zip(self.map.nominal.iter().flatten());
-        let of_kind: Vec<Verdict> = all.filter(|(_, nominal)| self.criterion.kind(**nominal) == kind).map(|(verdict, _)| *verdict).collect();
-        share(of_kind.iter().filter(|verdict| **verdict == Verdict::Stable).count(), of_kind.len())
-    }
-
-    /// What share of its cells is stable.
-    fn stable_fraction(&self) -> f64 {
-        let cells = || self.verdicts.iter().flatten();
-        share(cells().filter(|verdict| **verdict == Verdict::Stable).count(), cells().count())
-    }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "far fewer cells than 2^52")]
-fn share(part: usize, whole: usize) -> f64 {
-    part as f64 / whole.max(1) as f64
 }

@@ -1,8 +1,6 @@
 //! `cohaptic stability point`.
 
-mod answer;
 mod every_number;
-mod speed;
 mod switching;
 mod worst;
 
@@ -32,7 +30,7 @@ fn ended() -> Failure {
 /// The same where the worst case is known already: it took its time, and is told.
 fn ended_after(worst: Option<&SceneWorstCase>) -> Failure {
     let Some(worst) = worst else { return ended() };
-    Failure::Interrupted(format!("the analysis was ended before its verdict; before that,{}", answer::worst_in_words(worst)))
+    Failure::Interrupted(format!("the analysis was ended before its verdict; before that,{}", cohaptic_answers::point::worst_in_words(worst)))
 }
 
 /// Says whether the scene is stable.
@@ -73,8 +71,14 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_POINT,
-        &answer::of(&scene, &judgement, worst.as_ref(), every.as_ref(), switching.as_ref()),
-        || answer::describe(&scene, &judgement, worst.as_ref()) + &more(),
+        &cohaptic_answers::point::document(
+            &scene,
+            &judgement,
+            worst.as_ref(),
+            every.as_ref().map(|every| every_number::document(&scene, every)),
+            switching.as_ref().map(switching::document),
+        ),
+        || cohaptic_answers::point::words(&scene, &judgement, worst.as_ref()) + &more(),
         every
             .iter()
             .filter_map(|every| every.certificate.as_ref())

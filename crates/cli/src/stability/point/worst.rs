@@ -5,12 +5,10 @@ use std::path::Path;
 use cohaptic_proofs::{Effort, Links, Patterns, SceneWorstCase, SceneWorstCaseError, worst_case_watched};
 use cohaptic_scene::Scene;
 use cohaptic_stability::AnalysisError;
-use serde::Serialize;
 
 use super::ended;
 use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::{LinksName, PointArguments};
-use crate::document_schema::document;
 use crate::failure::{Failure, not_analysed};
 
 /// The worst case, if it is asked for.
@@ -34,29 +32,4 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
         let is_stopped = matches!(error, SceneWorstCaseError::Analysis(AnalysisError::Stopped));
         if is_stopped { ended() } else { not_analysed(path, &error) }
     })
-}
-
-/// Its part of the JSON document.
-pub(super) fn document(worst: &SceneWorstCase) -> impl Serialize {
-    let part = worst.worst();
-    document! {
-        verdict: worst.verdict().word(),
-        lower: worst.lower,
-        upper: worst.upper,
-        // Whether the bounds are more than 1 % apart.
-        open: worst.is_open(),
-        // The rate that quadratic certificates prove.
-        certificate: worst.certificate,
-        links: match worst.links {
-            Links::Together => "together",
-            Links::Each => "each",
-        },
-        step_s: worst.step.as_secs_f64(),
-        // The pattern that attains the lower bound.
-        sequence: part.sequence.as_str(),
-        period: part.period,
-        dimension: part.dimension,
-        products: worst.products(),
-        notes: worst.notes.as_slice(),
-    }
 }

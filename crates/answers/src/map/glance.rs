@@ -1,6 +1,6 @@
 //! A map as text, with the dots of Unicode's braille patterns: a dot where the scene is stable.
 
-use crate::terminal_plot::BRAILLE;
+use crate::text_plot::BRAILLE;
 
 const WIDTH: usize = 60;
 const HEIGHT: usize = 15;

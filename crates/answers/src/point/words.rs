@@ -1,98 +1,19 @@
-//! A verdict as a JSON document and in words.
+//! A verdict in words.
 
-use cohaptic_answers::notes;
 use cohaptic_proofs::{SceneWorstCase, WorstVerdict};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, Verdict, VerdictKind, nominal_head};
 use cohaptic_units::print::Span;
-use serde::Serialize;
 
-use super::speed::{self, Bounded, per_second, time_constant};
-use super::{every_number, switching, worst};
-use crate::document_schema::document;
-use crate::output::figure;
-
-/// The answer of `cohaptic stability point --json`.
-pub(super) fn of(
-    scene: &Scene,
-    judgement: &Judgement,
-    worst: Option<&SceneWorstCase>,
-    every: Option<&every_number::Proof>,
-    contacts: Option<&switching::Proof>,
-) -> impl Serialize {
-    let Judgement { verdict, analysis, mean_square, left_out } = judgement;
-    let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);
-    let constant = time_constant(analysis);
-    let modes = analysis.modes.iter().map(|mode| {
-        document! {
-            // Of an object that turns, the components of its motion; absent otherwise.
-            #[serde(flatten)]
-            motion: (!mode.motion.is_empty()).then(|| document! { motion: mode.motion.clone() }),
-            contacts: mode.contacts.as_str(),
-            verdict: mode.radius.verdict().word(),
-            spectral_radius: mode.radius.value,
-            error_bound: mode.radius.error,
-            parts: parts(scene, mode),
-        }
-    });
-    document! {
-        title: scene.title.as_str(),
-        // In the mean square where links leave something to chance.
-        verdict: verdict.word(),
-        // The question that the verdict answers; of a nominal one, the random parts of the links that it leaves out.
-        judged: judgement.kind().word(),
-        left_out: left_out.as_slice(),
-        spectral_radius: analysis.radius.value,
-        error_bound: analysis.radius.error,
-        #[serde(flatten)]
-        mean_square: radius.map(|radius| document! { mean_square_radius: radius.value, mean_square_error_bound: radius.error }),
-        rigid_modes: analysis.rigid_modes,
-        dimension: analysis.dimension,
-        method: analysis.method.word(),
-        frame_s: analysis.frame.as_secs_f64(),
-        // Both `null` where the bounds of the radius leave more than a percent of them open.
-        per_second: per_second(analysis).known(),
-        time_constant_s: constant.and_then(|constant| constant.known()).filter(|seconds| *seconds != 0.0),
-        // The least and the most that the bounds of the radius allow.
-        time_constant_bounds_s: constant.map(|Bounded { low, high, .. }| [low, high]),
-        // Of the mode of contact with the largest radius.
-        parts: worst_mode(analysis).map(|mode| parts(scene, mode)).into_iter().flatten().collect::<Vec<_>>(),
-        modes: modes.collect::<Vec<_>>(),
-        #[serde(flatten)]
-        worst: worst.map(|worst| document! { worst_case: worst::document(worst) }),
-        #[serde(flatten)]
-        every: every.map(|every| document! { every_number: every_number::document(scene, every) }),
-        #[serde(flatten)]
-        switching: contacts.map(|contacts| document! { switching: switching::document(contacts) }),
-        notes: notes(judgement),
-    }
-}
-
-fn parts(scene: &Scene, mode: &ContactMode) -> Vec<impl Serialize + use<>> {
-    let parts = mode.parts.iter().map(|part| {
-        document! {
-            kind: part.kind.word(),
-            // The first peer that it is about; absent where it is about all peers.
-            #[serde(flatten)]
-            peer: part.kind.peer().map(|peer| document! { peer: scene.peers[peer].name.clone() }),
-            dimension: part.size,
-            multiplicity: part.copies,
-            spectral_radius: part.radius.value,
-            error_bound: part.radius.error,
-        }
-    });
-    parts.collect()
-}
-
-/// The mode of contact with the largest radius.
-fn worst_mode(analysis: &Analysis) -> Option<&ContactMode> {
-    analysis.modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value))
-}
+use super::{speed, worst_mode};
+use crate::{figure, notes};
 
 /// The modes of contact that are listed at most; the worst is always among them.
 const MOST_MODES: usize = 16;
 
-pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> String {
+/// A verdict in words, for people.
+#[must_use]
+pub fn words(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> String {
     let Judgement { verdict, analysis, mean_square, left_out } = judgement;
     let sentence = sentence(*verdict, mean_square.is_some());
     let mut text = match judgement.kind() {
@@ -156,7 +77,8 @@ fn sentence(verdict: Verdict, mean_square: bool) -> &'static str {
 }
 
 /// The worst case by itself.
-pub(super) fn worst_in_words(worst: &SceneWorstCase) -> String {
+#[must_use]
+pub fn worst_in_words(worst: &SceneWorstCase) -> String {
     let mut text = String::new();
     worst_case(worst, &[], &mut |line: String| text.push_str(&format!("{line}\n")));
     text.trim_end().to_owned()

@@ -1,0 +1,56 @@
+//! A boundary in words.
+
+use cohaptic_stability::{VerdictKind, nominal_head};
+use cohaptic_units::print::Counted;
+
+use super::Searched;
+use crate::crossing_in_words;
+
+/// A boundary in words, for people. `is_ended`: whether the user asked for the end before the search had settled.
+#[must_use]
+pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
+    let found = searched.found;
+    let range = searched.range;
+    let mut text = format!("{}\n\n", searched.title);
+    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
+    let kinds = searched.kinds();
+    // Of several kinds, the verdict at the lower end has that of its own value.
+    let lowest = found.known.iter().min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, cell)| searched.family.criterion().kind(cell.is_nominal));
+    let kind = kinds.only().or(lowest).unwrap_or(VerdictKind::Certain);
+    if kinds.present().any(|(kind, _)| kind == VerdictKind::Nominal) {
+        let head = nominal_head(searched.family.left_out());
+        line(if kinds.only().is_some() { head } else { format!("{head}: {} of {}", found.nominal(), Counted(found.known.len(), "value")) });
+    }
+    line(format!("{} from {}", kind.says(found.first.word()), range.text(range.low)));
+    for crossing in &found.crossings {
+        line(crossing_in_words(range, crossing));
+    }
+    if found.crossings.is_empty() {
+        line(format!("no crossing up to {}", range.text(range.high)));
+    }
+    for stretch in &found.marginal {
+        if stretch.low < stretch.high {
+            line(format!("cannot be told from 1 from {} to {}", range.text(stretch.low), range.text(stretch.high)));
+        } else {
+            line(format!("touches 1, or comes closer than can be told, at {}", range.text(stretch.low)));
+        }
+    }
+    let unit = &range.unit;
+    line(format!(
+        "{} looked at, {:.3e}{unit} to {:.3e}{unit} apart; crossings to {:.1e}{unit}. What comes and goes between two of them without a trace is not seen",
+        Counted(found.samples, "value"),
+        found.finest,
+        found.coarsest,
+        searched.options.tolerance
+    ));
+    if !found.is_settled() {
+        line(if found.samples < searched.options.most && is_ended {
+            "NOT SETTLED: it was ended before it had looked as closely as it should; what lies between two values is open".to_owned()
+        } else {
+            "NOT SETTLED: it ended after the most values that it may look at; --values allows more, and a larger tolerance or a shorter range decides"
+                .to_owned()
+        });
+    }
+    searched.notes().iter().for_each(|note| line(format!("note: {note}")));
+    text
+}

@@ -1,0 +1,115 @@
+//! What maps answer: the document, the words and the tables of maps over two keys.
+
+mod document;
+mod glance;
+mod words;
+
+use cohaptic_stability::{Criterion, KeyRange, Kinds, Map, Verdict, VerdictKind};
+use cohaptic_units::print::csv_field;
+
+use crate::nominal;
+pub use document::document;
+pub use words::words;
+
+/// Maps of one scene over the same keys.
+#[derive(Clone, Copy, Debug)]
+pub struct Filled<'a> {
+    /// The title of the scene.
+    pub title: &'a str,
+    /// The keys along x and y.
+    pub axes: [&'a KeyRange; 2],
+    /// The map of the scene as it stands, and those of its variants.
+    pub maps: &'a [VariantMap],
+}
+
+/// The map of a variant of a scene.
+#[derive(Clone, Debug)]
+pub struct VariantMap {
+    /// Its name in the legend.
+    pub name: String,
+    /// What differs from the scene as it stands.
+    pub overrides: Vec<String>,
+    /// The radii.
+    pub map: Map,
+    /// By which radius it judges.
+    pub criterion: Criterion,
+    /// Random parts of the links that its nominal cells leave out, in words.
+    pub left_out: Vec<&'static str>,
+    /// Of every cell, row after row.
+    pub verdicts: Vec<Vec<Verdict>>,
+    /// Its table, if it was written.
+    pub file: Option<String>,
+}
+
+/// How fast the maps were filled.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Speed {
+    /// The time that it took \[s\].
+    pub wall_s: f64,
+    /// Cells computed now.
+    pub cells: usize,
+}
+
+impl Speed {
+    fn cells_per_s(self) -> f64 {
+        share(self.cells, 1) / self.wall_s
+    }
+}
+
+impl Filled<'_> {
+    /// Returns what the radii of the maps leave out.
+    fn notes(&self) -> Vec<String> {
+        let cells: usize = self.maps.iter().map(VariantMap::nominal_cells).sum();
+        nominal(cells, ["cell is", "cells are"]).into_iter().collect()
+    }
+}
+
+impl VariantMap {
+    /// How many of its cells leave out what their links leave to chance.
+    fn nominal_cells(&self) -> usize {
+        self.map.nominal.iter().flatten().filter(|nominal| **nominal).count()
+    }
+
+    /// Returns the numbers of its cells, by the question that their verdicts answer.
+    fn kinds(&self) -> Kinds {
+        Kinds::of(self.criterion, self.map.nominal.iter().flatten().copied())
+    }
+
+    /// Returns the share of the cells of a kind that is stable.
+    fn stable_fraction_of(&self, kind: VerdictKind) -> f64 {
+        let all = self.verdicts.iter().flatten().zip(self.map.nominal.iter().flatten());
+        let of_kind: Vec<Verdict> = all.filter(|(_, nominal)| self.criterion.kind(**nominal) == kind).map(|(verdict, _)| *verdict).collect();
+        share(of_kind.iter().filter(|verdict| **verdict == Verdict::Stable).count(), of_kind.len())
+    }
+
+    /// What share of its cells is stable.
+    fn stable_fraction(&self) -> f64 {
+        let cells = || self.verdicts.iter().flatten();
+        share(cells().filter(|verdict| **verdict == Verdict::Stable).count(), cells().count())
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "far fewer cells than 2^52")]
+fn share(part: usize, whole: usize) -> f64 {
+    part as f64 / whole.max(1) as f64
+}
+
+/// Returns `map.csv`: one row a cell, x running fastest.
+#[must_use]
+pub fn csv([x, y]: [&KeyRange; 2], VariantMap { map, criterion, verdicts, .. }: &VariantMap) -> String {
+    let keys = format!("{},{}", csv_field(&x.key), csv_field(&y.key));
+    let mut text = match criterion {
+        Criterion::SpectralRadius => format!("{keys},spectral_radius,verdict\n"),
+        Criterion::MeanSquare => format!("{keys},mean_square_radius,verdict,judged\n"),
+    };
+    for (((y, row), verdicts), nominal) in map.y.iter().zip(&map.radius).zip(verdicts).zip(&map.nominal) {
+        for (((x, radius), verdict), nominal) in map.x.iter().zip(row).zip(verdicts).zip(nominal) {
+            text.push_str(&format!("{x:?},{y:?},{radius:?},{}", verdict.word()));
+            if *criterion == Criterion::MeanSquare {
+                text.push_str(&format!(",{}", criterion.kind(*nominal).word()));
+            }
+            text.push('\n');
+        }
+    }
+    text
+}

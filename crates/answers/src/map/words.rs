@@ -1,0 +1,64 @@
+//! Maps in words, with small pictures.
+
+use std::fmt::Write as _;
+
+use cohaptic_stability::{KeyRange, Verdict, VerdictKind, nominal_head};
+use cohaptic_units::print::Counted;
+
+use super::{Filled, Speed, VariantMap, glance};
+use crate::{are, figure, label};
+
+/// More pictures than this do not fit on a screen.
+const MOST_PICTURES: usize = 4;
+
+/// Maps in words, for people. `pictures`: whether small pictures of them stand in the text.
+#[must_use]
+pub fn words(filled: &Filled<'_>, speed: Speed, pictures: bool) -> String {
+    let Filled { title, axes, maps } = *filled;
+    let mut text = format!("{title}\n");
+    for (number, map) in maps.iter().enumerate() {
+        // Writing to a string does not fail.
+        let _ = match maps.len() {
+            1 => writeln!(text),
+            _ => writeln!(text, "\n{}", map.name),
+        };
+        if pictures && number < MOST_PICTURES {
+            let (x, y) = (label(axes[0]), label(axes[1]));
+            let shown = (glance::Axis { label: &x, values: &map.map.x }, glance::Axis { label: &y, values: &map.map.y });
+            text.push_str(&glance::draw(&shown.0, &shown.1, |column, row| map.verdicts[row][column] == Verdict::Stable));
+        }
+        text.push_str(&headline(axes, map));
+    }
+    let _ = writeln!(text, "\n{} computed in {:.3} s: {:.0} a second", Counted(speed.cells, "cell"), speed.wall_s, speed.cells_per_s());
+    for note in filled.notes() {
+        let _ = writeln!(text, "note: {note}");
+    }
+    text
+}
+
+/// The share of stable cells, a line for each question that verdicts answer: a share over cells of several kinds would answer none.
+fn headline(axes: [&KeyRange; 2], map: &VariantMap) -> String {
+    let is_mixed = map.kinds().only().is_none();
+    let line = |(kind, count): (VerdictKind, usize)| {
+        let cells = if is_mixed { format!("{} judged {} {}", Counted(count, "cell"), kind.manner(), verb(count)) } else { are(count, "cell") };
+        let head = if kind == VerdictKind::Nominal { format!("{}: ", nominal_head(&map.left_out)) } else { String::new() };
+        format!("  {head}{:.2} % of {cells} {}{}\n", 100.0 * map.stable_fraction_of(kind), kind.says("stable"), least(axes, map, kind))
+    };
+    map.kinds().present().map(line).collect()
+}
+
+const fn verb(count: usize) -> &'static str {
+    if count == 1 { "is" } else { "are" }
+}
+
+/// The least radius of the cells of a kind, and where it is.
+fn least([x_range, y_range]: [&KeyRange; 2], VariantMap { map, criterion, .. }: &VariantMap, kind: VerdictKind) -> String {
+    let rows = map.y.iter().zip(map.radius.iter().zip(&map.nominal));
+    let cells =
+        rows.flat_map(|(y, (row, nominal))| map.x.iter().zip(row.iter().zip(nominal)).map(move |(x, (radius, nominal))| (*radius, *x, *y, *nominal)));
+    let of_kind = cells.filter(|(radius, _, _, nominal)| radius.is_finite() && criterion.kind(*nominal) == kind);
+    let least = of_kind.min_by(|one, other| one.0.total_cmp(&other.0));
+    least.map_or_else(String::new, |(radius, x, y, _)| {
+        format!("; the least {} is {}, at {} and {}", kind.radius_name(), figure(radius, 6), x_range.text(x), y_range.text(y))
+    })
+}
