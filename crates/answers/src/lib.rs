@@ -8,6 +8,7 @@
 //!
 //! The commands that have a module of their own have their answer in its function `document`, and the text for people in its function `words`: [`campaign`],
 //! [`compare`], [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`].
+//! [`shards`] has those of work that several processes share.
 //!
 //! Nothing here reads a clock or prints: [`measure()`] is given a clock.
 //!
@@ -47,6 +48,8 @@ mod pictures;
 pub mod point;
 mod quick_verdict;
 mod run;
+mod run_words;
+pub mod shards;
 mod text_plot;
 mod words;
 
@@ -54,12 +57,11 @@ pub use check::{Answered, OutcomeDocument, check};
 pub use explanation::explanation;
 pub use methods::{Kind, Measured, MeasuredMethod, MeasurementWatch, Method, cost_picture, error_in_words, explanation_with_costs, measure, methods};
 pub use notes::notes;
-pub use parts::{MOST_LINKS, access_line, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
-pub use pictures::{
-    AdmittanceCurve, AdmittanceWords, NamedMap, admittance_picture, admittance_words, axis_of, axis_of_key, boundary_picture, crossing_in_words,
-    label, map_picture,
-};
+pub use parts::{access_line, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
+pub use pictures::{AdmittanceCurve, NamedMap, admittance_picture, axis_of, boundary_picture, map_picture};
+pub(crate) use pictures::{AdmittanceWords, admittance_words, axis_of_key, crossing_in_words, label};
 pub use quick_verdict::{OPERATIONS_A_SECOND, Quick, quick_verdict};
 pub use run::run;
-pub use text_plot::text_plot;
+pub use run_words::{angle_text, diverged, measured_lines, packets, run_words};
+pub(crate) use text_plot::text_plot;
 pub use words::{are, figure, length, nominal};

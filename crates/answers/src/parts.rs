@@ -48,7 +48,7 @@ pub fn rotation(summary: &Summary) -> Option<impl Serialize + use<>> {
 }
 
 /// More links than these are not listed one by one.
-pub const MOST_LINKS: u64 = 1000;
+pub(crate) const MOST_LINKS: u64 = 1000;
 
 /// Each link between two peers at the end of a run, if they are listed.
 pub fn peer_links(scene: &Scene, summary: &Summary) -> Option<Vec<impl Serialize + use<>>> {

@@ -6,8 +6,7 @@ const WIDTH: usize = 72;
 const HEIGHT: usize = 12;
 
 /// Draws curves of positions into one frame, with the ends of both axes, and says if values far beyond were cut off. `scale` turns values into `unit`.
-#[must_use]
-pub fn text_plot(bands: &Bands, scale: f64, unit: &str) -> String {
+pub(crate) fn text_plot(bands: &Bands, scale: f64, unit: &str) -> String {
     let (range, cut) = bands.range(SANE_POSITION);
     let mut dots = [[0_u8; WIDTH]; HEIGHT];
     for curve in 0..bands.curves() {

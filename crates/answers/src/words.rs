@@ -8,8 +8,8 @@ pub fn length(metres: f64) -> String {
     if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }
 }
 
-/// Returns what the verdicts of so many combinations, cells or values leave out, because their second moment cannot be followed; `None` if there are none. `one` and
-/// `several` follow the number: "cell is", "cells are".
+/// Returns what the verdicts of a number of combinations, cells or values leave out, because their second moment cannot be followed; `None` if there are none.
+/// `one` and `several` follow the number: "cell is", "cells are".
 #[must_use]
 pub fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
     (count > 0).then(|| {

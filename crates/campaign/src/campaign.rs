@@ -334,7 +334,7 @@ impl Campaign {
     /// # Errors
     ///
     /// [`CampaignError::File`] if the table cannot be read, [`CampaignError::Damaged`] if it is not as it was written, [`CampaignError::Size`] if it has more than
-    /// [`MOST_NUMBERS_COMPARED`] numbers.
+    /// [`MOST_NUMBERS_COMPARED`](crate::MOST_NUMBERS_COMPARED) numbers.
     pub fn compare(&self) -> Result<Comparison, CampaignError> {
         let measures = compared(&self.columns, self.runs())?;
         let path = self.table_file();

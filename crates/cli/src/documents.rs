@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-pub(crate) use cohaptic_answers::{MOST_LINKS, access_line, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
+pub(crate) use cohaptic_answers::{access_line, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 #[cfg(target_os = "linux")]
 use cohaptic_realtime::LatenessSummary;
 use serde::Serialize;

@@ -29,7 +29,6 @@ mod interrupt;
 mod link;
 #[cfg(target_os = "linux")]
 mod live;
-mod measures;
 mod output;
 mod paper;
 #[cfg(target_os = "linux")]

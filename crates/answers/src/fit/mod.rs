@@ -71,8 +71,8 @@ pub enum FitFailure {
 }
 
 impl Source {
-    /// Estimates the link, and reads it as a scene reads it. `file` is the name of the file with the link, `delays_file` that of the file of delays beside it, which the link
-    /// names where no law fits. Neither of the files need exist.
+    /// Estimates the link, and reads it as a scene reads it. `file` is the name of the file with the link. `delays_file` is that of the file of delays beside
+    /// it, which the link names where no law fits. Neither of the files need exist.
     ///
     /// # Errors
     ///

@@ -44,7 +44,8 @@ const HEAD: u64 = 256;
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 impl Source {
-    /// Reads a table of delays or a log of fates. A log is read line by line, a table as a whole: `as_table` gets the rest of the reader before, to limit its length.
+    /// Reads a table of delays or a log of fates. A log is read line by line, a table as a whole: `as_table` gets the rest of the reader before, to limit its
+    /// length.
     ///
     /// # Errors
     ///

@@ -16,7 +16,7 @@ pub struct AdmittanceCurve<'a> {
 
 /// The words about an admittance.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct AdmittanceWords {
+pub(crate) struct AdmittanceWords {
     /// The motion over the push: `velocity over force`.
     pub what: String,
     /// The unit of that.
@@ -28,8 +28,7 @@ pub struct AdmittanceWords {
 }
 
 /// In words: the motion over the push, what the whole object alone is, and the units of both.
-#[must_use]
-pub fn admittance_words(admittance: &Admittance) -> AdmittanceWords {
+pub(crate) fn admittance_words(admittance: &Admittance) -> AdmittanceWords {
     let [push, seen] = admittance.axes();
     let along = |axis: PushedAxis| format!(" {} {}", if axis.is_turn() { "about" } else { "along" }, axis.word().trim_start_matches('r'));
     let [force, velocity] = if push == seen { [push, seen].map(|_| String::new()) } else { [push, seen].map(along) };

@@ -4,8 +4,7 @@ use cohaptic_picture::Axis;
 use cohaptic_stability::KeyRange;
 
 /// The key with the unit that its range has, or else that of the key itself: `coordination.stiffness [N/m]`, `link.delay [ms]`.
-#[must_use]
-pub fn label(range: &KeyRange) -> String {
+pub(crate) fn label(range: &KeyRange) -> String {
     match shown_unit(&range.key, &range.unit) {
         Some(unit) => format!("{} [{unit}]", range.key),
         None => range.key.clone(),
@@ -19,8 +18,7 @@ pub fn axis_of(range: &KeyRange) -> Axis {
 }
 
 /// The same of a key whose values have that unit, which may be empty.
-#[must_use]
-pub fn axis_of_key(key: &str, unit: &str) -> Axis {
+pub(crate) fn axis_of_key(key: &str, unit: &str) -> Axis {
     let named = NAMES.iter().find(|(known, _, _)| *known == key.trim());
     let axis = named.map_or_else(|| Axis::new(key), |(_, name, symbol)| Axis::new(*name).symbol(symbol));
     axis.unit(shown_unit(key, unit).unwrap_or_default())

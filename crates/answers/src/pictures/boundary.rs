@@ -29,8 +29,7 @@ pub fn boundary_picture(title: &str, range: &KeyRange, criterion: Criterion, lef
 }
 
 /// What changes at a crossing: `unstable from link.delay=54ms (before: stable)`.
-#[must_use]
-pub fn crossing_in_words(range: &KeyRange, crossing: &Crossing) -> String {
+pub(crate) fn crossing_in_words(range: &KeyRange, crossing: &Crossing) -> String {
     format!("{} from {} (before: {})", crossing.to.word(), range.text(crossing.value), crossing.from.word())
 }
 

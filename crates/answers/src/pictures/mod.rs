@@ -5,7 +5,10 @@ mod axis;
 mod boundary;
 mod map;
 
-pub use admittance::{AdmittanceCurve, AdmittanceWords, admittance_picture, admittance_words};
-pub use axis::{axis_of, axis_of_key, label};
-pub use boundary::{boundary_picture, crossing_in_words};
+pub use admittance::{AdmittanceCurve, admittance_picture};
+pub(crate) use admittance::{AdmittanceWords, admittance_words};
+pub use axis::axis_of;
+pub(crate) use axis::{axis_of_key, label};
+pub use boundary::boundary_picture;
+pub(crate) use boundary::crossing_in_words;
 pub use map::{NamedMap, map_picture};

@@ -46,7 +46,7 @@ pub struct Figures {
     pub difference: Option<Estimate>,
 }
 
-/// Returns the columns that are compared, in the order of the table of so many runs.
+/// Returns the columns that are compared, in the order of the table. `runs`: the number of its rows.
 ///
 /// # Errors
 ///

@@ -18,7 +18,7 @@ pub(crate) fn shard(
     shard: Shard,
     folder: &Path,
     judge: impl FnOnce(&mut SharedCampaign, &dyn Watch) -> Result<u64, CampaignError>,
-) -> Result<Done<'_>, Ended> {
+) -> Result<Done, Ended> {
     let combinations = plan.combinations();
     let owner = owner();
     let checking = Shown::checking(combinations);
@@ -30,13 +30,13 @@ pub(crate) fn shard(
     worker.end(done, Ended::Said)
 }
 
-fn work<'a>(
+fn work(
     shared: &mut SharedCampaign,
     shard: Shard,
-    folder: &'a Path,
+    folder: &Path,
     worker: &Worker,
     judge: impl FnOnce(&mut SharedCampaign, &dyn Watch) -> Result<u64, CampaignError>,
-) -> Result<Done<'a>, Ended> {
+) -> Result<Done, Ended> {
     let ended = |what: &str| {
         Ended::Said(Failure::Interrupted(format!("shard {shard}: {what} is kept in {}; the same command goes on from there", output::path(folder))))
     };
@@ -59,7 +59,7 @@ fn work<'a>(
         return Err(ended(&format!("all but {} of its {} runs", report.left, report.runs)));
     }
     let wall_s = worker.wall_s();
-    Ok(Done { shard, folder, names: NAMES, pieces: report.parts, units: report.runs, computed: report.computed, wall_s })
+    Ok(Done { shard, folder: output::path(folder), names: NAMES, pieces: report.parts, units: report.runs, computed: report.computed, wall_s })
 }
 
 /// Shows how far a shard is, and ends it when it must.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use cohaptic_answers::measured_lines;
 use cohaptic_harness::Ending;
 use cohaptic_harness::live::SeatStats;
 use cohaptic_live::session::SocketCounts;
@@ -13,7 +14,6 @@ use serde::Serialize;
 
 use crate::document_schema::document;
 use crate::documents::{access_line, lateness, link_quantiles, link_totals, measures_of, micros, peer, peer_links, rotation};
-use crate::measures::measured_lines;
 use crate::output;
 use crate::realtime::{late, notes};
 use crate::run::answer::{diverged, length, packets};

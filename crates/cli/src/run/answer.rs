@@ -1,16 +1,11 @@
 //! A run as a JSON document and in words.
 
-pub(crate) use cohaptic_answers::length;
-use cohaptic_harness::{DIVERGED_DISTANCE, Ending, LinkQuantiles, Summary};
+pub(crate) use cohaptic_answers::{angle_text, diverged, length, packets};
 use cohaptic_scene::Scene;
-use cohaptic_units::print::{Counted, Span};
-use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
 
 use super::Run;
 use crate::document_schema::document;
-use crate::documents::MOST_LINKS;
-use crate::measures::measured_lines;
 use crate::output;
 
 /// The answer of `cohaptic run --json`. `otherwise`: the differences of the scene from that of the session that is replayed. `against`: the document of the
@@ -29,102 +24,5 @@ pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option
 
 /// A run in words.
 pub(super) fn describe(scene: &Scene, run: &Run) -> String {
-    let mut text = String::new();
-    let summary = &run.summary;
-    let mut line = |line: String| text.push_str(&format!("{line}\n"));
-    if let Some(positions) = &run.positions {
-        line(format!("position of each copy of the object{}", if scene.axes.count() > 1 { ", along x" } else { "" }));
-        line(cohaptic_answers::text_plot(positions, 100.0, "cm").trim_end().to_owned());
-    }
-    let simulated = Span(summary.duration);
-    match summary.ending {
-        Ending::Complete | Ending::Diverged(_) => diverged(summary).into_iter().for_each(|why| line(format!("  DIVERGED: {why}"))),
-        Ending::Interrupted(_) => line(format!("  INTERRUPTED after {simulated} of {}", Span(scene.duration))),
-    }
-    let factor = summary.duration.as_secs_f64() / run.wall_s;
-    line(format!("  {simulated} simulated, {}, in {:.3} s: {factor:.0} times real time", Counted(summary.ticks, "tick"), run.wall_s));
-    line(format!("  largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
-    if let Some(angle) = summary.max_rotation_discrepancy {
-        line(format!("  largest angle between two copies: {}", angle_text(angle)));
-    }
-    for peer in summary.peers.iter().take(MOST_PEERS) {
-        let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
-        line(format!("  {} ends at {}", peer.name, position.join(", ")));
-    }
-    if summary.peers.len() > MOST_PEERS {
-        line(format!("  ... and {}", Counted(summary.peers.len() - MOST_PEERS, "more peer")));
-    }
-    line(format!("  {}", packets(summary)));
-    if summary.links.len() > MOST_LINKS {
-        over_links(summary).into_iter().for_each(|over| line(format!("  {over}")));
-    }
-    measured_lines(scene, &run.measured).into_iter().for_each(|measured| line(format!("  {measured}")));
-    text
-}
-
-/// The summary for people names this many peers at most.
-const MOST_PEERS: usize = 8;
-
-/// Returns how a run [diverged](Summary::has_diverged), in words; `None` if the run did not diverge.
-pub(crate) fn diverged(summary: &Summary) -> Option<String> {
-    match summary.ending {
-        Ending::Diverged(at) => Some(format!("at {at} a position or a velocity is not finite")),
-        Ending::Complete | Ending::Interrupted(_) => summary.has_diverged().then(|| format!("two copies were more than {DIVERGED_DISTANCE} m apart")),
-    }
-}
-
-pub(crate) fn angle_text(radians: f64) -> String {
-    format!("{radians:.4} rad ({:.2}°)", radians.to_degrees())
-}
-
-/// How the links of a large mesh differ.
-fn over_links(summary: &Summary) -> Vec<String> {
-    let words = |what: &str, unit: &str, factor: f64, quantiles: Option<LinkQuantiles>| {
-        quantiles.map(|LinkQuantiles { min, p01, p50, p99, max }| {
-            let [min, p01, p50, p99, max] = [min, p01, p50, p99, max].map(|value| format!("{:.3}{unit}", value * factor));
-            format!("{what} over links: least {min}, 1 % {p01}, median {p50}, 99 % {p99}, greatest {max}")
-        })
-    };
-    let delivered = words("delivered", " %", 100.0, summary.links.delivered_fraction());
-    delivered.into_iter().chain(words("mean delay", " ms", 1e3, summary.links.mean_delay())).collect()
-}
-
-/// What became of all packets, end to end.
-pub(crate) fn packets(summary: &Summary) -> String {
-    let total = summary.links.total();
-    // A packet enters at the uplink of its sender, or at the link, and leaves at the downlink of its receiver, or at the link.
-    let through = |uplink: bool, count: fn(&LinkStats) -> u64| -> u64 {
-        let lines = || summary.access_lines.iter().filter(move |line| line.uplink == uplink);
-        if lines().next().is_none() {
-            return count(&total);
-        }
-        let mut has_line = vec![false; summary.peers.len()];
-        lines().for_each(|line| has_line[line.peer] = true);
-        let links = summary.links.iter().filter(|link| !has_line[if uplink { link.from } else { link.to }]);
-        lines().map(|line| count(&line.stats)).sum::<u64>() + links.map(|link| count(&link.stats)).sum::<u64>()
-    };
-    let (sent, delivered) = (through(true, LinkStats::offered), through(false, LinkStats::delivered));
-    let mut everywhere = total;
-    summary.access_lines.iter().for_each(|line| everywhere.add(&line.stats, 1));
-    let mut parts = vec![format!("{} sent over {}", Counted(sent, "packet"), Counted(summary.links.len(), "link")), format!("{delivered} delivered")];
-    let copies = everywhere.duplicated();
-    if copies > 0 {
-        parts.push(format!("{} made", Counted(copies, "copy")));
-    }
-    for cause in DropCause::ALL {
-        let dropped = everywhere.dropped(cause);
-        if dropped > 0 {
-            parts.push(format!("{dropped} dropped ({})", cause.name()));
-        }
-    }
-    parts.push(format!("{} on the way at the end", everywhere.in_flight()));
-    let stale: u64 = summary.peers.iter().map(|peer| peer.stale_samples).sum();
-    if stale > 0 {
-        parts.push(format!("{stale} of those delivered too late to be used"));
-    }
-    let refused: u64 = summary.peers.iter().map(|peer| peer.refused_samples).sum();
-    if refused > 0 {
-        parts.push(format!("{refused} delivered damaged and refused"));
-    }
-    parts.join(", ")
+    cohaptic_answers::run_words(scene, &run.summary, &run.measured, run.wall_s, run.positions.as_ref())
 }

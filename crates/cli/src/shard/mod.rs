@@ -8,17 +8,18 @@ mod worker;
 use std::path::Path;
 use std::process::ExitCode;
 
+pub(crate) use cohaptic_answers::shards::{Done, Names, Piece};
+use cohaptic_answers::shards::{done_document, done_words};
 use cohaptic_campaign::Shard;
 use cohaptic_files::OwnFolder;
-use cohaptic_units::print::Counted;
 
 use crate::arguments::{ShardArguments, ShardName};
-use crate::document_schema::{DocumentSchema, document};
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::file::own_folder;
 use crate::output::{self, NO_FILES};
 
-pub(crate) use status::{Piece, all_done, logs_in, missing, show};
+pub(crate) use status::{all_done, logs_in, missing, show};
 use worker::nobody_works_in;
 pub(crate) use worker::{Worker, owner};
 
@@ -77,49 +78,8 @@ impl<'a> Sharing<'a> {
     }
 }
 
-/// A shard that is done.
-pub(crate) struct Done<'a> {
-    pub(crate) shard: Shard,
-    pub(crate) folder: &'a Path,
-    /// What the work is cut into, and what a piece of it is made of.
-    pub(crate) names: Names,
-    /// How many pieces the shard has, and of how many units they are.
-    pub(crate) pieces: u64,
-    pub(crate) units: u64,
-    /// How many units were computed this time.
-    pub(crate) computed: u64,
-    pub(crate) wall_s: f64,
-}
-
-/// What the work is cut into, such as parts, and what these are made of, such as runs.
-#[derive(Clone, Copy)]
-pub(crate) struct Names {
-    pub(crate) piece: &'static str,
-    pub(crate) unit: &'static str,
-}
-
 /// Says that a shard is done.
-pub(crate) fn answer(json: bool, done: &Done<'_>) -> Result<ExitCode, Failure> {
-    let Done { shard, folder, names, pieces, units, computed, wall_s } = done;
-    let document = document! {
-        shard: shard.to_string(),
-        out: output::path(folder),
-        piece: names.piece,
-        unit: names.unit,
-        pieces: pieces,
-        units: units,
-        units_computed: computed,
-        wall_s: wall_s,
-    };
-    let words = || {
-        let folder = output::path(folder);
-        if *pieces == 0 {
-            return format!("shard {shard} in {folder}: there are fewer {}s than shards, and none is this one's\n", names.piece);
-        }
-        let there = if computed < units { format!(", {} there already", units - computed) } else { String::new() };
-        let (pieces, units) = (Counted(*pieces, names.piece), Counted(*units, names.unit));
-        format!("shard {shard} in {folder}: {pieces} of {units}, {computed} computed in {wall_s:.3} s{there}\n")
-    };
-    output::answer(json, DocumentSchema::SHARD, &document, words, NO_FILES)?;
+pub(crate) fn answer(json: bool, done: &Done) -> Result<ExitCode, Failure> {
+    output::answer(json, DocumentSchema::SHARD, &done_document(done), || done_words(done), NO_FILES)?;
     Ok(ExitCode::SUCCESS)
 }

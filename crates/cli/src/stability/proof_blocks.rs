@@ -82,7 +82,7 @@ impl KnownPieces for Pieces<'_> {
     }
 }
 
-impl<'a> Proofs<'a> {
+impl Proofs<'_> {
     /// Whether each block is done.
     pub(super) fn pieces(self) -> Result<Vec<Piece>, Failure> {
         let (rows, _) = self.kept.read()?;
@@ -103,7 +103,7 @@ impl<'a> Proofs<'a> {
     }
 
     /// Looks at the blocks of a shard.
-    pub(super) fn shard(self, shard: Shard, failed: impl Fn(usize, ProofError) -> Failure) -> Result<Done<'a>, Failure> {
+    pub(super) fn shard(self, shard: Shard, failed: impl Fn(usize, ProofError) -> Failure) -> Result<Done, Failure> {
         let folder = self.kept.folder;
         // Rows of other work are refused before anything is written.
         self.kept.read()?;
@@ -111,7 +111,15 @@ impl<'a> Proofs<'a> {
         let owner = owner();
         let worker = Worker::begin(folder, shard, &owner)?;
         let done = self.blocks_of_shard(shard, &owner.name(), &worker, &failed);
-        let done = done.map(|[pieces, computed]| Done { shard, folder, names: NAMES, pieces, units: pieces, computed, wall_s: worker.wall_s() });
+        let done = done.map(|[pieces, computed]| Done {
+            shard,
+            folder: output::path(folder),
+            names: NAMES,
+            pieces,
+            units: pieces,
+            computed,
+            wall_s: worker.wall_s(),
+        });
         worker.end(done, |failure| failure)
     }
 

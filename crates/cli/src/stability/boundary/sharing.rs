@@ -41,7 +41,7 @@ pub(super) fn pieces(order: &Order, kept: Kept<'_>) -> Result<Vec<Piece>, Failur
 }
 
 /// Searches the blocks of a shard.
-pub(super) fn shard<'a>(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept<'a>) -> Result<Done<'a>, Failure> {
+pub(super) fn shard(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept<'_>) -> Result<Done, Failure> {
     // Rows of other work are refused before anything is written.
     kept.read()?;
     std::fs::create_dir_all(kept.folder).map_err(|error| Failure::File { verb: "create", path: kept.folder.to_path_buf(), error })?;
@@ -51,7 +51,7 @@ pub(super) fn shard<'a>(order: &Order, arguments: &BoundaryArguments, shard: Sha
     worker.end(done, |failure| failure)
 }
 
-fn search<'a>(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept<'a>, name: &str, worker: &Worker) -> Result<Done<'a>, Failure> {
+fn search(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept<'_>, name: &str, worker: &Worker) -> Result<Done, Failure> {
     let (file, rows) = kept.open(Some(name))?;
     let mine: Vec<(u64, (BoundaryBlock, bool))> = (0..).zip(blocks(order, &rows)).filter(|(place, _)| shard.has(*place)).collect();
     let (pieces, all) = (mine.len() as u64, mine.iter().map(|(_, (block, _))| units(block)).sum());
@@ -96,5 +96,5 @@ fn search<'a>(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: 
         let kept = format!("{done} of its {pieces} blocks are whole, and what was looked at is kept in {}", output::path(kept.folder));
         return Err(Failure::Interrupted(format!("shard {shard}: {kept}; the same command goes on from there")));
     }
-    Ok(Done { shard, folder: kept.folder, names: NAMES, pieces, units: all, computed, wall_s: worker.wall_s() })
+    Ok(Done { shard, folder: output::path(kept.folder), names: NAMES, pieces, units: all, computed, wall_s: worker.wall_s() })
 }

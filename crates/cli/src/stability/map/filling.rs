@@ -79,7 +79,7 @@ fn threads(arguments: &MapArguments) -> usize {
 }
 
 /// Fills the rows of a shard.
-pub(super) fn shard<'a>(order: &Order, arguments: &MapArguments, shard: Shard, folder: &'a Path) -> Result<Done<'a>, Failure> {
+pub(super) fn shard(order: &Order, arguments: &MapArguments, shard: Shard, folder: &Path) -> Result<Done, Failure> {
     let header = header(order, arguments, WHAT)?;
     let kept = Kept { folder, name: ROWS, header: &header };
     // Rows of other work are refused before anything is written.
@@ -88,7 +88,15 @@ pub(super) fn shard<'a>(order: &Order, arguments: &MapArguments, shard: Shard, f
     let owner = owner();
     let worker = Worker::begin(folder, shard, &owner)?;
     let done = rows_of_shard(order, arguments, shard, kept, &owner.name(), &worker);
-    let done = done.map(|[pieces, units, computed]| Done { shard, folder, names: NAMES, pieces, units, computed, wall_s: worker.wall_s() });
+    let done = done.map(|[pieces, units, computed]| Done {
+        shard,
+        folder: output::path(folder),
+        names: NAMES,
+        pieces,
+        units,
+        computed,
+        wall_s: worker.wall_s(),
+    });
     worker.end(done, |failure| failure)
 }
 

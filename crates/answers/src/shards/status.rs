@@ -1,0 +1,151 @@
+//! The status of shared work, as a JSON document and in words.
+
+use std::fmt::Write as _;
+
+use cohaptic_campaign::Missing;
+use serde::Serialize;
+
+use super::worker::State;
+use super::{Names, Piece, Worker};
+use crate::{document, figure};
+
+/// Work that several processes share, and those that do it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Status<'a> {
+    /// The folder, as it was named.
+    pub folder: String,
+    /// What the work is cut into.
+    pub names: Names,
+    /// The pieces of the work, in order.
+    pub pieces: &'a [Piece],
+    /// The workers that ever were in the folder, in the order of their shards.
+    pub workers: Vec<Worker>,
+}
+
+impl Status<'_> {
+    fn at_work(&self) -> impl Iterator<Item = &Worker> {
+        self.workers.iter().filter(|worker| worker.state == State::Working)
+    }
+
+    /// Returns the units of a worker's shard that are not done.
+    fn left(&self, worker: &Worker) -> u64 {
+        (0..).zip(self.pieces).filter(|(place, piece)| !piece.is_done && worker.shard.has(*place)).map(|(_, piece)| piece.units).sum()
+    }
+
+    /// Returns when a worker will be done \[s\]; `None` if it did nothing yet.
+    #[expect(clippy::cast_precision_loss, reason = "fewer units than 2^52")]
+    fn ends_in(&self, worker: &Worker) -> Option<f64> {
+        worker.units_per_s().map(|speed| self.left(worker) as f64 / speed)
+    }
+
+    /// Returns when a worker that is at work will be done \[s\].
+    fn worker_ends_in(&self, worker: &Worker) -> Option<f64> {
+        self.ends_in(worker).filter(|_| worker.state == State::Working)
+    }
+
+    /// Returns the numbers of pieces, and of units in them: of all, and of those that are done.
+    fn counts(&self) -> [(u64, u64); 2] {
+        let of = |is_meant: &dyn Fn(&Piece) -> bool| {
+            let meant: Vec<&Piece> = self.pieces.iter().filter(|piece| is_meant(piece)).collect();
+            (meant.len() as u64, meant.iter().map(|piece| piece.units).sum::<u64>())
+        };
+        [of(&|_| true), of(&|piece| piece.is_done)]
+    }
+
+    /// Returns the pieces that are not done and no worker does.
+    fn unassigned(&self) -> Vec<u64> {
+        let undone = |place: &u64, piece: &Piece| !piece.is_done && !self.at_work().any(|worker| worker.shard.has(*place));
+        (0..).zip(self.pieces).filter(|(place, piece)| undone(place, piece)).map(|(place, _)| place).collect()
+    }
+
+    /// Returns when all will be done \[s\]; `None` if anybody's end is not known, or if pieces are no worker's.
+    fn end(&self) -> Option<f64> {
+        let ends = self.at_work().map(|worker| self.ends_in(worker)).collect::<Option<Vec<f64>>>();
+        ends.filter(|_| self.unassigned().is_empty()).map(|ends| ends.into_iter().fold(0.0, f64::max))
+    }
+}
+
+/// The answer of `--status` with `--json`.
+pub fn status_document(status: &Status<'_>) -> impl Serialize {
+    let [all, done] = status.counts();
+    document! {
+        out: status.folder.as_str(),
+        piece: status.names.piece,
+        unit: status.names.unit,
+        pieces: all.0,
+        pieces_done: done.0,
+        units: all.1,
+        units_done: done.1,
+        pieces_unassigned: status.unassigned().len(),
+        ends_in_s: status.end(),
+        workers: status.workers.iter().map(|worker| document! {
+            shard: worker.shard.to_string(),
+            host: worker.host.as_str(),
+            process: worker.process,
+            state: worker.state.word(),
+            pieces: worker.pieces,
+            units: worker.units,
+            units_per_s: worker.units_per_s(),
+            units_left: status.left(worker),
+            ends_in_s: status.worker_ends_in(worker),
+        }).collect::<Vec<_>>(),
+    }
+}
+
+/// More workers are counted and not named.
+const MOST_WORKERS: usize = 100;
+
+/// The status of shared work in words.
+#[must_use]
+pub fn status_words(status: &Status<'_>) -> String {
+    let Status { folder, names: Names { piece, unit }, workers, .. } = status;
+    let ([all, done], end, unassigned) = (status.counts(), status.end(), status.unassigned());
+    let mut text = format!("{folder}: {} of {} {piece}s are done, {} of {} {unit}s\n", done.0, all.0, done.1, all.1);
+    let mut rows = vec![["shard", "state", "process", "host", "done", "left", "a second", "ends in"].map(str::to_owned)];
+    rows.extend(workers.iter().take(MOST_WORKERS).map(|worker| {
+        let speed = worker.units_per_s().map_or_else(|| "-".to_owned(), |speed| figure(speed, 1));
+        let end = status.worker_ends_in(worker).map_or_else(|| "-".to_owned(), span);
+        let [done, left] = [worker.units, status.left(worker)].map(|units| units.to_string());
+        [worker.shard.to_string(), worker.state.word().to_owned(), worker.process.to_string(), worker.host.clone(), done, left, speed, end]
+    }));
+    let widths: Vec<usize> = (0..rows[0].len()).map(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0)).collect();
+    if !workers.is_empty() {
+        for row in rows {
+            let cells: String = row.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}")).collect();
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "{cells}");
+        }
+    }
+    if let Some(more @ 1..) = workers.len().checked_sub(MOST_WORKERS) {
+        let _ = writeln!(text, "  ... and {more} more");
+    }
+    if !unassigned.is_empty() {
+        let missing = Missing { piece, count: all.0, pieces: unassigned };
+        let _ = writeln!(text, "no worker does these: {}", missing.words(workers.iter().map(|worker| worker.shard.count()).max()));
+    } else if done.0 == all.0 {
+        let _ = writeln!(text, "all is done: --merge puts it together");
+    } else if let Some(end) = end {
+        let _ = writeln!(text, "the rest is done in about {}", span(end));
+    }
+    text
+}
+
+/// A span in words.
+fn span(seconds: f64) -> String {
+    match seconds {
+        ..120.0 => format!("{seconds:.0} s"),
+        ..7200.0 => format!("{:.0} min", seconds / 60.0),
+        ..172_800.0 => format!("{:.1} h", seconds / 3600.0),
+        _ => format!("{:.1} days", seconds / 86_400.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans_have_a_unit_that_fits() {
+        assert_eq!([5.0, 119.4, 600.0, 9000.0, 864_000.0].map(span), ["5 s", "119 s", "10 min", "2.5 h", "10.0 days"]);
+    }
+}
