@@ -4,6 +4,7 @@
 //! scene the logical instant of either: that at which it was due, or that at which the kernel saw it. Files, live control and the terminal have threads of their own.
 
 mod config;
+mod driven;
 mod files;
 mod motion;
 mod outside;
@@ -12,10 +13,11 @@ mod rows;
 mod status;
 mod watch;
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use cohaptic_harness::live::{LiveDevice, LiveScene};
-use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Woken, prepare_thread};
+use cohaptic_realtime::{Clock as _, Driven as _, MonotonicClock, Schedule, drive, prepare_thread};
 use cohaptic_scene::{LinkKeys, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
@@ -75,6 +77,10 @@ pub struct Session {
     watch: Watch,
     config: SessionConfig,
     peers: usize,
+    /// The clock of the run, which begins with the run.
+    clock: MonotonicClock,
+    /// Whether the record can no longer be written.
+    is_stopped: bool,
 }
 
 /// So often the conductor is asked, and shown the session.
@@ -95,7 +101,8 @@ impl Session {
         let outside = Outside::open(scene, &config)?;
         let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene, config.content.clone(), config.recorded)).transpose()?;
         let peers = scene.peers.len();
-        Ok(Self { live: LiveScene::new(scene, devices), outside, watch: Watch::new(scene, recording), config, peers })
+        let (live, watch, clock) = (LiveScene::new(scene, devices), Watch::new(scene, recording), MonotonicClock::start());
+        Ok(Self { live, outside, watch, config, peers, clock, is_stopped: false })
     }
 
     /// Where the session listens; `None` in a scene without peers in other programs.
@@ -113,9 +120,9 @@ impl Session {
     /// [`SessionError`] if the system does not let it go on, or the record cannot be written. What was recorded until then is kept as far as it can be.
     pub fn run(mut self, conductor: &mut impl Conductor) -> Result<Report, SessionError> {
         let prepared = prepare_thread(&self.config.wishes);
-        let clock = MonotonicClock::start();
-        let driven = self.drive(&clock, conductor);
-        let behind = clock.now().saturating_duration_since(self.live.open());
+        self.clock = MonotonicClock::start();
+        let driven = self.conduct(conductor);
+        let behind = self.clock.now().saturating_duration_since(self.live.open());
         let summary = self.live.summary();
         let files = match self.watch.take_recording() {
             Some(recording) => recording.finish(&summary, &self.watch.ticks, &self.watch.releases)?,
@@ -137,35 +144,19 @@ impl Session {
         })
     }
 
-    fn drive(&mut self, clock: &MonotonicClock, conductor: &mut impl Conductor) -> Result<(), SessionError> {
-        let mut pacer = Pacer::new(self.config.pacing);
+    fn conduct(&mut self, conductor: &mut impl Conductor) -> Result<(), SessionError> {
         self.watch.is_shown = conductor.wants_status();
         self.watch.ended = conductor.wants_motion().then(Default::default);
-        let (mut next_look, mut looks) = (Instant::ZERO, 0_u32);
-        while let Some(due) = self.live.poll_timeout() {
-            let woken = {
-                let readable = self.outside.as_ref().and_then(Outside::readable);
-                pacer.wait(clock, Some(due), readable.as_slice())?
-            };
-            let now = clock.now();
-            self.watch.woken = now;
-            let happened = match woken {
-                Woken::Deadline => self.receive(clock)?.and_then(|()| self.live.handle_timeout(due, &mut self.watch)),
-                Woken::Readable => self.receive(clock)?,
-                Woken::Early => Ok(()),
-            };
-            let sent = happened.and_then(|()| self.send(clock));
-            if sent == Err(Stopped) {
-                // The record cannot be written: its end says why.
-                return Ok(());
-            }
-            if now >= next_look {
-                next_look = now + LOOK;
-                looks = looks.wrapping_add(1);
-                if self.look(conductor, clock, looks.is_multiple_of(SHOW_EVERY)) == Err(Stopped) {
-                    return Ok(());
-                }
-            }
+        let (schedule, mut looks) = (Schedule { pacing: self.config.pacing, end: None, look_every: LOOK }, 0_u32);
+        drive(self, &schedule, |session, now| {
+            looks = looks.wrapping_add(1);
+            let looked = session.look(conductor, now, looks.is_multiple_of(SHOW_EVERY));
+            session.note(looked);
+            if session.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        if self.is_stopped {
+            // The record cannot be written: its end says why.
+            return Ok(());
         }
         if conductor.wants_status() {
             conductor.show(self.status());
@@ -176,38 +167,16 @@ impl Session {
         Ok(())
     }
 
-    /// Everything that has come in, each at the instant at which the kernel saw it.
-    fn receive(&mut self, clock: &MonotonicClock) -> Result<Result<(), Stopped>, SessionError> {
-        let Self { outside: Some(outside), live, watch, .. } = self else { return Ok(Ok(())) };
-        let mut taken = Ok(());
-        outside.receive(clock, |at, peer, sample| {
-            if taken.is_ok() {
-                // A sample that the scene refuses is counted there.
-                taken = live.handle_sample(at, peer, sample, watch).map(drop);
-            }
-        })?;
-        Ok(taken)
+    fn note(&mut self, outcome: Result<(), Stopped>) {
+        self.is_stopped |= outcome.is_err();
     }
 
-    /// Sends on what the network has delivered.
-    fn send(&mut self, clock: &MonotonicClock) -> Result<(), Stopped> {
-        let Self { outside, live, watch, .. } = self;
-        let Some(outside) = outside else { return Ok(()) };
-        while let Some(transmit) = live.poll_transmit() {
-            if let Some(release) = outside.queue(clock, &transmit) {
-                watch.released(release)?;
-            }
-        }
-        outside.flush();
-        Ok(())
-    }
-
-    fn look(&mut self, conductor: &mut impl Conductor, clock: &MonotonicClock, show: bool) -> Result<(), Stopped> {
+    fn look(&mut self, conductor: &mut impl Conductor, now: Instant, show: bool) -> Result<(), Stopped> {
         while let Some(LinkChange { from, to, keys, model }) = conductor.next_change() {
-            self.live.set_link(clock.now(), (from, to), &keys, &model, &mut self.watch)?;
+            self.live.set_link(now, (from, to), &keys, &model, &mut self.watch)?;
         }
         if !conductor.keep_going() {
-            self.live.stop(clock.now(), &mut self.watch)?;
+            self.live.stop(now, &mut self.watch)?;
             return Ok(());
         }
         if show && conductor.wants_status() {

@@ -83,7 +83,8 @@ impl Outside {
     }
 
     /// Hands on the samples that have come in and may, with the instant at which the kernel saw them. Hellos are answered with the next [`Outside::flush`].
-    pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<()> {
+    /// Returns the number of datagrams.
+    pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<usize> {
         let Self { socket, buffers, admission, is_more, replies, .. } = self;
         // One batch: more than come in between two ticks of a session in order. The rest waits in the kernel until the next look, which is after the next
         // tick if that is due, so that a flood cannot keep the loop from its ticks.
@@ -93,7 +94,7 @@ impl Outside {
             Admission::Refused(_) => {}
         })?;
         *is_more = count == UdpEndpoint::BATCH;
-        Ok(())
+        Ok(count)
     }
 
     /// Makes a datagram ready for the program that has the seat; `None` if nobody has it.

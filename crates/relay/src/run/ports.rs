@@ -8,7 +8,7 @@ use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
 
 use cohaptic_realtime::udp::{BindError, EndpointConfig, EndpointCounts, ReceiveBuffers, UdpEndpoint};
-use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock};
+use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock, Received};
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 use rustix::event::{Timespec, epoll};
@@ -95,9 +95,10 @@ impl Ports {
         self.epoll.as_fd()
     }
 
-    /// Hands what has come in to the engine. Says up to when all has been: time must not be let pass beyond, or what came earlier would be late.
-    pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock) -> io::Result<Heard> {
-        let mut heard = Heard { count: 0, until: clock.now() };
+    /// Hands to the engine what has come in by `now`, the time of the clock, and later. Returns up to when all has been handed on: time must not be let pass
+    /// beyond, or what came earlier would be late.
+    pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock, now: Instant) -> io::Result<Received> {
+        let mut heard = Received { count: 0, until: now };
         if self.ports.len() == 1 {
             self.receive_at(0, engine, clock, &mut heard)?;
         } else {
@@ -119,7 +120,7 @@ impl Ports {
         Ok(heard)
     }
 
-    fn receive_at(&mut self, place: usize, engine: &mut Engine, clock: &MonotonicClock, heard: &mut Heard) -> io::Result<()> {
+    fn receive_at(&mut self, place: usize, engine: &mut Engine, clock: &MonotonicClock, heard: &mut Received) -> io::Result<()> {
         let Some(Some(open)) = self.ports.get_mut(place) else { return Ok(()) };
         let port = match (&self.layout, u32::try_from(place).unwrap_or(u32::MAX)) {
             (Layout::Mesh(_), _) => Port::Program(NodeId::new(place)),
@@ -278,14 +279,6 @@ impl fmt::Debug for Ports {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Ports").field("layout", &self.layout).field("config", &self.config).finish_non_exhaustive()
     }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Heard {
-    /// A number of datagrams.
-    pub(super) count: usize,
-    /// All that came up to then.
-    pub(super) until: Instant,
 }
 
 impl Tally {

@@ -1,14 +1,16 @@
-//! The router in real time: one thread that reads both devices, tells the engine the time, and writes what leaves.
+//! The router in real time: one thread that reads both devices and writes what leaves, in the loop of [`cohaptic_realtime::drive`].
 
 mod counts;
 
 use std::io;
+use std::ops::ControlFlow;
+use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use cohaptic_linkfile::router::{RouterFile, Side};
-use cohaptic_realtime::{Clock, Lateness, LatenessSummary, MonotonicClock, Pacer, Pacing};
+use cohaptic_realtime::{Clock, Driven, Lateness, LatenessSummary, MonotonicClock, Pacing, Received, Schedule, drive};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
@@ -24,7 +26,7 @@ pub struct Router<D = AnyDevice, C = MonotonicClock> {
     /// Left, right.
     devices: [D; 2],
     clock: C,
-    pacer: Pacer,
+    pacing: Pacing,
     release: Lateness,
     written: [Written; 2],
     /// What one reading gave.
@@ -53,12 +55,8 @@ pub enum RunError {
     },
     /// The system does not let the thread wait.
     #[error("cannot wait: {0}")]
-    Wait(#[source] io::Error),
+    Wait(#[from] io::Error),
 }
-
-/// This close to a departure nothing is read any more, while spinning: reading and dealing with a packet takes about as long. A packet that comes then is
-/// read that much late.
-const TOO_CLOSE: Duration = Duration::from_micros(10);
 
 /// The number of packets from one device after which those that leave are written, and the other one has its turn.
 const IN_TURN: usize = 64;
@@ -80,8 +78,7 @@ impl<D: Device, C: Clock> Router<D, C> {
     #[must_use]
     pub fn with(file: &RouterFile, devices: [D; 2], clock: C, pacing: Pacing) -> Self {
         let (written, leaving) = ([Written::default(); 2], [Leaving::default(), Leaving::default()]);
-        let (engine, pacer, release) = (Engine::new(file), Pacer::new(pacing), Lateness::new());
-        Self { engine, devices, clock, pacer, release, written, incoming: Vec::new(), leaving }
+        Self { engine: Engine::new(file), devices, clock, pacing, release: Lateness::new(), written, incoming: Vec::new(), leaving }
     }
 
     /// Routes packets until `stop` is set, or until the run is `until` old. Every now and then, `every` so often and once at the end, `look` is called on
@@ -95,81 +92,18 @@ impl<D: Device, C: Clock> Router<D, C> {
     pub fn run(&mut self, stop: &AtomicBool, until: Option<Instant>, every: Duration, mut look: impl FnMut(&mut Self)) -> Result<(), RunError> {
         // A stop is noticed as often.
         const NEVER_LONGER: Duration = Duration::from_millis(50);
+        let every = every.max(Duration::from_millis(1));
         let mut next_look = self.clock.now().saturating_add(every);
-        loop {
-            let now = self.clock.now();
-            if stop.load(Ordering::Relaxed) || until.is_some_and(|until| now >= until) {
-                break;
-            }
+        let schedule = Schedule { pacing: self.pacing, end: until, look_every: every.min(NEVER_LONGER) };
+        drive(self, &schedule, |router, now| {
             if now >= next_look {
-                look(self);
-                next_look = now.saturating_add(every.max(Duration::from_millis(1)));
+                look(router);
+                next_look = now.saturating_add(every);
             }
-            let due = self.engine.poll_timeout();
-            if due.is_some_and(|due| due <= now) {
-                self.engine.handle_timeout(now);
-                self.release();
-                self.receive()?;
-                continue;
-            }
-            let left = due.map(|due| due.saturating_duration_since(now));
-            match left.filter(|left| *left <= self.pacer.margin()) {
-                // Reading is what a packet waits for: its instant is that at which it was read.
-                Some(left) if left > TOO_CLOSE => self.receive()?,
-                Some(_) => std::hint::spin_loop(),
-                None => {
-                    let wake = [due, Some(next_look), until, Some(now.saturating_add(NEVER_LONGER))].into_iter().flatten().min();
-                    let readable = [self.devices[0].readable(), self.devices[1].readable()];
-                    self.pacer.approach(&self.clock, wake, &readable).map_err(RunError::Wait)?;
-                    self.receive()?;
-                }
-            }
-        }
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
         look(self);
         Ok(())
-    }
-
-    /// Reads the packets that are there, in turns. After each turn those leave whose time has come meanwhile: together, as far as a device takes them so.
-    fn receive(&mut self) -> Result<(), RunError> {
-        for side in Side::BOTH {
-            let mut count = 0;
-            while count < IN_TURN {
-                let received = self.devices[side.index()].receive(&mut self.incoming);
-                if !received.map_err(|source| RunError::Device { side, source })? {
-                    break;
-                }
-                // The packets of a segment came at one instant.
-                let now = self.clock.now();
-                count += self.incoming.len();
-                self.incoming.drain(..).for_each(|packet| self.engine.handle_packet(now, side, packet));
-            }
-            self.release();
-        }
-        Ok(())
-    }
-
-    /// Writes what has left the engine.
-    fn release(&mut self) {
-        while let Some(Departure { at, to, packet }) = self.engine.poll_departure() {
-            let leaving = &mut self.leaving[to.index()];
-            leaving.at.push(at);
-            leaving.packets.push(packet);
-        }
-        for ((device, written), Leaving { packets, at }) in self.devices.iter_mut().zip(&mut self.written).zip(&mut self.leaving) {
-            let mut rest = packets.as_slice();
-            let mut at = at.drain(..);
-            while !rest.is_empty() {
-                let now = self.clock.now();
-                let (count, sent) = device.send(rest);
-                let (gone, left) = rest.split_at(count.clamp(1, rest.len()));
-                for (packet, at) in gone.iter().zip(&mut at) {
-                    self.release.record(now.saturating_duration_since(at));
-                    written.add(sent, packet.bytes().len());
-                }
-                rest = left;
-            }
-            packets.clear();
-        }
     }
 
     /// Changes a link from now on, in one direction or (`None`) in both: see [`Engine::set_link`].
@@ -179,7 +113,8 @@ impl<D: Device, C: Clock> Router<D, C> {
     /// [`NoSuchLink`]; nothing was changed.
     pub fn set_link(&mut self, name: &str, from: Option<Side>, model: &LinkModel) -> Result<(), NoSuchLink> {
         self.engine.set_link(self.clock.now(), name, from, model)?;
-        self.release();
+        self.take_departures();
+        self.send();
         Ok(())
     }
 
@@ -198,5 +133,87 @@ impl<D: Device, C: Clock> Router<D, C> {
     #[must_use]
     pub fn release_error(&self) -> LatenessSummary {
         self.release.summary()
+    }
+
+    /// Takes from the engine what has left it.
+    fn take_departures(&mut self) {
+        while let Some(Departure { at, to, packet }) = self.engine.poll_departure() {
+            let leaving = &mut self.leaving[to.index()];
+            leaving.at.push(at);
+            leaving.packets.push(packet);
+        }
+    }
+}
+
+impl<D: Device, C: Clock> Driven for Router<D, C> {
+    type Clock = C;
+    type Error = RunError;
+
+    /// To read a packet and to deal with it takes about as long. A packet that comes meanwhile is read that much late.
+    const AHEAD: Option<Duration> = Some(Duration::from_micros(10));
+    const RESTS: bool = false;
+
+    fn clock(&self) -> &C {
+        &self.clock
+    }
+
+    fn readable(&self) -> impl IntoIterator<Item = BorrowedFd<'_>> {
+        self.devices.each_ref().map(Device::readable)
+    }
+
+    /// Reads the packets that are there, from one side and then from the other.
+    fn receive(&mut self, mut now: Instant) -> Result<Received, RunError> {
+        let mut received = 0;
+        for side in Side::BOTH {
+            // The instant of a packet is that at which it is read, so that departures need not wait for packets that are unread: those whose time has come
+            // leave first, together as far as a device takes them so.
+            self.handle_timeout(now);
+            self.send();
+            let mut count = 0;
+            while count < IN_TURN {
+                let is_read = self.devices[side.index()].receive(&mut self.incoming);
+                if !is_read.map_err(|source| RunError::Device { side, source })? {
+                    break;
+                }
+                // The packets of a segment came at one instant.
+                let at = self.clock.now();
+                count += self.incoming.len();
+                self.incoming.drain(..).for_each(|packet| self.engine.handle_packet(at, side, packet));
+            }
+            received += count;
+            now = self.clock.now();
+        }
+        Ok(Received { count: received, until: now })
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.engine.poll_timeout()
+    }
+
+    fn handle_timeout(&mut self, now: Instant) -> bool {
+        self.engine.handle_timeout(now);
+        self.take_departures();
+        false
+    }
+
+    /// Writes what has left the engine.
+    fn send(&mut self) -> u64 {
+        let before = self.release.count();
+        for ((device, written), Leaving { packets, at }) in self.devices.iter_mut().zip(&mut self.written).zip(&mut self.leaving) {
+            let mut rest = packets.as_slice();
+            let mut at = at.drain(..);
+            while !rest.is_empty() {
+                let now = self.clock.now();
+                let (count, sent) = device.send(rest);
+                let (gone, left) = rest.split_at(count.clamp(1, rest.len()));
+                for (packet, at) in gone.iter().zip(&mut at) {
+                    self.release.record(now.saturating_duration_since(at));
+                    written.add(sent, packet.bytes().len());
+                }
+                rest = left;
+            }
+            packets.clear();
+        }
+        self.release.count() - before
     }
 }
