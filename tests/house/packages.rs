@@ -156,6 +156,33 @@ fn every_package_says_what_a_registry_shows() {
     }
 }
 
+/// Libraries that are of use without the rest of the project, each with the example that its README shows. The test of the example compares its output.
+const ALONE: [(&str, &str); 6] =
+    [("falcon", "wall"), ("peer", "two_hands"), ("stability", "how_stiff"), ("tcp", "download"), ("testkit", "paid_twice"), ("wan", "call")];
+
+#[test]
+fn libraries_of_use_alone_package_a_readme_and_its_example() {
+    let metadata = metadata(&["--no-deps"]);
+    for (short, example) in ALONE {
+        let package = format!("cohaptic-{short}");
+        let told = published(&metadata).into_iter().find(|told| text(told, "name") == package).unwrap();
+        assert_eq!(text(told, "readme"), "README.md", "{package}");
+        let folder = root().join("crates").join(short);
+        let readme = fs::read_to_string(folder.join("README.md")).unwrap();
+        assert!(readme.contains(&format!("\ncargo run -p {package} --example {example}\n")), "the README of {package} does not run {example}");
+        let source = fs::read_to_string(folder.join(format!("examples/{example}.rs"))).unwrap();
+        assert!(source.contains("include_str!(\"../README.md\")"), "no test compares the output of {example} with the README");
+        assert!(!source.contains("#[path"), "{example} needs files that are not in its package");
+        let mut list = Command::new(env!("CARGO"));
+        let output = list.current_dir(root()).args(["package", "--list", "--allow-dirty", "--offline", "--package", &package]).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let listed = String::from_utf8(output.stdout).unwrap();
+        let examples: Vec<&str> = listed.lines().filter(|file| file.starts_with("examples")).collect();
+        assert_eq!(examples.iter().map(|file| file.replace('\\', "/")).collect::<Vec<_>>(), [format!("examples/{example}.rs")], "{package}");
+        assert!(listed.lines().any(|file| file == "README.md"), "{package}: {listed}");
+    }
+}
+
 /// Without building them: the test below looks at the files that they are built from.
 #[test]
 fn packages_are_made() {

@@ -54,3 +54,8 @@ pub mod safety;
 pub mod simulator;
 pub mod transport;
 pub mod usb;
+
+/// Runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

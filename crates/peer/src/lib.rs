@@ -113,3 +113,8 @@ pub use plant::{Integrator, Plant, StepMap};
 pub use send_when::{LastSent, SendWhen};
 pub use signal::{Signal, Table, TableError};
 pub use state::State;
+
+/// Runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -92,3 +92,8 @@ pub use radius::{Radius, Verdict};
 pub use spectrum::{bounded_radius, eigenvalues, radius, radius_small};
 pub use state_name::{StateKind, StateName};
 pub use watch::{Limits, Unwatched, Watch};
+
+/// Runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

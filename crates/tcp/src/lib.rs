@@ -56,3 +56,8 @@ pub use connection::Connection;
 pub use error::Error;
 pub use info::{Info, State};
 pub use segment::{Ecn, Flags, Options, ParseError, SackBlocks, Segment};
+
+/// Runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -155,3 +155,8 @@ pub use task::{JoinHandle, TaskStopped};
 pub use tcp::{TcpConfig, TcpListener, TcpSocket, TcpStream};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use watch::STALL_VARIABLE;
+
+/// Runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

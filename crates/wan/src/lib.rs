@@ -100,3 +100,8 @@ pub use stages::queue::{
 };
 pub use stages::reorder::{Displacement, Reorder};
 pub use stages::slots::{SlotGap, Slots, SlotsError};
+
+/// Runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -102,6 +102,8 @@ pages! {
     how_to_second_computer: "docs/how-to-second-computer.md",
     model: "docs/model.md",
     netem: "docs/netem.md",
+    falcon_crate: "crates/falcon/README.md",
+    peer_crate: "crates/peer/README.md",
     python: "python/README.md",
     reference_commands: "docs/reference-commands.md",
     reference_documents: "docs/reference-documents.md",
@@ -117,13 +119,17 @@ pages! {
     stability: "docs/stability.md",
     stability_switching: "docs/stability-switching.md",
     scenarios: "scenarios/README.md",
+    stability_crate: "crates/stability/README.md",
+    tcp_crate: "crates/tcp/README.md",
     testing: "docs/testing.md",
+    testkit_crate: "crates/testkit/README.md",
     #[ignore = ".ci/nightly runs it: it takes long"]
     tutorial_laboratory: "docs/tutorial-laboratory.md",
     tutorial_network_test: "docs/tutorial-network-test.md",
     #[ignore = ".ci/nightly runs it: it takes long"]
     tutorial_paper: "docs/tutorial-paper.md",
     tutorial_tray: "docs/tutorial-tray.md",
+    wan_crate: "crates/wan/README.md",
 }
 
 fn root() -> PathBuf {

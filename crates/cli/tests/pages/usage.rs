@@ -90,7 +90,7 @@ pub(crate) fn of_cargo(words: &[String]) -> Result<(), String> {
     let names = names(&root());
     for pair in words.windows(2) {
         let [option, name] = pair else { continue };
-        if ["-p", "--test", "--bin"].contains(&option.as_str()) && !names.contains(name) {
+        if ["-p", "--test", "--bin", "--example"].contains(&option.as_str()) && !names.contains(name) {
             return Err(format!("no Cargo.toml names {name}: {}", words.join(" ")));
         }
     }
