@@ -3,7 +3,7 @@
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
-use cohaptic_realtime::{Clock as _, Driven, MonotonicClock, Received};
+use cohaptic_realtime::{Driven, MonotonicClock, Received};
 use cohaptic_units::Instant;
 
 use super::outside::Outside;

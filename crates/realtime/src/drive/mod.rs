@@ -106,7 +106,7 @@ pub fn drive<D: Driven>(driven: &mut D, schedule: &Schedule, mut look: impl FnMu
             Some(received) => received,
             None => driven.receive(waited.now)?,
         };
-        let is_more = driven.handle_timeout(until);
+        let is_left = driven.handle_timeout(until);
         let sent = driven.send();
         let now = driven.clock().now();
         density.note(now, count as u64 + sent);
@@ -119,14 +119,17 @@ pub fn drive<D: Driven>(driven: &mut D, schedule: &Schedule, mut look: impl FnMu
             }
             look_at = now.saturating_add(schedule.look_every);
         }
-        waited = if is_more {
-            Waited::until_now(driven)
-        } else if D::RESTS && schedule.pacing == Pacing::Sleep && density.is_dense() {
+        waited = if !is_left && D::RESTS && schedule.pacing == Pacing::Sleep && density.is_dense() {
             let clock = driven.clock();
             clock.block(Some(clock.now() + REST), &[])?;
             Waited::until_now(driven)
         } else {
-            wait(driven, &mut pacer, look_at, schedule.end)?
+            let due = driven.poll_timeout();
+            if is_left || due.is_some_and(|due| due <= now) {
+                Waited::until_now(driven)
+            } else {
+                wait(driven, &mut pacer, due, look_at, schedule.end)?
+            }
         };
     }
 }
@@ -146,8 +149,7 @@ impl Waited {
 }
 
 /// Waits until something is due or can be read.
-fn wait<D: Driven>(driven: &mut D, pacer: &mut Pacer, look_at: Instant, end: Option<Instant>) -> Result<Waited, D::Error> {
-    let due = driven.poll_timeout();
+fn wait<D: Driven>(driven: &mut D, pacer: &mut Pacer, due: Option<Instant>, look_at: Instant, end: Option<Instant>) -> Result<Waited, D::Error> {
     let next = due.filter(|due| *due <= look_at.saturating_add(LOOK_WAITS)).unwrap_or(look_at);
     let until = end.map_or(next, |end| next.min(end));
     let readable: Vec<_> = driven.readable().into_iter().collect();

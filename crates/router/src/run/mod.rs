@@ -44,6 +44,7 @@ struct Leaving {
 
 /// Why a router came to an end by itself.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RunError {
     /// A device gives no more packets.
     #[error("{}: cannot read the device: {source}", side.name())]
@@ -57,6 +58,9 @@ pub enum RunError {
     #[error("cannot wait: {0}")]
     Wait(#[from] io::Error),
 }
+
+/// To read a packet and to deal with it takes about as long.
+const READING: Duration = Duration::from_micros(10);
 
 /// The number of packets from one device after which those that leave are written, and the other one has its turn.
 const IN_TURN: usize = 64;
@@ -81,8 +85,8 @@ impl<D: Device, C: Clock> Router<D, C> {
         Self { engine: Engine::new(file), devices, clock, pacing, release: Lateness::new(), written, incoming: Vec::new(), leaving }
     }
 
-    /// Routes packets until `stop` is set, or until the run is `until` old. Every now and then, `every` so often and once at the end, `look` is called on
-    /// this thread: packets wait meanwhile, so it should take microseconds.
+    /// Routes packets until `stop` is set, or until the run is `until` old. `look` is called on this thread at the end, and `every` so often or up to 50 ms
+    /// later: packets wait meanwhile, so it should take microseconds.
     ///
     /// Packets inside the links at the end stay there: a further call goes on.
     ///
@@ -149,8 +153,8 @@ impl<D: Device, C: Clock> Driven for Router<D, C> {
     type Clock = C;
     type Error = RunError;
 
-    /// To read a packet and to deal with it takes about as long. A packet that comes meanwhile is read that much late.
-    const AHEAD: Option<Duration> = Some(Duration::from_micros(10));
+    /// A packet that comes meanwhile is read that much late.
+    const AHEAD: Option<Duration> = Some(READING);
     const RESTS: bool = false;
 
     fn clock(&self) -> &C {
@@ -161,14 +165,16 @@ impl<D: Device, C: Clock> Driven for Router<D, C> {
         self.devices.each_ref().map(Device::readable)
     }
 
-    /// Reads the packets that are there, from one side and then from the other.
-    fn receive(&mut self, mut now: Instant) -> Result<Received, RunError> {
-        let mut received = 0;
-        for side in Side::BOTH {
-            // The instant of a packet is that at which it is read, so that departures need not wait for packets that are unread: those whose time has come
-            // leave first, together as far as a device takes them so.
+    /// Reads the packets that are there, in turns.
+    fn receive(&mut self, now: Instant) -> Result<Received, RunError> {
+        // A packet counts from when it is read, so that departures need not wait for packets that are unread: those that are late already leave first. If
+        // all that are due left first, more packets would leave alone, in a call of the kernel each.
+        if self.engine.poll_timeout().is_some_and(|due| now.saturating_duration_since(due) >= READING) {
             self.handle_timeout(now);
             self.send();
+        }
+        let mut received = 0;
+        for side in Side::BOTH {
             let mut count = 0;
             while count < IN_TURN {
                 let is_read = self.devices[side.index()].receive(&mut self.incoming);
@@ -176,12 +182,14 @@ impl<D: Device, C: Clock> Driven for Router<D, C> {
                     break;
                 }
                 // The packets of a segment came at one instant.
-                let at = self.clock.now();
+                let now = self.clock.now();
                 count += self.incoming.len();
-                self.incoming.drain(..).for_each(|packet| self.engine.handle_packet(at, side, packet));
+                self.incoming.drain(..).for_each(|packet| self.engine.handle_packet(now, side, packet));
             }
             received += count;
-            now = self.clock.now();
+            // After each turn those leave whose time has come meanwhile: together, as far as a device takes them so.
+            self.take_departures();
+            self.send();
         }
         Ok(Received { count: received, until: now })
     }

@@ -121,8 +121,7 @@ fn rests<const RESTS: bool>(pacing: Pacing) -> usize {
     let mut line = Line::<{ 3 * MICRO }, RESTS>::new(50, 0, (0..2000).map(|number| number * 10 * MICRO));
     line.run(pacing, 40 * MILLI);
     assert_eq!(line.sent, 2000);
-    let rests = line.world.slept.borrow().iter().filter(|(_, for_packets)| !for_packets).count();
-    rests
+    line.world.slept.borrow().iter().filter(|(_, for_packets)| !for_packets).count()
 }
 
 #[test]
