@@ -56,6 +56,7 @@ impl Calibration {
 
 /// Error of a calibration with a number out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[non_exhaustive]
 pub enum CalibrationError {
     /// The counts per N·m are far from the counts of any known Falcon.
     #[error("{0} counts per N·m are not within 100 to 100000: 10000 is libnifalcon's value, 2200 to 5400 fits Novint's own packets")]

@@ -5,15 +5,15 @@ use core::time::Duration;
 use crate::transport::{Request, Transport, TransportError};
 
 /// USB vendor number of the chip.
-pub const VENDOR: u16 = 0x0403;
+pub(crate) const VENDOR: u16 = 0x0403;
 /// USB product number that Novint gave to the Falcon.
-pub const PRODUCT: u16 = 0xCB48;
+pub(crate) const PRODUCT: u16 = 0xCB48;
 /// Number of the USB interface to claim.
-pub const INTERFACE: u8 = 0;
+pub(crate) const INTERFACE: u8 = 0;
 /// Bulk endpoint to the device.
-pub const ENDPOINT_OUT: u8 = 0x02;
+pub(crate) const ENDPOINT_OUT: u8 = 0x02;
 /// Bulk endpoint from the device.
-pub const ENDPOINT_IN: u8 = 0x81;
+pub(crate) const ENDPOINT_IN: u8 = 0x81;
 /// Length of a packet of the bulk endpoint \[bytes\].
 pub const PACKET: usize = 64;
 /// Number of status bytes at the beginning of every packet from the device.
@@ -26,17 +26,17 @@ pub const PURGE_RX: u16 = 1;
 /// Value of a reset that discards bytes to the device.
 pub const PURGE_TX: u16 = 2;
 /// Value that lowers DTR.
-pub const DTR_LOW: u16 = 0x0100;
+pub(crate) const DTR_LOW: u16 = 0x0100;
 /// Value that raises DTR.
-pub const DTR_HIGH: u16 = 0x0101;
+pub(crate) const DTR_HIGH: u16 = 0x0101;
 /// Value that lowers RTS.
-pub const RTS_LOW: u16 = 0x0200;
+pub(crate) const RTS_LOW: u16 = 0x0200;
 /// Eight bits, no parity, one stop bit.
-pub const FORMAT_8N1: u16 = 0x0008;
+pub(crate) const FORMAT_8N1: u16 = 0x0008;
 /// No flow control.
-pub const NO_FLOW_CONTROL: u16 = 0;
+pub(crate) const NO_FLOW_CONTROL: u16 = 0;
 /// Divisor of 9,600 baud, for the greeting of the boot loader.
-pub const BAUD_HANDSHAKE: u16 = 0x4138;
+pub(crate) const BAUD_HANDSHAKE: u16 = 0x4138;
 /// Divisor of 142,857 baud, for the transfer of the firmware. Existing drivers ask for 140,000.
 pub const BAUD_LOADING: u16 = 0x0015;
 /// Divisor of 1.5 million baud, for the running firmware.
@@ -47,7 +47,7 @@ pub const BAUD_RUNNING: u16 = 0x0002;
 /// # Errors
 ///
 /// [`TransportError`] of a control transfer.
-pub fn set_up_running<T: Transport + ?Sized>(transport: &mut T) -> Result<(), TransportError> {
+pub(crate) fn set_up_running<T: Transport + ?Sized>(transport: &mut T) -> Result<(), TransportError> {
     transport.control(Request::LatencyTimer, 1)?;
     transport.control(Request::BaudRate, BAUD_RUNNING)?;
     transport.control(Request::Reset, PURGE_RX)?;
@@ -59,7 +59,7 @@ pub fn set_up_running<T: Transport + ?Sized>(transport: &mut T) -> Result<(), Tr
 /// # Errors
 ///
 /// [`TransportError`] of a control transfer.
-pub fn set_up_handshake<T: Transport + ?Sized>(transport: &mut T) -> Result<(), TransportError> {
+pub(crate) fn set_up_handshake<T: Transport + ?Sized>(transport: &mut T) -> Result<(), TransportError> {
     transport.control(Request::Reset, PURGE_RX)?;
     transport.control(Request::Reset, PURGE_TX)?;
     // With a latency timer of 1 ms the echo of the firmware comes in pieces, and checks of existing drivers tend to fail.
@@ -77,7 +77,7 @@ pub fn set_up_handshake<T: Transport + ?Sized>(transport: &mut T) -> Result<(), 
 /// # Errors
 ///
 /// [`TransportError`] of a control transfer.
-pub fn set_up_loading<T: Transport + ?Sized>(transport: &mut T) -> Result<(), TransportError> {
+pub(crate) fn set_up_loading<T: Transport + ?Sized>(transport: &mut T) -> Result<(), TransportError> {
     transport.control(Request::ModemControl, DTR_LOW)?;
     transport.control(Request::BaudRate, BAUD_LOADING)
 }
@@ -85,7 +85,7 @@ pub fn set_up_loading<T: Transport + ?Sized>(transport: &mut T) -> Result<(), Tr
 /// Returns the time of a byte on the wire, with start and stop bit, at a divisor of the chip's 3 MHz. The upper two bits of the divisor are eighths; the
 /// divisor 2 means 1.5 million baud.
 #[must_use]
-pub const fn byte_time(divisor: u16) -> Duration {
+pub(crate) const fn byte_time(divisor: u16) -> Duration {
     // The sub-divisor codes 0, 1, 2, 3 mean 0, 1/2, 1/4, 1/8.
     let eighths = match divisor >> 14 {
         0 => 0,
@@ -100,7 +100,7 @@ pub const fn byte_time(divisor: u16) -> Duration {
 
 /// Copies the payload of a bulk transfer into `into`, packet by packet, without the two status bytes of each packet. Returns the number of copied bytes.
 /// Payload beyond the room in `into` is lost.
-pub fn strip_status(transfer: &[u8], into: &mut [u8]) -> usize {
+pub(crate) fn strip_status(transfer: &[u8], into: &mut [u8]) -> usize {
     let mut count = 0;
     for packet in transfer.chunks(PACKET) {
         // A packet shorter than its status bytes has no payload.

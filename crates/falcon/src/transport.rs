@@ -93,6 +93,7 @@ pub enum Fault {
 /// Error of a transfer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum TransportError {
     #[error("the device was unplugged; plug it in again and start anew")]
     Unplugged,

@@ -124,7 +124,7 @@ impl Pacer {
     ///
     /// What the system says of the wait.
     #[inline]
-    pub fn approach(&mut self, clock: &impl Clock, deadline: Option<Instant>, readable: &[BorrowedFd<'_>]) -> io::Result<Woken> {
+    pub(crate) fn approach(&mut self, clock: &impl Clock, deadline: Option<Instant>, readable: &[BorrowedFd<'_>]) -> io::Result<Woken> {
         let Some(deadline) = deadline else {
             return Ok(if clock.block(None, readable)? { Woken::Readable } else { Woken::Early });
         };

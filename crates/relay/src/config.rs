@@ -91,6 +91,7 @@ pub struct Change {
 
 /// Why there is no such relay.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ConfigError {
     /// Fewer than two programs, or a table of links for another number of them.
     #[error("{programs} programs and links between {links}: expected at least two programs, and links between as many")]

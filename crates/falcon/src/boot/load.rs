@@ -61,6 +61,7 @@ pub enum Progress {
 /// Reason why the firmware was not loaded.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum BootError {
     /// The transport failed.
     #[error(transparent)]

@@ -68,6 +68,7 @@ impl<const A: usize> Axes<A> {
 
 /// Error of an assignment of axes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum AxesError {
     /// An axis is named twice.
     #[error("the axis {0:?} is named twice: each axis of the device can be one of the peer's")]

@@ -189,6 +189,7 @@ fn run<T: Transport, const A: usize>(mut turns: Turns<T, A>, shared: &Shared) ->
 
 /// Error of the start of a device.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum StartError {
     /// A number of the configuration is out of range.
     #[error(transparent)]

@@ -74,6 +74,7 @@ impl<const A: usize> DeviceConfig<A> {
 
 /// Error of a configuration with a number out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[non_exhaustive]
 pub enum DeviceConfigError {
     /// The period is out of range.
     #[error("the period of the loop is {0:?}, not within 250 us to 20 ms: 1 ms is what USB gives")]

@@ -74,6 +74,7 @@ impl DriverConfig {
 /// Error of a configuration with a number out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum DriverConfigError {
     /// A limit of forces is out of range.
     #[error(transparent)]

@@ -10,6 +10,7 @@ use crate::transport::TransportError;
 /// Reason why a driver cannot go on.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum DriverError {
     /// A number of the configuration is out of range.
     #[error(transparent)]

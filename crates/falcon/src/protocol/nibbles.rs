@@ -24,7 +24,7 @@ pub const fn decode(letters: [u8; 4]) -> Option<i16> {
 
 /// Returns whether a byte stands for a nibble.
 #[must_use]
-pub const fn is_letter(byte: u8) -> bool {
+pub(crate) const fn is_letter(byte: u8) -> bool {
     byte >= BASE && byte <= BASE + 0xF
 }
 

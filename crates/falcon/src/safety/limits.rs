@@ -54,6 +54,7 @@ impl Limits {
 /// Error of a limit out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum LimitsError {
     #[error("the limit of force is {0} N, not within 0 to 20: the device is said to give 8")]
     Force(f64),

@@ -175,7 +175,7 @@ impl Simulator {
 
     /// Returns the time at which the device receives the next byte; `None` without bytes on the way. The answer of the device may lead to an earlier packet.
     #[must_use]
-    pub fn next_heard(&self) -> Option<Instant> {
+    pub(crate) fn next_heard(&self) -> Option<Instant> {
         self.chip.next_heard()
     }
 
@@ -236,7 +236,7 @@ impl Simulator {
 
     /// Returns whether the device is plugged in.
     #[must_use]
-    pub const fn is_plugged(&self) -> bool {
+    pub(crate) const fn is_plugged(&self) -> bool {
         self.plugged
     }
 

@@ -24,6 +24,7 @@ pub use report::{LinkReport, PortReport, Report, View};
 
 /// Why there is no relay, or why it stopped.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RelayError {
     /// There is no such relay.
     #[error(transparent)]
@@ -66,6 +67,7 @@ impl Default for RunOptions {
 
 /// What may be said to a relay while it runs.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Control {
     /// A link becomes another one, from when it is heard on.
     SetLink {

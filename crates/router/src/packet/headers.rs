@@ -51,7 +51,7 @@ pub struct Ecn(u8);
 
 impl Ecn {
     /// Congestion experienced.
-    pub const CONGESTION: Self = Self(0b11);
+    pub(crate) const CONGESTION: Self = Self(0b11);
 
     /// Whether both ends understand it: any codepoint but 00.
     #[must_use]

@@ -89,7 +89,7 @@ impl AnyDevice {
     ///
     /// [`OpenError`] with what was tried and what the system says, and if both sides are one device, whatever its namespace is called: each packet would
     /// come back again and again.
-    pub fn open_both(left: &Attachment, right: &Attachment) -> Result<[Self; 2], OpenError> {
+    pub(crate) fn open_both(left: &Attachment, right: &Attachment) -> Result<[Self; 2], OpenError> {
         if left.device() == right.device() {
             let failed = match namespace::are_one(left.namespace(), right.namespace()) {
                 Ok(true) => Some(Failed::SameDevice),
@@ -146,6 +146,7 @@ impl OpenError {
 
 /// Why a device could not be opened.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Failed {
     /// Both sides name it.
     #[error("it is the device of the other side, in the same network namespace: expected two devices")]
