@@ -45,8 +45,14 @@ fn peer(place: u32, clock: &Clock) -> OnePeer {
     Peer::new(config, device, object, strategy, Held::new([State::REST]))
 }
 
-/// Runs three seconds over a way that takes this number of ticks. Returns where both copies are and the force that the second user feels, at every tick.
-fn pull(delay: u64) -> Result<Vec<([f64; 2], f64)>, Box<dyn Error>> {
+/// The state after one tick: where both copies are \[m\], and the force that the second user feels \[N\].
+struct Row {
+    copies: [f64; 2],
+    felt: f64,
+}
+
+/// Runs three seconds over a way that takes this number of ticks. Returns a row for each tick.
+fn pull(delay: u64) -> Result<Vec<Row>, Box<dyn Error>> {
     let clock = Clock::regular(TICK);
     let mut peers = [peer(0, &clock), peer(1, &clock)];
     // Samples on their way to each peer: the tick of the arrival, and the bytes.
@@ -75,7 +81,7 @@ fn pull(delay: u64) -> Result<Vec<([f64; 2], f64)>, Box<dyn Error>> {
             felt = peer.compute(now).coupling[0];
             peer.advance(now, TICK);
         }
-        rows.push((peers.each_ref().map(|peer| peer.object().state().position[0]), -felt));
+        rows.push(Row { copies: peers.each_ref().map(|peer| peer.object().state().position[0]), felt: -felt });
     }
     Ok(rows)
 }
@@ -85,7 +91,7 @@ fn table() -> Result<String, Box<dyn Error>> {
     let mut text = format!("{:>9} {:>10} {:>11} {:>12} {:>14}\n", "delay", "time", "first copy", "second copy", "second user");
     for delay in [0, 24, 100] {
         for (row, tick) in pull(delay)?.iter().zip(1..).filter(|(_, tick)| [100, 250, 500, 1000, 2000, 3000].contains(tick)) {
-            let ([first, second], felt) = row;
+            let Row { copies: [first, second], felt } = row;
             writeln!(text, "{delay:>6} ms {tick:>7} ms {:>8.2} mm {:>9.2} mm {felt:>12.3} N", first * 1e3, second * 1e3)?;
         }
     }
