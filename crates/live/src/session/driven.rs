@@ -1,4 +1,4 @@
-//! A session in the loop of [`cohaptic_realtime::drive`].
+//! A session in the loop of [`cohaptic_realtime::drive()`].
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;

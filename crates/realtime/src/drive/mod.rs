@@ -16,7 +16,7 @@ use cohaptic_units::Instant;
 use crate::{Clock, Pacer, Pacing, Woken};
 use density::Density;
 
-/// A state machine together with its sockets or devices, to be run by [`drive`].
+/// A state machine together with its sockets or devices, to be run by [`drive()`].
 pub trait Driven {
     /// The clock of the run.
     type Clock: Clock;

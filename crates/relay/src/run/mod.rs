@@ -1,4 +1,4 @@
-//! The relay in real time: one thread, in the loop of [`cohaptic_realtime::drive`].
+//! The relay in real time: one thread, in the loop of [`cohaptic_realtime::drive()`].
 
 mod ports;
 mod report;

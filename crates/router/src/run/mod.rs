@@ -1,4 +1,4 @@
-//! The router in real time: one thread that reads both devices and writes what leaves, in the loop of [`cohaptic_realtime::drive`].
+//! The router in real time: one thread that reads both devices and writes what leaves, in the loop of [`cohaptic_realtime::drive()`].
 
 mod counts;
 
