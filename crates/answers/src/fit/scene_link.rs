@@ -21,7 +21,7 @@ pub(super) fn read_again(scene: &str, link: &FittedLink, file: &Path, delays: Op
     let modulators = Arc::default();
     let read = parse_with(Sources { file, text: scene, overrides: &[] }, FileReader(&named), |document, context| {
         let link = document.as_table().and_then(|table| table.get("link"))?;
-        read_link(&link.node, context.with_modulators(Some(&modulators)), &[])
+        read_link(&link.node, context.with_modulators(Some(&modulators)))
     });
     let delay = match read.map_err(|error| FitFailure::Scene(Box::new(error)))?.whole {
         LinkModel::Fixed(config) => config.delay,

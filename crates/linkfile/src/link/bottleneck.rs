@@ -5,19 +5,19 @@ use core::num::NonZeroU32;
 use cohaptic_wan::{Bottleneck, Cells, DeliveryTrace, Discipline, Framing, Peak, Service, TokenBucket};
 
 use super::queue::{Queue, read_limit, read_queue};
-use super::{NONE, UNLIMITED, read_two, unless, written_together};
+use super::{NONE, UNLIMITED, unless, written_together};
 use crate::document::Node;
 use crate::reading::{Context, TableReader, values};
+use crate::schema::link::LINK_TABLE;
 
 /// The bottleneck, whose line sends at a rate or at the instants of a recording.
 pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<DeliveryTrace>, context: Context<'_>) -> Option<Option<Bottleneck>> {
     let (rate_entry, trace_entry) = (table.entry("rate"), table.entry("trace"));
     let parts = [table.entry("queue"), table.entry("overhead"), table.entry("cells")];
-    let rate = table.optional("rate", None, unless(UNLIMITED, values::rate));
-    let none = Queue { limit: None, discipline: Discipline::TailDrop };
-    let queue = table.optional("queue", none, read_queue);
-    let overhead = table.optional("overhead", 0, values::signed_size);
-    let cells = table.optional("cells", None, unless(NONE, read_cells));
+    let rate = table.read("rate", unless(UNLIMITED, values::rate));
+    let queue = table.maybe("queue", read_queue);
+    let overhead = table.read("overhead", values::signed_size);
+    let cells = table.read("cells", unless(NONE, read_cells));
     let (rate, queue, overhead, cells) = (rate?, queue?, overhead?, cells?);
     let service = match (rate, recorded) {
         (None, None) => None,
@@ -40,7 +40,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
         }
     };
     if let Some(service) = service {
-        let Queue { limit, discipline } = queue;
+        let Queue { limit, discipline } = queue.unwrap_or(Queue { limit: None, discipline: Discipline::TailDrop });
         return Some(Some(Bottleneck { service, framing: Framing { overhead, cells }, limit, discipline }));
     }
     for entry in parts.into_iter().flatten() {
@@ -57,7 +57,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
 
 fn read_cells(node: &Node, context: Context<'_>) -> Option<Cells> {
     const EXPECTED: &str = "a table such as { payload = \"48B\", overhead = \"5B\" }";
-    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("cells"), EXPECTED)?;
     let size = |least: u32| {
         move |node: &Node, context: Context<'_>| {
             let size = values::size(node, context)?;
@@ -68,27 +68,28 @@ fn read_cells(node: &Node, context: Context<'_>) -> Option<Cells> {
             found
         }
     };
-    let payload = table.required("payload", "what a cell carries, a size such as \"48B\"", size(1));
-    let overhead = table.optional("overhead", 0, size(0));
+    let payload = table.read("payload", size(1));
+    let overhead = table.read("overhead", size(0));
     table.finish();
     Some(Cells { payload: NonZeroU32::new(payload?)?, overhead: overhead? })
 }
 
 pub(super) fn read_token_bucket(node: &Node, context: Context<'_>) -> Option<TokenBucket> {
-    let mut table = TableReader::new(node, context, "\"none\" or a table such as { rate = \"1Mbit\", burst = \"10kB\" }")?;
-    let rate = table.required("rate", "how fast the bucket fills, a rate such as \"1Mbit\"", values::rate);
-    let burst = table.required("burst", "what the bucket holds, a size such as \"10kB\"", values::size);
+    const EXPECTED: &str = "\"none\" or a table such as { rate = \"1Mbit\", burst = \"10kB\" }";
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("token-bucket"), EXPECTED)?;
+    let (rate, burst) = (table.value("rate"), table.value("burst"));
     let peak = table.maybe("peak", read_peak);
-    let limit = table.optional("limit", None, unless(UNLIMITED, read_limit));
-    let overhead = table.optional("overhead", 0, values::signed_size);
+    let limit = table.read("limit", unless(UNLIMITED, read_limit));
+    let overhead = table.read("overhead", values::signed_size);
     table.finish();
     let framing = Framing { overhead: overhead?, cells: None };
     Some(TokenBucket { rate: rate?, burst: burst?, peak: peak?, framing, limit: limit? })
 }
 
 fn read_peak(node: &Node, context: Context<'_>) -> Option<Peak> {
-    let rate = ("rate", "how fast a burst leaves, a rate such as \"2Mbit\"", values::rate);
-    let burst = ("burst", "at least the largest packet, a size such as \"1500B\"", values::size);
-    let (rate, burst) = read_two(node, context, "a table such as { rate = \"2Mbit\", burst = \"1500B\" }", rate, burst)?;
-    Some(Peak { rate, burst })
+    const EXPECTED: &str = "a table such as { rate = \"2Mbit\", burst = \"1500B\" }";
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("token-bucket.peak"), EXPECTED)?;
+    let (rate, burst) = (table.value("rate"), table.value("burst"));
+    table.finish();
+    Some(Peak { rate: rate?, burst: burst? })
 }

@@ -6,15 +6,16 @@ use super::loss_pattern::read_range;
 use super::read_chance_in;
 use crate::document::{Node, quote};
 use crate::reading::{Context, TableReader, values};
+use crate::schema::link::LINK_TABLE;
 
 /// `"1%"` (one bit of such a packet), `{ probability, correlation, bits }` or `{ bit-error-rate }`, the tables also with `bytes` and `checksum`.
 pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Option<Corruption>> {
+    const EXPECTED: &str = "a probability or a table such as { probability = \"1%\", bits = 3 } or { bit-error-rate = 1e-6 }";
     if node.as_table().is_none() {
         let probability = values::probability(node, context)?;
         return Some(flipping(Flips::Bits { packets: Chance::independent(probability), count: 1 }));
     }
-    let mut table =
-        TableReader::new(node, context, "a probability or a table such as { probability = \"1%\", bits = 3 } or { bit-error-rate = 1e-6 }")?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("corrupt"), EXPECTED)?;
     let bytes = table.maybe("bytes", |node, context| {
         const EXPECTED: &str = "the first and the last byte that may be hit, counted from 0, such as \"8-15\"";
         let text = values::text(node, context, EXPECTED)?;
@@ -24,9 +25,8 @@ pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Optio
         }
         range
     });
-    let checksums = [("discards", Checksum::Discards), ("passes", Checksum::Passes)];
-    let checksum = table.optional("checksum", Checksum::Discards, |node, context| values::choice(node, context, &checksums));
-    let rate = table.maybe("bit-error-rate", values::probability);
+    let checksum = table.choice("checksum", &Checksum::CHOICES);
+    let rate = table.maybe_value("bit-error-rate");
     let bits = match table.entry("bit-error-rate") {
         Some(rate_entry) => {
             let others = ["probability", "correlation", "bits"].map(|key| table.entry(key));
@@ -41,12 +41,9 @@ pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Optio
         }
         None => {
             let packets = read_chance_in(&mut table, node, context);
-            let count = table.optional("bits", 1, |node, context| {
-                let most = u64::from(u32::MAX);
-                values::integer(node, context, 1..=most, "a number of bits of at least 1").and_then(|bits| u32::try_from(bits).ok())
-            });
+            let count: Option<u64> = table.value("bits");
             table.finish();
-            Some(Flips::Bits { packets: packets?, count: count? })
+            Some(Flips::Bits { packets: packets?, count: u32::try_from(count?).ok()? })
         }
     };
     let corruption = flipping(bits?);

@@ -6,13 +6,13 @@ use cohaptic_wan::{Correlation, Delay, Distribution, Jitter};
 
 use super::distribution::read_distribution;
 use crate::document::Node;
-use crate::reading::values::{self, CORRELATION, ReadNumber as _};
-use crate::reading::{Context, TableReader, only_one};
+use crate::reading::{Context, TableReader, only_one, values};
+use crate::schema::link::LINK_TABLE;
 
 /// The delay of a link with its jitter.
 pub(super) fn read_delay(table: &mut TableReader<'_>, keys: &Node, context: Context<'_>) -> Option<Delay> {
     let (delay_node, jitter_node) = (table.get("delay"), table.get("jitter"));
-    let mean = table.maybe("delay", values::duration);
+    let mean = table.maybe_value("delay");
     let jitter = table.maybe("jitter", read_jitter);
     let (mean, jitter) = (mean?, jitter?);
     let Some(Read { jitter, own_mean }) = jitter else { return Some(Delay::constant(mean.unwrap_or_default())) };
@@ -31,13 +31,14 @@ struct Read {
 }
 
 fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
+    const EXPECTED: &str = "a duration or a table such as { sd = \"2ms\", distribution = \"gamma\" }";
     if node.as_table().is_none() {
         return Some(Read { jitter: Jitter::new(values::duration(node, context)?, Distribution::Normal), own_mean: None });
     }
-    let mut table = TableReader::new(node, context, "a duration or a table such as { sd = \"2ms\", distribution = \"gamma\" }")?;
-    let sd = table.maybe("sd", values::duration);
-    let distribution = table.optional("distribution", Distribution::Normal, read_distribution);
-    let floor = table.optional("floor", Duration::ZERO, values::duration);
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("jitter"), EXPECTED)?;
+    let sd: Option<Option<Duration>> = table.maybe_value("sd");
+    let distribution = table.read("distribution", read_distribution);
+    let floor = table.value("floor");
     let correlation = read_correlation(&mut table, node, context);
     let own = match &distribution {
         Some(Distribution::Empirical(delays)) => Some((nanos(delays.mean()), nanos(delays.sd()))),
@@ -60,10 +61,10 @@ fn read_correlation(table: &mut TableReader<'_>, node: &Node, context: Context<'
     }
     let chosen = only_one(node, context, &[per_packet, in_time], "correlation and correlation-time")?;
     if chosen.name == "correlation" {
-        let correlation = CORRELATION.read(&chosen.node, context)?;
+        let correlation = values::of_key(table.key("correlation"), &chosen.node, context)?;
         return Some(if correlation == 0.0 { Correlation::None } else { Correlation::PerPacket(correlation) });
     }
-    values::positive_duration(&chosen.node, context).map(Correlation::InTime)
+    values::of_key(table.key("correlation-time"), &chosen.node, context).map(Correlation::InTime)
 }
 
 /// Values of a file are nanoseconds from 0 to 9·10¹⁸.

@@ -8,25 +8,15 @@ use cohaptic_wan::law::{DistTable, DistTableError, Empirical, EmpiricalError};
 use crate::document::{Node, quote};
 use crate::reading::named_file::{Fault, file_path, line_span, read_file};
 use crate::reading::{Context, TableReader, only_one, values};
+use crate::schema::link::LINK_TABLE;
 
 const EXPECTED: &str = "the name of a law, { table = \"file.dist\" } or { empirical = \"file.csv\" }";
 
 pub(super) fn read_distribution(node: &Node, context: Context<'_>) -> Option<Distribution> {
-    let laws = [
-        ("normal", Distribution::Normal),
-        ("uniform", Distribution::Uniform),
-        ("pareto", Distribution::Pareto),
-        ("paretonormal", Distribution::ParetoNormal),
-        ("lognormal", Distribution::LogNormal),
-        ("gamma", Distribution::Gamma),
-        ("weibull", Distribution::Weibull),
-        ("laplace", Distribution::Laplace),
-    ];
     if node.as_text().is_some() {
-        let places: Vec<(&str, usize)> = laws.iter().enumerate().map(|(place, (name, _))| (*name, place)).collect();
-        return values::choice(node, context, &places).map(|place| laws[place].1.clone());
+        return values::word(node, context, &Distribution::CHOICES);
     }
-    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("jitter.distribution"), EXPECTED)?;
     let files = [table.entry("table"), table.entry("empirical")];
     table.finish();
     let file = only_one(node, context, &files, EXPECTED)?;

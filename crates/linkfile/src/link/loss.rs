@@ -6,8 +6,8 @@ use cohaptic_wan::{Bursts, FourState, GilbertElliott, GilbertElliottInTime, Loss
 use super::loss_pattern::{read_lost_packets, read_lost_times};
 use super::read_chance;
 use crate::document::Node;
-use crate::reading::values::{self, PACKETS, ReadNumber as _};
-use crate::reading::{Context, TableReader, only_one};
+use crate::reading::{Context, TableReader, only_one, values};
+use crate::schema::link::LINK_TABLE;
 
 const EXPECTED: &str =
     "a probability such as \"1%\", or { gilbert-elliott = … }, { states = … }, { bursts = … }, { correlated = … }, { packets = … } or { times = … }";
@@ -18,7 +18,7 @@ pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
         let probability = values::probability(node, context)?;
         return Some(if probability == Probability::ZERO { Loss::None } else { Loss::Independent(probability) });
     }
-    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("loss"), EXPECTED)?;
     let models = ["gilbert-elliott", "states", "bursts", "correlated", "packets", "times"].map(|key| table.entry(key));
     let every = table.entry("every");
     table.finish();
@@ -40,14 +40,12 @@ pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
 
 /// The chain of packets, or that in continuous time.
 fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
-    let mut table = TableReader::new(node, context, CHAIN)?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("loss.gilbert-elliott"), CHAIN)?;
     let in_time = table.get("mean-good").is_some() || table.get("mean-bad").is_some();
-    let h = table.optional("h", Probability::ZERO, values::probability);
-    let k = table.optional("k", Probability::ONE, values::probability);
+    let (h, k) = (table.value("h"), table.value("k"));
     if in_time {
         let (p, r) = (table.entry("p"), table.entry("r"));
-        let good = table.required("mean-good", "the mean time in the good state, a duration such as \"160ms\"", values::positive_duration);
-        let bad = table.required("mean-bad", "the mean time in the bad state, a duration such as \"40ms\"", values::positive_duration);
+        let (good, bad) = (table.value("mean-good"), table.value("mean-bad"));
         table.finish();
         if let Some(entry) = p.or(r) {
             let message = format!("{} beside mean times: expected either p and r, for each packet, or mean-good and mean-bad", entry.name);
@@ -57,8 +55,7 @@ fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
         let chain = GilbertElliottInTime::new(good?, bad?, h?, k?);
         return chain.map(Loss::GilbertElliottInTime).map_err(|error| values::refuse(context, &[], node, &error)).ok();
     }
-    let p = table.required("p", "a probability, of going from good to bad", values::probability);
-    let r = table.maybe("r", values::probability);
+    let (p, r) = (table.value("p"), table.maybe_value("r"));
     table.finish();
     let p = p?;
     let r = match r? {
@@ -70,12 +67,9 @@ fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
 
 /// Salsano's four states, with the defaults of tc.
 fn read_states(node: &Node, context: Context<'_>) -> Option<FourState> {
-    let mut table = TableReader::new(node, context, "a table such as { p13 = 0.01, p31 = 0.3 }")?;
-    let p13 = table.required("p13", "a probability, of going from the gap to a burst", values::probability);
-    let p31 = table.maybe("p31", values::probability);
-    let p32 = table.optional("p32", Probability::ZERO, values::probability);
-    let p23 = table.optional("p23", Probability::ONE, values::probability);
-    let p14 = table.optional("p14", Probability::ZERO, values::probability);
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("loss.states"), "a table such as { p13 = 0.01, p31 = 0.3 }")?;
+    let (p13, p31) = (table.value("p13"), table.maybe_value("p31"));
+    let (p32, p23, p14) = (table.value("p32"), table.value("p23"), table.value("p14"));
     table.finish();
     let p13 = p13?;
     let p31 = match p31? {
@@ -87,13 +81,10 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<FourState> {
 
 /// The same in the words of a person.
 fn read_bursts(node: &Node, context: Context<'_>) -> Option<FourState> {
-    let mut table = TableReader::new(node, context, "a table such as { loss = \"2%\", length = 5 }")?;
-    let loss = table.required("loss", "a probability, the mean fraction lost", values::probability);
-    let length =
-        table.required("length", "the mean length of a burst, a number of packets of at least 1", |node, context| PACKETS.read(node, context));
-    let density = table.optional("density", Probability::ONE, values::probability);
-    let isolated = table.optional("isolated", Probability::ZERO, values::probability);
-    let good_run = table.optional("good-run", 1.0, |node, context| PACKETS.read(node, context));
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("loss.bursts"), "a table such as { loss = \"2%\", length = 5 }")?;
+    let (loss, length) = (table.value::<Probability>("loss"), table.value("length"));
+    let [density, isolated] = ["density", "isolated"].map(|key| table.value::<Probability>(key));
+    let good_run = table.value("good-run");
     table.finish();
     let bursts = Bursts { loss: loss?.get(), length: length?, density: density?.get(), isolated: isolated?.get(), good_run: good_run? };
     FourState::from_bursts(bursts).map_err(|error| values::refuse(context, &[], node, &error)).ok()

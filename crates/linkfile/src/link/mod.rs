@@ -17,48 +17,27 @@ mod trace;
 
 use std::borrow::Cow;
 
-use cohaptic_wan::parameters::Key;
-use cohaptic_wan::{Chance, LinkConfig, LinkModel, Loss, Order, Outages};
+use cohaptic_wan::parameters::Table;
+use cohaptic_wan::{Chance, LinkConfig, LinkModel, Order};
 
 use crate::document::{Entry, Node, Value};
-use crate::reading::values::{self, CORRELATION, ReadNumber as _};
-use crate::reading::{Context, TableReader};
-use crate::schema::link::LINK;
+use crate::reading::{Context, TableReader, values};
+use crate::schema::link::LINK_TABLE;
 
 pub use modulators::read_modulators;
 
-/// The keys of a link, in the order in which they are explained.
-pub static LINK_KEYS: [&str; names_in(&LINK)] = {
-    let mut names = [""; names_in(&LINK)];
-    let (mut count, mut group) = (0, 0);
-    while group < LINK.len() {
-        let mut key = 0;
-        while key < LINK[group].len() {
-            names[count] = LINK[group][key].name;
-            (count, key) = (count + 1, key + 1);
-        }
-        group += 1;
-    }
-    names
-};
-
-const fn names_in(groups: &[&[Key]]) -> usize {
-    let (mut count, mut group) = (0, 0);
-    while group < groups.len() {
-        count += groups[group].len();
-        group += 1;
-    }
-    count
+/// Reads the keys of a link.
+pub fn read_link(node: &Node, context: Context<'_>) -> Option<LinkModel> {
+    read_link_of(&LINK_TABLE, node, context)
 }
 
-/// Reads the keys of a link. `beside`: keys of the same table that somebody else reads.
-pub fn read_link(node: &Node, context: Context<'_>, beside: &[&'static str]) -> Option<LinkModel> {
-    let mut table = TableReader::new(node, context, "a table of link keys such as { delay = \"24ms\" }")?;
-    table.know(beside);
-    table.know(&LINK_KEYS);
+/// Reads the keys of a link. `declaration` has the keys that may stand there; those that are none of a link somebody else reads.
+pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Context<'_>) -> Option<LinkModel> {
+    let mut table = TableReader::of(node, context, declaration, "a table of link keys such as { delay = \"24ms\" }")?;
+    table.know_all();
     table.finish();
     let keys = in_force(node, context)?;
-    let mut table = TableReader::new(&keys, context, "a table of link keys")?;
+    let mut table = TableReader::of(&keys, context, &LINK_TABLE, "a table of link keys")?;
     if let Some(replay) = table.get("replay").filter(|replay| !is_none(replay)) {
         return trace::read_replay(replay, context).map(LinkModel::Replay);
     }
@@ -73,28 +52,27 @@ pub fn read_link(node: &Node, context: Context<'_>, beside: &[&'static str]) -> 
 
 /// Reads the keys that say what one configuration does.
 fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
-    let mut table = TableReader::new(keys, context, "a table of link keys")?;
-    let orders = [("allow-reordering", Order::AllowReordering), ("in-order", Order::InOrder)];
+    let mut table = TableReader::of(keys, context, &LINK_TABLE, "a table of link keys")?;
     let delay = delay::read_delay(&mut table, keys, context);
-    let order = table.optional("order", Order::AllowReordering, |node, context| values::choice(node, context, &orders));
-    let loss = table.optional("loss", Loss::None, loss::read_loss);
-    let marks = table.optional("mark-instead-of-loss", false, values::boolean);
-    let duplication = table.optional("duplicate", Chance::default(), read_chance);
-    let corruption = table.optional("corrupt", None, corrupt::read_corruption);
-    let reorder = table.optional("reorder", None, reorder::read_reorder);
-    let trace = table.maybe("trace", trace::read_trace);
+    let order = table.choice("order", &Order::CHOICES);
+    let loss = table.read("loss", loss::read_loss);
+    let marks = table.value("mark-instead-of-loss");
+    let duplication = table.read("duplicate", read_chance);
+    let corruption = table.read("corrupt", corrupt::read_corruption);
+    let reorder = table.read("reorder", reorder::read_reorder);
+    let trace = table.read("trace", trace::read_trace);
     let (delivery, path) = match &trace {
-        Some(Some(Some(trace::Trace::Delivery(delivery)))) => (Some(delivery.clone()), None),
-        Some(Some(Some(trace::Trace::Path(path)))) => (None, Some(path.clone())),
-        Some(Some(None) | None) | None => (None, None),
+        Some(Some(trace::Trace::Delivery(delivery))) => (Some(delivery.clone()), None),
+        Some(Some(trace::Trace::Path(path))) => (None, Some(path.clone())),
+        Some(None) | None => (None, None),
     };
     let bottleneck = bottleneck::read_bottleneck(&mut table, delivery, context);
-    let token_bucket = table.optional("token-bucket", None, unless(NONE, bottleneck::read_token_bucket));
-    let slots = table.optional("slots", None, unless(NONE, slots::read_slots));
-    let mtu = table.optional("mtu", None, unless(UNLIMITED, values::size));
-    let limit = table.optional("limit", None, unless(UNLIMITED, queue::read_packets));
+    let token_bucket = table.read("token-bucket", unless(NONE, bottleneck::read_token_bucket));
+    let slots = table.read("slots", unless(NONE, slots::read_slots));
+    let mtu = table.read("mtu", unless(UNLIMITED, values::size));
+    let limit = table.read("limit", unless(UNLIMITED, queue::read_packets));
     let listed = listed::read_listed(&mut table, context);
-    let outages = table.optional("outage", Outages::default(), outage::read_outages);
+    let outages = table.read("outage", outage::read_outages);
     trace?;
     Some(LinkConfig {
         mtu: mtu?,
@@ -126,25 +104,8 @@ fn is_none(node: &Node) -> bool {
 }
 
 /// A reader of a value that a word takes away: the answer to the word is `None`.
-fn unless<'a, T>(
-    word: &'static str,
-    read: impl FnOnce(&'a Node, Context<'a>) -> Option<T>,
-) -> impl FnOnce(&'a Node, Context<'a>) -> Option<Option<T>> {
-    move |node, context| if node.as_text() == Some(word) { Some(None) } else { read(node, context).map(Some) }
-}
-
-/// Reads a table of two values that must be there, each with its key, what it is, and its reader.
-fn read_two<'a, A, B>(
-    node: &'a Node,
-    context: Context<'a>,
-    expected: &str,
-    (key, about, read): (&'static str, &str, impl FnOnce(&'a Node, Context<'a>) -> Option<A>),
-    (other_key, other_about, read_other): (&'static str, &str, impl FnOnce(&'a Node, Context<'a>) -> Option<B>),
-) -> Option<(A, B)> {
-    let mut table = TableReader::new(node, context, expected)?;
-    let (one, other) = (table.required(key, about, read), table.required(other_key, other_about, read_other));
-    table.finish();
-    Some((one?, other?))
+fn unless<T>(word: &'static str, read: fn(&Node, Context<'_>) -> Option<T>) -> impl FnOnce(&Node, Context<'_>) -> Option<Option<T>> {
+    move |node: &Node, context: Context<'_>| if node.as_text() == Some(word) { Some(None) } else { read(node, context).map(Some) }
 }
 
 /// Whether two keys were written in the same table, as opposed to one being laid over the other.
@@ -161,10 +122,11 @@ pub fn is_empty(node: &Node) -> bool {
 
 /// `"1%"` or `{ probability, correlation }`.
 fn read_chance(node: &Node, context: Context<'_>) -> Option<Chance> {
+    const EXPECTED: &str = "a probability or a table such as { probability = \"1%\", correlation = 0.5 }";
     if node.as_table().is_none() {
         return values::probability(node, context).map(Chance::independent);
     }
-    let mut table = TableReader::new(node, context, "a probability or a table such as { probability = \"1%\", correlation = 0.5 }")?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("duplicate"), EXPECTED)?;
     let chance = read_chance_in(&mut table, node, context);
     table.finish();
     chance
@@ -173,8 +135,7 @@ fn read_chance(node: &Node, context: Context<'_>) -> Option<Chance> {
 /// The keys `probability` and `correlation` of a table that has others too.
 fn read_chance_in(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Chance> {
     let nodes = [table.get("probability"), table.get("correlation")];
-    let probability = table.required("probability", "a probability such as \"1%\"", values::probability);
-    let correlation = table.optional("correlation", 0.0, |node, context| CORRELATION.read(node, context));
+    let (probability, correlation) = (table.value("probability"), table.value("correlation"));
     Chance::correlated(probability?, correlation?).map_err(|error| values::refuse(context, &nodes, node, &error)).ok()
 }
 
@@ -187,7 +148,7 @@ fn in_force<'a>(node: &'a Node, context: Context<'_>) -> Option<Cow<'a, Node>> {
     let mut taken_away = Vec::new();
     for (index, entry) in table.0.iter().enumerate() {
         let belongs = entry.name == whole.name || (whole.name == "netem" && entry.name == "netem-profile");
-        let known = LINK_KEYS.contains(&entry.name.as_str());
+        let known = LINK_TABLE.key(&entry.name).is_some();
         if belongs || !known || is_none_of_whole(entry) {
             continue;
         }

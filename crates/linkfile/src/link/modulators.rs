@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use cohaptic_wan::{LINK_KIND_PARAMETERS, LinkConfig, Modulated, Modulator, ModulatorState};
+use cohaptic_wan::{LINK_KIND_PARAMETERS, LinkConfig, MODULATOR, Modulated, Modulator, ModulatorState};
 
 use super::outage::{SOJOURN, read_sojourn};
-use super::{LINK_KEYS, read_config};
+use super::read_config;
 use crate::document::{Node, Value, quote};
 use crate::reading::values::{self, ReadNumber as _, WEIGHT};
 use crate::reading::{Context, Modulators, TableReader, one_of};
+use crate::schema::link::LINK_TABLE;
 
 /// Reads the list. `None` where something was refused.
 pub fn read_modulators(node: Option<&Node>, context: Context<'_>) -> Option<Arc<Modulators>> {
@@ -32,18 +33,16 @@ pub fn read_modulators(node: Option<&Node>, context: Context<'_>) -> Option<Arc<
 type Read = (Modulator, Vec<String>);
 
 fn read_modulator<'a>(node: &'a Node, context: Context<'a>) -> Option<(String, &'a Node, Read)> {
-    let mut table = TableReader::new(node, context, "a table with name and states")?;
-    let name = table.required("name", "a name that links refer to", |node, context| read_name(node, context).map(|name| (name, node)));
-    let states =
-        table.required("states", "a list such as [{ name = \"good\", sojourn = \"2s\" }, { name = \"bad\", sojourn = \"1s\" }]", |node, context| {
-            read_states(node, context).map(|states| (states, node))
-        });
+    let mut table = TableReader::of(node, context, &MODULATOR, "a table with name and states")?;
+    let (name_node, states_node) = (table.get("name"), table.get("states"));
+    let name = table.read("name", read_name);
+    let states = table.read("states", read_states);
     table.finish();
-    let ((name, name_node), ((names, states), states_node)) = (name?, states?);
+    let (name, (names, states)) = (name?, states?);
     match Modulator::new(&name, states) {
-        Ok(modulator) => Some((name, name_node, (modulator, names))),
+        Ok(modulator) => Some((name, name_node?, (modulator, names))),
         Err(error) => {
-            values::refuse(context, &[], states_node, &error);
+            values::refuse(context, &[], states_node?, &error);
             None
         }
     }
@@ -65,9 +64,9 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<(Vec<String>, Vec<Mo
     let mut names: Vec<String> = Vec::new();
     let mut tables = Vec::new();
     for entry in entries {
-        let mut table = TableReader::new(entry, context, "a table with name, sojourn and next")?;
+        let mut table = TableReader::of(entry, context, MODULATOR.table("states.0"), "a table with name, sojourn and next")?;
         let name_node = table.get("name");
-        let name = table.required("name", "the name of the state", read_name);
+        let name = table.read("name", read_name);
         let sojourn = table.maybe("sojourn", read_sojourn);
         let next = table.get("next");
         table.finish();
@@ -129,17 +128,6 @@ fn read_next(node: &Node, context: Context<'_>, names: &[String]) -> Option<Vec<
     Some(weights)
 }
 
-/// Keys that say which kind of link it is cannot change with a state.
-const NOT_OF_A_STATE: [&str; LINK_KIND_PARAMETERS.len()] = {
-    let mut names = [""; LINK_KIND_PARAMETERS.len()];
-    let mut key = 0;
-    while key < names.len() {
-        names[key] = LINK_KIND_PARAMETERS[key].name;
-        key += 1;
-    }
-    names
-};
-
 /// `{ by = "cell", good = { … }, bad = { … } }`: the keys of each state laid over `keys`, those of the link.
 pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> Option<Modulated> {
     const EXPECTED: &str = "\"none\" or a table such as { by = \"cell\", good = { delay = \"20ms\" }, bad = { delay = \"80ms\" } }";
@@ -147,7 +135,8 @@ pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> 
         context.fault_at(node, format!("found {}: expected {EXPECTED}", node.describe()));
         return None;
     };
-    let base = keys.without(&NOT_OF_A_STATE);
+    // Keys that say which kind of link it is cannot change with a state.
+    let base = keys.without(&LINK_KIND_PARAMETERS.each_ref().map(|key| key.name));
     // On their own, so that a fault in a key that every state replaces is found too.
     let sound = read_config(&base, context.of_part());
     let Some(by) = table.get("by") else {
@@ -187,9 +176,8 @@ pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> 
 
 /// A state may say what a link says, but not which kind of link it is.
 fn check_keys(node: &Node, context: Context<'_>) -> Option<()> {
-    let mut table = TableReader::new(node, context, "a table of link keys such as { delay = \"80ms\" }")?;
-    let keys: Vec<&'static str> = LINK_KEYS.into_iter().filter(|key| !NOT_OF_A_STATE.contains(key)).collect();
-    table.know(&keys);
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("modulated.STATE"), "a table of link keys such as { delay = \"80ms\" }")?;
+    table.know_all();
     table.finish();
     Some(())
 }

@@ -13,20 +13,10 @@ use crate::document::{Node, Place};
 use crate::reading::named_file::{Fault, beside_document, read_file};
 use crate::reading::{Context, TableReader, values};
 
-/// The model that the words give.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Profile {
-    /// What they say, with the laws of this program.
-    Exact,
-    /// What Linux 6.6 does when it is told so.
-    Kernel,
-}
-
 /// The link, if there are words.
 pub(super) fn read_netem(table: &mut TableReader<'_>, context: Context<'_>) -> Option<Option<LinkModel>> {
-    let profiles = [("exact", Profile::Exact), ("kernel-6.6", Profile::Kernel)];
     let profile_entry = table.entry("netem-profile");
-    let profile = table.optional("netem-profile", Profile::Exact, |node, context| values::choice(node, context, &profiles));
+    let profile: Option<&str> = table.value("netem-profile");
     let Some(node) = table.get("netem").filter(|node| !is_none(node)) else {
         // A profile that was inherited means nothing without the words, and harms nobody; one beside no words is a slip.
         if let Some(entry) = profile_entry.filter(|_| !context.partial && table.get("netem").is_none()) {
@@ -44,11 +34,7 @@ pub(super) fn read_netem(table: &mut TableReader<'_>, context: Context<'_>) -> O
             return None;
         }
     };
-    match profile? {
-        Profile::Exact => read_exact(node, words, &netem, context),
-        Profile::Kernel => read_kernel(node, netem, context),
-    }
-    .map(Some)
+    if profile? == "exact" { read_exact(node, words, &netem, context) } else { read_kernel(node, netem, context) }.map(Some)
 }
 
 /// Where a word stands in the text of the scene; the whole value if it is written with escapes.

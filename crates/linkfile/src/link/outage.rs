@@ -2,18 +2,18 @@
 
 use cohaptic_wan::{IdleOutages, Outage, Outages, RandomOutages, Sojourn};
 
-use super::read_two;
 use crate::document::Node;
 use crate::reading::{Context, TableReader, only_one, values};
+use crate::schema::link::LINK_TABLE;
 
 /// A list of spans, or `{ scheduled, random, idle }`.
 pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages> {
     if node.as_table().is_none() {
         return read_scheduled(node, context);
     }
-    let mut table = TableReader::new(node, context, "a list, or a table with scheduled, random and idle")?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage"), "a list, or a table with scheduled, random and idle")?;
     let (random_node, idle_node) = (table.get("random"), table.get("idle"));
-    let scheduled = table.optional("scheduled", Outages::default(), read_scheduled);
+    let scheduled = table.read("scheduled", read_scheduled);
     let random = table.maybe("random", read_random);
     let idle = table.maybe("idle", read_idle);
     table.finish();
@@ -28,16 +28,17 @@ pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages>
 }
 
 fn read_random(node: &Node, context: Context<'_>) -> Option<RandomOutages> {
-    let (up, down) = (("up", SOJOURN, read_sojourn), ("down", SOJOURN, read_sojourn));
-    let (up, down) = read_two(node, context, "a table such as { up = \"30s\", down = \"1s\" }", up, down)?;
-    Some(RandomOutages { up, down })
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage.random"), "a table such as { up = \"30s\", down = \"1s\" }")?;
+    let [up, down] = ["up", "down"].map(|key| table.read_expecting(key, SOJOURN, read_sojourn));
+    table.finish();
+    Some(RandomOutages { up: up?, down: down? })
 }
 
 fn read_idle(node: &Node, context: Context<'_>) -> Option<IdleOutages> {
-    let after = ("after", "how long nothing must be sent, a duration such as \"10s\"", values::positive_duration);
-    let down = ("down", "how long the link is down then, a duration such as \"2s\"", values::positive_duration);
-    let (after, down) = read_two(node, context, "a table such as { after = \"10s\", down = \"2s\" }", after, down)?;
-    Some(IdleOutages { after, down })
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage.idle"), "a table such as { after = \"10s\", down = \"2s\" }")?;
+    let (after, down) = (table.value("after"), table.value("down"));
+    table.finish();
+    Some(IdleOutages { after: after?, down: down? })
 }
 
 fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
@@ -60,9 +61,10 @@ fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
 
 /// A span of time.
 pub(super) fn read_span(node: &Node, context: Context<'_>) -> Option<Outage> {
-    let (from, to) = (("from", "a time such as \"1s\"", values::instant), ("to", "a time such as \"2s\"", values::instant));
-    let (from, to) = read_two(node, context, "a table such as { from = \"1s\", to = \"2s\" }", from, to)?;
-    Some(Outage { from, to })
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage.0"), "a table such as { from = \"1s\", to = \"2s\" }")?;
+    let (from, to) = (table.read("from", values::instant), table.read("to", values::instant));
+    table.finish();
+    Some(Outage { from: from?, to: to? })
 }
 
 /// What stands in place of a sojourn where something else was found.
@@ -80,7 +82,7 @@ pub(super) fn read_sojourn(node: &Node, context: Context<'_>) -> Option<Sojourn>
 }
 
 fn read_law(node: &Node, context: Context<'_>) -> Option<Sojourn> {
-    let mut table = TableReader::new(node, context, SOJOURN)?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage.random.up"), SOJOURN)?;
     let laws = [table.entry("fixed"), table.entry("uniform"), table.entry("erlang"), table.entry("exponential")];
     table.finish();
     let law = only_one(node, context, &laws, SOJOURN)?;
@@ -98,11 +100,11 @@ fn read_law(node: &Node, context: Context<'_>) -> Option<Sojourn> {
             Some(Sojourn::Uniform(from?, to?))
         }
         _ => {
-            const STAGES: &str = "a number of stages from 1 to 1000";
-            let mean = ("mean", "the mean of all stages together, a duration", values::duration);
-            let stages = ("stages", STAGES, |node, context| values::integer(node, context, 1..=1000, STAGES));
-            let (mean, stages) = read_two(&law.node, context, "a table such as { mean = \"2s\", stages = 4 }", mean, stages)?;
-            Some(Sojourn::Erlang(mean, u32::try_from(stages).ok()?))
+            let declaration = LINK_TABLE.table("outage.random.up.erlang");
+            let mut table = TableReader::of(&law.node, context, declaration, "a table such as { mean = \"2s\", stages = 4 }")?;
+            let (mean, stages): (_, Option<u64>) = (table.value("mean"), table.value("stages"));
+            table.finish();
+            Some(Sojourn::Erlang(mean?, u32::try_from(stages?).ok()?))
         }
     }
 }

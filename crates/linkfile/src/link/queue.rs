@@ -1,12 +1,12 @@
 //! `queue` and limits: how much may wait, and which packets are dropped.
 
-use cohaptic_units::{Bytes, Probability};
+use cohaptic_units::Bytes;
 use cohaptic_wan::{CoDel, Discipline, QueueLimit, Red};
 
 use super::{UNLIMITED, unless};
 use crate::document::{Node, quote};
-use crate::reading::values::{self, FRACTION, ReadNumber as _};
-use crate::reading::{Context, TableReader, only_one};
+use crate::reading::{Context, TableReader, only_one, values};
+use crate::schema::link::LINK_TABLE;
 
 /// What a queue is, apart from what it stands before.
 #[derive(Clone, Copy, Debug)]
@@ -19,9 +19,9 @@ const DISCIPLINES: &str = "one of tail-drop, head-drop, codel, red, { codel = â€
 const LIMIT: &str = "a limit such as \"100 packets\", \"64kB\" or \"50ms\"";
 
 pub(super) fn read_queue(node: &Node, context: Context<'_>) -> Option<Queue> {
-    let mut table = TableReader::new(node, context, "a table such as { limit = \"100 packets\" }")?;
-    let limit = table.required("limit", LIMIT, unless(UNLIMITED, read_limit));
-    let discipline = table.optional("discipline", Discipline::TailDrop, |node, context| read_discipline(node, context, limit.flatten()));
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("queue"), "a table such as { limit = \"100 packets\" }")?;
+    let limit = table.read_expecting("limit", LIMIT, unless(UNLIMITED, read_limit));
+    let discipline = table.read("discipline", |node, context| read_discipline(node, context, limit.flatten()));
     table.finish();
     Some(Queue { limit: limit?, discipline: discipline? })
 }
@@ -55,7 +55,7 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
         return match name {
             "tail-drop" => Some(Discipline::TailDrop),
             "head-drop" => Some(Discipline::HeadDrop),
-            "codel" => Some(Discipline::CoDel(CoDel::default())),
+            "codel" => read_codel(&nothing(node), context).map(Discipline::CoDel),
             "red" => read_plain_red(node, context, limit),
             other => {
                 context.fault_at(node, format!("unknown name {}: expected {DISCIPLINES}", quote(other)));
@@ -63,24 +63,22 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
             }
         };
     }
-    let mut table = TableReader::new(node, context, DISCIPLINES)?;
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("queue.discipline"), DISCIPLINES)?;
     let entries = [table.entry("codel"), table.entry("red")];
     table.finish();
     let chosen = only_one(node, context, &entries, DISCIPLINES)?;
     if chosen.name == "codel" {
         read_codel(&chosen.node, context).map(Discipline::CoDel)
     } else {
-        read_red(&chosen.node, context).map(Discipline::Red)
+        read_red(&chosen.node, context, None).map(Discipline::Red)
     }
 }
 
 fn read_codel(node: &Node, context: Context<'_>) -> Option<CoDel> {
-    let custom = CoDel::default();
-    let mut table = TableReader::new(node, context, "a table such as { target = \"5ms\", interval = \"100ms\" }")?;
-    let target = table.optional("target", custom.target, values::positive_duration);
-    let interval = table.optional("interval", custom.interval, values::positive_duration);
-    let mtu = table.optional("mtu", custom.mtu, values::size);
-    let ecn = table.optional("ecn", custom.ecn, values::boolean);
+    const EXPECTED: &str = "a table such as { target = \"5ms\", interval = \"100ms\" }";
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("queue.discipline.codel"), EXPECTED)?;
+    let (target, interval) = (table.value("target"), table.value("interval"));
+    let (mtu, ecn) = (table.value("mtu"), table.value("ecn"));
     table.finish();
     Some(CoDel { target: target?, interval: interval?, mtu: mtu?, ecn: ecn? })
 }
@@ -92,25 +90,23 @@ fn read_plain_red(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) 
         context.fault_at(node, format!("red takes its thresholds from the limit: expected {EXPECTED}"));
         return None;
     };
-    let (min, max) = (Bytes::new(limit.get() / 6), Bytes::new(limit.get() / 2));
-    let red = Red::new(min, max, Probability::new(CUSTOM_PROBABILITY).ok()?, CUSTOM_WEIGHT, CUSTOM_PACKET, false);
-    red.map(Discipline::Red).map_err(|error| values::refuse(context, &[], node, &error)).ok()
+    read_red(&nothing(node), context, Some([Bytes::new(limit.get() / 6), Bytes::new(limit.get() / 2)])).map(Discipline::Red)
 }
 
-const CUSTOM_PROBABILITY: f64 = 0.1;
-const CUSTOM_WEIGHT: f64 = 0.002;
-const CUSTOM_PACKET: Bytes = Bytes::new(500);
+/// A table without keys in place of a word, for a discipline with its defaults.
+fn nothing(word: &Node) -> Node {
+    Node::empty_table(word.place, word.path.clone())
+}
 
-fn read_red(node: &Node, context: Context<'_>) -> Option<Red> {
-    let mut table = TableReader::new(node, context, "a table such as { min = \"5kB\", max = \"15kB\" }")?;
+/// `thresholds`: the least and the greatest, if the table does not say them.
+fn read_red(node: &Node, context: Context<'_>, thresholds: Option<[Bytes; 2]>) -> Option<Red> {
+    let declaration = LINK_TABLE.table("queue.discipline.red");
+    let mut table = TableReader::of(node, context, declaration, "a table such as { min = \"5kB\", max = \"15kB\" }")?;
     let nodes = [table.get("min"), table.get("max")];
     let (weight_node, packet_node) = (table.get("weight"), table.get("mean-packet"));
-    let min = table.required("min", "the average queue at which dropping begins, a size such as \"5kB\"", values::size);
-    let max = table.required("max", "the average queue at which everything is dropped, a size such as \"15kB\"", values::size);
-    let probability = table.optional("max-probability", Probability::new(CUSTOM_PROBABILITY).ok()?, values::probability);
-    let weight = table.optional("weight", CUSTOM_WEIGHT, |node, context| FRACTION.read(node, context));
-    let packet = table.optional("mean-packet", CUSTOM_PACKET, values::size);
-    let ecn = table.optional("ecn", false, values::boolean);
+    let [min, max] = thresholds.map_or_else(|| ["min", "max"].map(|key| table.value(key)), |ends| ends.map(Some));
+    let (probability, weight) = (table.value("max-probability"), table.value("weight"));
+    let (packet, ecn) = (table.value("mean-packet"), table.value("ecn"));
     table.finish();
     let red = Red::new(min?, max?, probability?, weight?, packet?, ecn?);
     red.map_err(|error| {

@@ -5,8 +5,9 @@ use core::num::NonZeroU32;
 use cohaptic_wan::{Chance, Displacement, Reorder};
 
 use super::read_chance_in;
-use crate::document::Node;
+use crate::document::{Entry, Node};
 use crate::reading::{Context, TableReader, only_one, values};
+use crate::schema::link::LINK_TABLE;
 
 /// `"25%"` (jumps ahead), or `{ probability, correlation }` with `gap`, with `behind` and `at-most`, or with `later`.
 pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<Reorder>> {
@@ -15,11 +16,12 @@ pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<R
         let packets = Chance::independent(values::probability(node, context)?);
         return Some((!packets.is_never()).then_some(Reorder { packets, how: any }));
     }
-    let mut table = TableReader::new(node, context, "a probability or a table such as { probability = \"25%\", gap = 5 }")?;
+    let declaration = LINK_TABLE.table("reorder");
+    let mut table = TableReader::of(node, context, declaration, "a probability or a table such as { probability = \"25%\", gap = 5 }")?;
     let packets = read_chance_in(&mut table, node, context);
     let how = [table.entry("gap"), table.entry("behind"), table.entry("later")];
     let at_most_entry = table.entry("at-most");
-    let at_most = table.maybe("at-most", values::duration);
+    let at_most = table.maybe_value("at-most");
     if how[1].is_some() && at_most_entry.is_none() {
         table.miss("at-most", "how long a packet is held at most, a duration such as \"50ms\"");
     }
@@ -29,16 +31,15 @@ pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<R
         context.fault(at_most.key, &at_most.node.path, "at-most says how long a packet is held: expected it beside behind");
         return None;
     }
-    let count = |node: &Node| {
-        let most = u64::from(u32::MAX);
-        let count = values::integer(node, context, 1..=most, "a number of packets of at least 1")?;
+    let count = |how: &Entry| {
+        let count: u64 = values::of_key(declaration.key(&how.name)?, &how.node, context)?;
         NonZeroU32::new(u32::try_from(count).ok()?)
     };
     let how = match how {
         None => any,
-        Some(how) if how.name == "gap" => Displacement::Jump { gap: count(&how.node)? },
+        Some(how) if how.name == "gap" => Displacement::Jump { gap: count(how)? },
         Some(how) if how.name == "behind" => {
-            let packets = count(&how.node);
+            let packets = count(how);
             let at_most = at_most?;
             // A missing key was reported above, and in a part of a scene none is missing.
             let at_most = if context.partial { at_most.unwrap_or_default() } else { at_most? };

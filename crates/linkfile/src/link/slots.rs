@@ -7,9 +7,11 @@ use cohaptic_wan::Slots;
 use super::delay::read_delay;
 use crate::document::Node;
 use crate::reading::{Context, TableReader, values};
+use crate::schema::link::LINK_TABLE;
 
 pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
-    let mut table = TableReader::new(node, context, "\"none\" or a table such as { min = \"10ms\", max = \"20ms\" }")?;
+    const EXPECTED: &str = "\"none\" or a table such as { min = \"10ms\", max = \"20ms\" }";
+    let mut table = TableReader::of(node, context, LINK_TABLE.table("slots"), EXPECTED)?;
     let ends = [table.entry("min"), table.entry("max")];
     let law = [table.entry("delay"), table.entry("jitter")];
     let slots = match (ends.into_iter().flatten().next(), law.into_iter().flatten().next()) {
@@ -22,10 +24,7 @@ pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
         (None, Some(_)) => read_delay(&mut table, node, context).map(Slots::drawn),
         (_, None) => read_ends(&mut table, node, context),
     };
-    let packets = table.maybe("packets", |node, context| {
-        let most = i64::MAX.unsigned_abs();
-        values::integer(node, context, 1..=most, "a number of packets of at least 1").and_then(NonZeroU64::new)
-    });
+    let packets: Option<Option<u64>> = table.maybe_value("packets");
     let bytes = table.maybe("bytes", |node, context| {
         let bytes = NonZeroU64::new(values::size(node, context)?.get());
         if bytes.is_none() {
@@ -35,15 +34,14 @@ pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
     });
     table.finish();
     let mut slots = slots?;
-    (slots.packets, slots.bytes) = (packets?, bytes?);
+    (slots.packets, slots.bytes) = (packets?.and_then(NonZeroU64::new), bytes?);
     Some(slots)
 }
 
 /// Gaps that are uniform between two spans.
 fn read_ends(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Slots> {
     let nodes = [table.get("min"), table.get("max")];
-    let min = table.required("min", "the shortest time from slot to slot, a duration such as \"10ms\"", values::duration);
-    let max = table.maybe("max", values::duration);
+    let (min, max) = (table.value("min"), table.maybe_value("max"));
     let (min, max) = (min?, max?);
     Slots::new(min, max.unwrap_or(min)).map_err(|error| values::refuse(context, &nodes, node, &error)).ok()
 }

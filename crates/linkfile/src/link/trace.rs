@@ -12,6 +12,7 @@ use super::is_none;
 use crate::document::Node;
 use crate::reading::named_file::{Fault, file_path, line_span, read_file};
 use crate::reading::{Context, TableReader, values};
+use crate::schema::link::LINK_TABLE;
 
 /// What a file has recorded.
 #[derive(Clone, Debug)]
@@ -29,12 +30,14 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     if is_none(node) {
         return Some(None);
     }
+    let declaration = LINK_TABLE.table("trace");
     if node.as_table().is_none() {
         return load(node, context, Form { bytes: MAHIMAHI_BYTES, between: Between::Steps, repeat: false, start: Start::Zero }).map(Some);
     }
-    let mut table = TableReader::new(node, context, "the name of a recording, or a table such as { file = \"path.csv\", repeat = true }")?;
+    let mut table =
+        TableReader::of(node, context, declaration, "the name of a recording, or a table such as { file = \"path.csv\", repeat = true }")?;
     let (bytes_entry, of_path) = (table.entry("bytes"), [table.entry("between"), table.entry("repeat"), table.entry("start")]);
-    let bytes = table.optional("bytes", MAHIMAHI_BYTES, |node, context| {
+    let bytes = table.read("bytes", |node, context| {
         let bytes = values::size(node, context)?;
         if bytes == Bytes::ZERO {
             context.fault_at(node, "zero is out of range: expected a size above zero such as \"1504B\"");
@@ -42,11 +45,9 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
         }
         Some(bytes)
     });
-    let ways = [("steps", Between::Steps), ("lines", Between::Lines)];
-    let between = table.optional("between", Between::Steps, |node, context| values::choice(node, context, &ways));
-    let repeat = table.optional("repeat", false, values::boolean);
-    let starts = [("zero", Start::Zero), ("first", Start::First)];
-    let start = table.optional("start", Start::Zero, |node, context| values::choice(node, context, &starts));
+    let between = table.choice("between", &Between::CHOICES);
+    let repeat = table.value("repeat");
+    let start = table.value("start").map(|word: &str| if word == "first" { Start::First } else { Start::Zero });
     let file = table.get("file");
     if file.is_none() {
         table.miss("file", FILE);

@@ -56,7 +56,7 @@ fn read_overrides(
         let nothing = Node::empty_table(BEGINNING, "link".to_owned());
         let link = document.as_table().and_then(|table| table.get("link")).map_or(&nothing, |entry| &*entry.node);
         check(link, context);
-        read_link(link, context, &[])
+        read_link(link, context)
     })?;
     Ok(parsed.whole)
 }
@@ -227,6 +227,7 @@ mod tests {
                 Form::List(form) | Form::Pair(form) => of(form),
                 Form::AnyOf(forms) => forms.iter().map(of).sum(),
                 Form::Text | Form::Boolean | Form::Integer(..) | Form::Number(_) | Form::Vector(_) | Form::Triple(_) | Form::Duration => 0,
+                Form::PositiveDuration => 0,
                 Form::Rate | Form::Size | Form::Probability | Form::Like(_) | Form::Words(_) => 0,
             }
         }

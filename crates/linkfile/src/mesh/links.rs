@@ -14,8 +14,9 @@ use super::link_keys::{KeysOfLinks, LinkKeys};
 use super::link_table::{LinkChange, LinkTable, first_left, pairs};
 use super::selector::{LinkSelector, read_ends};
 use crate::document::{BEGINNING, Node};
-use crate::link::{LINK_KEYS, is_empty, read_link};
+use crate::link::{is_empty, read_link, read_link_of};
 use crate::reading::{Context, Modulators, TableReader, values};
+use crate::schema::link::LINK_ENTRY;
 
 /// The classes of links as they stand at some time.
 #[derive(Clone, Debug)]
@@ -44,7 +45,7 @@ struct Class {
 pub fn read_links(defaults: Option<&Node>, entries: Option<&Node>, context: Context<'_>) -> Option<LinkClasses> {
     let nothing = Node::empty_table(BEGINNING, "link".to_owned());
     let defaults = defaults.unwrap_or(&nothing);
-    let base = read_link(defaults, context, &[]);
+    let base = read_link(defaults, context);
     let entries = match entries {
         Some(node) => values::list(node, context, "entries [[links]]")?,
         None => Vec::new(),
@@ -74,7 +75,7 @@ pub fn read_links(defaults: Option<&Node>, entries: Option<&Node>, context: Cont
 /// Checks the keys that a change of links sets, without the link that they are laid over, so that a fault is found even where it is not known which links
 /// are meant. `None` only if there are none.
 pub fn read_key_changes(set: &Node, context: Context<'_>) -> Option<()> {
-    read_link(set, context.of_part(), &[]);
+    read_link(set, context.of_part());
     if is_empty(set) {
         context.fault_at(set, "nothing changes: expected keys of a link");
         return None;
@@ -90,23 +91,21 @@ fn read_entry(
     seen: &mut BTreeSet<(usize, usize)>,
     context: Context<'_>,
 ) -> Option<((usize, usize), Option<(Node, LinkModel)>)> {
-    let mut table = TableReader::new(entry, context, "a table with from, to and link keys")?;
+    let mut table = TableReader::of(entry, context, &LINK_ENTRY, "a table with from, to and link keys")?;
     let ends = read_ends(&mut table, context);
     let to = table.get("to");
     // Its other keys, known and unknown, are looked at below; a missing key is reported here.
-    if entry.as_table().is_some_and(|table| table.get("from").is_none() || table.get("to").is_none()) {
-        let rest = entry.as_table()?.0.iter().filter(|entry| !matches!(entry.name.as_str(), "from" | "to"));
-        if rest.clone().all(|entry| LINK_KEYS.contains(&entry.name.as_str())) {
-            table.know(&LINK_KEYS);
-            table.finish();
-        }
+    let lacks_an_end = ["from", "to"].iter().any(|end| table.get(end).is_none());
+    if lacks_an_end && entry.as_table().is_some_and(|keys| keys.0.iter().all(|entry| LINK_ENTRY.key(&entry.name).is_some())) {
+        table.know_all();
+        table.finish();
     }
     let own = entry.without(&["from", "to"]);
     let class = if is_empty(&own) {
         Some(None)
     } else {
         let keys = own.over(below, &[]);
-        read_link(&keys, context, &["from", "to"]).map(|config| Some((keys, config)))
+        read_link_of(&LINK_ENTRY, &keys, context).map(|config| Some((keys, config)))
     };
     let ends = ends?;
     if !seen.insert(ends) {
@@ -173,7 +172,7 @@ impl LinkClasses {
     /// The class of links of an old class over which keys are laid.
     fn lay_over(&mut self, old: usize, keys: &Node, context: Context<'_>) -> Option<usize> {
         let merged = keys.over(&self.classes.get(old)?.keys, &[]);
-        let config = read_link(&merged, context, &[])?;
+        let config = read_link(&merged, context)?;
         Some(self.add(merged, config))
     }
 

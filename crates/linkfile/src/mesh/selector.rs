@@ -2,6 +2,7 @@
 
 use crate::document::{Node, quote};
 use crate::reading::{Context, Names, TableReader, one_of, only_one, values};
+use crate::schema::link::{ENDS_TABLE, LINK_OR_LINE};
 
 /// Which links are meant, by the places of peers in the file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -41,8 +42,8 @@ pub fn read_peer_name(node: &Node, context: Context<'_>) -> Option<usize> {
 pub fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(usize, usize)> {
     let to_node = table.get("to");
     let noun = context.names.map_or("peer", Names::noun);
-    let from = table.required("from", &format!("the name of the {noun} that sends"), read_peer_name);
-    let to = table.required("to", &format!("the name of the {noun} that receives"), read_peer_name);
+    let from = table.read_expecting("from", &format!("the name of the {noun} that sends"), read_peer_name);
+    let to = table.read_expecting("to", &format!("the name of the {noun} that receives"), read_peer_name);
     let (from, to) = (from?, to?);
     if from == to {
         context.fault_at(to_node?, format!("a {noun} has no link to itself: expected the name of another {noun}"));
@@ -57,7 +58,7 @@ pub fn read_links_between(node: &Node, context: Context<'_>) -> Option<LinkSelec
     if is_all(node, context, EXPECTED)? {
         return Some(LinkSelector::All);
     }
-    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let mut table = TableReader::of(node, context, &ENDS_TABLE, EXPECTED)?;
     let ends = read_ends(&mut table, context);
     table.finish();
     ends.map(|(from, to)| LinkSelector::Between { from, to })
@@ -69,7 +70,7 @@ pub fn read_link_or_line(node: &Node, context: Context<'_>) -> Option<LinkSelect
     if is_all(node, context, EXPECTED)? {
         return Some(LinkSelector::All);
     }
-    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let mut table = TableReader::of(node, context, &LINK_OR_LINE, EXPECTED)?;
     let (uplink, downlink) = (table.entry("uplink"), table.entry("downlink"));
     if uplink.is_none() && downlink.is_none() {
         let ends = read_ends(&mut table, context);

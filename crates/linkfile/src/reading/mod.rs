@@ -9,11 +9,9 @@ mod names;
 mod overrides;
 mod parse;
 mod table_reader;
-#[cfg(feature = "testing")]
-pub mod testing;
 pub mod values;
 
 pub use context::{Context, FileReader, Modulators};
 pub use names::{Names, one_of};
-pub use parse::{Parsed, default_title, file_text, parse, parse_with, text_of, with_text};
+pub use parse::{Parsed, default_title, defaults, file_text, parse, parse_with, text_of, with_text};
 pub use table_reader::{TableReader, only_one};

@@ -95,6 +95,15 @@ pub fn parse_with<T>(
     }
 }
 
+/// What a reader makes of a table without keys: the declared default of each.
+///
+/// # Panics
+///
+/// If the reader refuses such a table.
+pub fn defaults<T>(read: impl FnOnce(&Node, Context<'_>) -> Option<T>) -> T {
+    parse(Sources { file: Path::new(""), text: "", overrides: &[] }, read).expect("every key has a default").whole
+}
+
 /// The name of the file without its ending.
 #[must_use]
 pub fn default_title(file: &Path) -> String {

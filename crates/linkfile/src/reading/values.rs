@@ -3,12 +3,61 @@
 use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, ParseError, Probability, Rate, parse};
+use cohaptic_wan::ParameterValue;
+use cohaptic_wan::parameters::{Form, Key};
 
-pub use cohaptic_wan::parameters::{CORRELATION, FRACTION, PACKETS, Quantity, WEIGHT};
+pub use cohaptic_wan::parameters::{Quantity, WEIGHT};
 
 use super::context::Context;
 use super::names::one_of;
-use crate::document::{Node, Value, quote, shorten};
+use crate::document::{BEGINNING, Node, Value, quote, shorten};
+
+/// The value of a key as its form says.
+///
+/// # Panics
+///
+/// If the form of the key has no single value, or values of another type.
+#[track_caller]
+pub fn of_key<T: TryFrom<ParameterValue>>(key: &Key, node: &Node, context: Context<'_>) -> Option<T> {
+    let value = match key.form {
+        Form::Duration => duration(node, context).map(ParameterValue::Duration),
+        Form::PositiveDuration => positive_duration(node, context).map(ParameterValue::Duration),
+        Form::Rate => rate(node, context).map(ParameterValue::Rate),
+        Form::Size => size(node, context).map(ParameterValue::Size),
+        Form::Probability => probability(node, context).map(ParameterValue::Probability),
+        Form::Number(quantity) => quantity.read(node, context).map(ParameterValue::Number),
+        Form::Integer(least, most) => integer(node, context, least..=most, &key.expected()).map(ParameterValue::Integer),
+        Form::Boolean => boolean(node, context).map(ParameterValue::Boolean),
+        Form::Words(words) => {
+            let words: Vec<_> = words.iter().map(|(word, about)| (*word, *word, *about)).collect();
+            word(node, context, &words).map(ParameterValue::Word)
+        }
+        Form::Text
+        | Form::File
+        | Form::Vector(_)
+        | Form::Triple(_)
+        | Form::Like(_)
+        | Form::Table(_)
+        | Form::List(_)
+        | Form::Pair(_)
+        | Form::AnyOf(_) => unreachable!("{} has a reader of its own", key.name),
+    }?;
+    Some(T::try_from(value).ok().expect("a key is read as its form says"))
+}
+
+/// The value that a declaration gives to a key which is not there: the same in TOML and in JSON.
+pub(super) fn default_of(default: &str) -> Node {
+    // A file with ten thousand links takes a dozen defaults for each: the parser of TOML would take longer than all readers together.
+    let text = default.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map(|text| Value::Text(text.to_owned()));
+    let integer = || default.parse().ok().map(|integer| Value::Integer(Some(integer)));
+    let boolean = || default.parse().ok().map(Value::Boolean);
+    let empty = || (default == "[]").then(|| Value::List(Vec::new()));
+    if let Some(value) = text.or_else(integer).or_else(boolean).or_else(empty) {
+        return Node { value, place: BEGINNING, path: String::new() };
+    }
+    let value = toml::de::DeValue::parse(default).expect("the default of a key is a value");
+    Node::value(&value, String::new(), 0, 0).expect("the default of a key is flat")
+}
 
 /// Reads a number in its range.
 pub trait ReadNumber {
@@ -100,15 +149,24 @@ pub fn text<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<
     text
 }
 
-/// One of a few words.
-pub fn choice<T: Copy>(node: &Node, context: Context<'_>, choices: &[(&str, T)]) -> Option<T> {
-    let words = || choices.iter().map(|(word, _)| *word);
-    let given = text(node, context, &one_of(words(), ""))?;
-    let chosen = choices.iter().find(|(word, _)| *word == given).map(|(_, value)| *value);
+/// One of a few words: the value that it stands for.
+pub fn word<T: Clone>(node: &Node, context: Context<'_>, choices: &[(&str, T, &str)]) -> Option<T> {
+    let words = || choices.iter().map(|(word, ..)| *word);
+    let Some(given) = node.as_text() else {
+        context.fault_at(node, format!("found {}: expected {}", node.describe(), one_of(words(), "")));
+        return None;
+    };
+    let chosen = choices.iter().find(|(word, ..)| *word == given).map(|(_, value, _)| value.clone());
     if chosen.is_none() {
         context.fault_at(node, format!("unknown name {}: expected {}", quote(given), one_of(words(), given)));
     }
     chosen
+}
+
+/// [`word`] without meanings.
+pub fn choice<T: Copy>(node: &Node, context: Context<'_>, choices: &[(&str, T)]) -> Option<T> {
+    let choices: Vec<_> = choices.iter().map(|(word, value)| (*word, *value, "")).collect();
+    word(node, context, &choices)
 }
 
 /// A list, as its elements.

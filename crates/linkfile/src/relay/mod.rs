@@ -7,11 +7,13 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::parameters::{Form, Table, optional, required, usual};
 
 use crate::document::{FileError, Node, Sources};
 use crate::link::read_modulators;
 use crate::mesh::{KeysOfLinks, LinkChange, LinkClasses, LinkSelector, LinkTable, pairs, read_key_changes, read_links, read_links_between};
-use crate::reading::{Context, TableReader, default_title, parse, values, with_text};
+use crate::reading::{Context, TableReader, default_title, defaults, parse, values, with_text};
+use crate::schema::link::{LINK_CHANGE, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR};
 
 /// What `cohaptic relay FILE` does. Every number in it has been checked.
 ///
@@ -87,11 +89,38 @@ pub struct RelayLimits {
 }
 
 impl Default for RelayLimits {
-    /// 262,144 datagrams, 64 MB, 30 s, 1 ms.
+    /// Those of a file that does not say them: 262,144 datagrams, 64 MB, 30 s, 1 ms.
     fn default() -> Self {
-        Self { packets: 262_144, bytes: Bytes::new(64_000_000), forget_after: Duration::from_secs(30), tolerance: Duration::from_millis(1) }
+        defaults(|node, context| read_header(node, context)?.limits)
     }
 }
+
+/// The top of a relay file.
+pub static ROOT: Table = Table::of(&[&[
+    optional("relay", Form::Table(&RELAY), "Seed and limits"),
+    required("programs", Form::List(&Form::Table(&programs::PROGRAM)), "The programs, at least two")
+        .expecting("at least two entries [[programs]], each with a name and a port"),
+    optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
+    optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
+    optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
+    optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the relay runs"),
+]]);
+static RELAY: Table = Table::of(&[&[
+    optional("title", Form::Text, "A line for people; without it the name of the file"),
+    usual("seed", Form::Integer(0, i64::MAX.unsigned_abs()), "0", "Seed of all random numbers"),
+    usual("allow-remote", Form::Boolean, "false", "Whether ports and addresses may be on other machines"),
+    // Each takes at least a hundred bytes.
+    usual("most-packets", Form::Integer(1, 1 << 24), "262144", "The most datagrams in flight at once").expecting("a number of datagrams, {}"),
+    usual("most-bytes", Form::Size, "\"64MB\"", "The most bytes of datagrams in flight at once"),
+    usual("forget-after", Form::PositiveDuration, "\"30s\"", "A learnt address that is silent for so long may be replaced"),
+    usual("tolerance", Form::PositiveDuration, "\"1ms\"", "Later than this is late"),
+]]);
+static TIMELINE: Table = Table::of(&[&[
+    required("at", Form::Duration, "When, from the beginning").expecting("a time such as \"3s\""),
+    required("link", LINKS_BETWEEN, "Which links change: all, or one by its ends")
+        .expecting("\"all\" or a table such as { from = \"left\", to = \"right\" }"),
+    required("set", Form::Table(&LINK_CHANGE), "The keys that change"),
+]]);
 
 impl RelayFile {
     /// Reads a relay file. `overrides` are texts `KEY=VALUE` that replace values of the file, in this order.
@@ -142,14 +171,11 @@ struct Header {
 }
 
 fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, LinkClasses)> {
-    let mut root = TableReader::new(document, context, "a table")?;
-    root.know(&["relay", "programs", "modulators", "link", "links", "timeline"]);
-    let defaults = Header { title: Some(None), seed: Some(0), allow_remote: Some(false), limits: Some(RelayLimits::default()) };
-    let header = root.optional("relay", defaults, read_header).unwrap_or_default();
+    let mut root = TableReader::of(document, context, &ROOT, "a table")?;
+    root.know_all();
+    let header = root.table("relay", read_header).unwrap_or_default();
     let programs_node = root.get("programs");
-    let programs = root.required("programs", "at least two entries [[programs]], each with a name and a port", |node, context| {
-        programs::read_programs(node, header.allow_remote, context)
-    });
+    let programs = root.read("programs", |node, context| programs::read_programs(node, header.allow_remote, context));
     let (names, programs) = programs.unzip();
     let context = context.with_names(names.as_ref());
     let modulators = read_modulators(root.get("modulators"), context);
@@ -174,16 +200,10 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, Li
 }
 
 fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
-    let default = RelayLimits::default();
-    let mut table = TableReader::new(node, context, "a table such as [relay]")?;
+    let mut table = TableReader::of(node, context, &RELAY, "a table such as [relay]")?;
     let title = table.maybe("title", |node, context| values::text(node, context, "a text").map(str::to_owned));
-    let seed = table
-        .optional("seed", 0, |node, context| values::integer(node, context, 0..=i64::MAX.unsigned_abs(), "an integer from 0 to 9223372036854775807"));
-    let allow_remote = table.optional("allow-remote", false, values::boolean);
-    let packets = table.optional("most-packets", default.packets, |node, context| {
-        values::integer(node, context, 1..=MOST_PACKETS, "a number of datagrams, an integer from 1 to 16777216")
-    });
-    let bytes = table.optional("most-bytes", default.bytes, |node, context| {
+    let (seed, allow_remote, packets) = (table.value("seed"), table.value("allow-remote"), table.value("most-packets"));
+    let bytes = table.read("most-bytes", |node, context| {
         let size = values::size(node, context)?;
         if size.get() < LEAST_BYTES {
             context.fault_at(node, "out of range: expected at least \"65535B\", one datagram");
@@ -191,16 +211,12 @@ fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
         }
         Some(size)
     });
-    let forget_after = table.optional("forget-after", default.forget_after, values::positive_duration);
-    let tolerance = table.optional("tolerance", default.tolerance, values::positive_duration);
+    let (forget_after, tolerance) = (table.value("forget-after"), table.value("tolerance"));
     table.finish();
     let limits = packets.zip(bytes).zip(forget_after).zip(tolerance);
     let limits = limits.map(|(((packets, bytes), forget_after), tolerance)| RelayLimits { packets, bytes, forget_after, tolerance });
     Some(Header { title, seed, allow_remote, limits })
 }
-
-/// Each takes at least a hundred bytes.
-const MOST_PACKETS: u64 = 1 << 24;
 
 const LEAST_BYTES: u64 = 65_535;
 
@@ -227,10 +243,11 @@ fn read_timeline(node: Option<&Node>, links: Option<&LinkClasses>, context: Cont
 }
 
 fn read_entry<'a>(entry: &'a Node, context: Context<'a>) -> Option<(Instant, LinkSelector, &'a Node)> {
-    let mut table = TableReader::new(entry, context, "a table with at, link and set")?;
-    let at = table.required("at", "a time such as \"3s\"", values::instant);
-    let selector = table.required("link", "\"all\" or a table such as { from = \"left\", to = \"right\" }", read_links_between);
-    let set = table.required("set", "a table of the keys that change", |node, _| Some(node));
+    let mut table = TableReader::of(entry, context, &TIMELINE, "a table with at, link and set")?;
+    let at = table.read("at", values::instant);
+    let selector = table.read("link", read_links_between);
+    let set = table.get("set");
+    table.require("set", "a table of the keys that change");
     table.finish();
     let set = set?;
     read_key_changes(set, context)?;

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 
 use cohaptic_units::print::Counted;
+use cohaptic_wan::parameters::{Form, Table, optional, required};
 
 use super::RelayProgram;
 use crate::document::{Node, quote};
@@ -10,6 +11,14 @@ use crate::reading::{Context, Names, TableReader, values};
 
 /// Each has a socket, and each pair two links.
 const MOST_PROGRAMS: usize = 256;
+
+pub(super) static PROGRAM: Table = Table::of(&[&[
+    required("name", Form::Text, "Its name, which names its links: unique, not all, without space and without . > / , and quotes")
+        .expecting("the name of the program"),
+    required("port", Form::Like(&["127.0.0.1:7001"]), "The address that stands for it: a program that sends there speaks to it")
+        .expecting("the address that stands for it, such as \"127.0.0.1:7001\""),
+    optional("address", Form::Like(&["127.0.0.1:9001"]), "Where it sends from and listens; without it learnt from the first datagram that it sends"),
+]]);
 
 /// The entry of a program, with the nodes that faults point at.
 #[derive(Debug)]
@@ -42,10 +51,10 @@ pub(super) fn check_enough(names: &Names, node: &Node, context: Context<'_>) {
 }
 
 fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Names, context: Context<'a>) -> Option<Written<'a>> {
-    let mut table = TableReader::new(entry, context, "a table with name and port")?;
+    let mut table = TableReader::of(entry, context, &PROGRAM, "a table with name and port")?;
     let (port_node, address_node) = (table.get("port"), table.get("address"));
-    let name = table.required("name", "the name of the program", |node, context| read_name(node, names, context));
-    let port = table.required("port", "the address that stands for it, such as \"127.0.0.1:7001\"", |node, context| {
+    let name = table.read("name", |node, context| read_name(node, names, context));
+    let port = table.read("port", |node, context| {
         read_address(node, "an address with a port, such as \"127.0.0.1:7001\", \"[::1]:7001\" or \"localhost:7001\"", allow_remote, context)
     });
     let address = table.maybe("address", |node, context| {

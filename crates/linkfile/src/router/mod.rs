@@ -25,7 +25,7 @@
 
 mod address;
 mod model;
-mod read;
+pub(crate) mod read;
 mod rules;
 mod sides;
 

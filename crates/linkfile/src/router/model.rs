@@ -38,13 +38,6 @@ pub struct Memory {
     pub bytes: Bytes,
 }
 
-impl Default for Memory {
-    /// 262,144 packets, which is one second of 250,000 packets/s, and 256 MB.
-    fn default() -> Self {
-        Self { packets: 1 << 18, bytes: Bytes::new(256_000_000) }
-    }
-}
-
 /// A link and what it is called.
 #[derive(Clone, PartialEq, Debug)]
 pub struct NamedLink {

@@ -3,14 +3,53 @@
 use std::path::Path;
 
 use cohaptic_units::Bytes;
+use cohaptic_wan::parameters::{Form, Table, optional, required, usual};
 
-use super::rules::{TARGET, read_rules, read_target};
-use super::sides::{check_sides, read_side};
+use super::rules::{RULE, TARGET, TARGET_FORM, read_rules, read_target};
+use super::sides::{SIDE, check_sides, read_side};
 use super::{Memory, NamedLink, RouterFile, Target};
 use crate::document::{FileError, Node, Sources, Value, quote};
 use crate::link::{read_link, read_modulators};
 use crate::mesh::LinkKeys;
-use crate::reading::{Context, TableReader, parse, values, with_text};
+use crate::reading::{Context, TableReader, defaults, parse, values, with_text};
+use crate::schema::link::{LINK_TABLE, MODULATOR};
+
+/// The top of a router file.
+pub static ROOT: Table = Table::of(&[&[
+    required("router", Form::Table(&ROUTER), "Seed, memory, and where packets go to which no rule applies")
+        .expecting("a table such as [router] with a default"),
+    required("left", Form::Table(&SIDE), "One side: a tun or an interface").expecting(A_SIDE),
+    required("right", Form::Table(&SIDE), "The other side: of the same kind as the first").expecting(A_SIDE),
+    optional("links", Form::Table(&LINKS), "The links, each under its name"),
+    optional("rules", Form::List(&Form::Table(&RULE)), "Which packets go where: the first rule that applies decides"),
+    optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
+]]);
+const A_SIDE: &str = "a table such as { tun = \"wan0\", addresses = [\"10.1.0.1/24\"] } or { interface = \"eth1\" }";
+static ROUTER: Table = Table::of(&[&[
+    usual("seed", Form::Integer(0, i64::MAX.unsigned_abs()), "0", "Seed of all random numbers"),
+    optional("memory", Form::Table(&MEMORY), "How much may be inside all links together; what comes beyond is dropped"),
+    required(
+        "default",
+        Form::AnyOf(const { &[TARGET_FORM, Form::Table(&DEFAULT)] }),
+        "Where packets go to which no rule applies: the name of a link, pass or drop",
+    ),
+]]);
+static DEFAULT: Table = Table::of(&[&[
+    required("left-to-right", TARGET_FORM, "The name of a link, pass or drop").expecting(TARGET),
+    required("right-to-left", TARGET_FORM, "The name of a link, pass or drop").expecting(TARGET),
+]]);
+static MEMORY: Table = Table::of(&[&[
+    usual("packets", Form::Integer(1, 1 << 32), "262144", "The most packets").expecting("a number of packets, {}"),
+    usual("bytes", Form::Size, "\"256MB\"", "The most bytes"),
+]]);
+static LINKS: Table = Table::with_others(&[], &Form::Table(&LINK_TABLE));
+
+impl Default for Memory {
+    /// That of a file which does not say it: 262,144 packets, which is one second of 250,000 packets/s, and 256 MB.
+    fn default() -> Self {
+        defaults(read_memory)
+    }
+}
 
 impl RouterFile {
     /// Reads the file of a router. `overrides` are texts `KEY=VALUE` that replace values of the file, such as `links.wan.delay=8ms`.
@@ -40,19 +79,19 @@ impl RouterFile {
 
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
 fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
-    let mut root = TableReader::new(document, context, "a table")?;
-    root.know(&["router", "left", "right", "links", "rules", "modulators"]);
+    let mut root = TableReader::of(document, context, &ROOT, "a table")?;
+    root.know_all();
     let modulators = read_modulators(root.get("modulators"), context);
     let context = context.with_modulators(modulators.as_ref());
-    let links = root.optional("links", Some(Vec::new()), |node, _| Some(read_links(node, context))).flatten();
-    let router = root.required("router", "a table such as [router] with a default", |node, _| read_router(node, links.as_deref(), context));
-    let side = "a table such as { tun = \"wan0\", addresses = [\"10.1.0.1/24\"] } or { interface = \"eth1\" }";
-    let left = root.required("left", side, read_side);
-    let right = root.required("right", side, |node, context| read_side(node, context).map(|side| (side, node)));
-    let rules = root.optional("rules", Some(Vec::new()), |node, _| Some(read_rules(node, links.as_deref(), context))).flatten();
+    let links = root.maybe("links", |node, _| read_links(node, context)).map(Option::unwrap_or_default);
+    let router = root.read("router", |node, _| read_router(node, links.as_deref(), context));
+    let left = root.read("left", read_side);
+    let right_node = root.get("right");
+    let right = root.read("right", read_side);
+    let rules = root.maybe("rules", |node, _| read_rules(node, links.as_deref(), context)).map(Option::unwrap_or_default);
     root.finish();
-    let (left, (right, right_node)) = (left?, right?);
-    check_sides(&left, &right, right_node, context)?;
+    let (left, right) = (left?, right?);
+    check_sides(&left, &right, right_node?, context)?;
     let (seed, memory, default) = router?;
     Some(RouterFile { file: context.sources.file.to_path_buf(), seed, memory, left, right, links: links?, rules: rules?, default })
 }
@@ -70,7 +109,7 @@ fn read_links(node: &Node, context: Context<'_>) -> Option<Vec<NamedLink>> {
                 format!("{} cannot be the name of a link: expected letters, digits, - and _, and neither pass nor drop", quote(&entry.name));
             context.fault(entry.key, &entry.node.path, message);
         }
-        let model = read_link(&entry.node, context, &[]);
+        let model = read_link(&entry.node, context);
         let keys = LinkKeys::of_table(entry.node.as_table()?, context.modulators?);
         Some(NamedLink { name: is_name.then(|| entry.name.clone())?, keys, model: model? })
     });
@@ -86,12 +125,11 @@ fn is_link_name(name: &str) -> bool {
 
 /// `[router]`: the seed, the memory and the defaults.
 fn read_router(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<(u64, Memory, [Target; 2])> {
-    let mut table = TableReader::new(node, context, "a table such as [router]")?;
-    let seed = table
-        .optional("seed", 0, |node, context| values::integer(node, context, 0..=i64::MAX.unsigned_abs(), "an integer from 0 to 9223372036854775807"));
-    let memory = table.optional("memory", Memory::default(), read_memory);
+    let mut table = TableReader::of(node, context, &ROUTER, "a table such as [router]")?;
+    let seed = table.value("seed");
+    let memory = table.table("memory", read_memory);
     let expected = format!("{TARGET}, or {{ left-to-right = \"wan\", right-to-left = \"pass\" }}");
-    let default = table.required("default", &expected, |node, context| read_default(node, links, context));
+    let default = table.read_expecting("default", &expected, |node, context| read_default(node, links, context));
     table.finish();
     Some((seed?, memory?, default?))
 }
@@ -100,22 +138,17 @@ fn read_default(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) 
     if !matches!(node.value, Value::Table(_)) {
         return read_target(node, links, context).map(|target| [target; 2]);
     }
-    let mut table = TableReader::new(node, context, TARGET)?;
-    let left = table.required("left-to-right", TARGET, |node, context| read_target(node, links, context));
-    let right = table.required("right-to-left", TARGET, |node, context| read_target(node, links, context));
+    let mut table = TableReader::of(node, context, &DEFAULT, TARGET)?;
+    let [left, right] = ["left-to-right", "right-to-left"].map(|way| table.read(way, |node, context| read_target(node, links, context)));
     table.finish();
     Some([left?, right?])
 }
 
 /// `memory = { packets = 10000, bytes = "64MB" }`.
 fn read_memory(node: &Node, context: Context<'_>) -> Option<Memory> {
-    const MOST: u64 = 1 << 32;
-    let mut table = TableReader::new(node, context, "a table such as { packets = 10000, bytes = \"64MB\" }")?;
-    let default = Memory::default();
-    let packets = table.optional("packets", default.packets, |node, context| {
-        values::integer(node, context, 1..=MOST, "a number of packets, an integer from 1 to 4294967296")
-    });
-    let bytes = table.optional("bytes", default.bytes, |node, context| {
+    let mut table = TableReader::of(node, context, &MEMORY, "a table such as { packets = 10000, bytes = \"64MB\" }")?;
+    let packets = table.value("packets");
+    let bytes = table.read("bytes", |node, context| {
         let bytes = values::size(node, context)?;
         if bytes == Bytes::new(0) {
             context.fault_at(node, "zero is out of range: expected a size above zero such as \"64MB\"");

@@ -1,5 +1,7 @@
 //! `[\[rules\]]`: which packets go where.
 
+use cohaptic_wan::parameters::{Choices, Form, Table, optional, required, words};
+
 use super::sides::read_network;
 use super::{NamedLink, Network, Ports, Protocol, RuleSpec, Side, Target};
 use crate::document::{Node, Value, quote};
@@ -7,6 +9,24 @@ use crate::reading::{Context, TableReader, one_of, values};
 
 /// What a target may be.
 pub(super) const TARGET: &str = "the name of a link, \"pass\" or \"drop\"";
+
+pub(super) const TARGET_FORM: Form = Form::Like(&["pass", "drop", "wan"]);
+pub(super) static RULE: Table = Table::of(&[&[
+    optional("from", Form::Words(const { &words(&SIDES) }), "On which side the packet comes in"),
+    optional("source", Form::Like(&["10.1.0.0/16"]), "An address or a network that it comes from"),
+    optional("destination", Form::Like(&["10.2.0.0/16"]), "An address or a network that it goes to"),
+    optional(
+        "protocol",
+        Form::AnyOf(const { &[Form::Like(&["tcp", "udp", "icmp", "icmpv6"]), Form::Integer(0, 255)] }),
+        "Its protocol, by name or number",
+    ),
+    optional("source-port", PORTS_FORM, "A port or a range of ports that it comes from"),
+    optional("destination-port", PORTS_FORM, "A port or a range of ports that it goes to"),
+    optional("port", PORTS_FORM, "A port or a range of ports, on either end"),
+    required("link", TARGET_FORM, "Where it goes: the name of a link, pass or drop").expecting(TARGET),
+]]);
+const SIDES: Choices<Side, 2> = [("left", Side::Left, "what comes in on the left"), ("right", Side::Right, "what comes in on the right")];
+const PORTS_FORM: Form = Form::AnyOf(&[Form::Integer(0, 65_535), Form::Like(&["5000-5999"])]);
 
 const PORTS: &str = "a port from 0 to 65535, or a range such as \"5000-5999\"";
 const PROTOCOL: &str = "tcp, udp, icmp, icmpv6 or a number from 0 to 255";
@@ -20,10 +40,9 @@ pub(super) fn read_rules(node: &Node, links: Option<&[NamedLink]>, context: Cont
 }
 
 fn read_rule(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<RuleSpec> {
-    let mut table = TableReader::new(node, context, "a table such as { protocol = \"tcp\", port = 80, link = \"wan\" }")?;
-    let sides = [("left", Side::Left), ("right", Side::Right)];
+    let mut table = TableReader::of(node, context, &RULE, "a table such as { protocol = \"tcp\", port = 80, link = \"wan\" }")?;
     let network = |node, context| read_network(node, context, "an address or a network such as \"10.1.0.0/16\" or \"fd00::/64\"");
-    let from = table.maybe("from", |node, context| values::choice(node, context, &sides));
+    let from = table.maybe("from", |node, context| values::word(node, context, &SIDES));
     let source = table.maybe("source", network);
     let destination_node = table.get("destination");
     let destination = table.maybe("destination", network);
@@ -33,7 +52,7 @@ fn read_rule(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> 
     let source_port = table.maybe("source-port", read_ports);
     let destination_port = table.maybe("destination-port", read_ports);
     let port = table.maybe("port", read_ports);
-    let target = table.required("link", TARGET, |node, context| read_target(node, links, context));
+    let target = table.read("link", |node, context| read_target(node, links, context));
     table.finish();
     let (source, destination, protocol) = (source?, destination?, protocol?);
     if let (Some(source), Some(destination)) = (source, destination)

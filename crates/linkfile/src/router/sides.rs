@@ -1,11 +1,29 @@
 //! `left` and `right`: what the router stands between.
 
+use cohaptic_wan::parameters::{Form, Table, optional, usual};
+
 use super::{Attachment, InterfaceSpec, Network, TunSpec};
 use crate::document::{Node, quote};
 use crate::reading::{Context, TableReader, values};
 
+pub(super) static SIDE: Table = Table::of(&[&[
+    optional("tun", Form::Text, "Name of a TUN device, which is made and is gone with the router")
+        .expecting("tun = \"NAME\" for a device of the router, or interface = \"NAME\" for one that is there"),
+    optional("interface", Form::Text, "In place of tun: name of an Ethernet interface that is there"),
+    optional(
+        "namespace",
+        Form::Like(&["lab", "/proc/4711/ns/net"]),
+        "Network namespace of the device: a name or a path; without it that of the program",
+    ),
+    usual("existing", Form::Boolean, "false", "The TUN device is there and is left as it is"),
+    usual("addresses", Form::List(&Form::Like(&["10.1.0.1/24", "fd00::1/64"])), "[]", "Addresses of the TUN device with their prefixes"),
+    optional("mtu", Form::Integer(68, 65_535), "The largest packet that the TUN device takes, in bytes; without it the system's")
+        .expecting("a number of bytes, {}"),
+    usual("offloads", Form::Boolean, "true", "Packets cross the TUN device in large segments, which the router cuts and joins"),
+]]);
+
 pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment> {
-    let mut table = TableReader::new(node, context, "a table with a tun or an interface")?;
+    let mut table = TableReader::of(node, context, &SIDE, "a table with a tun or an interface")?;
     let interface = table.get("interface");
     let namespace = table.maybe("namespace", read_namespace);
     if let Some(interface) = interface {
@@ -17,15 +35,12 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
         table.finish();
         return Some(Attachment::Interface(InterfaceSpec { name: name?, namespace: namespace? }));
     }
-    let name = table.required("tun", "tun = \"NAME\" for a device of the router, or interface = \"NAME\" for one that is there", read_device);
-    let existing = table.optional("existing", false, values::boolean);
+    let name = table.read("tun", read_device);
+    let existing = table.value("existing");
     let (addresses_node, mtu_node) = (table.get("addresses"), table.get("mtu"));
-    let addresses = table.optional("addresses", Vec::new(), read_addresses);
-    let mtu = table.maybe("mtu", |node, context| {
-        let mtu = values::integer(node, context, 68..=65_535, "a number of bytes, an integer from 68 to 65535")?;
-        u16::try_from(mtu).ok()
-    });
-    let offloads = table.optional("offloads", true, values::boolean);
+    let addresses = table.read("addresses", read_addresses);
+    let mtu: Option<Option<u64>> = table.maybe_value("mtu");
+    let offloads = table.value("offloads");
     table.finish();
     if existing == Some(true)
         && let Some(given) = addresses_node.or(mtu_node)
@@ -33,7 +48,8 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
         context.fault_at(given, "an existing device is left as it is: expected no such key beside existing = true");
         return None;
     }
-    Some(Attachment::Tun(TunSpec { name: name?, existing: existing?, addresses: addresses?, mtu: mtu?, offloads: offloads?, namespace: namespace? }))
+    let mtu = mtu?.and_then(|mtu| u16::try_from(mtu).ok());
+    Some(Attachment::Tun(TunSpec { name: name?, existing: existing?, addresses: addresses?, mtu, offloads: offloads?, namespace: namespace? }))
 }
 
 /// What cannot be said of one side alone.

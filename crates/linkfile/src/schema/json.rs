@@ -70,7 +70,7 @@ fn form(form_of: &Form) -> Value {
             json!({ "anyOf": [number(*amount), { "type": "array", "items": number(*amount), "minItems": 1, "maxItems": 3 }] })
         }
         Form::Triple(amount) => json!({ "type": "array", "items": number(*amount), "minItems": 3, "maxItems": 3 }),
-        Form::Duration => with_unit(&["8ms", "1.5s", "250us"]),
+        Form::Duration | Form::PositiveDuration => with_unit(&["8ms", "1.5s", "250us"]),
         Form::Rate => with_unit(&["10Mbit", "64kbit"]),
         Form::Size => with_unit(&["1500B", "64kB"]),
         Form::Probability => json!({ "anyOf": [

@@ -94,8 +94,8 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
     let device_position = table.maybe("device-position", |node, _| read_position(node, context));
     let device_velocity = table.maybe("device-velocity", |node, _| read_velocity(node, context));
     let turned = read_peer_rotation(&mut table);
-    let uplink = table.maybe("uplink", |node, context| read_link(node, context, &[]).map(Arc::new));
-    let downlink = table.maybe("downlink", |node, context| read_link(node, context, &[]).map(Arc::new));
+    let uplink = table.maybe("uplink", |node, context| read_link(node, context).map(Arc::new));
+    let downlink = table.maybe("downlink", |node, context| read_link(node, context).map(Arc::new));
     table.finish();
 
     if let (Some(tick), Some((update, update_node)), false) = (tick, update, context.partial) {

@@ -16,7 +16,7 @@ fn the_display_form_shows_the_line_with_carets_below_the_place() {
 #[test]
 fn the_display_form_of_an_override_shows_the_override() {
     let error = refused(SCENE, &["link.dlay=\"8ms\""]);
-    let keys = cohaptic_linkfile::link::LINK_KEYS.join(", ");
+    let keys = cohaptic_linkfile::schema::link::LINK_TABLE.keys().map(|key| key.name).collect::<Vec<_>>().join(", ");
     assert!(keys.starts_with("delay, jitter, order, loss, mark-instead-of-loss, duplicate, corrupt, reorder, rate, queue"), "{keys}");
     let expected = format!(
         "--set link.dlay=\"8ms\": link.dlay: unknown key: expected one of {keys}; did you mean \"delay\"?\n |\n | link.dlay=\"8ms\"\n |      ^^^^"

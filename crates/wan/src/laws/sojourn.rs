@@ -68,8 +68,8 @@ static SOJOURN_TABLE: Table = Table::of(&[&[
     optional("erlang", Form::Table(&ERLANG), "The sum of several exponential stages"),
 ]]);
 static ERLANG: Table = Table::of(&[&[
-    required("mean", Form::Duration, "The mean of all stages together"),
-    required("stages", Form::Integer(1, 1000), "How many stages"),
+    required("mean", Form::Duration, "The mean of all stages together").expecting("the mean of all stages together, a duration"),
+    required("stages", Form::Integer(1, 1000), "How many stages").expecting("a number of stages from 1 to 1000"),
 ]]);
 
 impl Sojourn {

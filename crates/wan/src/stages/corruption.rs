@@ -13,7 +13,7 @@ use crate::laws::chance::CHANCES;
 use crate::laws::chance::{Chance, ChanceStage};
 use crate::packet::PacketInfo;
 use crate::packet::damage::Damage;
-use crate::parameters::{Form, Key, MOST_OF_32_BITS, Table, optional, usual};
+use crate::parameters::{Choices, Form, Key, MOST_OF_32_BITS, Table, optional, usual, words};
 use crate::random::{PacketDraws, Purpose, unit};
 
 /// Which bits of which packets are flipped, and whether the receiver notices.
@@ -147,13 +147,20 @@ const CORRUPT: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CORRUPT_TABL
 static CORRUPT_TABLE: Table = Table::of(&[
     &CHANCES,
     &[
-        usual("bits", Form::Integer(1, MOST_OF_32_BITS), "1", "How many different bits of such a packet are flipped"),
+        usual("bits", Form::Integer(1, MOST_OF_32_BITS), "1", "How many different bits of such a packet are flipped")
+            .expecting("a number of bits of at least 1"),
         optional("bit-error-rate", Form::Probability, "In place of probability and bits: each bit by itself"),
         optional("bytes", Form::Like(&["8-15"]), "The first and the last byte that may be hit, counted from 0"),
         usual("checksum", Form::Words(&CHECKSUMS), "\"discards\"", "What the receiver does with a damaged packet"),
     ],
 ]);
-const CHECKSUMS: [(&str, &str); 2] = [("discards", "it is dropped when it arrives"), ("passes", "it is taken, and the peer's own checks decide")];
+const CHECKSUMS: [(&str, &str); 2] = words(&Checksum::CHOICES);
+
+impl Checksum {
+    /// The words of files.
+    pub const CHOICES: Choices<Self, 2> =
+        [("discards", Self::Discards, "it is dropped when it arrives"), ("passes", Self::Passes, "it is taken, and the peer's own checks decide")];
+}
 
 impl Corruption {
     /// The flipped bits in words.

@@ -13,7 +13,7 @@ use cohaptic_units::print::Span;
 
 use crate::laws::delay::{Distribution, GammaCubics, GammaLaw, Law, LawError};
 use crate::laws::normal::{in_the_core, in_the_core_or_nan, outside_the_core, standard_normal};
-use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
+use crate::parameters::{CORRELATION, Choices, Form, Key, Table, number, optional, usual, words};
 use crate::random::{PacketDraws, Purpose};
 
 /// Random variation of the delay around its mean.
@@ -429,18 +429,23 @@ static JITTER_TABLE: Table = Table::of(&[&[
     usual("distribution", Form::AnyOf(const { &[Form::Words(&LAWS), Form::Table(&LAW_FILE)] }), "\"normal\"", "The law of the delay"),
     usual("floor", Form::Duration, "\"0s\"", "No packet is faster"),
     usual("correlation", number(CORRELATION), "0", "Correlation of a packet's delay with that of the one before"),
-    optional("correlation-time", Form::Duration, "In place of correlation: the time over which delays forget, whatever is sent"),
+    optional("correlation-time", Form::PositiveDuration, "In place of correlation: the time over which delays forget, whatever is sent"),
 ]]);
-const LAWS: [(&str, &str); 8] = [
-    ("normal", "Gaussian, cut off at the floor"),
-    ("uniform", "equally likely between two ends"),
-    ("pareto", "a heavy tail above"),
-    ("paretonormal", "the mixture of tc-netem"),
-    ("lognormal", "above the floor, with a long tail"),
-    ("gamma", "above the floor, as many small delays add up"),
-    ("weibull", "above the floor"),
-    ("laplace", "two exponentials, back to back"),
-];
+const LAWS: [(&str, &str); 8] = words(&Distribution::CHOICES);
+
+impl Distribution {
+    /// The words of files for laws that need no file.
+    pub const CHOICES: Choices<Self, 8> = [
+        ("normal", Self::Normal, "Gaussian, cut off at the floor"),
+        ("uniform", Self::Uniform, "equally likely between two ends"),
+        ("pareto", Self::Pareto, "a heavy tail above"),
+        ("paretonormal", Self::ParetoNormal, "the mixture of tc-netem"),
+        ("lognormal", Self::LogNormal, "above the floor, with a long tail"),
+        ("gamma", Self::Gamma, "above the floor, as many small delays add up"),
+        ("weibull", Self::Weibull, "above the floor"),
+        ("laplace", Self::Laplace, "two exponentials, back to back"),
+    ];
+}
 static LAW_FILE: Table = Table::of(&[&[
     optional("table", Form::File, "A .dist table as tc reads it"),
     optional("empirical", Form::File, "A CSV file of measured delays with the header delay, in seconds"),

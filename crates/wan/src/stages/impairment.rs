@@ -77,7 +77,7 @@ pub struct Refusal {
 /// The value of a parameter, as its form says.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum ParameterValue {
-    /// Of [`Form::Duration`](crate::parameters::Form::Duration).
+    /// Of [`Form::Duration`](crate::parameters::Form::Duration) and [`Form::PositiveDuration`](crate::parameters::Form::PositiveDuration).
     Duration(Duration),
     /// Of [`Form::Rate`](crate::parameters::Form::Rate).
     Rate(Rate),
@@ -93,6 +93,29 @@ pub enum ParameterValue {
     Boolean(bool),
     /// Of [`Form::Words`](crate::parameters::Form::Words).
     Word(&'static str),
+}
+
+macro_rules! values_of_forms {
+    ($($form:ident: $type:ty,)*) => {$(
+        impl TryFrom<ParameterValue> for $type {
+            /// The value, which is of another form.
+            type Error = ParameterValue;
+
+            fn try_from(value: ParameterValue) -> Result<Self, ParameterValue> {
+                if let ParameterValue::$form(value) = value { Ok(value) } else { Err(value) }
+            }
+        }
+    )*};
+}
+values_of_forms! {
+    Duration: Duration,
+    Rate: Rate,
+    Size: Bytes,
+    Probability: Probability,
+    Number: f64,
+    Integer: u64,
+    Boolean: bool,
+    Word: &'static str,
 }
 
 /// The values of parameters by key, defaults included. A parameter without a default that is not given has none.

@@ -246,11 +246,12 @@ impl ModulationStage {
 
 /// The parameters of a modulator.
 pub static MODULATOR: Table = Table::of(&[&[
-    required("name", Form::Text, "What links call it, without space or dot"),
-    required("states", Form::List(&Form::Table(&MODULATOR_STATE)), "Its states; the first is the one in the beginning"),
+    required("name", Form::Text, "What links call it, without space or dot").expecting("a name that links refer to"),
+    required("states", Form::List(&Form::Table(&MODULATOR_STATE)), "Its states; the first is the one in the beginning")
+        .expecting("a list such as [{ name = \"good\", sojourn = \"2s\" }, { name = \"bad\", sojourn = \"1s\" }]"),
 ]]);
 static MODULATOR_STATE: Table = Table::of(&[&[
-    required("name", Form::Text, "The name of the state, without space or dot, and not by"),
+    required("name", Form::Text, "The name of the state, without space or dot, and not by").expecting("the name of the state"),
     optional("sojourn", SOJOURN, "How long it lasts; without it for ever"),
     optional(
         "next",

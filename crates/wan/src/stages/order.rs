@@ -1,6 +1,6 @@
 //! Whether a packet may overtake another.
 
-use crate::parameters::{Form, Key, usual};
+use crate::parameters::{Choices, Form, Key, usual, words};
 use cohaptic_units::Instant;
 
 /// The order policy of a link. It is the last stage: it sees arrival instants and may only put them off.
@@ -44,5 +44,12 @@ impl OrderStage {
 /// The parameter of the order of packets.
 pub(crate) const KEYS: [Key; 1] =
     [usual("order", Form::Words(&ORDERS), "\"allow-reordering\"", "Whether a packet with a shorter delay overtakes those before it")];
-const ORDERS: [(&str, &str); 2] =
-    [("allow-reordering", "a packet with a shorter delay overtakes"), ("in-order", "a packet with a shorter delay waits for those before it")];
+const ORDERS: [(&str, &str); 2] = words(&Order::CHOICES);
+
+impl Order {
+    /// The words of files.
+    pub const CHOICES: Choices<Self, 2> = [
+        ("allow-reordering", Self::AllowReordering, "a packet with a shorter delay overtakes"),
+        ("in-order", Self::InOrder, "a packet with a shorter delay waits for those before it"),
+    ];
+}

@@ -236,8 +236,8 @@ fn drawn(law: Sojourn, draws: Stream, span: u64) -> Duration {
 pub(crate) const KEYS: [Key; 1] = [usual("outage", OUTAGE, "[]", "When the link is down: a list of spans, or a table")];
 /// A span of time.
 pub(crate) static SPAN: Table = Table::of(&[&[
-    required("from", Form::Duration, "When it begins, from the beginning of the scene"),
-    required("to", Form::Duration, "When it ends, from the beginning of the scene"),
+    required("from", Form::Duration, "When it begins, from the beginning of the scene").expecting("a time such as \"1s\""),
+    required("to", Form::Duration, "When it ends, from the beginning of the scene").expecting("a time such as \"2s\""),
 ]]);
 const OUTAGE: Form = Form::AnyOf(&[Form::List(&Form::Table(&SPAN)), Form::Table(&OUTAGE_TABLE)]);
 static OUTAGE_TABLE: Table = Table::of(&[&[
@@ -248,8 +248,9 @@ static OUTAGE_TABLE: Table = Table::of(&[&[
 static RANDOM_OUTAGE: Table =
     Table::of(&[&[required("up", SOJOURN, "How long the link is up"), required("down", SOJOURN, "How long the link is down")]]);
 static IDLE_OUTAGE: Table = Table::of(&[&[
-    required("after", Form::Duration, "For how long nothing was sent"),
-    required("down", Form::Duration, "For how long the link is down then"),
+    required("after", Form::PositiveDuration, "For how long nothing was sent").expecting("how long nothing must be sent, a duration such as \"10s\""),
+    required("down", Form::PositiveDuration, "For how long the link is down then")
+        .expecting("how long the link is down then, a duration such as \"2s\""),
 ]]);
 
 impl Outages {

@@ -6,7 +6,7 @@ use core::fmt;
 use core::time::Duration;
 
 use crate::delay_table::{self, Attoseconds, DelayRow, DelayTableError};
-use crate::parameters::{Form, Key, Table, required, usual};
+use crate::parameters::{Choices, Form, Key, Table, required, usual, words};
 use cohaptic_units::{Instant, Probability};
 
 /// Delay and loss over time, as measured: a [table of delays](crate::delay_table), perhaps with a column `loss`.
@@ -188,7 +188,12 @@ static TRACE: Table = Table::of(&[&[
     usual("start", Form::Words(&START), "\"zero\"", "What times of a recorded path count from"),
 ]]);
 const START: [(&str, &str); 2] = [("zero", "the start of the run"), ("first", "the first row, as for times since 1970")];
-const BETWEEN: [(&str, &str); 2] = [("steps", "the earlier row"), ("lines", "a delay on the line between both")];
+const BETWEEN: [(&str, &str); 2] = words(&Between::CHOICES);
+
+impl Between {
+    /// The words of files.
+    pub const CHOICES: Choices<Self, 2> = [("steps", Self::Steps, "the earlier row"), ("lines", Self::Lines, "a delay on the line between both")];
+}
 
 #[cfg(test)]
 mod tests {

@@ -191,11 +191,12 @@ pub(crate) const KEYS: [Key; 1] = [usual(
     "The line sends only now and then, all that has gathered or a part of it",
 )];
 static SLOTS: Table = Table::of(&[&[
-    optional("min", Form::Duration, "The shortest time from slot to slot"),
+    optional("min", Form::Duration, "The shortest time from slot to slot")
+        .expecting("the shortest time from slot to slot, a duration such as \"10ms\""),
     optional("max", Form::Duration, "The longest time from slot to slot; without it min"),
     optional("delay", Form::Duration, "In place of min and max: the mean time from slot to slot"),
     optional("jitter", JITTER, "Beside delay: how the time from slot to slot varies"),
-    optional("packets", Form::Integer(1, MOST), "How many packets leave in a slot at most"),
+    optional("packets", Form::Integer(1, MOST), "How many packets leave in a slot at most").expecting("a number of packets of at least 1"),
     optional("bytes", Form::Size, "How many bytes leave in a slot at most"),
 ]]);
 

@@ -123,6 +123,7 @@ fn tables(form: &'static Form) -> Vec<(&'static str, &'static Table)> {
         | Form::Vector(_)
         | Form::Triple(_)
         | Form::Duration
+        | Form::PositiveDuration
         | Form::Rate
         | Form::Size
         | Form::Probability
@@ -250,7 +251,7 @@ fn form(of: &Form, words: &mut Vec<String>) -> String {
         Form::Number(amount) => number(amount.expected(), "number"),
         Form::Vector(amount) => number(amount.expected(), "number or vector"),
         Form::Triple(amount) => number(amount.expected(), "3 numbers"),
-        Form::Duration => "duration".to_owned(),
+        Form::Duration | Form::PositiveDuration => "duration".to_owned(),
         Form::Rate => "rate".to_owned(),
         Form::Size => "size".to_owned(),
         Form::Probability => "probability".to_owned(),

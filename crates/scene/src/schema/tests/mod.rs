@@ -1,58 +1,20 @@
-//! The catalogue against the readers, both ways, and the JSON Schema against files.
+//! The catalogue, and the JSON Schema against files.
 
 mod samples;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use cohaptic_linkfile::reading::testing::take_seen;
-use cohaptic_linkfile::schema::{Form, Need, Table};
+use cohaptic_linkfile::document::{Node, Value as DocumentValue};
+use cohaptic_linkfile::schema::link::LINK_TABLE;
+use cohaptic_linkfile::schema::{Form, Table};
 use serde_json::{Map, Value, json};
 use toml::de::{DeTable, DeValue};
 
-use samples::{SCENES, Sample, read, root, samples};
+use samples::{SCENES, read, root, samples};
 
 use super::FileSchema;
 use crate::Scene;
-
-/// The tables of the catalogue that a path leads to. An element of a list may have several names in a path: a link between two ends has two.
-fn tables_at(form: &'static Form, path: &[&str], names: usize) -> Vec<&'static Table> {
-    match form {
-        Form::Table(table) => within(table, path),
-        // A key of a table that may stand there is no element of a list that may.
-        Form::AnyOf(forms) => match form.table().filter(|table| path.first().is_some_and(|first| table.key(first).is_some())) {
-            Some(table) => within(table, path),
-            None => forms.iter().flat_map(|form| tables_at(form, path, names)).collect(),
-        },
-        Form::List(element) | Form::Pair(element) => path.get(names..).map_or_else(Vec::new, |rest| tables_at(element, rest, 1)),
-        Form::Text
-        | Form::File
-        | Form::Boolean
-        | Form::Integer(..)
-        | Form::Number(_)
-        | Form::Vector(_)
-        | Form::Triple(_)
-        | Form::Duration
-        | Form::Rate
-        | Form::Size
-        | Form::Probability
-        | Form::Like(_)
-        | Form::Words(_) => Vec::new(),
-    }
-}
-
-fn within(table: &'static Table, path: &[&str]) -> Vec<&'static Table> {
-    let Some((first, rest)) = path.split_first() else { return vec![table] };
-    match (table.key(first), table.others) {
-        (Some(key), _) => tables_at(&key.form, rest, if *first == "links" { 2 } else { 1 }),
-        (None, Some(others)) => tables_at(others, rest, 1),
-        (None, None) => Vec::new(),
-    }
-}
-
-fn split(path: &str) -> Vec<&str> {
-    path.split('.').filter(|name| !name.is_empty()).collect()
-}
 
 /// Every table of the catalogue, each once, with a way to it for messages.
 fn tables() -> BTreeMap<*const Table, (String, &'static Table)> {
@@ -79,86 +41,39 @@ fn tables() -> BTreeMap<*const Table, (String, &'static Table)> {
     all
 }
 
-/// Where readers of tables were, by table of the catalogue: in which sample and under which path, and which keys they knew.
-type Visits = BTreeMap<*const Table, (BTreeSet<&'static str>, Vec<(usize, String)>)>;
+/// The path of every table of a document.
+fn paths(node: &Node) -> Vec<&str> {
+    match &node.value {
+        DocumentValue::Table(table) => core::iter::once(node.path.as_str()).chain(table.0.iter().flat_map(|entry| paths(&entry.node))).collect(),
+        DocumentValue::List(elements) => elements.iter().flat_map(|element| paths(element)).collect(),
+        DocumentValue::Text(_) | DocumentValue::Integer(_) | DocumentValue::Float(_) | DocumentValue::Boolean(_) | DocumentValue::Date => Vec::new(),
+    }
+}
 
-fn visits(samples: &[Sample]) -> Visits {
-    let mut visits = Visits::new();
-    for (number, sample) in samples.iter().enumerate() {
-        let _ = take_seen();
-        read(sample, &[]).unwrap_or_else(|error| panic!("{}: {error}", sample.path.display()));
-        for (path, known) in take_seen() {
-            let found = within(sample.kind.root(), &split(&path));
-            assert!(!found.is_empty(), "the catalogue has no table {path}, which the reader reads in {}", sample.path.display());
-            for table in found {
-                let (keys, places) = visits.entry(core::ptr::from_ref(table)).or_default();
-                keys.extend(known.iter().copied());
-                places.push((number, path.clone()));
+/// A reader asks for declared keys alone. This is the other way round: a key that is declared and that no reader asks for is refused as unknown.
+#[test]
+fn readers_take_every_key_that_is_declared() {
+    let keys = |declared: &'static Table| declared.keys().map(|key| key.name.to_owned()).collect::<BTreeSet<String>>();
+    let mut taken: BTreeMap<*const Table, BTreeSet<String>> = BTreeMap::new();
+    for sample in &samples() {
+        let document = Node::document(DeTable::parse(&sample.text).unwrap().get_ref()).unwrap();
+        for path in paths(&document) {
+            // A link has two names in a path, and stands in the catalogue as any entry of a list.
+            let ends = path.strip_prefix("links.").filter(|_| sample.kind != FileSchema::Router);
+            let below = ends.map_or_else(|| path.to_owned(), |ends| format!("links.{}", ends.split_once('.').unwrap().1));
+            let declared = if path.is_empty() { sample.kind.root() } else { sample.kind.root().table(&below) };
+            let known = taken.entry(core::ptr::from_ref(declared)).or_default();
+            if declared.others.is_none() && *known != keys(declared) {
+                let refused = read(sample, &[format!("{path}.no-such-key=1").trim_start_matches('.').to_owned()]).unwrap_err();
+                let message = refused.diagnostic().unwrap().message();
+                let listed = message.strip_prefix("unknown key: expected ").unwrap_or_else(|| panic!("{path}: {message}"));
+                known.extend(listed.trim_start_matches("one of ").split(", ").map(str::to_owned));
             }
         }
     }
-    visits
-}
-
-#[test]
-fn the_catalogue_has_the_keys_that_the_readers_ask_for_and_no_other() {
-    let visits = visits(&samples());
-    for (table, (way, fields)) in tables() {
-        // Under names that the file makes up, a reader takes any key and requires none.
-        if fields.others.is_some() {
-            continue;
-        }
-        let (asked, _) = visits.get(&table).unwrap_or_else(|| panic!("no sample has a table {way}"));
-        let listed: BTreeSet<&str> = fields.keys().map(|key| key.name).collect();
-        assert_eq!(listed, *asked, "{way}");
+    for (table, (way, declared)) in tables().into_iter().filter(|(_, (_, declared))| declared.others.is_none()) {
+        assert_eq!(Some(&keys(declared)), taken.get(&table), "{way}");
     }
-}
-
-/// Wherever a table is read, a default of the catalogue changes nothing; each can be written in at least one place.
-#[test]
-fn a_default_of_the_catalogue_is_what_the_reader_takes_without_the_key() {
-    let samples = samples();
-    let visits = visits(&samples);
-    let as_written: Vec<String> = samples.iter().map(|sample| read(sample, &[]).unwrap()).collect();
-    let tables = tables();
-    for (table, (_, places)) in &visits {
-        let (way, fields) = &tables[table];
-        // Without a key, what it is laid over holds.
-        if fields.is_laid_over {
-            continue;
-        }
-        for key in fields.keys() {
-            let Need::Default(default) = key.need else { continue };
-            let mut accepted = 0;
-            for (number, path) in places {
-                let sample = &samples[*number];
-                let full = if path.is_empty() { key.name.to_owned() } else { format!("{path}.{}", key.name) };
-                if has(&sample.text, &split(&full)) {
-                    continue;
-                }
-                let Ok(with) = read(sample, &[format!("{full}={default}")]) else { continue };
-                // What an entry says replaces what it is laid over, so that it is no default where that says something else.
-                accepted += usize::from(with == as_written[*number]);
-                if accepted > 0 {
-                    break;
-                }
-            }
-            assert!(accepted > 0, "{way}: {} = {default} is not what holds without it, in any of {places:?}", key.name);
-        }
-    }
-}
-
-/// Whether a text has a key, as far as its tables have names: elements of lists are not followed.
-fn has(text: &str, path: &[&str]) -> bool {
-    let Ok(document) = DeTable::parse(text) else { return false };
-    let mut table = document.get_ref();
-    for (place, name) in path.iter().enumerate() {
-        match table.get(*name).map(toml::Spanned::get_ref) {
-            Some(DeValue::Table(inner)) if place + 1 < path.len() => table = inner,
-            found => return found.is_some() && place + 1 == path.len(),
-        }
-    }
-    false
 }
 
 /// A document as JSON, for the validator.
@@ -266,7 +181,7 @@ fn the_reference_has_the_keys_of_the_catalogue() {
     let links = page("reference-link-keys.md");
     let of_links = links.split("\n## Keys of a link\n\n").nth(1).unwrap();
     let rows: Vec<&str> = of_links.lines().take_while(|line| line.starts_with("- `")).filter_map(|line| line.split('`').nth(1)).collect();
-    assert_eq!(rows, cohaptic_linkfile::link::LINK_KEYS, "the list of the keys of a link");
+    assert_eq!(rows, LINK_TABLE.keys().map(|key| key.name).collect::<Vec<_>>(), "the list of the keys of a link");
 
     let listed: BTreeSet<&str> = tables().values().flat_map(|(_, table)| table.keys().map(|key| key.name)).collect();
     let pages = links + &page("reference-keys.md") + &page("reference-network-keys.md");

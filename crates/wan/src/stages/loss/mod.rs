@@ -182,23 +182,25 @@ static LOSS_TABLE: Table = Table::of(&[&[
     ),
 ]]);
 static GILBERT_ELLIOTT: Table = Table::of(&[&[
-    optional("p", Form::Probability, "Probability of going from good to bad at each packet"),
+    optional("p", Form::Probability, "Probability of going from good to bad at each packet").expecting("a probability, of going from good to bad"),
     optional("r", Form::Probability, "Probability of going back; without it 1 - p"),
-    optional("mean-good", Form::Duration, "In place of p: the mean time in the good state"),
-    optional("mean-bad", Form::Duration, "In place of r: the mean time in the bad state"),
+    optional("mean-good", Form::PositiveDuration, "In place of p: the mean time in the good state")
+        .expecting("the mean time in the good state, a duration such as \"160ms\""),
+    optional("mean-bad", Form::PositiveDuration, "In place of r: the mean time in the bad state")
+        .expecting("the mean time in the bad state, a duration such as \"40ms\""),
     usual("h", Form::Probability, "0", "Probability of getting through in the bad state"),
     usual("k", Form::Probability, "1", "Probability of getting through in the good state"),
 ]]);
 static FOUR_STATES: Table = Table::of(&[&[
-    required("p13", Form::Probability, "From receiving to a burst of loss"),
+    required("p13", Form::Probability, "From receiving to a burst of loss").expecting("a probability, of going from the gap to a burst"),
     optional("p31", Form::Probability, "From a burst of loss to receiving; without it 1 - p13"),
     usual("p32", Form::Probability, "0", "From a burst of loss to receiving within a burst"),
     usual("p23", Form::Probability, "1", "From receiving within a burst to loss"),
     usual("p14", Form::Probability, "0", "From receiving to a single loss"),
 ]]);
 static BURSTS: Table = Table::of(&[&[
-    required("loss", Form::Probability, "The mean fraction lost"),
-    required("length", number(PACKETS), "The mean length of a burst"),
+    required("loss", Form::Probability, "The mean fraction lost").expecting("a probability, the mean fraction lost"),
+    required("length", number(PACKETS), "The mean length of a burst").expecting("the mean length of a burst, a number of packets of at least 1"),
     usual("density", Form::Probability, "1", "The fraction lost within bursts"),
     usual("isolated", Form::Probability, "0", "The fraction lost outside of bursts"),
     usual("good-run", number(PACKETS), "1", "The mean number received in a row within a burst"),

@@ -136,8 +136,8 @@ fn control_law(t: Instant, interval: Duration, count: u64) -> Instant {
 
 /// The parameters of the discipline.
 pub(crate) static CODEL: Table = Table::of(&[&[
-    usual("target", Form::Duration, "\"5ms\"", "How long packets may wait"),
-    usual("interval", Form::Duration, "\"100ms\"", "For how long they may wait longer"),
+    usual("target", Form::PositiveDuration, "\"5ms\"", "How long packets may wait"),
+    usual("interval", Form::PositiveDuration, "\"100ms\"", "For how long they may wait longer"),
     usual("mtu", Form::Size, "\"1500B\"", "Nothing is dropped with this size or less waiting"),
     usual("ecn", Form::Boolean, "false", "Packets are marked where they would be dropped"),
 ]]);

@@ -39,8 +39,10 @@ impl Framing {
 }
 
 /// The packets of a link in cells.
-pub(crate) static CELLS: Table =
-    Table::of(&[&[required("payload", Form::Size, "What a cell carries"), usual("overhead", Form::Size, "\"0B\"", "What a cell costs beyond that")]]);
+pub(crate) static CELLS: Table = Table::of(&[&[
+    required("payload", Form::Size, "What a cell carries").expecting("what a cell carries, a size such as \"48B\""),
+    usual("overhead", Form::Size, "\"0B\"", "What a cell costs beyond that"),
+]]);
 /// A size that may be negative.
 pub(crate) const SIGNED_SIZE: Form = Form::Like(&["28B", "-14B"]);
 

@@ -218,14 +218,16 @@ impl<T> TokenBucketStage<T> {
 pub(crate) const KEYS: [Key; 1] =
     [usual("token-bucket", Form::AnyOf(const { &[Form::Table(&TOKEN_BUCKET), NONE] }), "\"none\"", "How much may leave in bursts")];
 static TOKEN_BUCKET: Table = Table::of(&[&[
-    required("rate", Form::Rate, "How fast the bucket fills"),
-    required("burst", Form::Size, "What the bucket holds"),
+    required("rate", Form::Rate, "How fast the bucket fills").expecting("how fast the bucket fills, a rate such as \"1Mbit\""),
+    required("burst", Form::Size, "What the bucket holds").expecting("what the bucket holds, a size such as \"10kB\""),
     optional("peak", Form::Table(&PEAK), "A second, smaller bucket, which limits how fast a burst leaves"),
     usual("limit", LIMIT, "\"unlimited\"", "How much may wait for tokens"),
     usual("overhead", SIGNED_SIZE, "\"0B\"", "What each packet costs beyond its own size"),
 ]]);
-static PEAK: Table =
-    Table::of(&[&[required("rate", Form::Rate, "How fast a burst leaves"), required("burst", Form::Size, "At least the largest packet")]]);
+static PEAK: Table = Table::of(&[&[
+    required("rate", Form::Rate, "How fast a burst leaves").expecting("how fast a burst leaves, a rate such as \"2Mbit\""),
+    required("burst", Form::Size, "At least the largest packet").expecting("at least the largest packet, a size such as \"1500B\""),
+]]);
 
 impl TokenBucket {
     /// The bucket in words.
