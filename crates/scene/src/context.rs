@@ -4,6 +4,7 @@ use core::ops::Deref;
 
 use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::reading::{Context, values};
+use cohaptic_linkfile::schema::{Choices, Form, words};
 
 use crate::model::Axes;
 
@@ -34,9 +35,12 @@ impl<'a> Deref for SceneContext<'a> {
     }
 }
 
+pub(crate) const AXIS: Form = Form::Words(const { &words(&AXES) });
+const AXES: Choices<usize, 3> = [("x", 0, "the first"), ("y", 1, "the second"), ("z", 2, "the third")];
+
 /// An axis that the scene has, from 0.
 pub(crate) fn read_axis(node: &Node, context: SceneContext<'_>) -> Option<usize> {
-    let axis = values::choice(node, *context, &[("x", 0), ("y", 1), ("z", 2)])?;
+    let axis = values::word(node, *context, &AXES)?;
     check_axis(node, context, axis)
 }
 

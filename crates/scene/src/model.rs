@@ -141,13 +141,6 @@ pub struct MeasureSettings {
     pub probe: Option<usize>,
 }
 
-impl Default for MeasureSettings {
-    /// The first peer's copy along x over 20 mm, a band of 1 mm, no probe.
-    fn default() -> Self {
-        Self { travel: MeasureTravel { peer: 0, axis: 0, distance: 0.02 }, band: 0.001, probe: None }
-    }
-}
-
 /// A distance that a copy travels.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MeasureTravel {
@@ -355,12 +348,6 @@ pub struct Silence {
     pub fade: Duration,
 }
 
-impl Default for Silence {
-    fn default() -> Self {
-        Self { after: Duration::from_millis(100), fade: Duration::from_millis(250) }
-    }
-}
-
 /// The arm through which a pointer pulls the device of a peer.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PointerSpec {
@@ -374,13 +361,6 @@ pub struct PointerSpec {
     pub held: bool,
 }
 
-impl Default for PointerSpec {
-    /// With the device of a Falcon nearly without overshoot, and no stronger than an adult's wrist.
-    fn default() -> Self {
-        Self { stiffness: 400.0, damping: 20.0, force_limit: 20.0, held: false }
-    }
-}
-
 /// Which Falcon a peer has, and how its counts become metres and newtons.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FalconSpec {
@@ -392,13 +372,6 @@ pub struct FalconSpec {
     pub force_limit: f64,
     /// The place in the coordinates of the device that is the origin of the scene \[m\]. The first axes of both are the same.
     pub origin: [f64; 3],
-}
-
-impl Default for FalconSpec {
-    /// The first one found; 10,000 counts, with which full scale is about what the maker names; 4 N, half of what the device is said to give; the middle of the workspace.
-    fn default() -> Self {
-        Self { device: FalconDevice::First, counts_per_newton_metre: 10_000.0, force_limit: 4.0, origin: [0.0, 0.0, 0.125] }
-    }
 }
 
 /// Which Falcon is meant.

@@ -1,6 +1,7 @@
 //! The quantities of mechanics: their ranges and units, and vectors of them.
 
 use cohaptic_linkfile::document::{Node, Value};
+use cohaptic_linkfile::reading::TableReader;
 use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
 use cohaptic_units::print::Counted;
 
@@ -51,6 +52,18 @@ pub(crate) const COMPONENT: Quantity = Quantity::any("");
 pub(crate) const ANGLE_BOUND: Quantity = Quantity::not_negative("rad");
 /// Any \[rad\].
 pub(crate) const ANGLE: Quantity = Quantity::any("rad");
+
+/// Reads the vector under a key, or the declared default: see [`read_vector`].
+pub(crate) fn vector_of(table: &mut TableReader<'_>, key: &'static str, context: SceneContext<'_>, spread: Spread) -> Option<[f64; 3]> {
+    let quantity = table.key(key).quantity();
+    table.read(key, |node, _| read_vector(quantity, node, context, spread))
+}
+
+/// Reads the vector under a key that may be left out.
+pub(crate) fn maybe_vector_of(table: &mut TableReader<'_>, key: &'static str, context: SceneContext<'_>, spread: Spread) -> Option<Option<[f64; 3]>> {
+    let quantity = table.key(key).quantity();
+    table.maybe(key, |node, _| read_vector(quantity, node, context, spread))
+}
 
 /// Reads one number for each axis. A plain number stands for a list of one or, where `spread` allows it, for the same number on every axis.
 pub(crate) fn read_vector(quantity: Quantity, node: &Node, context: SceneContext<'_>, spread: Spread) -> Option<[f64; 3]> {

@@ -8,14 +8,34 @@ use cohaptic_linkfile::document::{BEGINNING, Node, Sources, Value};
 use cohaptic_linkfile::link::read_modulators;
 use cohaptic_linkfile::mesh::{LinkClasses, LinkSelector, OnLinks, read_links};
 use cohaptic_linkfile::reading::{Context, Parsed, TableReader, default_title, parse, with_text};
+use cohaptic_linkfile::schema::link::{LINK_ENTRY, LINK_TABLE, MODULATOR};
+use cohaptic_linkfile::schema::{Form, Table, optional, required};
 use cohaptic_units::Instant;
 
 use crate::context::SceneContext;
 use crate::model::{ChangeKind, Scene};
 use crate::sections::{
-    Header, Measured, PeerSources, Stepping, Ways, check_enough, read_coordination, read_expect, read_header, read_measure, read_names, read_object,
-    read_peers, read_stepping, read_timeline, read_topology, refuse_rotational_keys, refuse_unlinked, rotation,
+    COORDINATION, EXPECT, Header, MEASURE, Measured, OBJECT, PEER, PEERS, PeerSources, SCENE, SIMULATION, TIMELINE, TOPOLOGY, Ways, check_enough,
+    read_coordination, read_expect, read_header, read_measure, read_names, read_object, read_peers, read_stepping, read_timeline, read_topology,
+    refuse_rotational_keys, refuse_unlinked, rotation,
 };
+
+/// The top of a scene.
+pub(crate) static ROOT: Table = Table::of(&[&[
+    required("scene", Form::Table(&SCENE), "How long the scene lasts, its seed and its axes").expecting("a table [scene] with a duration"),
+    required("object", Form::Table(&OBJECT), "The shared virtual object, of which every peer has a copy").expecting("a table [object] with a mass"),
+    required("coordination", Form::Table(&COORDINATION), "How the copies are kept together").expecting("a table [coordination] with a strategy"),
+    optional("simulation", Form::Table(&SIMULATION), "How motion between ticks is computed"),
+    optional("peer", Form::Table(&PEER), "Holds for every peer that does not say otherwise"),
+    optional("peers", Form::List(&Form::Table(&PEERS)), "One peer each: its own keys are laid over those of [peer]"),
+    optional("topology", Form::Table(&TOPOLOGY), "The peers to which each peer sends"),
+    optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
+    optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
+    optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
+    optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the scene runs"),
+    optional("measure", Form::Table(&MEASURE), "Numbers that sum a run up, computed while it runs"),
+    optional("expect", Form::Table(&EXPECT), "The result that must come out: makes the scene a test for cohaptic check"),
+]]);
 
 impl Scene {
     /// Reads a scene from a file. `overrides` are texts `KEY=VALUE` that replace values of the file, in this order.
@@ -91,24 +111,10 @@ pub(crate) fn parse_scene(sources: Sources<'_>, live: bool, on_links: OnLinks<'_
 
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
 fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLinks<'_>) -> Option<Scene> {
-    let mut root = TableReader::new(document, file, "a table")?;
-    root.know(&[
-        "scene",
-        "object",
-        "coordination",
-        "simulation",
-        "peer",
-        "peers",
-        "topology",
-        "modulators",
-        "link",
-        "links",
-        "timeline",
-        "measure",
-        "expect",
-    ]);
+    let mut root = TableReader::new(document, file, &ROOT, "a table")?;
+    root.know_all();
     let header_node = root.get("scene");
-    let header = root.required("scene", "a table [scene] with a duration", read_header).unwrap_or_default();
+    let header = root.read("scene", read_header).unwrap_or_default();
     let Header { title, duration, seed, axes, count } = header;
     let peers_node = root.get("peers");
     let names = count.and_then(|count| read_names(peers_node, count, file));
@@ -123,12 +129,12 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let turns = root.get("object").and_then(Node::as_table).is_some_and(|object| object.get("inertia").is_some());
     let context = SceneContext { file, axes, live, turns };
     // From here on the readers know axes, names and modulators.
-    let object = root.required("object", "a table [object] with a mass", |node, _| read_object(node, context));
+    let object = root.read("object", |node, _| read_object(node, context));
     let (object, object_rotation) = object.unzip();
     let coordination_node = root.get("coordination");
-    let coordination = root.required("coordination", "a table [coordination] with a strategy", |node, _| read_coordination(node, file));
+    let coordination = root.read("coordination", |node, _| read_coordination(node, file));
     let (coordination, rotation_gains) = coordination.unzip();
-    let stepping = root.optional("simulation", Stepping::default(), read_stepping);
+    let stepping = root.table("simulation", read_stepping);
     if object_rotation == Some(None) {
         refuse_rotational_keys(document, file);
     }

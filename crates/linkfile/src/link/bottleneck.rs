@@ -57,7 +57,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
 
 fn read_cells(node: &Node, context: Context<'_>) -> Option<Cells> {
     const EXPECTED: &str = "a table such as { payload = \"48B\", overhead = \"5B\" }";
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("cells"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("cells"), EXPECTED)?;
     let size = |least: u32| {
         move |node: &Node, context: Context<'_>| {
             let size = values::size(node, context)?;
@@ -76,7 +76,7 @@ fn read_cells(node: &Node, context: Context<'_>) -> Option<Cells> {
 
 pub(super) fn read_token_bucket(node: &Node, context: Context<'_>) -> Option<TokenBucket> {
     const EXPECTED: &str = "\"none\" or a table such as { rate = \"1Mbit\", burst = \"10kB\" }";
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("token-bucket"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("token-bucket"), EXPECTED)?;
     let (rate, burst) = (table.value("rate"), table.value("burst"));
     let peak = table.maybe("peak", read_peak);
     let limit = table.read("limit", unless(UNLIMITED, read_limit));
@@ -88,7 +88,7 @@ pub(super) fn read_token_bucket(node: &Node, context: Context<'_>) -> Option<Tok
 
 fn read_peak(node: &Node, context: Context<'_>) -> Option<Peak> {
     const EXPECTED: &str = "a table such as { rate = \"2Mbit\", burst = \"1500B\" }";
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("token-bucket.peak"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("token-bucket.peak"), EXPECTED)?;
     let (rate, burst) = (table.value("rate"), table.value("burst"));
     table.finish();
     Some(Peak { rate: rate?, burst: burst? })

@@ -15,7 +15,7 @@ pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Optio
         let probability = values::probability(node, context)?;
         return Some(flipping(Flips::Bits { packets: Chance::independent(probability), count: 1 }));
     }
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("corrupt"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("corrupt"), EXPECTED)?;
     let bytes = table.maybe("bytes", |node, context| {
         const EXPECTED: &str = "the first and the last byte that may be hit, counted from 0, such as \"8-15\"";
         let text = values::text(node, context, EXPECTED)?;

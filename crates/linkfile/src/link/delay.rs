@@ -35,7 +35,7 @@ fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
     if node.as_table().is_none() {
         return Some(Read { jitter: Jitter::new(values::duration(node, context)?, Distribution::Normal), own_mean: None });
     }
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("jitter"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("jitter"), EXPECTED)?;
     let sd: Option<Option<Duration>> = table.maybe_value("sd");
     let distribution = table.read("distribution", read_distribution);
     let floor = table.value("floor");

@@ -16,7 +16,7 @@ pub(super) fn read_distribution(node: &Node, context: Context<'_>) -> Option<Dis
     if node.as_text().is_some() {
         return values::word(node, context, &Distribution::CHOICES);
     }
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("jitter.distribution"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("jitter.distribution"), EXPECTED)?;
     let files = [table.entry("table"), table.entry("empirical")];
     table.finish();
     let file = only_one(node, context, &files, EXPECTED)?;

@@ -35,7 +35,7 @@ fn read_impairment(impairments: &mut Impairments, key: &Key, node: &Node, contex
 /// The values of a table of parameters, defaults included.
 fn read_values(parameters: &'static Table, node: &Node, context: Context<'_>) -> Option<Values> {
     let names: Vec<&str> = parameters.keys().map(|key| key.name).collect();
-    let mut table = TableReader::of(node, context, parameters, &format!("\"none\" or a table with {}", names.join(", ")))?;
+    let mut table = TableReader::new(node, context, parameters, &format!("\"none\" or a table with {}", names.join(", ")))?;
     let mut values = Vec::new();
     let mut complete = true;
     for key in parameters.keys() {

@@ -18,7 +18,7 @@ pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
         let probability = values::probability(node, context)?;
         return Some(if probability == Probability::ZERO { Loss::None } else { Loss::Independent(probability) });
     }
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("loss"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("loss"), EXPECTED)?;
     let models = ["gilbert-elliott", "states", "bursts", "correlated", "packets", "times"].map(|key| table.entry(key));
     let every = table.entry("every");
     table.finish();
@@ -40,7 +40,7 @@ pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
 
 /// The chain of packets, or that in continuous time.
 fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("loss.gilbert-elliott"), CHAIN)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("loss.gilbert-elliott"), CHAIN)?;
     let in_time = table.get("mean-good").is_some() || table.get("mean-bad").is_some();
     let (h, k) = (table.value("h"), table.value("k"));
     if in_time {
@@ -67,7 +67,7 @@ fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
 
 /// Salsano's four states, with the defaults of tc.
 fn read_states(node: &Node, context: Context<'_>) -> Option<FourState> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("loss.states"), "a table such as { p13 = 0.01, p31 = 0.3 }")?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("loss.states"), "a table such as { p13 = 0.01, p31 = 0.3 }")?;
     let (p13, p31) = (table.value("p13"), table.maybe_value("p31"));
     let (p32, p23, p14) = (table.value("p32"), table.value("p23"), table.value("p14"));
     table.finish();
@@ -81,7 +81,7 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<FourState> {
 
 /// The same in the words of a person.
 fn read_bursts(node: &Node, context: Context<'_>) -> Option<FourState> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("loss.bursts"), "a table such as { loss = \"2%\", length = 5 }")?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("loss.bursts"), "a table such as { loss = \"2%\", length = 5 }")?;
     let (loss, length) = (table.value::<Probability>("loss"), table.value("length"));
     let [density, isolated] = ["density", "isolated"].map(|key| table.value::<Probability>(key));
     let good_run = table.value("good-run");

@@ -33,11 +33,11 @@ pub fn read_link(node: &Node, context: Context<'_>) -> Option<LinkModel> {
 
 /// Reads the keys of a link. `declaration` has the keys that may stand there; those that are none of a link somebody else reads.
 pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Context<'_>) -> Option<LinkModel> {
-    let mut table = TableReader::of(node, context, declaration, "a table of link keys such as { delay = \"24ms\" }")?;
+    let mut table = TableReader::new(node, context, declaration, "a table of link keys such as { delay = \"24ms\" }")?;
     table.know_all();
     table.finish();
     let keys = in_force(node, context)?;
-    let mut table = TableReader::of(&keys, context, &LINK_TABLE, "a table of link keys")?;
+    let mut table = TableReader::new(&keys, context, &LINK_TABLE, "a table of link keys")?;
     if let Some(replay) = table.get("replay").filter(|replay| !is_none(replay)) {
         return trace::read_replay(replay, context).map(LinkModel::Replay);
     }
@@ -52,7 +52,7 @@ pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Co
 
 /// Reads the keys that say what one configuration does.
 fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
-    let mut table = TableReader::of(keys, context, &LINK_TABLE, "a table of link keys")?;
+    let mut table = TableReader::new(keys, context, &LINK_TABLE, "a table of link keys")?;
     let delay = delay::read_delay(&mut table, keys, context);
     let order = table.choice("order", &Order::CHOICES);
     let loss = table.read("loss", loss::read_loss);
@@ -126,7 +126,7 @@ fn read_chance(node: &Node, context: Context<'_>) -> Option<Chance> {
     if node.as_table().is_none() {
         return values::probability(node, context).map(Chance::independent);
     }
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("duplicate"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("duplicate"), EXPECTED)?;
     let chance = read_chance_in(&mut table, node, context);
     table.finish();
     chance

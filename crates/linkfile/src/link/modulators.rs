@@ -33,7 +33,7 @@ pub fn read_modulators(node: Option<&Node>, context: Context<'_>) -> Option<Arc<
 type Read = (Modulator, Vec<String>);
 
 fn read_modulator<'a>(node: &'a Node, context: Context<'a>) -> Option<(String, &'a Node, Read)> {
-    let mut table = TableReader::of(node, context, &MODULATOR, "a table with name and states")?;
+    let mut table = TableReader::new(node, context, &MODULATOR, "a table with name and states")?;
     let (name_node, states_node) = (table.get("name"), table.get("states"));
     let name = table.read("name", read_name);
     let states = table.read("states", read_states);
@@ -64,7 +64,7 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<(Vec<String>, Vec<Mo
     let mut names: Vec<String> = Vec::new();
     let mut tables = Vec::new();
     for entry in entries {
-        let mut table = TableReader::of(entry, context, MODULATOR.table("states.0"), "a table with name, sojourn and next")?;
+        let mut table = TableReader::new(entry, context, MODULATOR.table("states.0"), "a table with name, sojourn and next")?;
         let name_node = table.get("name");
         let name = table.read("name", read_name);
         let sojourn = table.maybe("sojourn", read_sojourn);
@@ -176,7 +176,7 @@ pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> 
 
 /// A state may say what a link says, but not which kind of link it is.
 fn check_keys(node: &Node, context: Context<'_>) -> Option<()> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("modulated.STATE"), "a table of link keys such as { delay = \"80ms\" }")?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("modulated.STATE"), "a table of link keys such as { delay = \"80ms\" }")?;
     table.know_all();
     table.finish();
     Some(())

@@ -11,7 +11,7 @@ pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages>
     if node.as_table().is_none() {
         return read_scheduled(node, context);
     }
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage"), "a list, or a table with scheduled, random and idle")?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("outage"), "a list, or a table with scheduled, random and idle")?;
     let (random_node, idle_node) = (table.get("random"), table.get("idle"));
     let scheduled = table.read("scheduled", read_scheduled);
     let random = table.maybe("random", read_random);
@@ -28,14 +28,14 @@ pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages>
 }
 
 fn read_random(node: &Node, context: Context<'_>) -> Option<RandomOutages> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage.random"), "a table such as { up = \"30s\", down = \"1s\" }")?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.random"), "a table such as { up = \"30s\", down = \"1s\" }")?;
     let [up, down] = ["up", "down"].map(|key| table.read_expecting(key, SOJOURN, read_sojourn));
     table.finish();
     Some(RandomOutages { up: up?, down: down? })
 }
 
 fn read_idle(node: &Node, context: Context<'_>) -> Option<IdleOutages> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage.idle"), "a table such as { after = \"10s\", down = \"2s\" }")?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.idle"), "a table such as { after = \"10s\", down = \"2s\" }")?;
     let (after, down) = (table.value("after"), table.value("down"));
     table.finish();
     Some(IdleOutages { after: after?, down: down? })
@@ -61,7 +61,7 @@ fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
 
 /// A span of time.
 pub(super) fn read_span(node: &Node, context: Context<'_>) -> Option<Outage> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage.0"), "a table such as { from = \"1s\", to = \"2s\" }")?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.0"), "a table such as { from = \"1s\", to = \"2s\" }")?;
     let (from, to) = (table.read("from", values::instant), table.read("to", values::instant));
     table.finish();
     Some(Outage { from: from?, to: to? })
@@ -82,7 +82,7 @@ pub(super) fn read_sojourn(node: &Node, context: Context<'_>) -> Option<Sojourn>
 }
 
 fn read_law(node: &Node, context: Context<'_>) -> Option<Sojourn> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("outage.random.up"), SOJOURN)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.random.up"), SOJOURN)?;
     let laws = [table.entry("fixed"), table.entry("uniform"), table.entry("erlang"), table.entry("exponential")];
     table.finish();
     let law = only_one(node, context, &laws, SOJOURN)?;
@@ -101,7 +101,7 @@ fn read_law(node: &Node, context: Context<'_>) -> Option<Sojourn> {
         }
         _ => {
             let declaration = LINK_TABLE.table("outage.random.up.erlang");
-            let mut table = TableReader::of(&law.node, context, declaration, "a table such as { mean = \"2s\", stages = 4 }")?;
+            let mut table = TableReader::new(&law.node, context, declaration, "a table such as { mean = \"2s\", stages = 4 }")?;
             let (mean, stages): (_, Option<u64>) = (table.value("mean"), table.value("stages"));
             table.finish();
             Some(Sojourn::Erlang(mean?, u32::try_from(stages?).ok()?))

@@ -19,7 +19,7 @@ const DISCIPLINES: &str = "one of tail-drop, head-drop, codel, red, { codel = â€
 const LIMIT: &str = "a limit such as \"100 packets\", \"64kB\" or \"50ms\"";
 
 pub(super) fn read_queue(node: &Node, context: Context<'_>) -> Option<Queue> {
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("queue"), "a table such as { limit = \"100 packets\" }")?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("queue"), "a table such as { limit = \"100 packets\" }")?;
     let limit = table.read_expecting("limit", LIMIT, unless(UNLIMITED, read_limit));
     let discipline = table.read("discipline", |node, context| read_discipline(node, context, limit.flatten()));
     table.finish();
@@ -63,7 +63,7 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
             }
         };
     }
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("queue.discipline"), DISCIPLINES)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("queue.discipline"), DISCIPLINES)?;
     let entries = [table.entry("codel"), table.entry("red")];
     table.finish();
     let chosen = only_one(node, context, &entries, DISCIPLINES)?;
@@ -76,7 +76,7 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
 
 fn read_codel(node: &Node, context: Context<'_>) -> Option<CoDel> {
     const EXPECTED: &str = "a table such as { target = \"5ms\", interval = \"100ms\" }";
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("queue.discipline.codel"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("queue.discipline.codel"), EXPECTED)?;
     let (target, interval) = (table.value("target"), table.value("interval"));
     let (mtu, ecn) = (table.value("mtu"), table.value("ecn"));
     table.finish();
@@ -101,7 +101,7 @@ fn nothing(word: &Node) -> Node {
 /// `thresholds`: the least and the greatest, if the table does not say them.
 fn read_red(node: &Node, context: Context<'_>, thresholds: Option<[Bytes; 2]>) -> Option<Red> {
     let declaration = LINK_TABLE.table("queue.discipline.red");
-    let mut table = TableReader::of(node, context, declaration, "a table such as { min = \"5kB\", max = \"15kB\" }")?;
+    let mut table = TableReader::new(node, context, declaration, "a table such as { min = \"5kB\", max = \"15kB\" }")?;
     let nodes = [table.get("min"), table.get("max")];
     let (weight_node, packet_node) = (table.get("weight"), table.get("mean-packet"));
     let [min, max] = thresholds.map_or_else(|| ["min", "max"].map(|key| table.value(key)), |ends| ends.map(Some));

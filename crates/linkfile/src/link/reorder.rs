@@ -17,7 +17,7 @@ pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<R
         return Some((!packets.is_never()).then_some(Reorder { packets, how: any }));
     }
     let declaration = LINK_TABLE.table("reorder");
-    let mut table = TableReader::of(node, context, declaration, "a probability or a table such as { probability = \"25%\", gap = 5 }")?;
+    let mut table = TableReader::new(node, context, declaration, "a probability or a table such as { probability = \"25%\", gap = 5 }")?;
     let packets = read_chance_in(&mut table, node, context);
     let how = [table.entry("gap"), table.entry("behind"), table.entry("later")];
     let at_most_entry = table.entry("at-most");

@@ -11,7 +11,7 @@ use crate::schema::link::LINK_TABLE;
 
 pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
     const EXPECTED: &str = "\"none\" or a table such as { min = \"10ms\", max = \"20ms\" }";
-    let mut table = TableReader::of(node, context, LINK_TABLE.table("slots"), EXPECTED)?;
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("slots"), EXPECTED)?;
     let ends = [table.entry("min"), table.entry("max")];
     let law = [table.entry("delay"), table.entry("jitter")];
     let slots = match (ends.into_iter().flatten().next(), law.into_iter().flatten().next()) {

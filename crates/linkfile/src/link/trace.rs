@@ -35,7 +35,7 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
         return load(node, context, Form { bytes: MAHIMAHI_BYTES, between: Between::Steps, repeat: false, start: Start::Zero }).map(Some);
     }
     let mut table =
-        TableReader::of(node, context, declaration, "the name of a recording, or a table such as { file = \"path.csv\", repeat = true }")?;
+        TableReader::new(node, context, declaration, "the name of a recording, or a table such as { file = \"path.csv\", repeat = true }")?;
     let (bytes_entry, of_path) = (table.entry("bytes"), [table.entry("between"), table.entry("repeat"), table.entry("start")]);
     let bytes = table.read("bytes", |node, context| {
         let bytes = values::size(node, context)?;

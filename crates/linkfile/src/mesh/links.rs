@@ -91,7 +91,7 @@ fn read_entry(
     seen: &mut BTreeSet<(usize, usize)>,
     context: Context<'_>,
 ) -> Option<((usize, usize), Option<(Node, LinkModel)>)> {
-    let mut table = TableReader::of(entry, context, &LINK_ENTRY, "a table with from, to and link keys")?;
+    let mut table = TableReader::new(entry, context, &LINK_ENTRY, "a table with from, to and link keys")?;
     let ends = read_ends(&mut table, context);
     let to = table.get("to");
     // Its other keys, known and unknown, are looked at below; a missing key is reported here.

@@ -58,7 +58,7 @@ pub fn read_links_between(node: &Node, context: Context<'_>) -> Option<LinkSelec
     if is_all(node, context, EXPECTED)? {
         return Some(LinkSelector::All);
     }
-    let mut table = TableReader::of(node, context, &ENDS_TABLE, EXPECTED)?;
+    let mut table = TableReader::new(node, context, &ENDS_TABLE, EXPECTED)?;
     let ends = read_ends(&mut table, context);
     table.finish();
     ends.map(|(from, to)| LinkSelector::Between { from, to })
@@ -70,7 +70,7 @@ pub fn read_link_or_line(node: &Node, context: Context<'_>) -> Option<LinkSelect
     if is_all(node, context, EXPECTED)? {
         return Some(LinkSelector::All);
     }
-    let mut table = TableReader::of(node, context, &LINK_OR_LINE, EXPECTED)?;
+    let mut table = TableReader::new(node, context, &LINK_OR_LINE, EXPECTED)?;
     let (uplink, downlink) = (table.entry("uplink"), table.entry("downlink"));
     if uplink.is_none() && downlink.is_none() {
         let ends = read_ends(&mut table, context);

@@ -18,8 +18,7 @@ use crate::document::{BEGINNING, Entry, Node, Table, join};
 pub struct TableReader<'a> {
     node: &'a Node,
     table: &'a Table,
-    /// `None` while the readers of a section still say themselves what its keys are.
-    declaration: Option<&'static Declaration>,
+    declaration: &'static Declaration,
     context: Context<'a>,
     known: Vec<&'static str>,
     missing: Vec<(&'static str, String)>,
@@ -27,42 +26,12 @@ pub struct TableReader<'a> {
 
 impl<'a> TableReader<'a> {
     /// Begins to read; `None`, and a fault, if the value is no table.
-    pub fn of(node: &'a Node, context: Context<'a>, declaration: &'static Declaration, expected: &str) -> Option<Self> {
+    pub fn new(node: &'a Node, context: Context<'a>, declaration: &'static Declaration, expected: &str) -> Option<Self> {
         let Some(table) = node.as_table() else {
             context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
             return None;
         };
-        Some(Self { node, table, declaration: Some(declaration), context, known: Vec::new(), missing: Vec::new() })
-    }
-
-    /// [`of`](Self::of) for a table that is not read by its declaration.
-    pub fn new(node: &'a Node, context: Context<'a>, expected: &str) -> Option<Self> {
-        static NOTHING: Declaration = Declaration::of(&[]);
-        Self::of(node, context, &NOTHING, expected).map(|reader| Self { declaration: None, ..reader })
-    }
-
-    /// The value under a key that must be there.
-    pub fn required<T>(&mut self, key: &'static str, expected: &str, read: impl FnOnce(&'a Node, Context<'a>) -> Option<T>) -> Option<T> {
-        match self.get(key) {
-            Some(node) => read(node, self.context),
-            None => {
-                self.miss(key, expected);
-                None
-            }
-        }
-    }
-
-    /// The value under a key, or the default if it is not there.
-    pub fn optional<T>(&mut self, key: &'static str, default: T, read: impl FnOnce(&'a Node, Context<'a>) -> Option<T>) -> Option<T> {
-        match self.get(key) {
-            Some(node) => read(node, self.context),
-            None => Some(default),
-        }
-    }
-
-    /// Takes keys that somebody else reads.
-    pub fn know(&mut self, keys: &[&'static str]) {
-        self.known.extend_from_slice(keys);
+        Some(Self { node, table, declaration, context, known: Vec::new(), missing: Vec::new() })
     }
 
     /// The declaration of a key.
@@ -73,19 +42,20 @@ impl<'a> TableReader<'a> {
     #[must_use]
     #[track_caller]
     pub fn key(&self, name: &'static str) -> &'static Key {
-        self.declaration.and_then(|declaration| declaration.key(name)).expect("a reader asks for keys that are declared")
+        self.declaration.key(name).expect("a reader asks for keys that are declared")
     }
 
     /// The key and the value under it, if it is there.
     #[track_caller]
     pub fn entry(&mut self, name: &'static str) -> Option<&'a Entry> {
-        if self.declaration.is_some() {
-            let _ = self.key(name);
+        self.entry_of(self.key(name))
+    }
+
+    fn entry_of(&mut self, key: &'static Key) -> Option<&'a Entry> {
+        if !self.known.contains(&key.name) {
+            self.known.push(key.name);
         }
-        if !self.known.contains(&name) {
-            self.known.push(name);
-        }
-        self.table.get(name)
+        self.table.get(key.name)
     }
 
     /// The value under a key, if it is there.
@@ -107,7 +77,7 @@ impl<'a> TableReader<'a> {
     #[track_caller]
     pub fn value<T: TryFrom<ParameterValue>>(&mut self, name: &'static str) -> Option<T> {
         let key = self.key(name);
-        self.read(name, |node, context| values::of_key(key, node, context))
+        self.read_key(key, "", |node, context| values::of_key(key, node, context))
     }
 
     /// The value under a key, read as its form says, or `Some(None)` if it is not there.
@@ -130,18 +100,21 @@ impl<'a> TableReader<'a> {
     /// The value under a key: that of the file, or else the declared default. A key without either is missing.
     #[track_caller]
     pub fn read<T>(&mut self, name: &'static str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
-        self.read_expecting(name, "", read)
+        self.read_key(self.key(name), "", read)
     }
 
     /// [`read`](Self::read), with what a message expects if the key is missing; empty: what the declaration says.
     #[track_caller]
     pub fn read_expecting<T>(&mut self, name: &'static str, expected: &str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
-        let key = self.key(name);
-        match (self.get(name), key.need) {
-            (Some(node), _) => read(node, self.context),
+        self.read_key(self.key(name), expected, read)
+    }
+
+    fn read_key<T>(&mut self, key: &'static Key, expected: &str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
+        match (self.entry_of(key), key.need) {
+            (Some(entry), _) => read(&entry.node, self.context),
             (None, Need::Default(default)) => read(&values::default_of(default), self.context),
             (None, Need::Required | Need::RequiredSomewhere | Need::Optional) => {
-                self.missing.push((name, if expected.is_empty() { key.expected() } else { expected.to_owned() }));
+                self.missing.push((key.name, if expected.is_empty() { key.expected() } else { expected.to_owned() }));
                 None
             }
         }
@@ -188,7 +161,7 @@ impl<'a> TableReader<'a> {
 
     /// Takes all declared keys, which somebody else reads.
     pub fn know_all(&mut self) {
-        self.known.extend(self.declaration.iter().flat_map(|declaration| declaration.keys()).map(|key| key.name));
+        self.known.extend(self.declaration.keys().map(|key| key.name));
     }
 
     /// Reports unknown keys; if there are none, missing ones. A key that is misspelt is both, and said once.

@@ -163,12 +163,6 @@ pub fn word<T: Clone>(node: &Node, context: Context<'_>, choices: &[(&str, T, &s
     chosen
 }
 
-/// [`word`] without meanings.
-pub fn choice<T: Copy>(node: &Node, context: Context<'_>, choices: &[(&str, T)]) -> Option<T> {
-    let choices: Vec<_> = choices.iter().map(|(word, value)| (*word, *value, "")).collect();
-    word(node, context, &choices)
-}
-
 /// A list, as its elements.
 pub fn list<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<Vec<&'a Node>> {
     let Value::List(elements) = &node.value else {

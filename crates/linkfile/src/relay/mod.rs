@@ -171,7 +171,7 @@ struct Header {
 }
 
 fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, LinkClasses)> {
-    let mut root = TableReader::of(document, context, &ROOT, "a table")?;
+    let mut root = TableReader::new(document, context, &ROOT, "a table")?;
     root.know_all();
     let header = root.table("relay", read_header).unwrap_or_default();
     let programs_node = root.get("programs");
@@ -200,7 +200,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, Li
 }
 
 fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
-    let mut table = TableReader::of(node, context, &RELAY, "a table such as [relay]")?;
+    let mut table = TableReader::new(node, context, &RELAY, "a table such as [relay]")?;
     let title = table.maybe("title", |node, context| values::text(node, context, "a text").map(str::to_owned));
     let (seed, allow_remote, packets) = (table.value("seed"), table.value("allow-remote"), table.value("most-packets"));
     let bytes = table.read("most-bytes", |node, context| {
@@ -243,7 +243,7 @@ fn read_timeline(node: Option<&Node>, links: Option<&LinkClasses>, context: Cont
 }
 
 fn read_entry<'a>(entry: &'a Node, context: Context<'a>) -> Option<(Instant, LinkSelector, &'a Node)> {
-    let mut table = TableReader::of(entry, context, &TIMELINE, "a table with at, link and set")?;
+    let mut table = TableReader::new(entry, context, &TIMELINE, "a table with at, link and set")?;
     let at = table.read("at", values::instant);
     let selector = table.read("link", read_links_between);
     let set = table.get("set");

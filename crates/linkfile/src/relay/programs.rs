@@ -51,7 +51,7 @@ pub(super) fn check_enough(names: &Names, node: &Node, context: Context<'_>) {
 }
 
 fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Names, context: Context<'a>) -> Option<Written<'a>> {
-    let mut table = TableReader::of(entry, context, &PROGRAM, "a table with name and port")?;
+    let mut table = TableReader::new(entry, context, &PROGRAM, "a table with name and port")?;
     let (port_node, address_node) = (table.get("port"), table.get("address"));
     let name = table.read("name", |node, context| read_name(node, names, context));
     let port = table.read("port", |node, context| {

@@ -79,7 +79,7 @@ impl RouterFile {
 
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
 fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
-    let mut root = TableReader::of(document, context, &ROOT, "a table")?;
+    let mut root = TableReader::new(document, context, &ROOT, "a table")?;
     root.know_all();
     let modulators = read_modulators(root.get("modulators"), context);
     let context = context.with_modulators(modulators.as_ref());
@@ -125,7 +125,7 @@ fn is_link_name(name: &str) -> bool {
 
 /// `[router]`: the seed, the memory and the defaults.
 fn read_router(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<(u64, Memory, [Target; 2])> {
-    let mut table = TableReader::of(node, context, &ROUTER, "a table such as [router]")?;
+    let mut table = TableReader::new(node, context, &ROUTER, "a table such as [router]")?;
     let seed = table.value("seed");
     let memory = table.table("memory", read_memory);
     let expected = format!("{TARGET}, or {{ left-to-right = \"wan\", right-to-left = \"pass\" }}");
@@ -138,7 +138,7 @@ fn read_default(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) 
     if !matches!(node.value, Value::Table(_)) {
         return read_target(node, links, context).map(|target| [target; 2]);
     }
-    let mut table = TableReader::of(node, context, &DEFAULT, TARGET)?;
+    let mut table = TableReader::new(node, context, &DEFAULT, TARGET)?;
     let [left, right] = ["left-to-right", "right-to-left"].map(|way| table.read(way, |node, context| read_target(node, links, context)));
     table.finish();
     Some([left?, right?])
@@ -146,7 +146,7 @@ fn read_default(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) 
 
 /// `memory = { packets = 10000, bytes = "64MB" }`.
 fn read_memory(node: &Node, context: Context<'_>) -> Option<Memory> {
-    let mut table = TableReader::of(node, context, &MEMORY, "a table such as { packets = 10000, bytes = \"64MB\" }")?;
+    let mut table = TableReader::new(node, context, &MEMORY, "a table such as { packets = 10000, bytes = \"64MB\" }")?;
     let packets = table.value("packets");
     let bytes = table.read("bytes", |node, context| {
         let bytes = values::size(node, context)?;

@@ -40,7 +40,7 @@ pub(super) fn read_rules(node: &Node, links: Option<&[NamedLink]>, context: Cont
 }
 
 fn read_rule(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<RuleSpec> {
-    let mut table = TableReader::of(node, context, &RULE, "a table such as { protocol = \"tcp\", port = 80, link = \"wan\" }")?;
+    let mut table = TableReader::new(node, context, &RULE, "a table such as { protocol = \"tcp\", port = 80, link = \"wan\" }")?;
     let network = |node, context| read_network(node, context, "an address or a network such as \"10.1.0.0/16\" or \"fd00::/64\"");
     let from = table.maybe("from", |node, context| values::word(node, context, &SIDES));
     let source = table.maybe("source", network);

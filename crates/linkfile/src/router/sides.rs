@@ -23,7 +23,7 @@ pub(super) static SIDE: Table = Table::of(&[&[
 ]]);
 
 pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment> {
-    let mut table = TableReader::of(node, context, &SIDE, "a table with a tun or an interface")?;
+    let mut table = TableReader::new(node, context, &SIDE, "a table with a tun or an interface")?;
     let interface = table.get("interface");
     let namespace = table.maybe("namespace", read_namespace);
     if let Some(interface) = interface {

@@ -1,8 +1,5 @@
 //! The kinds of files and their catalogues of keys: see [`cohaptic_linkfile::schema`].
-//!
-//! A test reads files in which every table occurs, and compares the keys that the readers know with those of the catalogue: neither may have one more.
 
-mod scene;
 #[cfg(test)]
 mod tests;
 
@@ -28,7 +25,7 @@ impl FileSchema {
     #[must_use]
     pub const fn root(self) -> &'static Table {
         match self {
-            Self::Scene => &scene::ROOT,
+            Self::Scene => &crate::read::ROOT,
             Self::Relay => &schema::RELAY,
             Self::Router => &schema::ROUTER,
         }
@@ -48,9 +45,7 @@ impl FileSchema {
     /// whose values carry their units (`link.delay`), are no numbers or have no unit, and for a text that names no key.
     #[must_use]
     pub fn unit_of(self, key: &str) -> &'static str {
-        let mut parts = key.split('.');
-        let Some(first) = parts.next().and_then(|name| form_of(self.root(), name)) else { return "" };
-        parts.try_fold(first, within).map_or("", unit)
+        self.root().form(key).map_or("", unit)
     }
 
     /// The catalogue as a JSON Schema of draft 7.
@@ -58,22 +53,6 @@ impl FileSchema {
     pub fn json(self) -> Value {
         schema::json_schema(self.root(), self.title())
     }
-}
-
-/// The form of the value under a name within a value: a key of a table, or an entry of a list by its name or place.
-fn within(form: &'static Form, name: &str) -> Option<&'static Form> {
-    if let Form::List(entry) = form {
-        Some(entry)
-    } else if let Form::AnyOf(forms) = form {
-        forms.iter().find_map(|form| within(form, name))
-    } else {
-        form_of(form.table()?, name)
-    }
-}
-
-/// The form of the value under a name of a table.
-fn form_of(table: &'static Table, name: &str) -> Option<&'static Form> {
-    table.keys().find(|key| key.name == name).map(|key| &key.form).or(table.others)
 }
 
 /// The unit of a number that may stand there.

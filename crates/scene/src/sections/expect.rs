@@ -7,14 +7,69 @@ use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::mesh::{read_link_or_line, read_peer_name};
 use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
 use cohaptic_linkfile::reading::{Context, TableReader};
-use cohaptic_units::{Instant, Probability};
+use cohaptic_linkfile::schema::link::{ALL_LINKS, LINK_OR_LINE};
+use cohaptic_linkfile::schema::{Choices, Form, Key, Table, number, optional, required, usual, words};
+use cohaptic_units::Probability;
 use cohaptic_wan::DropCause;
 
-use super::rotation::read_orientation;
-use crate::context::{SceneContext, read_axis};
+use super::measure::MEASURE_NAME_FORM;
+use super::rotation::{QUATERNION, read_orientation};
+use super::timeline::read_instant;
+use crate::context::{AXIS, SceneContext, read_axis};
 use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectMeasure, ExpectOrientation, ExpectPosition, ExpectTravel, PeerSpec};
 use crate::quantities::{ANGLE_BOUND, DISTANCE, POSITION};
 use crate::sections::read_measure_name;
+
+pub(crate) static EXPECT: Table = Table::of(&[&[
+    optional("stable", Form::Boolean, "Whether a small disturbance dies out"),
+    optional("discrepancy", Form::Table(&METRES), "The largest distance along an axis between two copies"),
+    optional("position", Form::List(&Form::Table(&POSITIONS)), "Where copies are at some time"),
+    optional("travel", Form::List(&Form::Table(&TRAVEL)), "When copies have first moved so far"),
+    optional("loss", Form::List(&Form::Table(&LOSS)), "Which fraction of what was offered was dropped"),
+    optional("delay", Form::List(&Form::Table(&DELAY)), "The mean delay of what was delivered"),
+    optional("measures", Form::List(&Form::Table(&MEASURE)), "The values of measures"),
+    optional("rotation-discrepancy", Form::Table(&RADIANS), "The largest angle between two copies"),
+    optional("orientation", Form::List(&Form::Table(&ORIENTATION)), "How copies are turned at some time"),
+]]);
+static RADIANS: Table = Table::of(&[&[optional("min", number(ANGLE_BOUND), "At least"), optional("max", number(ANGLE_BOUND), "At most")]]);
+static ORIENTATION: Table = Table::of(&[&[
+    PEER,
+    AT,
+    required("of", QUATERNION, "A quaternion w, x, y, z of any length").expecting("a quaternion, a list of four numbers w, x, y, z"),
+    required("max", number(ANGLE_BOUND), "The largest angle between the two"),
+]]);
+static METRES: Table = Table::of(&[&METRE_BOUNDS]);
+const METRE_BOUNDS: [Key; 2] = [optional("min", number(POSITION), "At least"), optional("max", number(POSITION), "At most")];
+const TIME_BOUNDS: [Key; 2] = [optional("min", Form::Duration, "At least"), optional("max", Form::Duration, "At most")];
+const FRACTION_BOUNDS: [Key; 2] = [optional("min", Form::Probability, "At least"), optional("max", Form::Probability, "At most")];
+const PEER: Key = required("peer", Form::Text, "The name of a peer").expecting("the name of a peer");
+const AT: Key = required("at", Form::Duration, "When, from the beginning of the scene").expecting("a time such as \"1s\"");
+const ALONG: Key = usual("axis", AXIS, "\"x\"", "Along which axis");
+static POSITIONS: Table = Table::of(&[&[PEER, ALONG, AT], &METRE_BOUNDS]);
+static TRAVEL: Table = Table::of(&[&[PEER, ALONG, required("distance", number(DISTANCE), "How far from where it began")], &TIME_BOUNDS]);
+const LINK: Key = usual(
+    "link",
+    Form::AnyOf(const { &[Form::Words(ALL_LINKS), Form::Table(&LINK_OR_LINE)] }),
+    "\"all\"",
+    "Which link: all, one by its ends, or an access line",
+);
+static LOSS: Table =
+    Table::of(&[&[LINK, optional("cause", Form::Words(const { &words(&CAUSES) }), "Dropped for this cause; without it for any")], &FRACTION_BOUNDS]);
+static DELAY: Table = Table::of(&[&[LINK], &TIME_BOUNDS]);
+static MEASURE: Table = Table::of(&[&[
+    required("name", MEASURE_NAME_FORM, "The name of the measure, which ends in its unit").expecting("the name of a measure such as \"energy_j\""),
+    optional("min", Form::Number(Quantity::any("")), "At least"),
+    optional("max", Form::Number(Quantity::any("")), "At most"),
+]]);
+const CAUSES: Choices<DropCause, { DropCause::ALL.len() }> = {
+    let mut causes = [("", DropCause::ALL[0], "dropped for this cause"); DropCause::ALL.len()];
+    let mut place = 0;
+    while place < causes.len() {
+        (causes[place].0, causes[place].1) = (DropCause::ALL[place].name(), DropCause::ALL[place]);
+        place += 1;
+    }
+    causes
+};
 
 /// Reads the expectations. `duration` and `peers` are `None` where they were refused; `has_probe` says whether the impedance of a hand is measured.
 pub(crate) fn read_expect(
@@ -24,17 +79,17 @@ pub(crate) fn read_expect(
     peers: Option<&[PeerSpec]>,
     context: SceneContext<'_>,
 ) -> Option<Expect> {
-    let mut table = TableReader::new(node, *context, "a table such as [expect]")?;
-    let stable = table.maybe("stable", values::boolean);
-    let discrepancy = table.maybe("discrepancy", |node, context| read_discrepancy(node, context, POSITION));
-    let turned = table.maybe("rotation-discrepancy", |node, context| read_discrepancy(node, context, ANGLE_BOUND));
-    let orientations =
-        table.optional("orientation", Vec::new(), |node, file| each(node, file, |entry| read_expected_orientation(entry, duration, context)));
-    let positions = table.optional("position", Vec::new(), |node, file| each(node, file, |entry| read_position(entry, duration, context)));
-    let travel = table.optional("travel", Vec::new(), |node, file| each(node, file, |entry| read_travel(entry, context)));
-    let loss = table.optional("loss", Vec::new(), |node, context| each(node, context, |entry| read_loss(entry, peers, context)));
-    let delay = table.optional("delay", Vec::new(), |node, context| each(node, context, |entry| read_delay(entry, peers, context)));
-    let measures = table.optional("measures", Vec::new(), |node, file| each(node, file, |entry| read_measure(entry, has_probe, file)));
+    let file = *context;
+    let mut table = TableReader::new(node, file, &EXPECT, "a table such as [expect]")?;
+    let stable = table.maybe_value("stable");
+    let discrepancy = table.maybe("discrepancy", |node, context| read_discrepancy(node, context, &METRES));
+    let turned = table.maybe("rotation-discrepancy", |node, context| read_discrepancy(node, context, &RADIANS));
+    let orientations = each(&mut table, "orientation", |entry| read_expected_orientation(entry, duration, context));
+    let positions = each(&mut table, "position", |entry| read_position(entry, duration, context));
+    let travel = each(&mut table, "travel", |entry| read_travel(entry, context));
+    let loss = each(&mut table, "loss", |entry| read_loss(entry, peers, file));
+    let delay = each(&mut table, "delay", |entry| read_delay(entry, peers, file));
+    let measures = each(&mut table, "measures", |entry| read_measure(entry, has_probe, file));
     table.finish();
     Some(Expect {
         stable: stable?,
@@ -49,58 +104,49 @@ pub(crate) fn read_expect(
     })
 }
 
-/// Reads every table of a list, also after one that was refused.
-fn each<T>(node: &Node, context: Context<'_>, read: impl Fn(&Node) -> Option<T>) -> Option<Vec<T>> {
-    let read: Vec<Option<T>> = values::list(node, context, "a list of tables")?.into_iter().map(read).collect();
+/// Reads every table of a list, also after one that was refused; without the list none.
+fn each<T>(table: &mut TableReader<'_>, key: &'static str, read: impl Fn(&Node) -> Option<T>) -> Option<Vec<T>> {
+    let entries = table.maybe(key, |node, context| values::list(node, context, "a list of tables"))?.unwrap_or_default();
+    let read: Vec<Option<T>> = entries.into_iter().map(read).collect();
     read.into_iter().collect()
 }
 
-fn read_discrepancy(node: &Node, context: Context<'_>, quantity: Quantity) -> Option<Bounds> {
-    let mut table = TableReader::new(node, context, "a table such as { max = 0.001 }")?;
-    let bounds = read_bounds(&mut table, node, context, quantity);
+fn read_discrepancy(node: &Node, context: Context<'_>, declaration: &'static Table) -> Option<Bounds> {
+    let mut table = TableReader::new(node, context, declaration, "a table such as { max = 0.001 }")?;
+    let ends = read_ends(&mut table, node, context, TableReader::maybe_value);
     table.finish();
-    bounds
+    bounds(ends)
 }
 
 fn read_position(node: &Node, duration: Option<Duration>, context: SceneContext<'_>) -> Option<ExpectPosition> {
-    let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\", at = \"1s\", min = 0.1 }")?;
-    let peer = table.required("peer", "the name of a peer", read_peer_name);
-    let at = read_at(&mut table, duration);
-    let axis = table.optional("axis", 0, |node, _| read_axis(node, context));
-    let bounds = read_bounds(&mut table, node, *context, POSITION);
+    const EXPECTED: &str = "a table such as { peer = \"left\", at = \"1s\", min = 0.1 }";
+    let mut table = TableReader::new(node, *context, &POSITIONS, EXPECTED)?;
+    let peer = table.read("peer", read_peer_name);
+    let at = table.read("at", |node, context| read_instant(node, duration, context));
+    let axis = table.read("axis", |node, _| read_axis(node, context));
+    let ends = read_ends(&mut table, node, *context, TableReader::maybe_value);
     table.finish();
-    Some(ExpectPosition { peer: peer?, axis: axis?, at: at?, bounds: bounds? })
-}
-
-/// `at`: a time within the scene.
-fn read_at(table: &mut TableReader<'_>, duration: Option<Duration>) -> Option<Instant> {
-    table.required("at", "a time such as \"1s\"", |node, context| {
-        let at = values::instant(node, context)?;
-        let last = Instant::ZERO.saturating_add(duration?);
-        if at > last {
-            context.fault_at(node, format!("{at} is after the end of the scene: expected at most scene.duration, {last}"));
-            return None;
-        }
-        Some(at)
-    })
+    Some(ExpectPosition { peer: peer?, axis: axis?, at: at?, bounds: bounds(ends)? })
 }
 
 fn read_expected_orientation(node: &Node, duration: Option<Duration>, context: SceneContext<'_>) -> Option<ExpectOrientation> {
-    let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\", at = \"1s\", of = [1, 0, 0, 0], max = 0.01 }")?;
-    let peer = table.required("peer", "the name of a peer", read_peer_name);
-    let at = read_at(&mut table, duration);
-    let of = table.required("of", "a quaternion, a list of four numbers w, x, y, z", read_orientation);
-    let max = table.required("max", &ANGLE_BOUND.expected(), |node, context| ANGLE_BOUND.read(node, context));
+    const EXPECTED: &str = "a table such as { peer = \"left\", at = \"1s\", of = [1, 0, 0, 0], max = 0.01 }";
+    let mut table = TableReader::new(node, *context, &ORIENTATION, EXPECTED)?;
+    let peer = table.read("peer", read_peer_name);
+    let at = table.read("at", |node, context| read_instant(node, duration, context));
+    let of = table.read("of", read_orientation);
+    let max = table.value("max");
     table.finish();
     Some(ExpectOrientation { peer: peer?, at: at?, of: of?, max: max? })
 }
 
 fn read_travel(node: &Node, context: SceneContext<'_>) -> Option<ExpectTravel> {
-    let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\", distance = 0.1, max = \"1.2s\" }")?;
-    let peer = table.required("peer", "the name of a peer", read_peer_name);
-    let distance = table.required("distance", &DISTANCE.expected(), |node, context| DISTANCE.read(node, context));
-    let axis = table.optional("axis", 0, |node, _| read_axis(node, context));
-    let ends = read_ends(&mut table, node, *context, values::duration);
+    const EXPECTED: &str = "a table such as { peer = \"left\", distance = 0.1, max = \"1.2s\" }";
+    let mut table = TableReader::new(node, *context, &TRAVEL, EXPECTED)?;
+    let peer = table.read("peer", read_peer_name);
+    let distance = table.value("distance");
+    let axis = table.read("axis", |node, _| read_axis(node, context));
+    let ends = read_ends(&mut table, node, *context, TableReader::maybe_value);
     table.finish();
     let (min, max) = ends?;
     let seconds = |end: Option<Duration>| end.map(|end| end.as_secs_f64());
@@ -108,32 +154,32 @@ fn read_travel(node: &Node, context: SceneContext<'_>) -> Option<ExpectTravel> {
 }
 
 fn read_loss(node: &Node, peers: Option<&[PeerSpec]>, context: Context<'_>) -> Option<ExpectLoss> {
-    let mut table = TableReader::new(node, context, "a table such as { link = \"all\", max = 0.02 }")?;
-    let link = table.optional("link", LinkSelector::All, |node, context| read_existing_link(node, peers, context));
-    let causes = DropCause::ALL.map(|cause| (cause.name(), cause));
-    let cause = table.maybe("cause", |node, context| values::choice(node, context, &causes));
-    let ends = read_ends(&mut table, node, context, values::probability);
+    let mut table = TableReader::new(node, context, &LOSS, "a table such as { link = \"all\", max = 0.02 }")?;
+    let link = table.read("link", |node, context| read_existing_link(node, peers, context));
+    let cause = table.maybe("cause", |node, context| values::word(node, context, &CAUSES));
+    let ends = read_ends(&mut table, node, context, TableReader::maybe_value);
     table.finish();
     let (min, max): (Option<Probability>, Option<Probability>) = ends?;
     Some(ExpectLoss { link: link?, cause: cause?, min, max })
 }
 
 fn read_delay(node: &Node, peers: Option<&[PeerSpec]>, context: Context<'_>) -> Option<ExpectDelay> {
-    let mut table = TableReader::new(node, context, "a table such as { link = \"all\", max = \"25ms\" }")?;
-    let link = table.optional("link", LinkSelector::All, |node, context| read_existing_link(node, peers, context));
-    let ends = read_ends(&mut table, node, context, values::duration);
+    let mut table = TableReader::new(node, context, &DELAY, "a table such as { link = \"all\", max = \"25ms\" }")?;
+    let link = table.read("link", |node, context| read_existing_link(node, peers, context));
+    let ends = read_ends(&mut table, node, context, TableReader::maybe_value);
     table.finish();
     let (min, max) = ends?;
     Some(ExpectDelay { link: link?, min, max })
 }
 
 fn read_measure(node: &Node, has_probe: bool, context: Context<'_>) -> Option<ExpectMeasure> {
-    let mut table = TableReader::new(node, context, "a table such as { name = \"energy_j\", max = 0.01 }")?;
-    let name = table.required("name", "the name of a measure such as \"energy_j\"", |node, context| read_measure_name(node, has_probe, context));
-    let unit = name.map_or("", |name| name.measure.unit());
-    let bounds = read_bounds(&mut table, node, context, Quantity::any(unit));
+    let mut table = TableReader::new(node, context, &MEASURE, "a table such as { name = \"energy_j\", max = 0.01 }")?;
+    let name = table.read("name", |node, context| read_measure_name(node, has_probe, context));
+    // The unit of the bounds is that of the measure.
+    let quantity = Quantity::any(name.map_or("", |name| name.measure.unit()));
+    let ends = read_ends(&mut table, node, context, |table, key| table.maybe(key, |node, context| quantity.read(node, context)));
     table.finish();
-    Some(ExpectMeasure { name: name?, bounds: bounds? })
+    Some(ExpectMeasure { name: name?, bounds: bounds(ends)? })
 }
 
 /// A link or an access line that the scene has: nothing can be expected of a line that is not there.
@@ -151,24 +197,23 @@ fn read_existing_link(node: &Node, peers: Option<&[PeerSpec]>, context: Context<
     Some(link)
 }
 
-fn read_bounds(table: &mut TableReader<'_>, node: &Node, context: Context<'_>, quantity: Quantity) -> Option<Bounds> {
-    let (min, max) = read_ends(table, node, context, |node, context| quantity.read(node, context))?;
-    Some(Bounds { min, max })
+fn bounds(ends: Option<(Option<f64>, Option<f64>)>) -> Option<Bounds> {
+    ends.map(|(min, max)| Bounds { min, max })
 }
 
 /// `min` and `max`: at least one of them, and not the wrong way round.
-fn read_ends<T: PartialOrd>(
-    table: &mut TableReader<'_>,
+fn read_ends<'a, T: PartialOrd>(
+    table: &mut TableReader<'a>,
     node: &Node,
     context: Context<'_>,
-    read: impl Fn(&Node, Context<'_>) -> Option<T>,
+    read: impl Fn(&mut TableReader<'a>, &'static str) -> Option<Option<T>>,
 ) -> Option<(Option<T>, Option<T>)> {
     let (min_node, max_node) = (table.get("min"), table.get("max"));
     if min_node.is_none() && max_node.is_none() {
         context.fault_at(node, "neither min nor max is given: expected at least one of them");
         return None;
     }
-    let (min, max) = (table.maybe("min", &read), table.maybe("max", &read));
+    let (min, max) = (read(table, "min"), read(table, "max"));
     let (min, max) = (min?, max?);
     if let (Some(least), Some(most)) = (&min, &max)
         && least > most

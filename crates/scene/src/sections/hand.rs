@@ -2,16 +2,46 @@
 
 use std::time::Duration;
 
-use cohaptic_linkfile::document::{Node, quote};
-use cohaptic_linkfile::reading::values::{Quantity, ReadNumber as _};
+use cohaptic_linkfile::document::{Entry, Node, Table as DocumentTable, quote};
 use cohaptic_linkfile::reading::{Context, TableReader, only_one};
+use cohaptic_linkfile::schema::{Form, Key, Table, number, optional, required, usual, vector};
 use cohaptic_peer::{ArmConfig, Hand, Signal};
 use cohaptic_units::Hertz;
 use cohaptic_units::print::{SixDigits, Span};
 
 use super::motion_file::{Columns, read_motion_file};
 use crate::context::SceneContext;
-use crate::quantities::{ADDED_MASS, ANGLE, DAMPING, FORCE, FREQUENCY, POSITION, STIFFNESS, Spread, read_vector};
+use crate::quantities::{ADDED_MASS, ANGLE, DAMPING, FORCE, FREQUENCY, POSITION, STIFFNESS, Spread, TORQUE, read_vector, vector_of};
+
+pub(super) const HAND: Form = Form::AnyOf(&[Form::Words(&[("none", "nothing; takes away what [peer] says")]), Form::Table(&HAND_TABLE)]);
+static HAND_TABLE: Table = Table::of(&[&[
+    optional("force", vector(FORCE), "A constant force"),
+    optional("sine", Form::Table(&FORCE_SINE), "A force that sways"),
+    optional("file", Form::File, "A recorded force: a CSV with the header t,fx (and fy, fz, then tx,ty,tz), in s, N and N·m"),
+    optional("arm", Form::Table(&ARM), "An arm that adds its mass to the device and holds it with a damper and a spring"),
+    optional("follows", Form::Table(&FOLLOWS), "Beside arm: the motion that it wants; without it to rest at 0"),
+    optional("torque", vector(TORQUE), "A constant torque on a device that turns, in world axes"),
+]]);
+static FORCE_SINE: Table = Table::of(&[
+    &[required("amplitude", vector(FORCE), "Amplitude")],
+    &SINE,
+    &[optional("torque", vector(TORQUE), "Amplitude of a torque that sways with it")],
+]);
+static MOTION_SINE: Table = Table::of(&[&[required("amplitude", vector(POSITION), "Amplitude")], &SINE]);
+const SINE: [Key; 2] = [
+    required("frequency", number(FREQUENCY), "Frequency, below half the rate of ticks"),
+    usual("phase", number(ANGLE), "0", "Phase at the beginning of the scene"),
+];
+static ARM: Table = Table::of(&[&[
+    required("mass", number(ADDED_MASS), "Mass that the arm adds to the device"),
+    required("damping", number(DAMPING), "Damping of the arm"),
+    required("stiffness", number(STIFFNESS), "Stiffness of the arm"),
+]]);
+static FOLLOWS: Table = Table::of(&[&[
+    optional("position", vector(POSITION), "A constant position"),
+    optional("sine", Form::Table(&MOTION_SINE), "A position that sways"),
+    optional("file", Form::File, "A recorded motion: a CSV with the header t,x (and y, z, then tx,ty,tz), in s, m and N·m"),
+]]);
 
 const EXPECTED: &str = "\"none\", { force = … }, { sine = … }, { file = … } or { arm = …, follows = … }";
 
@@ -25,7 +55,7 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
         }
         None => {}
     }
-    let mut table = TableReader::new(node, *context, EXPECTED)?;
+    let mut table = TableReader::new(node, *context, &HAND_TABLE, EXPECTED)?;
     let force = table.entry("force");
     let sine = table.entry("sine");
     let file = table.entry("file");
@@ -43,8 +73,8 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     }
     let value = &*chosen.node;
     let signal = match chosen.name.as_str() {
-        "force" => Signal::Constant(read_vector(FORCE, value, context, Spread::Refused)?),
-        "sine" => read_sine(value, context, FORCE, &["torque"])?,
+        "force" => Signal::Constant(constant(&HAND_TABLE, chosen, context)?),
+        "sine" => read_sine(value, context, &FORCE_SINE)?,
         "file" => Signal::Table(read_motion_file(value, context, Columns::Force)?.motion),
         _ => {
             let arm = read_arm(value, *context);
@@ -56,6 +86,40 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
         }
     };
     Some(Some(Hand::Force(signal)))
+}
+
+/// The vector under a key of that table.
+fn constant(declaration: &Table, entry: &Entry, context: SceneContext<'_>) -> Option<[f64; 3]> {
+    read_vector(declaration.key(&entry.name)?.quantity(), &entry.node, context, Spread::Refused)
+}
+
+/// The torque of a hand; `Some(None)` without one.
+pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option<Option<Signal>> {
+    let Some(table) = hand.as_table() else { return Some(None) };
+    let within = |key: &str| table.get(key).filter(|entry| entry.node.as_table().is_some());
+    let sine = within("sine").and_then(|sine| Some((&sine.node, sine.node.as_table()?.get("torque")?)));
+    let file = |table: Option<&DocumentTable>, columns: Columns| {
+        // Faults of a file are those of its other columns.
+        let torque = table.and_then(|table| table.get("file")).and_then(|file| read_motion_file(&file.node, context, columns)?.torque);
+        torque.map(Signal::Table)
+    };
+    let follows = within("follows").and_then(|follows| follows.node.as_table());
+    let file = file(Some(table), Columns::Force).or_else(|| file(follows, Columns::Position));
+    let torque = table.get("torque");
+    if let (Some(torque), true) = (torque, sine.is_some() || file.is_some()) {
+        let other = if sine.is_some() { "sine.torque" } else { "the torques of a file" };
+        context.fault(torque.key, &torque.node.path, format!("a torque stands beside {other}: expected one of the two"));
+        return None;
+    }
+    if let Some(torque) = torque {
+        return Some(Some(Signal::Constant(constant(&HAND_TABLE, torque, context)?)));
+    }
+    let Some((sine, torque)) = sine else { return Some(file) };
+    let amplitude = constant(&FORCE_SINE, torque, context);
+    // Faults of these two are those of the force, and so are missing and unknown keys: the table is not finished.
+    let mut table = TableReader::new(sine, *context, &FORCE_SINE, EXPECTED)?;
+    let (frequency, phase): (Option<f64>, _) = (table.value("frequency"), table.value("phase"));
+    Some(Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency?), phase: phase? }))
 }
 
 /// Refuses a sine that the ticks of its peer cannot show, and returns whether the hand has none. A hand is computed once a tick, so that at half the rate of ticks
@@ -83,35 +147,34 @@ pub(crate) fn hand_is_sampled(hand: Option<&Hand>, tick: Duration, node: &Node, 
 }
 
 fn read_arm(node: &Node, context: Context<'_>) -> Option<ArmConfig> {
-    let mut table = TableReader::new(node, context, "a table such as { mass = 0.5, damping = 3.0, stiffness = 200.0 }")?;
-    let mass = table.required("mass", &ADDED_MASS.expected(), |node, context| ADDED_MASS.read(node, context));
-    let damping = table.required("damping", &DAMPING.expected(), |node, context| DAMPING.read(node, context));
-    let stiffness = table.required("stiffness", &STIFFNESS.expected(), |node, context| STIFFNESS.read(node, context));
+    let mut table = TableReader::new(node, context, &ARM, "a table such as { mass = 0.5, damping = 3.0, stiffness = 200.0 }")?;
+    let (mass, damping, stiffness) = (table.value("mass"), table.value("damping"), table.value("stiffness"));
     table.finish();
     Some(ArmConfig { mass: mass?, damping: damping?, stiffness: stiffness? })
 }
 
 fn read_follows(node: &Node, context: SceneContext<'_>) -> Option<Signal> {
     const EXPECTED: &str = "{ position = … }, { sine = … } or { file = … }";
-    let mut table = TableReader::new(node, *context, EXPECTED)?;
+    let mut table = TableReader::new(node, *context, &FOLLOWS, EXPECTED)?;
     let choices = [table.entry("position"), table.entry("sine"), table.entry("file")];
     table.finish();
     let chosen = only_one(node, *context, &choices, EXPECTED)?;
     let value = &*chosen.node;
     match chosen.name.as_str() {
-        "position" => Some(Signal::Constant(read_vector(POSITION, value, context, Spread::Refused)?)),
-        "sine" => read_sine(value, context, POSITION, &[]),
+        "position" => Some(Signal::Constant(constant(&FOLLOWS, chosen, context)?)),
+        "sine" => read_sine(value, context, &MOTION_SINE),
         _ => Some(Signal::Table(read_motion_file(value, context, Columns::Position)?.motion)),
     }
 }
 
-/// A sine. `beside`: keys of the same table that somebody else reads.
-fn read_sine(node: &Node, context: SceneContext<'_>, quantity: Quantity, beside: &[&'static str]) -> Option<Signal> {
-    let mut table = TableReader::new(node, *context, "a table such as { amplitude = 2.0, frequency = 0.7, phase = 0.0 }")?;
-    table.know(beside);
-    let amplitude = table.required("amplitude", &quantity.expected(), |node, _| read_vector(quantity, node, context, Spread::Refused));
-    let frequency = table.required("frequency", &FREQUENCY.expected(), |node, context| FREQUENCY.read(node, context));
-    let phase = table.optional("phase", 0.0, |node, context| ANGLE.read(node, context));
+/// A sine. The torque of one is read by [`read_hand_torque`].
+fn read_sine(node: &Node, context: SceneContext<'_>, declaration: &'static Table) -> Option<Signal> {
+    let mut table = TableReader::new(node, *context, declaration, "a table such as { amplitude = 2.0, frequency = 0.7, phase = 0.0 }")?;
+    if declaration.key("torque").is_some() {
+        table.get("torque");
+    }
+    let amplitude = vector_of(&mut table, "amplitude", context, Spread::Refused);
+    let (frequency, phase) = (table.value("frequency"), table.value("phase"));
     table.finish();
     Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency?), phase: phase? })
 }

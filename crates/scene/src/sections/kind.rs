@@ -2,7 +2,8 @@
 
 use cohaptic_linkfile::document::{Node, quote};
 use cohaptic_linkfile::reading::values::ReadNumber as _;
-use cohaptic_linkfile::reading::{Context, TableReader, values};
+use cohaptic_linkfile::reading::{Context, TableReader, defaults, values};
+use cohaptic_linkfile::schema::{Choices, Form, Table, number, usual, words};
 use cohaptic_peer::DeviceConfig;
 use cohaptic_units::print::Counted;
 
@@ -23,13 +24,56 @@ enum Word {
     Pointer,
 }
 
+const KINDS: Choices<Word, 4> = [
+    ("simulated", Word::Simulated, "simulated here"),
+    ("udp", Word::Udp, "another program, which sends and receives samples"),
+    ("falcon", Word::Falcon, "simulated here, with a Novint Falcon"),
+    ("pointer", Word::Pointer, "simulated here, pulled by a mouse, a finger or a stick"),
+];
+pub(super) const KIND: Form = Form::Words(const { &words(&KINDS) });
+pub(super) static SILENCE: Table = Table::of(&[&[
+    usual("after", Form::PositiveDuration, "\"100ms\"", "After how long a silence the pull fades"),
+    usual("fade", Form::PositiveDuration, "\"250ms\"", "How long that takes"),
+]]);
+/// With the device of a Falcon nearly without overshoot, and no stronger than an adult's wrist.
+pub(super) static POINTER: Table = Table::of(&[&[
+    usual("stiffness", number(STIFFNESS), "400", "Stiffness of the arm between pointer and device"),
+    usual("damping", number(DAMPING), "20", "Its damping"),
+    usual("force-limit", number(POSITIVE_FORCE), "20", "The arm pulls with no greater force"),
+    usual("held", Form::Boolean, "false", "Whether the pointer holds the device from the beginning"),
+]]);
+/// With 10,000 counts full scale is about what the maker names; 4 N are half of what the device is said to give; the origin is the middle of the workspace.
+pub(super) static FALCON: Table = Table::of(&[&[
+    usual("device", Form::Like(&["first", "simulated"]), "\"first\"", "The first that no other peer has, one that is simulated, or a serial number"),
+    usual("counts-per-newton-metre", number(POSITIVE_COUNTS), "10000", "Motor counts for a torque at the joint of an arm"),
+    usual("force-limit", number(POSITIVE_FORCE), "4", "No greater force is sent to the motors"),
+    usual("origin", Form::Triple(POSITION), "[0, 0, 0.125]", "The place in the device's coordinates that is the origin of the scene"),
+]]);
+
+impl Default for Silence {
+    fn default() -> Self {
+        defaults(read_silence)
+    }
+}
+
+impl Default for PointerSpec {
+    fn default() -> Self {
+        defaults(read_pointer)
+    }
+}
+
+impl Default for FalconSpec {
+    fn default() -> Self {
+        defaults(read_falcon)
+    }
+}
+
 /// Reads the four keys. All but `kind` may come from `[peer]` and say nothing to a peer of another kind; they are checked all the same.
-pub(crate) fn read_kind(table: &mut TableReader<'_>, context: Context<'_>) -> Option<PeerKind> {
-    let words = [("simulated", Word::Simulated), ("udp", Word::Udp), ("falcon", Word::Falcon), ("pointer", Word::Pointer)];
-    let word = table.optional("kind", Word::Simulated, |node, context| values::choice(node, context, &words));
-    let silence = table.optional("silence", Silence::default(), read_silence);
-    let falcon = table.optional("falcon", FalconSpec::default(), |node, _| read_falcon(node, context));
-    let pointer = table.optional("pointer", PointerSpec::default(), read_pointer);
+pub(crate) fn read_kind(table: &mut TableReader<'_>) -> Option<PeerKind> {
+    let word = table.choice("kind", &KINDS);
+    let silence = table.table("silence", read_silence);
+    let falcon = table.table("falcon", read_falcon);
+    let pointer = table.table("pointer", read_pointer);
     let (silence, falcon, pointer) = (silence?, falcon?, pointer?);
     Some(match word? {
         Word::Simulated => PeerKind::Simulated,
@@ -40,32 +84,25 @@ pub(crate) fn read_kind(table: &mut TableReader<'_>, context: Context<'_>) -> Op
 }
 
 fn read_silence(node: &Node, context: Context<'_>) -> Option<Silence> {
-    let mut table = TableReader::new(node, context, "a table such as { after = \"100ms\", fade = \"250ms\" }")?;
-    let usual = Silence::default();
-    let after = table.optional("after", usual.after, values::positive_duration);
-    let fade = table.optional("fade", usual.fade, values::positive_duration);
+    let mut table = TableReader::new(node, context, &SILENCE, "a table such as { after = \"100ms\", fade = \"250ms\" }")?;
+    let (after, fade) = (table.value("after"), table.value("fade"));
     table.finish();
     Some(Silence { after: after?, fade: fade? })
 }
 
 fn read_pointer(node: &Node, context: Context<'_>) -> Option<PointerSpec> {
-    let mut table = TableReader::new(node, context, "a table such as { stiffness = 400.0, damping = 20.0 }")?;
-    let usual = PointerSpec::default();
-    let stiffness = table.optional("stiffness", usual.stiffness, |node, context| STIFFNESS.read(node, context));
-    let damping = table.optional("damping", usual.damping, |node, context| DAMPING.read(node, context));
-    let force_limit = table.optional("force-limit", usual.force_limit, |node, context| POSITIVE_FORCE.read(node, context));
-    let held = table.optional("held", usual.held, values::boolean);
+    let mut table = TableReader::new(node, context, &POINTER, "a table such as { stiffness = 400.0, damping = 20.0 }")?;
+    let (stiffness, damping) = (table.value("stiffness"), table.value("damping"));
+    let (force_limit, held) = (table.value("force-limit"), table.value("held"));
     table.finish();
     Some(PointerSpec { stiffness: stiffness?, damping: damping?, force_limit: force_limit?, held: held? })
 }
 
 fn read_falcon(node: &Node, context: Context<'_>) -> Option<FalconSpec> {
-    let mut table = TableReader::new(node, context, "a table such as { device = \"first\", force-limit = 4.0 }")?;
-    let usual = FalconSpec::default();
-    let device = table.optional("device", usual.device, read_device);
-    let counts = table.optional("counts-per-newton-metre", usual.counts_per_newton_metre, |node, context| POSITIVE_COUNTS.read(node, context));
-    let force_limit = table.optional("force-limit", usual.force_limit, |node, context| POSITIVE_FORCE.read(node, context));
-    let origin = table.optional("origin", usual.origin, read_origin);
+    let mut table = TableReader::new(node, context, &FALCON, "a table such as { device = \"first\", force-limit = 4.0 }")?;
+    let device = table.read("device", read_device);
+    let (counts, force_limit) = (table.value("counts-per-newton-metre"), table.value("force-limit"));
+    let origin = table.read("origin", read_origin);
     table.finish();
     Some(FalconSpec { device: device?, counts_per_newton_metre: counts?, force_limit: force_limit?, origin: origin? })
 }

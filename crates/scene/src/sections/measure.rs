@@ -2,14 +2,64 @@
 
 use cohaptic_linkfile::document::{Node, Value, quote};
 use cohaptic_linkfile::mesh::read_peer_name;
-use cohaptic_linkfile::reading::values::{self, ReadNumber as _};
-use cohaptic_linkfile::reading::{Context, TableReader, one_of};
+use cohaptic_linkfile::reading::{Context, TableReader, defaults, one_of, values};
+use cohaptic_linkfile::schema::{Form, Table, number, optional, required, usual};
 use cohaptic_peer::{Hand, Signal};
 
-use crate::context::{SceneContext, read_axis};
+use crate::context::{AXIS, SceneContext, read_axis};
 use crate::measures::{Measure, MeasureName, Scope};
-use crate::model::{Change, ChangeKind, MeasureSettings, MeasureSpec, MeasureTravel, PeerKind, PeerSpec};
+use crate::model::{Axes, Change, ChangeKind, MeasureSettings, MeasureSpec, MeasureTravel, PeerKind, PeerSpec};
 use crate::quantities::DISTANCE;
+
+pub(crate) static MEASURE: Table = Table::of(&[&[
+    usual("names", Form::AnyOf(const { &[Form::Words(&[("all", "every measure")]), Form::List(&MEASURE_NAME)] }), "\"all\"", "Which measures"),
+    optional("travel", Form::Table(&TRAVEL), "What travel_s is about"),
+    usual("band", number(DISTANCE), "0.001", "Above this discrepancy the copies are not settled, for settling_s"),
+    optional("probe", Form::Table(&PROBE), "Whose hand meets the impedance of viscosity_n_s_m and effective_mass_kg, which have no value without it"),
+]]);
+static TRAVEL: Table = Table::of(&[&[
+    optional("peer", Form::Text, "The name of the peer whose copy is meant; without it the first"),
+    usual("distance", number(DISTANCE), "0.02", "How far from where it began"),
+    usual("axis", AXIS, "\"x\"", "Along which axis"),
+]]);
+static PROBE: Table = Table::of(&[&[
+    required("peer", Form::Text, "The name of a peer whose hand is a sine from the beginning to the end").expecting("the name of a peer")
+]]);
+/// Words for the measures of a run, and an example for those of a peer.
+pub(super) const MEASURE_NAME_FORM: Form = Form::AnyOf(&[Form::Words(&MEASURES), Form::Like(&["peers.left.energy_j"])]);
+static MEASURE_NAME: Form = MEASURE_NAME_FORM;
+const MEASURES_OF_RUN: usize = {
+    let (mut place, mut count) = (0, 0);
+    while place < Measure::ALL.len() {
+        if matches!(Measure::ALL[place].scope(), Scope::Run) {
+            count += 1;
+        }
+        place += 1;
+    }
+    count
+};
+const MEASURES: [(&str, &str); MEASURES_OF_RUN] = {
+    let mut words = [("", ""); MEASURES_OF_RUN];
+    let (mut place, mut count) = (0, 0);
+    while place < Measure::ALL.len() {
+        if matches!(Measure::ALL[place].scope(), Scope::Run) {
+            words[count] = (Measure::ALL[place].name(), Measure::ALL[place].about());
+            count += 1;
+        }
+        place += 1;
+    }
+    words
+};
+
+impl Default for MeasureSettings {
+    /// Those of a scene that does not say them: the first peer's copy along x over 20 mm, a band of 1 mm, no probe.
+    fn default() -> Self {
+        defaults(|node, file| {
+            let context = SceneContext { file, axes: Some(Axes::One), live: false, turns: false };
+            read_measure(node, Measured { peers: Some(&[]), timeline: None }, context).map(|measure| measure.settings)
+        })
+    }
+}
 
 /// The parts of the scene that measures are about. Each is `None` if it was refused.
 #[derive(Clone, Copy, Debug)]
@@ -19,13 +69,11 @@ pub(crate) struct Measured<'a> {
 }
 
 pub(crate) fn read_measure(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Option<MeasureSpec> {
-    let mut table = TableReader::new(node, *context, "a table such as [measure]")?;
-    let usual = MeasureSettings::default();
-    let travel = table.optional("travel", usual.travel, |node, _| read_travel(node, context));
-    let band = table.optional("band", usual.band, |node, context| DISTANCE.read(node, context));
+    let mut table = TableReader::new(node, *context, &MEASURE, "a table such as [measure]")?;
+    let travel = table.table("travel", |node, _| read_travel(node, context));
+    let band = table.value("band");
     let probe = table.maybe("probe", |node, _| read_probe(node, of, context));
-    let names_node = table.get("names");
-    let names = names_node.map_or(Some(None), |node| read_names(node, probe.is_none_or(|probe| probe.is_some()), *context));
+    let names = table.read("names", |node, context| read_names(node, probe.is_none_or(|probe| probe.is_some()), context));
     table.finish();
     let names = match names? {
         Some(names) => names,
@@ -91,20 +139,19 @@ pub(crate) fn read_measure_name(node: &Node, has_probe: bool, context: Context<'
 }
 
 fn read_travel(node: &Node, context: SceneContext<'_>) -> Option<MeasureTravel> {
-    let usual = MeasureSettings::default().travel;
-    let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\", distance = 0.02 }")?;
-    let peer = table.optional("peer", usual.peer, read_peer_name);
-    let distance = table.optional("distance", usual.distance, |node, context| DISTANCE.read(node, context));
-    let axis = table.optional("axis", usual.axis, |node, _| read_axis(node, context));
+    let mut table = TableReader::new(node, *context, &TRAVEL, "a table such as { peer = \"left\", distance = 0.02 }")?;
+    let peer = table.maybe("peer", read_peer_name);
+    let distance = table.value("distance");
+    let axis = table.read("axis", |node, _| read_axis(node, context));
     table.finish();
-    Some(MeasureTravel { peer: peer?, distance: distance?, axis: axis? })
+    Some(MeasureTravel { peer: peer?.unwrap_or(0), distance: distance?, axis: axis? })
 }
 
 /// A peer whose hand pushes with one sine from the beginning to the end.
 fn read_probe(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Option<usize> {
     const EXPECTED: &str = "a peer with hand = { sine = { amplitude, frequency } } above 0 Hz";
-    let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\" }")?;
-    let peer = table.required("peer", "the name of a peer", read_peer_name);
+    let mut table = TableReader::new(node, *context, &PROBE, "a table such as { peer = \"left\" }")?;
+    let peer = table.read("peer", read_peer_name);
     let peer_node = table.get("peer");
     table.finish();
     let (peer, peer_node) = (peer?, peer_node?);

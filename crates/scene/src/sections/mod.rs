@@ -1,5 +1,7 @@
 //! The parts of a scene file, each read by a function of its own.
 
+mod coordination;
+mod device;
 mod expect;
 mod hand;
 mod header;
@@ -13,11 +15,16 @@ mod rotation;
 mod timeline;
 mod topology;
 
-pub(crate) use expect::read_expect;
-pub(crate) use header::{Header, Stepping, read_coordination, read_header, read_stepping};
-pub(crate) use measure::{Measured, read_measure, read_measure_name};
-pub(crate) use object::read_object;
+pub(crate) use coordination::{COORDINATION, read_coordination};
+pub(crate) use expect::{EXPECT, read_expect};
+pub(crate) use header::{Header, SCENE, SIMULATION, read_header, read_stepping};
+pub(crate) use measure::{MEASURE, Measured, read_measure, read_measure_name};
+pub(crate) use object::{OBJECT, read_object};
+pub(crate) use peer::{PEER, PEERS};
 pub(crate) use peers::{PeerSources, check_enough, read_names, read_peers};
 pub(crate) use rotation::{refuse_rotational_keys, rotation};
-pub(crate) use timeline::read_timeline;
-pub(crate) use topology::{Ways, read_topology, refuse_unlinked};
+pub(crate) use timeline::{TIMELINE, read_timeline};
+pub(crate) use topology::{TOPOLOGY, Ways, read_topology, refuse_unlinked};
+
+/// The largest integer of TOML.
+const MOST: u64 = i64::MAX.unsigned_abs();

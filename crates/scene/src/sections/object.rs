@@ -1,24 +1,49 @@
 //! `[object]`: the shared virtual object.
 
 use cohaptic_linkfile::document::Node;
-use cohaptic_linkfile::reading::values::ReadNumber as _;
-use cohaptic_linkfile::reading::{TableReader, values};
+use cohaptic_linkfile::reading::TableReader;
+use cohaptic_linkfile::schema::{Form, Table, number, optional, required, usual, vector};
 use cohaptic_peer::Enclosure;
 use cohaptic_units::print::SixDigits;
 
-use super::rotation::{ObjectRotation, read_object_rotation};
+use super::rotation::{ObjectRotation, QUATERNION, read_object_rotation};
 use crate::context::SceneContext;
 use crate::model::ObjectSpec;
-use crate::quantities::{DAMPING, MASS, POSITION, Spread, VELOCITY, WALL_STIFFNESS, read_vector};
+use crate::quantities::{DAMPING, INERTIA, MASS, POSITION, RATE, ROTATIONAL_DAMPING, Spread, VELOCITY, WALL_STIFFNESS, vector_of};
+
+pub(crate) static OBJECT: Table = Table::of(&[&[
+    required("mass", number(MASS), "Mass of the whole object"),
+    usual("damping", number(DAMPING), "0", "Viscous damping of each copy"),
+    usual("split-mass", Form::Boolean, "true", "Whether each of N copies has the mass divided by N, or all of it"),
+    usual("position", vector(POSITION), "0", "Where copies and devices begin"),
+    usual("velocity", vector(VELOCITY), "0", "With which velocity copies and devices begin"),
+    optional("enclosure", Form::Table(&ENCLOSURE), "Walls that limit the travel of every copy"),
+    optional(
+        "inertia",
+        vector(INERTIA),
+        "Principal moments of inertia of the whole object, which turns then; none above the sum of the others; needs three axes",
+    ),
+    optional(
+        "rotational-damping",
+        vector(ROTATIONAL_DAMPING),
+        "Viscous damping of the turn of each copy; without it damping times inertia over mass",
+    ),
+    usual("orientation", QUATERNION, "[1, 0, 0, 0]", "Quaternion w, x, y, z of any length with which copies and devices begin"),
+    usual("angular-velocity", vector(RATE), "0", "Angular velocity in their own axes with which they begin"),
+]]);
+static ENCLOSURE: Table = Table::of(&[&[
+    required("min", vector(POSITION), "The lower end on each axis").expecting(ENDS),
+    required("max", vector(POSITION), "The upper end on each axis").expecting(ENDS),
+    required("stiffness", number(WALL_STIFFNESS), "Stiffness of the walls"),
+    required("damping", number(DAMPING), "Damping of the walls"),
+]]);
+const ENDS: &str = "{}, or a list of one for each axis";
 
 /// The object, and how it turns if it does.
 pub(crate) fn read_object(node: &Node, context: SceneContext<'_>) -> Option<(ObjectSpec, Option<ObjectRotation>)> {
-    let mut table = TableReader::new(node, *context, "a table such as [object]")?;
-    let mass = table.required("mass", &MASS.expected(), |node, context| MASS.read(node, context));
-    let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
-    let split_mass = table.optional("split-mass", true, values::boolean);
-    let position = table.optional("position", [0.0; 3], |node, _| read_position(node, context));
-    let velocity = table.optional("velocity", [0.0; 3], |node, _| read_velocity(node, context));
+    let mut table = TableReader::new(node, *context, &OBJECT, "a table such as [object]")?;
+    let (mass, damping, split_mass) = (table.value("mass"), table.value("damping"), table.value("split-mass"));
+    let [position, velocity] = ["position", "velocity"].map(|key| vector_of(&mut table, key, context, Spread::EveryAxis));
     let enclosure = table.maybe("enclosure", |node, _| read_enclosure(node, context));
     let rotation = read_object_rotation(&mut table, context);
     table.finish();
@@ -26,24 +51,12 @@ pub(crate) fn read_object(node: &Node, context: SceneContext<'_>) -> Option<(Obj
     Some((ObjectSpec { mass: mass?, damping: damping?, split_mass: split_mass?, position, velocity, enclosure }, rotation?))
 }
 
-/// Where something begins.
-pub(crate) fn read_position(node: &Node, context: SceneContext<'_>) -> Option<[f64; 3]> {
-    read_vector(POSITION, node, context, Spread::EveryAxis)
-}
-
-/// With which velocity something begins.
-pub(crate) fn read_velocity(node: &Node, context: SceneContext<'_>) -> Option<[f64; 3]> {
-    read_vector(VELOCITY, node, context, Spread::EveryAxis)
-}
-
 fn read_enclosure(node: &Node, context: SceneContext<'_>) -> Option<Enclosure> {
-    let mut table = TableReader::new(node, *context, "a table such as { min = -0.1, max = 0.1, stiffness = 1000.0, damping = 5.0 }")?;
-    let ends = "a number [m], or a list of one for each axis";
-    let min = table.required("min", ends, |node, _| read_position(node, context));
+    const EXPECTED: &str = "a table such as { min = -0.1, max = 0.1, stiffness = 1000.0, damping = 5.0 }";
+    let mut table = TableReader::new(node, *context, &ENCLOSURE, EXPECTED)?;
+    let [min, max] = ["min", "max"].map(|key| vector_of(&mut table, key, context, Spread::EveryAxis));
     let max_node = table.get("max");
-    let max = table.required("max", ends, |node, _| read_position(node, context));
-    let stiffness = table.required("stiffness", &WALL_STIFFNESS.expected(), |node, context| WALL_STIFFNESS.read(node, context));
-    let damping = table.required("damping", &DAMPING.expected(), |node, context| DAMPING.read(node, context));
+    let (stiffness, damping) = (table.value("stiffness"), table.value("damping"));
     table.finish();
     let (min, max) = (min?, max?);
     let axes = context.axes?.count();

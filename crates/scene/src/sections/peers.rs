@@ -8,7 +8,7 @@ use cohaptic_linkfile::reading::{Context, Names, one_of, values};
 use cohaptic_peer::Gains;
 use cohaptic_units::print::Counted;
 
-use super::peer::{NESTED, PeerKeys, read_peer};
+use super::peer::{PEER, PEERS, PeerKeys, nested, read_peer};
 use super::rotation::PeerRotationKeys;
 use crate::context::SceneContext;
 use crate::model::{ObjectSpec, PeerSpec, Scaling};
@@ -99,7 +99,7 @@ pub(crate) struct PeerRead {
 pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, context: SceneContext<'_>) -> Option<Vec<PeerRead>> {
     if let Some(node) = sources.defaults {
         // On their own, so that a fault in a default that every peer replaces is found too.
-        read_peer(node, context.of_part(), &[], None);
+        read_peer(node, context.of_part(), &PEER, None);
     }
     let nothing = Node::empty_table(sources.count.map_or(BEGINNING, |entry| entry.key), "peer".to_owned());
     let base = sources.defaults.filter(|node| node.as_table().is_some()).unwrap_or(&nothing);
@@ -110,7 +110,7 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
     let own: Vec<Option<PeerKeys>> = entries.iter().map(|entry| read_entry(entry, base, sources.update, context)).collect();
     let names = context.names?;
     // What a peer without an entry is like; read only if there is one.
-    let shared = if entries.len() < names.len() { Some(read_peer(base, context, &[], sources.update)?) } else { None };
+    let shared = if entries.len() < names.len() { Some(read_peer(base, context, &PEER, sources.update)?) } else { None };
     let mut keys: BTreeMap<usize, (PeerKeys, Place)> = BTreeMap::new();
     for (entry, own) in entries.iter().zip(own) {
         let name = entry.as_table().and_then(|table| table.get("name")).and_then(|name| name.node.as_text())?;
@@ -131,7 +131,7 @@ fn read_entry(entry: &Node, base: &Node, update: Option<(Duration, &Node)>, cont
     if entry.as_table().is_some_and(|table| table.get("name").is_none()) {
         context.fault(entry.place, &join(&entry.path, "name"), "missing key: expected the name of the peer");
     }
-    read_peer(&entry.over(base, &NESTED), context, &["name"], update)
+    read_peer(&entry.over(base, &nested()), context, &PEERS, update)
 }
 
 fn spec(name: &str, keys: PeerKeys, object: &ObjectSpec) -> PeerSpec {

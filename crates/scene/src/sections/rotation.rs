@@ -1,19 +1,16 @@
 //! The keys of an object that turns, which stand in several tables and all need `object.inertia`.
 
-use cohaptic_linkfile::document::{Entry, Node, Table, Value};
+use cohaptic_linkfile::document::{Entry, Node, Value};
 use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
 use cohaptic_linkfile::reading::{Context, TableReader};
+use cohaptic_linkfile::schema::{Form, number};
 use cohaptic_peer::rotation::{Attitude, Spin, Triple};
 use cohaptic_peer::{Gains, Signal};
-use cohaptic_units::Hertz;
 
-use super::motion_file::{Columns, read_motion_file};
 use super::peers::PeerRead;
 use crate::context::SceneContext;
 use crate::model::Axes;
-use crate::quantities::{
-    ANGLE, COMPONENT, FREQUENCY, INERTIA, POSITION, RATE, ROTATIONAL_DAMPING, ROTATIONAL_STIFFNESS, Spread, TORQUE, read_vector,
-};
+use crate::quantities::{COMPONENT, INERTIA, ROTATIONAL_STIFFNESS};
 use crate::{DeviceRotationSpec, PeerRotation, RotationSpec};
 
 /// Keys that have no meaning without an inertia of the object, wherever they stand.
@@ -28,10 +25,10 @@ pub(crate) struct ObjectRotation {
     attitude: Attitude,
 }
 
-/// The keys of a peer; each is `None` where it is not given.
+/// The keys of a peer; each but `grasp` is `None` where it is not given.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct PeerRotationKeys {
-    pub(crate) grasp: Option<Triple>,
+    pub(crate) grasp: Triple,
     pub(crate) orientation: Option<[f64; 4]>,
     pub(crate) rate: Option<Triple>,
     pub(crate) device: Option<Spin>,
@@ -42,9 +39,9 @@ pub(crate) struct PeerRotationKeys {
 /// The keys of `[object]`; `Some(None)` without an inertia.
 pub(super) fn read_object_rotation(table: &mut TableReader<'_>, context: SceneContext<'_>) -> Option<Option<ObjectRotation>> {
     let inertia = table.maybe("inertia", |node, file| read_inertia(node, file, context.axes));
-    let damping = table.maybe("rotational-damping", |node, context| read_triple(ROTATIONAL_DAMPING, node, context));
-    let orientation = table.optional("orientation", Attitude::REST.orientation, read_orientation);
-    let rate = table.optional("angular-velocity", [0.0; 3], |node, context| read_triple(RATE, node, context));
+    let damping = maybe_triple(table, "rotational-damping");
+    let orientation = table.read("orientation", read_orientation);
+    let rate = triple(table, "angular-velocity");
     let (damping, orientation, rate) = (damping?, orientation?, rate?);
     Some(inertia?.map(|inertia| ObjectRotation { inertia, damping, attitude: Attitude { orientation, rate } }))
 }
@@ -81,15 +78,25 @@ fn read_triple(quantity: Quantity, node: &Node, context: Context<'_>) -> Option<
     triple
 }
 
+/// The numbers for all three axes of a body under a key, or the declared default.
+fn triple(table: &mut TableReader<'_>, key: &'static str) -> Option<Triple> {
+    let quantity = table.key(key).quantity();
+    table.read(key, |node, context| read_triple(quantity, node, context))
+}
+
+/// Such numbers under a key that may be left out.
+pub(super) fn maybe_triple(table: &mut TableReader<'_>, key: &'static str) -> Option<Option<Triple>> {
+    let quantity = table.key(key).quantity();
+    table.maybe(key, |node, context| read_triple(quantity, node, context))
+}
+
 /// KR: of its three numbers none may be above the sum of the others.
 pub(super) fn read_rotational_stiffness(node: &Node, context: Context<'_>) -> Option<Triple> {
     let stiffness = read_triple(ROTATIONAL_STIFFNESS, node, context)?;
     check_triangle(&stiffness, "a stiffness", node, context).then_some(stiffness)
 }
 
-pub(super) fn read_rotational_damping(node: &Node, context: Context<'_>) -> Option<Triple> {
-    read_triple(ROTATIONAL_DAMPING, node, context)
-}
+pub(super) const QUATERNION: Form = Form::List(&number(COMPONENT));
 
 /// A quaternion of any length above zero, as one of length 1.
 pub(super) fn read_orientation(node: &Node, context: Context<'_>) -> Option<[f64; 4]> {
@@ -112,9 +119,9 @@ pub(super) fn read_orientation(node: &Node, context: Context<'_>) -> Option<[f64
 
 /// `grasp`, `orientation` and `angular-velocity` of a peer.
 pub(super) fn read_peer_rotation(table: &mut TableReader<'_>) -> Option<PeerRotationKeys> {
-    let grasp = table.maybe("grasp", |node, context| read_triple(POSITION, node, context));
+    let grasp = triple(table, "grasp");
     let orientation = table.maybe("orientation", read_orientation);
-    let rate = table.maybe("angular-velocity", |node, context| read_triple(RATE, node, context));
+    let rate = maybe_triple(table, "angular-velocity");
     Some(PeerRotationKeys { grasp: grasp?, orientation: orientation?, rate: rate?, ..PeerRotationKeys::default() })
 }
 
@@ -124,57 +131,19 @@ pub(super) fn read_device_rotation(table: &mut TableReader<'_>) -> Option<Option
         let inertia = read_triple(INERTIA, node, context)?;
         check_triangle(&inertia, "a moment of inertia", node, context).then_some(inertia)
     });
-    let damping = table.optional("rotational-damping", [0.0; 3], |node, context| {
-        if inertia == Some(None) {
-            context.fault_at(node, "a device without an inertia does not turn: expected device.inertia beside it");
-            return None;
-        }
-        read_rotational_damping(node, context)
-    });
+    let needs = "a device without an inertia does not turn: expected device.inertia beside it";
+    let damping = table.only_if(inertia != Some(None), "rotational-damping", needs).and_then(|()| triple(table, "rotational-damping"));
     let (inertia, damping) = (inertia?, damping?);
     Some(inertia.map(|inertia| Spin { inertia, damping }))
 }
 
 /// `rotational-stiffness` and `rotational-damping` of a coupling; `Some(None)` without a stiffness.
 pub(super) fn read_coupling_rotation(table: &mut TableReader<'_>) -> Option<Option<Gains>> {
-    let stiffness = table.maybe("rotational-stiffness", |node, context| ROTATIONAL_STIFFNESS.read(node, context));
-    let damping = table.optional("rotational-damping", 0.0, |node, context| {
-        if stiffness == Some(None) {
-            context.fault_at(node, "a coupling that turns needs a stiffness: expected rotational-stiffness beside it");
-            return None;
-        }
-        ROTATIONAL_DAMPING.read(node, context)
-    });
+    let stiffness = table.maybe_value("rotational-stiffness");
+    let needs = "a coupling that turns needs a stiffness: expected rotational-stiffness beside it";
+    let damping = table.only_if(stiffness != Some(None), "rotational-damping", needs).and_then(|()| table.value("rotational-damping"));
     let (stiffness, damping) = (stiffness?, damping?);
     Some(stiffness.map(|stiffness| Gains { stiffness, damping }))
-}
-
-/// The torque of a hand; `Some(None)` without one.
-pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option<Option<Signal>> {
-    let Some(table) = hand.as_table() else { return Some(None) };
-    let within = |key: &str| table.get(key).and_then(|entry| entry.node.as_table());
-    let sine = within("sine").and_then(|sine| Some((sine, sine.get("torque")?)));
-    let file = |table: Option<&Table>, columns: Columns| {
-        // Faults of a file are those of its other columns.
-        let torque = table.and_then(|table| table.get("file")).and_then(|file| read_motion_file(&file.node, context, columns)?.torque);
-        torque.map(Signal::Table)
-    };
-    let file = file(Some(table), Columns::Force).or_else(|| file(within("follows"), Columns::Position));
-    let constant = table.get("torque");
-    if let (Some(constant), true) = (constant, sine.is_some() || file.is_some()) {
-        let other = if sine.is_some() { "sine.torque" } else { "the torques of a file" };
-        context.fault(constant.key, &constant.node.path, format!("a torque stands beside {other}: expected one of the two"));
-        return None;
-    }
-    if let Some(constant) = constant {
-        return Some(Some(Signal::Constant(read_vector(TORQUE, &constant.node, context, Spread::Refused)?)));
-    }
-    let Some((sine, torque)) = sine else { return Some(file) };
-    let amplitude = read_vector(TORQUE, &torque.node, context, Spread::Refused);
-    // Faults of these two are those of the force.
-    let number = |key: &str, quantity: Quantity| sine.get(key).and_then(|entry| quantity.read(&entry.node, *context));
-    let (frequency, phase) = (number("frequency", FREQUENCY)?, number("phase", ANGLE).unwrap_or(0.0));
-    Some(Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency), phase }))
 }
 
 /// How the object and the peers turn; `Some(None)` without an inertia. `object` has the keys under `[object]`, `gains` those under `[coordination]`.
@@ -216,7 +185,7 @@ fn peer_rotation(read: &PeerRead, attitude: Attitude, context: Context<'_>) -> O
         None => None,
     };
     let own = Attitude { orientation: orientation.unwrap_or(attitude.orientation), rate: rate.unwrap_or(attitude.rate) };
-    Some(PeerRotation { grasp: grasp.unwrap_or([0.0; 3]), attitude: own, device })
+    Some(PeerRotation { grasp: *grasp, attitude: own, device })
 }
 
 /// Refuses keys of an object that turns in a scene whose object does not.

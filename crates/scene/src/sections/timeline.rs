@@ -6,19 +6,30 @@ use cohaptic_linkfile::LinkSelector;
 use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::link::is_empty;
 use cohaptic_linkfile::mesh::{LinkClasses, OnLinks, read_key_changes, read_links_between, read_peer_name};
-use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, only_one, values};
-use cohaptic_peer::rotation::Triple;
-use cohaptic_peer::{Contact, Gains, Hand, SendWhen, Signal};
+use cohaptic_linkfile::schema::link::{LINK, LINKS_BETWEEN};
+use cohaptic_linkfile::schema::{Form, Key, Table, joined, optional, required};
+use cohaptic_peer::{Contact, Gains, Hand, Signal};
 use cohaptic_units::Instant;
 
-use super::hand::{hand_is_sampled, read_hand};
-use super::header::{ParameterChange, read_parameter_changes, read_send_when};
-use super::peer::read_contact;
-use super::rotation::{read_hand_torque, read_rotational_damping, read_rotational_stiffness};
+use super::coordination::{CHANGES, CoordinationChanges, read_coordination_changes};
+use super::device::{CONTACT, read_contact};
+use super::hand::{HAND, hand_is_sampled, read_hand, read_hand_torque};
 use crate::context::SceneContext;
 use crate::model::{Change, ChangeKind, CoordinationSpec, PeerSpec};
-use crate::quantities::{DAMPING, STIFFNESS};
+
+pub(crate) static TIMELINE: Table = Table::of(&[&[
+    required("at", Form::Duration, "When, from the beginning of the scene").expecting("a time such as \"3s\""),
+    optional("link", LINKS_BETWEEN, "Which links change: all, or one by its ends"),
+    optional("peer", Form::Text, "The name of the peer that changes"),
+    optional("set", Form::Table(&SET), "The keys that change: of the link, or contact and hand of the peer"),
+    optional("coordination", Form::Table(&CHANGES), "In place of link or peer, and without set: what changes at every peer"),
+]]);
+/// The key of a link or of a peer that is set: another key says which of the two.
+static SET: Table = Table::over(&joined::<16>(&[LINK.as_slice(), &[&OF_PEER]]));
+static SET_OF_PEER: Table = Table::over(&[&OF_PEER]);
+const OF_PEER: [Key; 2] =
+    [optional("contact", CONTACT, "Of a peer: how the device touches the object"), optional("hand", HAND, "Of a peer: what the user does")];
 
 /// An entry, before it is known what stands before it in time.
 #[derive(Debug)]
@@ -31,7 +42,7 @@ struct Planned<'a> {
 enum PlannedKind<'a> {
     Links { selector: LinkSelector, set: &'a Node },
     Peer { peer: usize, contact: Option<(Contact, &'a Node)>, hand: Option<(Option<Hand>, &'a Node)>, torque: Option<Signal> },
-    Coordination { gains: Gains<Option<f64>>, of_turns: Gains<Option<Triple>>, send_when: Option<SendWhen>, parameters: Vec<ParameterChange> },
+    Coordination(CoordinationChanges),
 }
 
 /// Reads the changes and puts them in order of time. The arguments say how things stand at the beginning; each is `None` if it was refused.
@@ -78,7 +89,7 @@ pub(crate) fn read_timeline(
                     changes.push(Change { at, what: ChangeKind::HandTorque { peer, torque } });
                 }
             }
-            PlannedKind::Coordination { gains: Gains { stiffness, damping }, of_turns, send_when, parameters } => {
+            PlannedKind::Coordination(CoordinationChanges { gains: Gains { stiffness, damping }, of_turns, send_when, parameters }) => {
                 if stiffness.is_some() || damping.is_some() {
                     gains = Gains { stiffness: stiffness.unwrap_or(gains.stiffness), damping: damping.unwrap_or(gains.damping) };
                     changes.push(Change { at, what: ChangeKind::Coordination(gains) });
@@ -99,18 +110,22 @@ pub(crate) fn read_timeline(
     complete.then_some(changes)
 }
 
+/// A time within the scene.
+pub(super) fn read_instant(node: &Node, duration: Option<Duration>, context: Context<'_>) -> Option<Instant> {
+    let at = values::instant(node, context)?;
+    let last = Instant::ZERO.saturating_add(duration?);
+    if at > last {
+        context.fault_at(node, format!("{at} is after the end of the scene: expected at most scene.duration, {last}"));
+        return None;
+    }
+    Some(at)
+}
+
 fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneContext<'a>) -> Option<Planned<'a>> {
     const TARGETS: &str = "link, peer or coordination";
-    let mut table = TableReader::new(node, *context, "a table with at, set and one of link and peer, or with at and coordination")?;
-    let at = table.required("at", "a time such as \"3s\"", |node, context| {
-        let at = values::instant(node, context)?;
-        let last = Instant::ZERO.saturating_add(duration?);
-        if at > last {
-            context.fault_at(node, format!("{at} is after the end of the scene: expected at most scene.duration, {last}"));
-            return None;
-        }
-        Some(at)
-    });
+    const EXPECTED: &str = "a table with at, set and one of link and peer, or with at and coordination";
+    let mut table = TableReader::new(node, *context, &TIMELINE, EXPECTED)?;
+    let at = table.read("at", |node, context| read_instant(node, duration, context));
     let (link, peer, coordination) = (table.entry("link"), table.entry("peer"), table.entry("coordination"));
     let set = table.entry("set");
     if set.is_none() && coordination.is_none() {
@@ -124,7 +139,7 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneCont
             return None;
         }
         let what = read_coordination_changes(&target.node, *context);
-        return Some(Planned { at: at?, what: what? });
+        return Some(Planned { at: at?, what: PlannedKind::Coordination(what?) });
     }
     let what = if target.name == "link" {
         let selector = read_links_between(&target.node, *context);
@@ -141,30 +156,9 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneCont
     Some(Planned { at: at?, what })
 }
 
-fn read_coordination_changes<'a>(node: &'a Node, context: Context<'a>) -> Option<PlannedKind<'a>> {
-    let mut table = TableReader::new(node, context, "a table such as { stiffness = 1000.0, damping = 5.0 }")?;
-    let stiffness = table.maybe("stiffness", |node, context| STIFFNESS.read(node, context));
-    let damping = table.maybe("damping", |node, context| DAMPING.read(node, context));
-    let stiffness_of_turns = table.maybe("rotational-stiffness", read_rotational_stiffness);
-    let damping_of_turns = table.maybe("rotational-damping", read_rotational_damping);
-    let send_when = table.maybe("send-when", read_send_when);
-    let parameters = read_parameter_changes(&mut table);
-    table.finish();
-    if is_empty(node) {
-        context.fault_at(node, "nothing changes: expected stiffness, damping, send-when, or a table of a strategy with parameters that change");
-        return None;
-    }
-    Some(PlannedKind::Coordination {
-        gains: Gains { stiffness: stiffness?, damping: damping? },
-        of_turns: Gains { stiffness: stiffness_of_turns?, damping: damping_of_turns? },
-        send_when: send_when?,
-        parameters: parameters?,
-    })
-}
-
 #[expect(clippy::type_complexity, reason = "used once, above")]
 fn read_peer_changes<'a>(node: &'a Node, context: SceneContext<'a>) -> Option<(Option<(Contact, &'a Node)>, Option<(Option<Hand>, &'a Node)>)> {
-    let mut table = TableReader::new(node, *context, "a table with contact, hand or both")?;
+    let mut table = TableReader::new(node, *context, &SET_OF_PEER, "a table with contact, hand or both")?;
     let contact = table.maybe("contact", |node, _| read_contact(node, context).map(|contact| (contact, node)));
     let hand = table.maybe("hand", |node, _| read_hand(node, context).map(|hand| (hand, node)));
     table.finish();

@@ -6,6 +6,7 @@ use cohaptic_linkfile::document::{Node, Value, quote};
 use cohaptic_linkfile::mesh::read_peer_name;
 use cohaptic_linkfile::reading::named_file::{file_path, read_file};
 use cohaptic_linkfile::reading::{Context, TableReader, values};
+use cohaptic_linkfile::schema::{Choices, Form, Table, optional, usual, words};
 
 use crate::topology::{Topology, parse_graph};
 
@@ -16,6 +17,22 @@ enum Kind {
     Ring,
     Graph,
 }
+
+pub(crate) static TOPOLOGY: Table = Table::of(&[&[
+    usual("kind", Form::Words(const { &words(&KINDS) }), "\"full\"", "The neighbours of a peer"),
+    optional("neighbours", Form::Integer(2, u16::MAX as u64), "Of a ring: how many, an even number; without it 2")
+        .expecting("how many peers each hears, an even number from 2 to 65534"),
+    optional("hub", Form::Text, "Of a star: the name of a peer; without it the first"),
+    optional("role", Form::Words(const { &words(&ROLES) }), "Of the hub; without it peer"),
+    optional("file", Form::File, "Of a graph: mutual weights, a row a peer"),
+]]);
+const KINDS: Choices<Kind, 4> = [
+    ("full", Kind::Full, "all others"),
+    ("star", Kind::Star, "the hub, or all others of the hub"),
+    ("ring", Kind::Ring, "half before it, half behind it"),
+    ("graph", Kind::Graph, "those with a weight above 0"),
+];
+const ROLES: Choices<Role, 2> = [("peer", Role::Peer, "has a copy"), ("relay", Role::Relay, "no peer: hands samples on")];
 
 /// The receivers of each peer, and the way to them.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -35,30 +52,25 @@ enum Role {
 
 /// The topology.
 pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
-    const KINDS: [(&str, Kind); 4] = [("full", Kind::Full), ("star", Kind::Star), ("ring", Kind::Ring), ("graph", Kind::Graph)];
-    let mut table = TableReader::new(node, context, "a table such as { kind = \"ring\", neighbours = 2 }")?;
-    let kind = table.optional("kind", Kind::Full, |node, context| values::choice(node, context, &KINDS));
+    let mut table = TableReader::new(node, context, &TOPOLOGY, "a table such as { kind = \"ring\", neighbours = 2 }")?;
+    let kind = table.choice("kind", &KINDS);
     let peers = context.names.map(|names| names.len());
-    let fits = |node: &Node, of: Kind, name: &str| {
-        let fits = kind.is_none_or(|kind| kind == of);
-        if !fits {
-            context.fault_at(node, format!("only a topology of kind = {} has this key: expected that kind, or no such key", quote(name)));
-        }
-        fits
+    let only_of = |table: &mut TableReader<'_>, of: Kind, word: &str, key: &'static str| {
+        let message = format!("only a topology of kind = {} has this key: expected that kind, or no such key", quote(word));
+        table.only_if(kind.is_none_or(|kind| kind == of), key, &message)
     };
-    let neighbours =
-        table.maybe("neighbours", |node, context| fits(node, Kind::Ring, "ring").then(|| read_neighbours(node, context))?.map(|count| (count, node)));
-    let hub = table.maybe("hub", |node, context| fits(node, Kind::Star, "star").then(|| read_peer_name(node, context))?.map(|hub| (hub, node)));
-    let role = table.maybe("role", |node, context| {
-        fits(node, Kind::Star, "star").then(|| values::choice(node, context, &[("peer", Role::Peer), ("relay", Role::Relay)]))?
-    });
-    let file = table.maybe("file", |node, context| {
-        if !fits(node, Kind::Graph, "graph") {
-            return None;
-        }
-        let path = file_path(node, context, "the name of a file of weights, relative to the folder of the scene")?;
-        let peers = peers?;
-        read_file(node, context, &path, &format!("weights of {peers} peers"), |text| parse_graph(text, peers))
+    let neighbours = only_of(&mut table, Kind::Ring, "ring", "neighbours")
+        .and_then(|()| table.maybe("neighbours", |node, context| read_neighbours(node, context).map(|count| (count, node))));
+    let hub = only_of(&mut table, Kind::Star, "star", "hub")
+        .and_then(|()| table.maybe("hub", |node, context| read_peer_name(node, context).map(|hub| (hub, node))));
+    let role =
+        only_of(&mut table, Kind::Star, "star", "role").and_then(|()| table.maybe("role", |node, context| values::word(node, context, &ROLES)));
+    let file = only_of(&mut table, Kind::Graph, "graph", "file").and_then(|()| {
+        table.maybe("file", |node, context| {
+            let path = file_path(node, context, "the name of a file of weights, relative to the folder of the scene")?;
+            let peers = peers?;
+            read_file(node, context, &path, &format!("weights of {peers} peers"), |text| parse_graph(text, peers))
+        })
     });
     if kind == Some(Kind::Graph) {
         table.require("file", "the name of a file of weights, a row a peer and numbers between commas");
@@ -93,7 +105,7 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
 }
 
 fn read_neighbours(node: &Node, context: Context<'_>) -> Option<usize> {
-    let count = values::integer(node, context, 2..=u64::from(u16::MAX), "how many peers each hears, an even number from 2 to 65534")?;
+    let count: u64 = values::of_key(TOPOLOGY.key("neighbours")?, node, context)?;
     if !count.is_multiple_of(2) {
         context.fault_at(node, format!("{count} neighbours cannot lie half on either side: expected an even number"));
         return None;

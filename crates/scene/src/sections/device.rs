@@ -1,0 +1,129 @@
+//! `device`, `coupling`, `contact` and `clock` of a peer.
+
+use core::time::Duration;
+
+use cohaptic_linkfile::document::{Node, Value, quote};
+use cohaptic_linkfile::reading::{Context, TableReader, values};
+use cohaptic_linkfile::schema::{Choices, Form, Table, number, optional, required, somewhere, usual, vector, words};
+use cohaptic_peer::rotation::Spin;
+use cohaptic_peer::{Contact, DeviceConfig, Direction, Drift, Gains};
+
+use super::coordination::{SCALING, SCALINGS};
+use super::rotation::{read_coupling_rotation, read_device_rotation};
+use crate::context::{SceneContext, check_axis};
+use crate::model::Scaling;
+use crate::quantities::{DAMPING, INERTIA, MASS, ROTATIONAL_DAMPING, ROTATIONAL_STIFFNESS, STIFFNESS};
+
+pub(super) static DEVICE: Table = Table::of(&[&[
+    somewhere("mass", number(MASS), "Mass of the device"),
+    usual("damping", number(DAMPING), "0", "Viscous damping of the device"),
+    optional("inertia", vector(INERTIA), "Moments of inertia of a device with six degrees of freedom"),
+    usual("rotational-damping", vector(ROTATIONAL_DAMPING), "0", "Viscous damping of its turn"),
+]]);
+pub(super) static COUPLING: Table = Table::of(&[&[
+    somewhere("stiffness", number(STIFFNESS), "Stiffness between device and copy, K_C"),
+    usual("damping", number(DAMPING), "0", "Damping between device and copy, B_C"),
+    usual("scaling", SCALING, "\"none\"", "How all follow the number of peers"),
+    optional(
+        "rotational-stiffness",
+        number(ROTATIONAL_STIFFNESS),
+        "Stiffness between the turns of device and copy, K_CR; needed with device.inertia",
+    ),
+    usual("rotational-damping", number(ROTATIONAL_DAMPING), "0", "Damping between their turns, B_CR"),
+]]);
+pub(super) const CONTACT: Form = Form::AnyOf(&[Form::Words(&[("grasp", "held both ways"), ("none", "not touched")]), Form::Table(&PUSH)]);
+static PUSH: Table =
+    Table::of(&[&[required("push", DIRECTION, "A finger that can push in that direction and cannot pull").expecting("a direction such as \"+x\"")]]);
+const DIRECTION: Form = Form::Words(const { &words(&DIRECTIONS) });
+const DIRECTIONS: Choices<Direction, 6> = [
+    ("+x", Direction { axis: 0, positive: true }, "to larger x"),
+    ("-x", Direction { axis: 0, positive: false }, "to smaller x"),
+    ("+y", Direction { axis: 1, positive: true }, "to larger y"),
+    ("-y", Direction { axis: 1, positive: false }, "to smaller y"),
+    ("+z", Direction { axis: 2, positive: true }, "to larger z"),
+    ("-z", Direction { axis: 2, positive: false }, "to smaller z"),
+];
+pub(super) static CLOCK: Table = Table::of(&[&[
+    usual("offset", Form::Duration, "\"0s\"", "By how much its first tick is late"),
+    usual("drift", DRIFT, "0", "How fast it runs: parts per million as text, or seconds gained in a second, at most 0.1 either way"),
+]]);
+const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(values::Quantity::any(""))]);
+
+pub(super) const A_COUPLING: &str = "a table such as { stiffness = 3500.0, damping = 5.0 }";
+
+/// A contact.
+pub(super) fn read_contact(node: &Node, context: SceneContext<'_>) -> Option<Contact> {
+    const EXPECTED: &str = "\"grasp\", \"none\" or { push = \"+x\" }";
+    if let Some(text) = node.as_text() {
+        return match text {
+            "grasp" => Some(Contact::Grasp),
+            "none" => Some(Contact::None),
+            other => {
+                context.fault_at(node, format!("unknown contact {}: expected {EXPECTED}", quote(other)));
+                None
+            }
+        };
+    }
+    let mut table = TableReader::new(node, *context, &PUSH, EXPECTED)?;
+    let direction = table.read("push", |node, _| read_direction(node, context));
+    table.finish();
+    direction.map(Contact::Push)
+}
+
+fn read_direction(node: &Node, context: SceneContext<'_>) -> Option<Direction> {
+    let direction = values::word(node, *context, &DIRECTIONS)?;
+    check_axis(node, context, direction.axis)?;
+    Some(direction)
+}
+
+/// A device, and how it turns if it does.
+pub(super) fn read_device(node: &Node, context: Context<'_>, expected: &str) -> Option<(DeviceConfig, Option<Spin>)> {
+    let mut table = TableReader::new(node, context, &DEVICE, expected)?;
+    let (mass, damping) = (table.value("mass"), table.value("damping"));
+    let turned = read_device_rotation(&mut table);
+    table.finish();
+    Some((DeviceConfig { mass: mass?, damping: damping? }, turned?))
+}
+
+/// A coupling, how it is scaled, and how it turns if it does.
+pub(super) fn read_coupling(node: &Node, context: Context<'_>) -> Option<(Gains, Scaling, Option<Gains>)> {
+    let mut table = TableReader::new(node, context, &COUPLING, A_COUPLING)?;
+    let (stiffness, damping) = (table.value("stiffness"), table.value("damping"));
+    let scaling = table.choice("scaling", &SCALINGS);
+    let turned = read_coupling_rotation(&mut table);
+    table.finish();
+    Some((Gains { stiffness: stiffness?, damping: damping? }, scaling?, turned?))
+}
+
+pub(super) fn read_clock(node: &Node, context: Context<'_>) -> Option<(Duration, Drift)> {
+    let mut table = TableReader::new(node, context, &CLOCK, "a table such as { offset = \"300us\", drift = \"20ppm\" }")?;
+    let (offset, drift) = (table.value("offset"), table.read("drift", read_drift));
+    table.finish();
+    Some((offset?, drift?))
+}
+
+/// A drift: a number, or text in parts per million.
+fn read_drift(node: &Node, context: Context<'_>) -> Option<Drift> {
+    const EXPECTED: &str = "a drift such as \"20ppm\" or \"-20ppm\", or a number, seconds gained in a second";
+    let fraction = match &node.value {
+        Value::Text(text) => {
+            let fraction = parts_per_million(text);
+            if fraction.is_none() {
+                context.fault_at(node, format!("{} is no drift: expected {EXPECTED}", quote(text)));
+            }
+            fraction?
+        }
+        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => {
+            values::number(node, context, EXPECTED)?
+        }
+    };
+    Drift::from_fraction(fraction).map_err(|error| context.fault_at(node, error.to_string())).ok()
+}
+
+fn parts_per_million(text: &str) -> Option<f64> {
+    let number = text.trim().strip_suffix("ppm")?.trim_end();
+    let digits = number.strip_prefix(['+', '-']).unwrap_or(number);
+    let plain = digits.starts_with(|c: char| c.is_ascii_digit()) && digits.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
+    // Divided, not multiplied: 20 / 1e6 is the double nearest to 0.00002.
+    plain.then(|| number.parse::<f64>().ok()).flatten().map(|millionths| millionths / 1e6)
+}
