@@ -1,7 +1,7 @@
 //! A verdict as a JSON document.
 
-use cohaptic_scene::Scene;
 use cohaptic_proofs::{Links, SceneWorstCase};
+use cohaptic_scene::Scene;
 use cohaptic_stability::{ContactMode, Judgement};
 use serde::Serialize;
 
