@@ -73,7 +73,7 @@ pub fn reproduce(options: Options, watch: &dyn Watch) -> Result<Reproduction, Pa
 
 /// Observer of the progress, able to end the work. Called from several threads.
 pub trait Watch: Sync {
-    /// Notes the end of a step; [`steps`](crate::steps) tells their number.
+    /// Notes the end of a step; [`steps`] tells their number.
     fn one_more(&self);
 
     /// Returns whether the work must end early.

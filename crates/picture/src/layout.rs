@@ -97,7 +97,8 @@ impl Layout {
         }
         let extents = picture.extents();
         let mut attempt = Attempt::new(picture, height, &extents);
-        // Each round removes the excess height. The limit of rounds ends the rare case of a wrapped text that changes back and forth.
+        // Each round removes the excess height. The number of rounds is bounded, because ticks and wrapped titles change with the height and can bring new
+        // excess.
         if let Some(whole) = picture.size.height {
             for _ in 0..12 {
                 let over = attempt.layout.height - whole;

@@ -103,13 +103,13 @@ impl Ticks {
             let text = if plain { Text::from(written(of, power)) } else { Text::power_of_ten(&of.to_string(), power) };
             (decimal(of, power), text)
         };
-        // With two decades or more, only powers of ten have labels.
+        // With two or more powers of ten in the range, only powers of ten have labels.
         if decades.len() >= 2 {
             let every = i32::try_from(decades.len().div_ceil(most.max(2))).unwrap_or(1).max(1);
             let marks = decades.into_iter().filter(|(_, power)| power.rem_euclid(every) == 0).map(label).collect();
             return Self { marks, between: nine, exponent: 0 };
         }
-        // Less than two decades: the first choice of multiples with a suitable number of ticks, or ticks as on a linear axis.
+        // With fewer powers of ten, the first choice of multiples with a suitable number of ticks is used, or ticks as on a linear axis.
         let choices = [&[1, 2, 5][..], &[1, 2, 3, 5, 7], &[1, 2, 3, 4, 5, 6, 7, 8, 9]].map(multiples);
         match choices.into_iter().find(|marks| (2..=most.max(2)).contains(&marks.len())) {
             Some(marks) => Self { marks: marks.into_iter().map(label).collect(), between: nine, exponent: 0 },
