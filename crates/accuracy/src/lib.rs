@@ -1,6 +1,6 @@
 //! Speed against error: the cost and the error of every method of the program, on the same work.
 //!
-//! You need it if you choose between the methods of this project by their cost and their error. The crate needs Linux.
+//! Use this crate if you choose between the methods of this project by their cost and their error. The crate needs Linux.
 //!
 //! [`measure`] returns [`Row`]s, one for each method at each setting. A cost is measured as processor time of the measuring thread, unless its unit says
 //! otherwise, and differs from run to run. An error is computed against a reference named in the row, and is the same in every run, unless the row says that

@@ -1,6 +1,6 @@
 //! What runs, checks, explanations, verdicts, campaigns, comparisons and links answer, as values, as JSON documents, in words and as pictures.
 //!
-//! You need it if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
+//! Use this crate if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
 //!
 //! [`run()`] is a run, [`explanation()`] the model of a scene, [`check()`] a scene and its expectations, where [`quick_verdict()`] tells first whether the
 //! scene is stable. [`methods()`] lists the methods that a scene can choose between, and [`measure()`] says what each costs and how wrong it is.

@@ -1,7 +1,7 @@
 //! Many runs of one scene: keys varied over ranges and lists, seeds counted up, on all threads, kept in parts so that a campaign can be stopped anywhere and
 //! continued, and put together as one table.
 //!
-//! You need it if you run one scene many times from Rust, over values of its keys and over seeds.
+//! Use this crate if you run one scene many times from Rust, over values of its keys and over seeds.
 //!
 //! A [`CampaignPlan`] is a scene, keys that are [varied](Variation), and how many runs there are of each combination. [`Campaign::open`] checks all
 //! of it before anything is written, and binds it to a folder; [`Campaign::run`] does the runs that are missing. The table is the same to the last byte

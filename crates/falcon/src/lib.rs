@@ -1,6 +1,6 @@
 //! Driver, force limits, kinematics and simulator for the Novint Falcon, a haptic device with three axes.
 //!
-//! You need it if you drive a Novint Falcon from Rust, or test such a program without the device.
+//! Use this crate if you drive a Novint Falcon from Rust, or test such a program without the device.
 //!
 //! ```text
 //!                 device            a Falcon as the device of a peer

@@ -1,6 +1,6 @@
 //! Runs a scene: compiles it to the least it needs, owns the clock and the order of events, and records what happens.
 //!
-//! You need it if you run scenes from Rust: to record them, to watch every tick, or to drive a session.
+//! Use this crate if you run scenes from Rust: to record them, to watch every tick, or to drive a session.
 //!
 //! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that send their samples through a
 //! [`cohaptic_wan::Network`]. A sample has the size of its datagram and is handed on as numbers; its bytes are made where they are damaged, or leave by a socket. A scene that needs no events, and of which no observer wants more than ticks, runs in arrays, which hold

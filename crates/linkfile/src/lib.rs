@@ -1,6 +1,6 @@
 //! Link, relay and router files: from TOML text to checked links.
 //!
-//! You need it if your program reads links from files, or from words such as `delay=24ms`.
+//! Use this crate if your program reads links from files, or from words such as `delay=24ms`.
 //!
 //! A link is a table of keys, such as `{ delay = "24ms", loss = "1%" }`. This crate reads the keys of a link, the links between named ends, the file of a
 //! relay ([`RelayFile`]) and the file of a router ([`router::RouterFile`]). Every refusal is a [`FileError`] that names file, line, column and key, shows

@@ -1,6 +1,6 @@
 //! Live sessions: a scene driven by the wall clock, in which some of the peers are other programs.
 //!
-//! You need it if you host a session with peers in other programs, or write such a peer in Rust. It needs Linux.
+//! Use this crate if you host a session with peers in other programs, or write such a peer in Rust. It needs Linux.
 //!
 //! [`Session`] is such a session, with its sockets and its clock. [`AdmissionControl`] decides which datagrams from outside reach the scene, and makes those to
 //! the outside; it does no input or output and reads no clock. [`client`] is the other side, for programs in Rust, and [`handshake`] has the datagrams that

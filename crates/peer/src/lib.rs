@@ -1,6 +1,6 @@
 //! One participant of a networked haptic cooperation: device, copy of the shared object, coordination law, and wire format of samples.
 //!
-//! You need it if you simulate a peer in your own program, add a coordination law, or connect a device. The crate has no sockets and no clock: the caller
+//! Use this crate if you simulate a peer in your own program, add a coordination law, or connect a device. The crate has no sockets and no clock: the caller
 //! transports datagrams and passes instants.
 //!
 //! ```text

@@ -1,6 +1,6 @@
 //! Logical time driven by the wall clock.
 //!
-//! You need it if a state machine of yours must act on time by the wall clock. It needs Linux.
+//! Use this crate if a state machine of yours must act on time by the wall clock. It needs Linux.
 //!
 //! The state machines of this project are told the time. In virtual time a loop tells them; here a [`Clock`] does, and a [`Pacer`] waits until they want to
 //! be called. [`drive()`] is the whole loop: it reads sockets, tells the time, sends and waits. What they are told is always the instant at which a thing was due, never the one at which the program got round to it: a late wake-up makes

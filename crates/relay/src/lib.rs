@@ -1,6 +1,6 @@
 //! UDP between programs through the emulator, in real time.
 //!
-//! You need it if your own program puts emulated links between programs that speak UDP. It needs Linux.
+//! Use this crate if your own program puts emulated links between programs that speak UDP. It needs Linux.
 //!
 //! Programs that know nothing of each other's place send to a port of the relay, which stands for the program that they speak to. What they send passes the
 //! directed link between the two, in the emulator of [`cohaptic_wan`], and leaves when the link lets it go.

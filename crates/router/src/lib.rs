@@ -1,6 +1,6 @@
 //! Any IP traffic through the emulator in real time.
 //!
-//! You need it if your own program puts emulated links between hosts or interfaces. It needs Linux.
+//! Use this crate if your own program puts emulated links between hosts or interfaces. It needs Linux.
 //!
 //! A [`Router`] stands between two devices: TUN devices, which are ends of the network for their hosts, or two Ethernet interfaces, which it joins like a
 //! cable. What comes in at one goes through the link that the first matching rule names, and leaves at the other one at the instant that the link says: its

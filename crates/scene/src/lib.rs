@@ -1,6 +1,6 @@
 //! Scene files: from TOML text to a checked [`Scene`].
 //!
-//! You need it if your program reads scene files.
+//! Use this crate if your program reads scene files.
 //!
 //! A scene file says who takes part, what they hold, how the copies of the shared object are kept together, and what lies between them on the network.
 //! This crate reads it, fills in every default, and refuses whatever makes no sense: a [`Scene`] that exists can be run. Every refusal is a

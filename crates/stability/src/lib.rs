@@ -1,6 +1,6 @@
 //! Stability and performance of a scene, without simulating it.
 //!
-//! You need it if you ask from Rust for which gains and delays a scene is stable, and how stiff or heavy it feels.
+//! Use this crate if you ask from Rust for which gains and delays a scene is stable, and how stiff or heavy it feels.
 //!
 //! One frame of a linear scene, from one common sampling to the next, multiplies its state by a constant matrix, the *monodromy matrix*. The scene is
 //! stable if and only if every eigenvalue of that matrix is inside the unit circle, once the motion of everything together is left out: space has no

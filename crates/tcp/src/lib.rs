@@ -1,6 +1,6 @@
 //! TCP as Linux does it, as a state machine without sockets or clock.
 //!
-//! You need it if a test or a simulation of yours wants real TCP in virtual time: handshakes, retransmissions, congestion control, windows, resets and
+//! Use this crate if a test or a simulation of yours wants real TCP in virtual time: handshakes, retransmissions, congestion control, windows, resets and
 //! their errors, to the nanosecond and the same on every run.
 //!
 //! A [`Connection`] is one end. Time is an argument: segments go in by [`Connection::handle_segment`], time by [`Connection::handle_timeout`], segments come

@@ -1,6 +1,6 @@
 //! Tests of networked programs over emulated bad links, in virtual time, the same way every time.
 //!
-//! You need it if you test a program that talks over TCP, UDP or QUIC, and want every failure again from its seed.
+//! Use this crate if you test a program that talks over TCP, UDP or QUIC, and want every failure again from its seed.
 //!
 //! A [`Testbed`] is hosts and the [links](wan) between them. A program that is run on it has sockets with the methods of tokio's,
 //! [timers](time), and hosts that crash, come back, and lose sight of each other. Nothing waits in real time: the clock jumps to the next event.

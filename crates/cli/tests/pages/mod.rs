@@ -71,6 +71,7 @@ macro_rules! pages {
 
 pages! {
     readme: "README.md",
+    python: "docs/python.md",
     contributing: "CONTRIBUTING.md",
     releasing: "RELEASING.md",
     security: "SECURITY.md",

@@ -87,9 +87,10 @@ fn for_is_the_duration() {
 #[test]
 fn more_late_ticks_than_one_in_a_thousand_make_it_invalid() {
     let desk = Desk::with("two.toml", TWO);
-    // Nothing happens within no time at all: every tick is late, on any machine.
+    // A tick within a nanosecond of its instant is a rare chance, on any machine.
     let document = desk.json("live two.toml --json --tolerance 1ns");
-    assert_eq!((&document["valid"], &document["late_ticks"]), (&json!(false), &json!(200)));
+    assert_eq!(document["valid"], json!(false));
+    assert!(document["late_ticks"].as_u64().is_some_and(|late| (100..=200).contains(&late)), "{document}");
     // And no machine that runs this takes an hour for a tick.
     let document = desk.json("live two.toml --json --tolerance 1h");
     assert_eq!((&document["valid"], &document["late_ticks"]), (&json!(true), &json!(0)));
