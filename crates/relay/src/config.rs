@@ -1,4 +1,4 @@
-//! What a relay does.
+//! Configuration of a relay: topology, limits and timed changes of links. The checks here need neither a socket of the relay nor a clock.
 
 use core::time::Duration;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
@@ -7,114 +7,114 @@ use cohaptic_linkfile::{LinkTable, RelayFile, RelayLimits};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, NodeId};
 
-/// What a relay does, checked by [`Engine::new`](crate::Engine::new).
+/// Configuration of a relay. [`Engine::new`](crate::Engine::new) checks the topology and the changes, [`Relay::bind`](crate::Relay::bind) also the targets.
 #[derive(Clone, Debug)]
 pub struct RelayConfig {
-    /// The seed of every random stream.
+    /// Seed of every random stream of the network.
     pub seed: u64,
-    /// The topology: which programs talk to each other.
+    /// Topology: the programs or clients that talk to each other, and the links between them.
     pub form: Form,
-    /// What it may take.
+    /// Bounds on datagrams in flight, and the silence before an address is forgotten.
     pub limits: Limits,
-    /// Links that become other ones, in order of time.
+    /// Changes of links during the run. [`Engine::new`](crate::Engine::new) sorts them by instant; changes at the same instant keep their order.
     pub changes: Vec<Change>,
 }
 
-/// The topology: which programs talk to each other.
+/// Topology of a relay.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one")]
 pub enum Form {
-    /// N programs, each with a port that stands for it.
+    /// N programs, each with a port of the relay standing for the program.
     Mesh(Mesh),
-    /// Clients on one side, one address on the other.
+    /// Clients on one side, one server address on the other.
     Proxy(Proxy),
 }
 
-/// N programs and the links between them.
+/// N programs and the directed links between them.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    /// The programs, as the nodes of the network: at least two.
+    /// Programs, at least two. Program number n is node n of the network.
     pub programs: Vec<Program>,
-    /// The links between them, by their places.
+    /// Links between the programs, indexed by the numbers of sender and receiver. The table is for as many peers as there are programs.
     pub links: LinkTable,
 }
 
-/// A program.
+/// Program of a mesh.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Program {
-    /// Its name: with the seed, the address of the random numbers of its links.
+    /// Name of the program. The seed and the names of sender and receiver select the random stream of a link.
     pub name: String,
-    /// The port that stands for it.
+    /// Port of the relay standing for the program: other programs send to this port, and receive from this port.
     pub port: SocketAddr,
-    /// Where it sends from and listens; `None`: learnt.
+    /// Address at which the program sends and listens. `None`: the relay learns the address from the program's first datagram.
     pub address: Option<SocketAddr>,
 }
 
-/// Clients that talk to one address. Node 0 of the network, `client`, is all of them; node 1, `server`, is that address.
+/// Clients that talk to one server address. Node 0 of the network, `client`, stands for all clients together; node 1, `server`, is the server.
 #[derive(Clone, Debug)]
 pub struct Proxy {
-    /// Where clients send to.
+    /// Port of the relay for clients.
     pub listen: SocketAddr,
-    /// The program that they speak to.
+    /// Address of the server.
     pub to: SocketAddr,
-    /// The link from the clients to that address, shared by all of them.
+    /// Link from the clients to the server, shared by all clients.
     pub forth: LinkModel,
-    /// The link back.
+    /// Link from the server back to the clients, shared by all clients.
     pub back: LinkModel,
-    /// The most clients at once; each has a socket. What others send is dropped and counted.
+    /// Clients at once, at most; each takes one socket. Datagrams of further clients are dropped and counted.
     pub most_clients: u32,
 }
 
-/// What a relay may take.
+/// Bounds of a relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Limits {
-    /// The most datagrams in flight at once; those beyond are dropped. Copies that a link makes count, but are not refused.
+    /// Datagrams in flight at once, at most. A datagram that arrives beyond this bound is dropped. Copies made by a link count, but are never refused.
     pub packets: u64,
-    /// The most bytes of them, headers not counted.
+    /// Bytes of the datagrams in flight, at most, without headers.
     pub bytes: Bytes,
-    /// An address that was learnt, and a client, is forgotten when it has been silent for so long.
+    /// Silence before a client of a proxy is forgotten. In a mesh, a learnt address gives way to the next stranger after this silence.
     pub forget_after: Duration,
 }
 
-/// A link that becomes another one.
+/// Change of one link's configuration during the run.
 #[derive(Clone, Debug)]
 pub struct Change {
-    /// When.
+    /// Instant of the change, since the start of the relay.
     pub at: Instant,
-    /// Its sender.
+    /// Sending node of the link.
     pub from: NodeId,
-    /// Its receiver.
+    /// Receiving node of the link.
     pub to: NodeId,
-    /// What it is from then on.
+    /// Model of the link from this instant on.
     pub model: LinkModel,
 }
 
-/// Why there is no such relay.
+/// Reason why a configuration is refused.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// Fewer than two programs, or a table of links for another number of them.
+    /// The mesh has fewer than two programs, or its table of links is for another number of programs.
     #[error("{programs} programs and links between {links}: expected at least two programs, and links between as many")]
     Programs {
-        /// How many programs.
+        /// Number of programs in the mesh.
         programs: usize,
-        /// How many programs the table of links is for.
+        /// Number of programs in the table of links.
         links: usize,
     },
-    /// A change of a link that is not there.
+    /// A change names a link between equal nodes, or a node outside of the network.
     #[error("there is no link from node {} to node {} to change", from.0, to.0)]
     NoLink {
-        /// The sender.
+        /// Sender in the change.
         from: NodeId,
-        /// The receiver.
+        /// Receiver in the change.
         to: NodeId,
     },
-    /// The relay would send to a port of its own: each datagram would pass the link again and again.
+    /// The relay would send to a port of its own, and each datagram would pass the link again and again.
     #[error("{to} is a port of the relay itself, {port}, to which each datagram would come back again and again: expected the address of a program")]
     ToItself {
-        /// Where the relay would send to.
+        /// Address of a program or of the server, to which the relay would send.
         to: SocketAddr,
-        /// The port of the relay.
+        /// Port of the relay at which a datagram to the target arrives.
         port: SocketAddr,
     },
 }
@@ -126,7 +126,7 @@ impl From<RelayLimits> for Limits {
 }
 
 impl Default for Limits {
-    /// Those of a relay file: 262,144 datagrams, 64 MB, 30 s.
+    /// Returns the default limits of a relay file: 262,144 datagrams, 64 MB, 30 s.
     fn default() -> Self {
         RelayLimits::default().into()
     }
@@ -149,12 +149,12 @@ impl From<RelayFile> for RelayConfig {
 }
 
 impl Proxy {
-    /// The most clients unless said otherwise.
+    /// Default of [`Proxy::most_clients`].
     pub const MOST_CLIENTS: u32 = 256;
 }
 
 impl RelayConfig {
-    /// The names of the nodes.
+    /// Returns the names of the nodes, indexed by node.
     pub(crate) fn names(&self) -> Vec<String> {
         match &self.form {
             Form::Mesh(mesh) => mesh.programs.iter().map(|program| program.name.clone()).collect(),
@@ -162,7 +162,7 @@ impl RelayConfig {
         }
     }
 
-    /// The link from one node to another.
+    /// Returns the model of the link between two nodes. Of a proxy, node 0 is the client and node 1 the server.
     pub(crate) fn link(&self, from: NodeId, to: NodeId) -> LinkModel {
         match &self.form {
             Form::Mesh(mesh) => mesh.links.between(from.index(), to.index()).clone(),
@@ -170,7 +170,7 @@ impl RelayConfig {
         }
     }
 
-    /// The ports of the relay as configured: 0 is a port that the system chooses.
+    /// Returns the configured ports of the relay, in the order of the programs; for a proxy, the listening port alone. Port number 0 lets the system choose.
     pub(crate) fn ports(&self) -> Vec<SocketAddr> {
         match &self.form {
             Form::Mesh(mesh) => mesh.programs.iter().map(|program| program.port).collect(),
@@ -178,8 +178,8 @@ impl RelayConfig {
         }
     }
 
-    /// Refuses a relay that sends to one of `ports`, its own ones, by whatever name. Addresses that are learnt are not known yet; the relay drops what a
-    /// program sends to the port that stands for the program itself.
+    /// Refuses a relay that would send to one of `ports`, the relay's own ports. Other names of the same address, such as an unspecified address, are
+    /// recognised. Learnt addresses are unknown at this time; the engine drops a datagram from a program to the port standing for the same program.
     pub(crate) fn check_targets(&self, ports: &[SocketAddr]) -> Result<(), ConfigError> {
         let targets: Vec<SocketAddr> = match &self.form {
             Form::Mesh(mesh) => mesh.programs.iter().filter_map(|program| program.address).collect(),
@@ -189,6 +189,7 @@ impl RelayConfig {
         targets.into_iter().find_map(own).map_or(Ok(()), Err)
     }
 
+    /// Checks the number of programs, and that every change names a link of the network.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         let nodes = match &self.form {
             Form::Mesh(mesh) if mesh.programs.len() < 2 || mesh.links.peers() != mesh.programs.len() => {
@@ -197,6 +198,7 @@ impl RelayConfig {
             Form::Mesh(mesh) => mesh.programs.len(),
             Form::Proxy(_) => 2,
         };
+        // The network has a link between any two different nodes, and none from a node to itself.
         let is_link = |from: NodeId, to: NodeId| from != to && (from.index()) < nodes && (to.index()) < nodes;
         match self.changes.iter().find(|change| !is_link(change.from, change.to)) {
             Some(Change { from, to, .. }) => Err(ConfigError::NoLink { from: *from, to: *to }),
@@ -205,21 +207,22 @@ impl RelayConfig {
     }
 }
 
-/// Whether a datagram to that address arrives at a socket that is bound to `port` on this machine.
+/// Returns whether a datagram to `to` arrives at a socket of this machine bound to `port`.
 fn reaches(to: SocketAddr, port: SocketAddr) -> bool {
-    // The kernel sends datagrams for the unspecified address to the loopback address.
+    // The kernel delivers datagrams for an unspecified address to the loopback address of the same family.
     let target = match (to.ip().to_canonical(), to.ip().is_ipv4()) {
         (target, _) if !target.is_unspecified() => target,
         (_, true) => IpAddr::V4(Ipv4Addr::LOCALHOST),
         (_, false) => IpAddr::V6(Ipv6Addr::LOCALHOST),
     };
-    // A port of IPv6 takes IPv6 alone: [::]:7000 and 127.0.0.1:7000 are two ports.
+    // An IPv6 socket of the relay takes IPv6 alone: [::]:7000 and 127.0.0.1:7000 are different ports.
     let own = port.ip().to_canonical();
     let is_here = || if own.is_unspecified() { own.is_ipv4() == target.is_ipv4() && is_of_this_machine(target) } else { own == target };
+    // Port number 0 is not chosen yet. The relay checks again when the system has chosen.
     to.port() == port.port() && port.port() != 0 && is_here()
 }
 
-/// Whether this machine has that address: the system lets a socket be bound to its own addresses alone.
+/// Returns whether `ip` is an address of this machine: the system lets a socket be bound to the machine's own addresses alone.
 fn is_of_this_machine(ip: IpAddr) -> bool {
     ip.is_loopback() || UdpSocket::bind((ip, 0)).is_ok()
 }
@@ -228,7 +231,7 @@ fn is_of_this_machine(ip: IpAddr) -> bool {
 mod tests {
     use super::*;
 
-    /// 192.0.2.1 is an address of documentation (RFC 5737): no machine has it.
+    /// 192.0.2.1 is reserved for documentation (RFC 5737), so no machine has this address.
     #[test]
     fn a_port_is_known_by_each_of_its_names() {
         let address = |text: &str| text.parse::<SocketAddr>().unwrap();

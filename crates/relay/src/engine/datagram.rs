@@ -1,4 +1,4 @@
-//! Arrivals, departures, and the counters of both.
+//! Datagrams at the border of the engine: arrivals, releases, and the counters of both.
 
 use core::time::Duration;
 use std::net::SocketAddr;
@@ -7,90 +7,91 @@ use cohaptic_realtime::udp::Ecn;
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
-/// Where a datagram comes in or goes out.
+/// Port of the relay, for arriving and for leaving datagrams.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Port {
-    /// The port that stands for this program of a mesh.
+    /// Port standing for this program of a mesh.
     Program(NodeId),
-    /// Where clients of a proxy send to.
+    /// Port of a proxy for clients.
     Listen,
-    /// The port of its own that the client in this place has on the far side.
+    /// Port towards the server that belongs to the client in this slot of a proxy.
     Client(u32),
 }
 
-/// A datagram that came in.
+/// Datagram arrived at a port of the relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Arrival<'a> {
-    /// When.
+    /// Instant of the arrival.
     pub at: Instant,
-    /// Where.
+    /// Port of the relay that received the datagram.
     pub port: Port,
-    /// The sender.
+    /// Address of the sender.
     pub from: SocketAddr,
-    /// What it carries. Its length is its size on the link: headers are not counted, and [`cohaptic_wan::Framing`] can add them.
+    /// Payload. The length of the payload is the datagram's size on the link: headers are not counted, and [`cohaptic_wan::Framing`] can add them.
     pub bytes: &'a [u8],
-    /// Its congestion bits.
+    /// Congestion bits (ECN) of the IP header; `None` if both bits are zero.
     pub ecn: Option<Ecn>,
 }
 
-/// What happened to a datagram that came in.
+/// Result of the intake of one datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Intake {
-    /// It was offered to its link.
+    /// The datagram was admitted, and is or will be offered to its link.
     Offered,
-    /// The same, and its sender is a new client: the port [`Port::Client`] with this number is needed from now on.
+    /// The sender is a new client, and the port [`Port::Client`] with this number is needed from now on. The datagram was offered to its link, or dropped and
+    /// counted as overload.
     FromNewClient(u32),
-    /// Too much is on its way: it was dropped.
+    /// The datagram was dropped: too many datagrams or bytes are in flight.
     Overload,
-    /// Nobody knows the sender: it was dropped.
+    /// The datagram was dropped: the relay does not know the sender's address, or has no such port.
     Stranger,
-    /// A program spoke to itself, and there is no such link: it was dropped.
+    /// The datagram was dropped: a program sent to the port standing for the same program, and no such link exists.
     ToItself,
-    /// There are as many clients as there may be: it was dropped.
+    /// The datagram was dropped: the proxy has as many clients as allowed.
     NoRoom,
 }
 
-/// A datagram that leaves.
+/// Datagram leaving the relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Release<'a> {
-    /// When, by the link.
+    /// Instant of the delivery by the link.
     pub at: Instant,
-    /// By how much it was offered to the link later than it came: see [`IntakeCounts::clamped`].
+    /// Time by which the datagram was offered to its link later than it arrived: see [`IntakeCounts::clamped`].
     pub late: Duration,
-    /// From where.
+    /// Port of the relay through which to send the datagram.
     pub port: Port,
-    /// The receiver.
+    /// Address of the receiver.
     pub to: SocketAddr,
-    /// What it carries, damaged if the link has damaged it.
+    /// Payload, with the bit errors of the link if the link has damaged the datagram.
     pub bytes: &'a [u8],
-    /// Its congestion bits: with a mark if the link has marked it.
+    /// Congestion bits (ECN); [`Ecn::Ce`] if the link has marked the datagram.
     pub ecn: Option<Ecn>,
 }
 
-/// What a relay counts of a link besides what the link counts itself.
+/// Counters of one link, kept by the relay in addition to [`LinkStats`](cohaptic_wan::LinkStats).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct LinkCounts {
-    /// Dropped before they were offered: too much was on its way.
+    /// Datagrams dropped before the link: too many datagrams or bytes were in flight.
     pub overload: u64,
-    /// Came out of the link and were dropped: where their receiver is is not known yet, or it has left.
+    /// Datagrams delivered by the link and then dropped: the receiver's address is not known yet, or the receiving client has left.
     pub undeliverable: u64,
-    /// The bytes of all that came out of the link.
+    /// Payload bytes of all datagrams delivered by the link.
     pub delivered_bytes: u64,
 }
 
-/// What came in.
+/// Counters of arrived datagrams, by result.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct IntakeCounts {
-    /// Offered to a link.
+    /// Datagrams offered to a link.
     pub offered: u64,
-    /// Dropped: too much was on its way.
+    /// Datagrams dropped: too many datagrams or bytes were in flight.
     pub overload: u64,
-    /// Dropped: nobody knows the sender.
+    /// Datagrams dropped: the relay does not know the sender's address, or has no such port.
     pub strangers: u64,
-    /// Dropped: a program spoke to itself.
+    /// Datagrams dropped: a program sent to the port standing for the same program.
     pub to_itself: u64,
-    /// Dropped: no room for another client.
+    /// Datagrams dropped: no room for another client.
     pub no_room: u64,
-    /// Offered, but at a later instant than the one at which they came, because time had been let pass beyond that.
+    /// Datagrams offered to their link later than they arrived, because logical time had already passed the arrival. Part of `offered`.
     pub clamped: u64,
 }

@@ -1,4 +1,5 @@
-//! The relay without sockets and without a clock.
+//! The relay without sockets and without a clock. Datagrams with instants come in; releases with instants go out. The engine knows addresses and links, but
+//! neither sockets nor the present time.
 
 mod clients;
 mod datagram;
@@ -23,45 +24,54 @@ use pool::{Packet, Pool};
 use programs::Programs;
 use recent::Recent;
 
-/// A relay as a state machine: datagrams in with [`Engine::handle_datagram`], datagrams out with [`Engine::poll_release`].
+/// State machine of a relay: datagrams go in with [`Engine::handle_datagram`] and come out with [`Engine::poll_release`].
 ///
-/// The driver hands datagrams in with the instant at which they came, asks with [`Engine::poll_timeout`] when to come back, calls
-/// [`Engine::handle_timeout`] then, and drains [`Engine::poll_release`] until it gives `None`. The fates are those of a [`Network`] to which the same
+/// The driver passes each datagram with the instant of its arrival, asks [`Engine::poll_timeout`] for the next deadline, calls [`Engine::handle_timeout`] at
+/// that instant, and drains [`Engine::poll_release`] until it returns `None`. The fates of the datagrams equal the fates in a [`Network`] to which the same
 /// datagrams are offered at the same instants.
 #[derive(Debug)]
 pub struct Engine {
     network: Network<Arc<Packet>>,
+    /// Names of the nodes, indexed by node.
     names: Vec<String>,
     routes: Routes,
     limits: Limits,
     pool: Pool,
+    /// Latest instant of logical time. Never decreases.
     now: Instant,
-    /// Admitted, and not offered yet.
+    /// Admitted datagrams that are not offered to their links yet.
     staged: Vec<Staged>,
-    /// On their way or admitted. A copy is announced when it is made, which may be polled after its end: for a moment too few are counted.
+    /// Datagrams in flight or staged. Signed, because the network can report the end of a copy before it reports the making of the copy: the number is then too
+    /// low until all events are polled.
     packets: i64,
+    /// Payload bytes of the same datagrams.
     bytes: i64,
+    /// Changes of links still to come, in order of time.
     changes: VecDeque<Change>,
-    /// By sender, then receiver.
+    /// Counters of each link, at the index [`Engine::link`].
     links: Vec<LinkCounts>,
-    /// By sender, then receiver.
+    /// Latest delays of each link, at the index [`Engine::link`].
     recent: Vec<Recent>,
     counts: IntakeCounts,
+    /// Time by which datagrams were offered later than they arrived.
     clamped: Lateness,
-    /// What the last release carries.
+    /// Payload of the release returned last. The caller borrows the payload until the next poll.
     released: Option<Arc<Packet>>,
 }
 
-/// The nodes of a proxy's network.
+/// Node of a proxy's network standing for all clients.
 const CLIENT: NodeId = NodeId(0);
+/// Node of a proxy's network standing for the server.
 const SERVER: NodeId = NodeId(1);
 
+/// Senders and receivers of a topology, by address.
 #[derive(Debug)]
 enum Routes {
     Programs(Programs),
     Clients { clients: Clients, server: SocketAddr },
 }
 
+/// Admitted datagram with its arrival and its link.
 #[derive(Debug)]
 struct Staged {
     at: Instant,
@@ -71,11 +81,11 @@ struct Staged {
 }
 
 impl Engine {
-    /// A relay to which nothing has come yet.
+    /// Returns a relay to which no datagram has been passed yet.
     ///
     /// # Errors
     ///
-    /// [`ConfigError`] if there is no such relay.
+    /// [`ConfigError`] if the configuration is refused.
     pub fn new(config: RelayConfig) -> Result<Self, ConfigError> {
         config.check()?;
         let names = config.names();
@@ -83,7 +93,7 @@ impl Engine {
         let network = NetworkConfig { seed: config.seed, nodes: names.clone(), general: false };
         let network = Network::new(network, |from, to| config.link(from, to));
         let RelayConfig { form, limits, mut changes, .. } = config;
-        // Stable: equal instants stay in their order.
+        // The sort is stable: changes at the same instant keep their order.
         changes.sort_by_key(|change| change.at);
         let routes = match form {
             Form::Mesh(mesh) => Routes::Programs(Programs::new(&mesh.programs, limits.forget_after)),
@@ -108,7 +118,7 @@ impl Engine {
         })
     }
 
-    /// Takes a datagram in.
+    /// Offers a datagram to its link, or drops and counts the datagram.
     #[inline]
     pub fn handle_datagram(&mut self, arrival: Arrival<'_>) -> Intake {
         let intake = self.stage(arrival);
@@ -116,8 +126,8 @@ impl Engine {
         intake
     }
 
-    /// Takes a datagram in, but lets it wait until [`Engine::offer_staged`]: datagrams that were read from several sockets are offered in the order
-    /// in which they came.
+    /// Admits a datagram like [`Engine::handle_datagram`], but offers the datagram only with [`Engine::offer_staged`]. Datagrams read from several sockets are
+    /// thus offered in the order of their arrival.
     #[inline]
     pub fn stage(&mut self, arrival: Arrival<'_>) -> Intake {
         let Arrival { at, port, from, bytes, ecn } = arrival;
@@ -135,6 +145,7 @@ impl Engine {
                     (CLIENT, SERVER, Some(client))
                 }
             },
+            // The server alone may answer at a client's port. Answers of other senders fall through to the last arm.
             (Routes::Clients { clients, server }, Port::Client(slot)) if from == *server => match clients.at_port(slot, at) {
                 None => return self.refuse(Intake::Stranger),
                 client => (SERVER, CLIENT, client),
@@ -142,12 +153,14 @@ impl Engine {
             (Routes::Programs(_) | Routes::Clients { .. }, _) => return self.refuse(Intake::Stranger),
         };
         let length = i64::try_from(bytes.len()).unwrap_or(i64::MAX);
+        // A sum below zero, in the moment when copies are missing from it, is within every limit.
         let is_full = |held: i64, more: i64, most: u64| u64::try_from(held.saturating_add(more)).is_ok_and(|sum| sum > most);
         if is_full(self.packets, 1, self.limits.packets) || is_full(self.bytes, length, self.limits.bytes.get()) {
+            // Sender and receiver are different nodes here, so they name a link.
             let link = self.link(sender, to);
             self.links[link].overload += 1;
             self.refuse(Intake::Overload);
-            // A new client is one all the same.
+            // The caller must learn of the new client even if this datagram is dropped: the client's next datagram no longer reports a new client.
             return opened.map_or(Intake::Overload, Intake::FromNewClient);
         }
         self.packets += 1;
@@ -157,22 +170,25 @@ impl Engine {
         opened.map_or(Intake::Offered, Intake::FromNewClient)
     }
 
-    /// Offers to their links what waits, in the order of the instants. What came before an instant that has been let pass is offered at that
-    /// instant, and counted.
+    /// Offers the staged datagrams to their links, in the order of arrival. A datagram that arrived before logical time as it stands is offered at the present
+    /// logical time, and counted as clamped.
     pub fn offer_staged(&mut self) {
+        // Datagrams of one socket are staged in order, so sorting is needed only after reading several sockets.
         if !self.staged.is_sorted_by_key(|staged| staged.at) {
             self.staged.sort_by_key(|staged| staged.at);
         }
+        // Taken out for the loop, which changes the rest of `self`, and put back empty to keep the memory.
         let mut staged = core::mem::take(&mut self.staged);
         for Staged { at, from, to, mut packet } in staged.drain(..) {
             if let Some(late) = self.now.checked_duration_since(at).filter(|late| !late.is_zero()) {
                 self.counts.clamped += 1;
                 self.clamped.record(late);
-                // Nobody else holds it yet.
+                // A staged packet has no copies yet, so this is its only owner.
                 if let Some(packet) = Arc::get_mut(&mut packet) {
                     packet.late = late;
                 }
             }
+            // Datagrams and changes of links due before the arrival come first.
             self.pass(at);
             let info = PacketInfo { size: Bytes::new(packet.bytes.len() as u64), ecn_capable: packet.ecn.is_some() };
             self.counts.offered += 1;
@@ -182,7 +198,7 @@ impl Engine {
         self.staged = staged;
     }
 
-    /// Lets time pass until `now`; an instant that has passed already changes nothing.
+    /// Lets logical time pass until `now`. An instant in the past changes nothing.
     #[inline]
     pub fn handle_timeout(&mut self, now: Instant) {
         self.pass(now);
@@ -191,7 +207,8 @@ impl Engine {
         }
     }
 
-    /// When [`Engine::handle_timeout`] must be called next; `None` if nothing is on its way.
+    /// Returns the instant of the next necessary call of [`Engine::handle_timeout`], or `None` if no datagram, no change of a link and no client waits for
+    /// time.
     #[must_use]
     #[inline]
     pub fn poll_timeout(&self) -> Option<Instant> {
@@ -203,7 +220,8 @@ impl Engine {
         [self.network.poll_timeout(), change, clients].into_iter().flatten().min()
     }
 
-    /// The next datagram that leaves, up to the last instant given; `None` when all have been polled.
+    /// Returns the next datagram that leaves, up to the present logical time, or `None` when all have been polled. Drops and counts datagrams for receivers
+    /// without a known address.
     #[inline]
     pub fn poll_release(&mut self) -> Option<Release<'_>> {
         if let Some(packet) = self.released.take() {
@@ -226,7 +244,7 @@ impl Engine {
                     };
                     let PacketEvent { record: PacketRecord { marked, .. }, mut payload, damage } = event;
                     if let Some(damage) = damage {
-                        // A copy of it may be on its way still, undamaged.
+                        // A copy still in flight may share these bytes, undamaged; `make_mut` then clones the bytes.
                         damage.apply(&mut Arc::make_mut(&mut payload).bytes);
                     }
                     let packet = self.released.insert(payload);
@@ -238,7 +256,7 @@ impl Engine {
                     self.bytes -= length;
                     self.pool.put(event.payload);
                 }
-                // The copy, which has an end of its own.
+                // The copy gets an event of its own, `Delivered` or `Dropped`, which subtracts the copy again.
                 Fate::Duplicated => {
                     self.packets += 1;
                     self.bytes += length;
@@ -247,7 +265,7 @@ impl Engine {
         }
     }
 
-    /// The next client that has left: its port is not needed any more.
+    /// Returns the slot of the next former client. The port of the slot can be closed.
     pub fn poll_closed(&mut self) -> Option<u32> {
         match &mut self.routes {
             Routes::Programs(_) => None,
@@ -255,60 +273,60 @@ impl Engine {
         }
     }
 
-    /// Forgets a client, for which no port could be had.
+    /// Forgets the client in a slot, for example because no port could be opened.
     pub fn close_client(&mut self, slot: u32) {
         if let Routes::Clients { clients, .. } = &mut self.routes {
             clients.close(slot);
         }
     }
 
-    /// Changes the model of a link from `now` on, or from the last instant given if that is later: see [`Network::set_link`].
+    /// Changes the model of a link from `now` on, or from the present logical time if that is later: see [`Network::set_link`].
     ///
     /// # Errors
     ///
-    /// [`NetworkError`] if there is no such link; nothing was changed.
+    /// [`NetworkError`] if no such link exists; nothing was changed except that time has passed.
     pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, model: LinkModel) -> Result<(), NetworkError> {
         self.pass(now);
         self.network.set_link(self.now, from, to, model)
     }
 
-    /// The names of the nodes of the network.
+    /// Returns the names of the nodes of the network, indexed by node.
     #[must_use]
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// What a link did; `None` if there is none.
+    /// Returns the counters of a link, or `None` if no such link exists.
     #[must_use]
     pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<(LinkStats, LinkCounts)> {
         Some((self.network.link_stats(from, to)?, self.links[self.link(from, to)]))
     }
 
-    /// The delays of the latest datagrams that came out of a link, in no order: of 128 at most.
+    /// Returns the delays of the latest datagrams delivered by a link, at most 128, in no particular order.
     #[must_use]
     pub fn recent_delays(&self, from: NodeId, to: NodeId) -> &[Duration] {
         self.recent.get(self.link(from, to)).map_or(&[], Recent::delays)
     }
 
-    /// What came in.
+    /// Returns the counters of arrived datagrams.
     #[must_use]
     pub const fn counts(&self) -> &IntakeCounts {
         &self.counts
     }
 
-    /// By how much datagrams were offered later than they came: see [`IntakeCounts::clamped`].
+    /// Returns the distribution of the time by which datagrams were offered later than they arrived: see [`IntakeCounts::clamped`].
     #[must_use]
     pub const fn clamped(&self) -> &Lateness {
         &self.clamped
     }
 
-    /// How many datagrams are on their way, and how many bytes; exact when [`Engine::poll_release`] has given `None`.
+    /// Returns the number of datagrams in flight and their payload bytes. Exact as soon as [`Engine::poll_release`] has returned `None`.
     #[must_use]
     pub fn held(&self) -> (u64, Bytes) {
         (u64::try_from(self.packets).unwrap_or(0), Bytes::new(u64::try_from(self.bytes).unwrap_or(0)))
     }
 
-    /// How many clients there are; for a mesh, none.
+    /// Returns the number of clients; zero for a mesh.
     #[must_use]
     pub fn clients(&self) -> usize {
         match &self.routes {
@@ -317,7 +335,7 @@ impl Engine {
         }
     }
 
-    /// Where a program is, if that is known; `None` for a proxy.
+    /// Returns the address of a program, or `None` if the address is not known or the relay is a proxy.
     #[must_use]
     pub fn program_address(&self, program: NodeId) -> Option<SocketAddr> {
         match &self.routes {
@@ -326,12 +344,14 @@ impl Engine {
         }
     }
 
-    /// Where a datagram that has come out of its link goes, and from which port: that which stands for its sender.
+    /// Returns the port and the receiver for a datagram delivered by its link, or `None` if the receiver's address is not known. The port is the port standing
+    /// for the sender.
     #[inline]
     fn way_out(&self, event: &PacketEvent<Arc<Packet>, Path>) -> Option<(Port, SocketAddr)> {
         match &self.routes {
             Routes::Programs(programs) => Some((Port::Program(event.path.from), programs.address(event.path.to)?)),
             Routes::Clients { clients, server } => {
+                // Every datagram of a proxy has a client; a client that has left has no address.
                 let client = event.payload.client?;
                 let address = clients.address(client)?;
                 Some(if event.path.to == CLIENT { (Port::Listen, address) } else { (Port::Client(client.slot), *server) })
@@ -339,9 +359,10 @@ impl Engine {
         }
     }
 
-    /// Lets time pass, with the changes on the way.
+    /// Lets logical time pass until `now`, and makes the changes of links that are due on the way. Never goes back.
     #[inline]
     fn pass(&mut self, now: Instant) {
+        // A change must be made at its own instant, before later datagrams leave the link.
         while self.changes.front().is_some_and(|change| change.at <= now) {
             let Some(change) = self.changes.pop_front() else { return };
             self.now = self.now.max(change.at);
@@ -353,10 +374,12 @@ impl Engine {
         debug_assert_eq!(passed, Ok(()), "time has not gone back");
     }
 
+    /// Returns the index of a link in `links` and `recent`: row of the sender, column of the receiver.
     fn link(&self, from: NodeId, to: NodeId) -> usize {
         from.index() * self.names.len() + to.index()
     }
 
+    /// Counts a datagram that was not admitted, and returns the reason.
     #[cold]
     const fn refuse(&mut self, why: Intake) -> Intake {
         let counter = match why {

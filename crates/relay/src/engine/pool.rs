@@ -1,4 +1,4 @@
-//! Datagrams in memory that is used again.
+//! Pool of datagrams, which reuses the memory of former datagrams.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -7,24 +7,25 @@ use cohaptic_realtime::udp::Ecn;
 
 use super::clients::ClientId;
 
-/// A datagram on its way. Copies that a link makes share it.
+/// Datagram in flight. Copies made by a link share one `Packet`.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(super) struct Packet {
     pub(super) bytes: Vec<u8>,
     pub(super) ecn: Option<Ecn>,
-    /// Whose it is, where clients share a link.
+    /// Client to or from which the datagram goes, if clients share the link (proxy); `None` in a mesh.
     pub(super) client: Option<ClientId>,
-    /// By how much it was offered later than it came.
+    /// Time by which the datagram was offered later than it arrived.
     pub(super) late: Duration,
 }
 
-/// Memory for datagrams: what one has left, another takes. Once as many have been on their way as ever are, nothing is allocated any more.
+/// Idle datagrams. When as many datagrams as ever at once have been in flight, further datagrams need no allocation.
 #[derive(Debug)]
 pub(super) struct Pool {
+    /// Datagrams whose memory can be reused. Each `Arc` has no other owner.
     idle: Vec<Arc<Packet>>,
-    /// The bytes that idle ones keep.
+    /// Capacity of the byte buffers in `idle` together \[bytes\].
     kept: usize,
-    /// The most that idle ones keep together: a burst of long datagrams does not stay in memory.
+    /// Bound on `kept`, so that the memory of a burst of long datagrams is returned to the system.
     most_kept: usize,
 }
 
@@ -33,20 +34,22 @@ impl Pool {
         Self { idle: Vec::new(), kept: 0, most_kept }
     }
 
+    /// Returns a datagram with these contents, in the memory of an idle datagram if there is one.
     pub(super) fn take(&mut self, bytes: &[u8], ecn: Option<Ecn>, client: Option<ClientId>) -> Arc<Packet> {
         let mut packet = self.idle.pop().unwrap_or_default();
         self.kept -= packet.bytes.capacity();
+        // Always succeeds: `put` keeps only datagrams without another owner, and a new one has none.
         if let Some(packet) = Arc::get_mut(&mut packet) {
             packet.bytes.clear();
             packet.bytes.extend_from_slice(bytes);
             (packet.ecn, packet.client, packet.late) = (ecn, client, Duration::ZERO);
-            // Only what nobody else holds is idle.
+            // No byte of the earlier datagram is left.
             debug_assert_eq!(packet.bytes, bytes);
         }
         packet
     }
 
-    /// Takes back a datagram, if no copy of it is left.
+    /// Takes the memory of a datagram back, unless a copy of the datagram is still in flight or the pool is full.
     pub(super) fn put(&mut self, mut packet: Arc<Packet>) {
         let capacity = packet.bytes.capacity();
         if self.kept + capacity <= self.most_kept && Arc::get_mut(&mut packet).is_some() {

@@ -1,4 +1,4 @@
-//! The sender of a datagram, in a mesh: programs by their addresses, given or learnt.
+//! Programs of a mesh, found by the address of the sender. Addresses are configured, or learnt from the first datagram.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -9,23 +9,31 @@ use cohaptic_wan::NodeId;
 
 use crate::config::Program;
 
-/// The addresses of the programs.
+/// Addresses of the programs of a mesh.
 ///
-/// A stranger's address becomes that of the first program, in the order of the file, to which it may belong: whose address is not given and not known; if
-/// there is none, whose address was learnt and has been silent too long. It is never that of the program to which it speaks.
+/// A stranger takes the place of the first program, in the order of the configuration, with neither a configured nor a learnt address. If there is no such
+/// program, the stranger takes the place of the first program with a learnt address after a silence of `forget_after`. A stranger never becomes the program to
+/// whose port the stranger sends.
 #[derive(Debug)]
 pub(super) struct Programs {
+    /// Program of each known address.
     places: BTreeMap<SocketAddr, NodeId>,
+    /// Address and latest datagram of each program, indexed by program.
     programs: Vec<Known>,
+    /// Silence before a learnt address gives way to a stranger.
     forget_after: Duration,
-    /// The sender before: most datagrams of a batch are of one.
+    /// Address and program of the latest sender: most datagrams of a batch come from the same program.
     last: Option<(SocketAddr, NodeId)>,
 }
 
+/// Current knowledge of one program.
 #[derive(Debug)]
 struct Known {
+    /// Address of the program; `None` if not learnt yet.
     address: Option<SocketAddr>,
+    /// Whether the address is configured. A configured address never changes.
     is_given: bool,
+    /// Instant of the latest datagram from the program; zero before the first.
     heard: Instant,
 }
 
@@ -36,7 +44,8 @@ impl Programs {
         Self { places, programs: programs.iter().map(known).collect(), forget_after, last: None }
     }
 
-    /// The program that sends from that address to the port of program `to`; `None`: a stranger.
+    /// Returns the program that sends from `from` to the port of program `to`, or `None` for a stranger without a place. Records `now` as the latest sign of
+    /// the program.
     #[inline]
     pub(super) fn sender(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
         let place = match self.last {
@@ -47,27 +56,32 @@ impl Programs {
                 place
             }
         };
+        // `places` and `last` name programs of the configuration only, so the index is valid.
         self.programs[place.index()].heard = now;
         Some(place)
     }
 
-    /// Where a program is; `None` if that is not known yet.
+    /// Returns the address of a program, or `None` if the address is not known yet.
     #[inline]
     pub(super) fn address(&self, place: NodeId) -> Option<SocketAddr> {
         self.programs.get(place.index())?.address
     }
 
+    /// Gives a stranger the place of a program, or returns `None` if no program can have this address.
     #[cold]
     fn learn(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
+        // The candidates: a configured address is never taken away, and a program does not send to its own port.
         let open = |place: &NodeId| *place != to && !self.programs[place.index()].is_given;
         let nodes = || (0..self.programs.len()).map(NodeId::new);
         let silent = |place: &NodeId| now.saturating_duration_since(self.programs[place.index()].heard) >= self.forget_after;
         let unknown = |place: &NodeId| self.programs[place.index()].address.is_none();
+        // Programs that were never heard of come first, so that a silent program keeps its place as long as there is another one.
         let place = nodes().filter(open).find(unknown).or_else(|| nodes().filter(open).find(silent))?;
         if let Some(before) = self.programs[place.index()].address.replace(from) {
             self.places.remove(&before);
         }
         self.places.insert(from, place);
+        // `last` may name the address that has just lost its place.
         self.last = None;
         Some(place)
     }
@@ -103,7 +117,7 @@ mod tests {
     #[test]
     fn a_stranger_is_the_first_program_that_it_may_be() {
         let mut programs = programs([None, Some(2), None]);
-        // It speaks to program 0, so it is not that one.
+        // The stranger sends to program 0, so program 2 is the first candidate.
         assert_eq!(programs.sender(address(9), NodeId(0), second(1)), Some(NodeId(2)));
         assert_eq!(programs.sender(address(8), NodeId(1), second(1)), Some(NodeId(0)));
         assert_eq!(programs.sender(address(7), NodeId(1), second(1)), None);
@@ -116,7 +130,7 @@ mod tests {
         assert_eq!(programs.sender(address(9), NodeId(1), second(1)), Some(NodeId(0)));
         assert_eq!(programs.sender(address(8), NodeId(1), second(30)), None);
         assert_eq!(programs.sender(address(8), NodeId(1), second(31)), Some(NodeId(0)));
-        // The one before is a stranger now.
+        // The former address has become a stranger.
         assert_eq!(programs.sender(address(9), NodeId(1), second(32)), None);
         assert_eq!(programs.address(NodeId(0)), Some(address(8)));
     }

@@ -1,21 +1,23 @@
-//! The delays of the latest datagrams, to be looked at while a relay runs.
+//! Delays of the latest datagrams of a link, for displays of a running relay.
 
 use core::time::Duration;
 
-/// The delays of the latest datagrams that came out of a link. Takes memory only where something does.
+/// Ring of the delays of the latest datagrams delivered by a link. Allocates nothing before the first datagram.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recent {
+    /// At most [`Recent::MOST`] delays.
     delays: Vec<Duration>,
-    /// Where the next one goes once there are as many as are remembered.
+    /// Index of the next delay. Once the ring is full, the oldest delay is at this index.
     next: usize,
 }
 
 impl Recent {
-    /// The number of delays that are remembered.
+    /// Capacity of the ring.
     const MOST: usize = 128;
 
     #[inline]
     pub(super) fn record(&mut self, delay: Duration) {
+        // While the ring grows, `next` is its length, and the lookup finds nothing.
         if let Some(oldest) = self.delays.get_mut(self.next) {
             *oldest = delay;
         } else {
@@ -24,7 +26,7 @@ impl Recent {
         self.next = (self.next + 1) % Self::MOST;
     }
 
-    /// In no order.
+    /// Returns the delays in no particular order.
     pub(super) fn delays(&self) -> &[Duration] {
         &self.delays
     }

@@ -1,4 +1,4 @@
-//! The relay in real time: one thread, in the loop of [`cohaptic_realtime::drive()`].
+//! The relay in real time: sockets and a clock around the engine, on one thread, in the loop of [`cohaptic_realtime::drive()`].
 
 mod ports;
 mod report;
@@ -22,14 +22,14 @@ use ports::Ports;
 
 pub use report::{LinkReport, PortReport, Report, View};
 
-/// Why there is no relay, or why it stopped.
+/// Reason why a relay could not start, or why a relay stopped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RelayError {
-    /// There is no such relay.
+    /// The configuration is refused.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// A port could not be had.
+    /// A port could not be opened.
     #[error(transparent)]
     Bind(#[from] BindError),
     /// The system refused to wait or to read.
@@ -37,23 +37,23 @@ pub enum RelayError {
     System(#[from] io::Error),
 }
 
-/// How to run.
+/// Options of a run, which do not change the fates of datagrams.
 #[derive(Clone, Copy, Debug)]
 pub struct RunOptions {
-    /// How to wait for the next release.
+    /// Way to wait for the next release.
     pub pacing: Pacing,
-    /// What the thread asks of the system.
+    /// Requests of the thread to the system, such as a real-time priority.
     pub wishes: Wishes,
-    /// How late releases may be for the run to be valid.
+    /// Lateness of releases up to which the run is valid.
     pub tolerance: Tolerance,
-    /// When to end by itself.
+    /// Length of the run, from the call of [`Relay::run`]; `None`: the run lasts until it is stopped.
     pub duration: Option<Duration>,
-    /// How often it is looked at.
+    /// Time between two calls of `look`.
     pub look_every: Duration,
 }
 
 impl Default for RunOptions {
-    /// Sleeping, with priority and locked memory if the system grants them, 1 ms, until it is stopped, looked at 20 times a second.
+    /// Returns: sleeping; priority and locked memory if the system grants them; 1 ms of tolerance; no end; 20 looks per second.
     fn default() -> Self {
         Self {
             pacing: Pacing::Sleep,
@@ -65,27 +65,29 @@ impl Default for RunOptions {
     }
 }
 
-/// What may be said to a relay while it runs.
+/// Message to a running relay.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Control {
-    /// A link becomes another one, from when it is heard on.
+    /// Changes the model of a link, from the instant at which the relay reads the message.
     SetLink {
-        /// Its sender.
+        /// Sending node of the link.
         from: NodeId,
-        /// Its receiver.
+        /// Receiving node of the link.
         to: NodeId,
-        /// What it becomes.
+        /// New model of the link.
         model: Box<LinkModel>,
     },
 }
 
-/// A relay whose ports are open: what comes to them waits until it runs.
+/// Relay with open ports. Datagrams that arrive before [`Relay::run`] wait in the kernel.
 #[derive(Debug)]
 pub struct Relay {
     engine: Engine,
     ports: Ports,
+    /// Release error of every datagram handed to the kernel.
     release: Lateness,
+    /// Messages that named a link outside of the network.
     refused_changes: u64,
 }
 
@@ -94,24 +96,26 @@ impl Relay {
     ///
     /// # Errors
     ///
-    /// [`RelayError`] if there is no such relay, if it would send to a port of its own, or if a port cannot be had.
+    /// [`RelayError`] if the configuration is refused, if the relay would send to a port of its own, or if a port cannot be opened.
     pub fn bind(config: RelayConfig, port: EndpointConfig) -> Result<Self, RelayError> {
-        // Before the ports are opened, because a program that has the port already would hide the fault; after it for a port that the system chose.
+        // Checked twice. Before the ports are opened, because another program that holds the port would hide the fault behind an error of `bind`; afterwards,
+        // because port numbers chosen by the system are known only then.
         config.check_targets(&config.ports())?;
         let ports = Ports::open(&config, port)?;
         config.check_targets(&ports.addresses().map(|(_, address)| address).collect::<Vec<_>>())?;
         Ok(Self { engine: Engine::new(config)?, ports, release: Lateness::new(), refused_changes: 0 })
     }
 
-    /// Where it listens: each program's name and the port that stands for it; of a proxy, `listen`.
+    /// Returns the name of each program with the port standing for the program; for a proxy, `listen` with the listening port.
     pub fn ports(&self) -> impl Iterator<Item = (&str, SocketAddr)> {
         self.ports.addresses()
     }
 
-    /// Runs once, in this thread, until `stop` is set (which is looked at as often as `look` is called), or until its end. `control` is looked at without
-    /// waiting; `look` is called from time to time and once at the end, and what it takes makes releases late.
+    /// Runs the relay once, on the calling thread, until `stop` is set or until the end of `options.duration`. `stop` is read after each call of `look`.
+    /// Messages in `control` are read without waiting. `look` is called about every `options.look_every` and once at the end; the time spent in `look` makes
+    /// releases late.
     ///
-    /// The sockets stay open until the relay is dropped: to close those of hundreds of clients can take longer than to make the report.
+    /// The sockets stay open until the relay is dropped: closing the sockets of hundreds of clients can take longer than making the report.
     ///
     /// # Errors
     ///
@@ -132,6 +136,7 @@ impl Relay {
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         let now = clock.now();
+        // The loop may end between two looks, by `options.duration`: the last look shows the state of the report.
         look(&self.view(now));
         Ok(Report {
             elapsed: now.saturating_duration_since(Instant::ZERO),
@@ -148,26 +153,27 @@ impl Relay {
         })
     }
 
+    /// Returns the state that a look may see.
     const fn view(&self, now: Instant) -> View<'_> {
         View { now, engine: &self.engine, release: &self.release }
     }
 }
 
-/// A relay in the middle of its run.
+/// Relay during its run, with the channel of its user and the clock of the run.
 struct Running<'a> {
     relay: &'a mut Relay,
     control: &'a Receiver<Control>,
     clock: MonotonicClock,
 }
 
-/// The kernel is offered again what it did not take, after this time.
+/// Delay until the kernel is offered again a datagram for which the send buffer of a socket had no room.
 const AGAIN: Duration = Duration::from_micros(500);
 
 impl Driven for Running<'_> {
     type Clock = MonotonicClock;
     type Error = io::Error;
 
-    /// To make a release ready takes less than a microsecond once the processor has it at hand. What comes in meanwhile is offered late.
+    /// Making a release ready takes less than a microsecond when the caches are warm. A datagram that arrives during this time is offered late.
     const AHEAD: Option<Duration> = Some(Duration::from_micros(3));
     const RESTS: bool = true;
 
@@ -182,17 +188,20 @@ impl Driven for Running<'_> {
     fn receive(&mut self, now: Instant) -> io::Result<Received> {
         let Relay { engine, ports, .. } = &mut *self.relay;
         let received = ports.receive(engine, &self.clock, now)?;
+        // Sockets of new clients are opened before releases are taken from the engine, because a release names the client's port.
         ports.follow_clients(engine);
         Ok(received)
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
+        // The send buffer of a socket announces no room to this loop, so the loop tries again after a while.
         let again = self.relay.ports.has_waiting().then(|| self.clock.now() + AGAIN);
         self.relay.engine.poll_timeout().into_iter().chain(again).min()
     }
 
     fn handle_timeout(&mut self, now: Instant) -> bool {
         let Relay { engine, ports, refused_changes, .. } = &mut *self.relay;
+        // Messages take effect before the releases of this round.
         while let Ok(Control::SetLink { from, to, model }) = self.control.try_recv() {
             *refused_changes += u64::from(engine.set_link(now, from, to, *model).is_err());
         }

@@ -1,4 +1,5 @@
-//! The sockets of a relay: what they take in goes to the engine, what the engine lets go leaves through them.
+//! Sockets of a relay. Arrived datagrams go from the sockets to the engine, releases go from the engine to the sockets. The fates of datagrams are decided in
+//! the engine alone.
 
 use core::fmt;
 use core::mem::MaybeUninit;
@@ -18,53 +19,63 @@ use super::PortReport;
 use crate::config::{Form, RelayConfig};
 use crate::engine::{Arrival, Engine, Intake, Port};
 
-/// All sockets.
+/// All sockets of a relay.
 pub(super) struct Ports {
-    /// Those of a mesh are its programs'; those of a proxy the one that listens, and then the clients'.
+    /// Sockets, indexed by program in a mesh. In a proxy, index 0 is the listening socket and index n + 1 the socket of the client in slot n. `None`: no client
+    /// has this slot.
     ports: Vec<Option<OpenPort>>,
+    /// Names of the ports, and the address for new sockets of clients.
     layout: Layout,
+    /// Options of every socket.
     config: EndpointConfig,
-    /// Readable when one of them is.
+    /// Epoll instance, readable when at least one socket is readable.
     epoll: OwnedFd,
+    /// Receive buffers, shared by all sockets: only one socket is read at a time.
     buffers: ReceiveBuffers,
-    /// New clients.
+    /// Slots of new clients whose sockets are still to be opened.
     opened: Vec<u32>,
-    /// Those in which something is queued.
+    /// Indices of sockets with queued datagrams. An index is listed at most once: see [`OpenPort::is_dirty`].
     dirty: Vec<usize>,
-    /// What the ports of clients that have left did.
+    /// Counts of the sockets of former clients.
     left: Tally,
-    /// Clients that were sent away because no socket could be had.
+    /// Clients sent away because no socket could be opened.
     without_socket: u64,
 }
 
+/// Open socket with its queue.
 #[derive(Debug)]
 struct OpenPort {
     socket: UdpEndpoint,
-    /// When what waits in it to be sent should leave.
+    /// Instants at which the queued datagrams should have left, one per datagram in the socket's outbox, in the same order.
     departures: VecDeque<Instant>,
+    /// Whether the socket's index is in [`Ports::dirty`].
     is_dirty: bool,
 }
 
+/// Kind of topology.
 #[derive(Debug)]
 enum Layout {
+    /// Names of the programs, indexed by program.
     Mesh(Vec<String>),
+    /// Local address for the sockets of clients, with port number 0.
     Proxy { clients: SocketAddr },
 }
 
+/// Sums over several sockets.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     counts: EndpointCounts,
     kernel_drops: u64,
 }
 
-/// The batches read from one socket before the others, and due departures, have their turn.
+/// Batches read from one socket before other sockets, and due departures, get their turn.
 const BATCHES: usize = 8;
 
-/// The datagrams that leave before arrivals have their turn.
+/// Datagrams taken from the engine before arrivals get their turn.
 const RELEASES: usize = 1024;
 
 impl Ports {
-    /// Opens the ports that are there from the beginning.
+    /// Opens the ports of the beginning: the ports of all programs, or the listening port of a proxy.
     pub(super) fn open(config: &RelayConfig, endpoint: EndpointConfig) -> Result<Self, BindError> {
         let layout = match &config.form {
             Form::Mesh(mesh) => Layout::Mesh(mesh.programs.iter().map(|program| program.name.clone()).collect()),
@@ -72,6 +83,7 @@ impl Ports {
         };
         let nowhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0));
         let failed = |address: SocketAddr| move |error: Errno| BindError { address, source: error.into() };
+        // `BindError` needs an address, but the epoll instance belongs to all sockets.
         let epoll = epoll::create(epoll::CreateFlags::CLOEXEC).map_err(failed(nowhere))?;
         let mut ports = Self {
             ports: Vec::new(),
@@ -90,19 +102,20 @@ impl Ports {
         Ok(ports)
     }
 
-    /// What becomes readable when something has come.
+    /// Returns a file descriptor, readable when a datagram waits at any socket.
     pub(super) fn readable(&self) -> BorrowedFd<'_> {
         self.epoll.as_fd()
     }
 
-    /// Hands to the engine what has come in by `now`, the time of the clock, and later. Returns up to when all has been handed on: time must not be let pass
-    /// beyond, or what came earlier would be late.
+    /// Hands to the engine the datagrams that have arrived by `now`, the present time of `clock`, and possibly later ones. Returns the instant up to which
+    /// every arrived datagram was handed on. The caller must not let logical time pass that instant: a datagram that is still unread would be offered late.
     pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock, now: Instant) -> io::Result<Received> {
         let mut heard = Received { count: 0, until: now };
+        // A proxy without clients has one socket, and needs no call of epoll.
         if self.ports.len() == 1 {
             self.receive_at(0, engine, clock, &mut heard)?;
         } else {
-            // Asking the kernel which of them have something costs less than asking two of them.
+            // One call of epoll tells which sockets are readable. Without epoll, every socket would need a call of its own.
             let mut events = [MaybeUninit::uninit(); 64];
             let ready = match epoll::wait(&self.epoll, &mut events, Some(&Timespec::default())) {
                 Ok((ready, _)) => &*ready,
@@ -114,12 +127,15 @@ impl Ports {
                 self.receive_at(place, engine, clock, &mut heard)?;
             }
         }
+        // Datagrams of several sockets are offered together, because the engine sorts them by arrival.
         if heard.count > 0 {
             engine.offer_staged();
         }
         Ok(heard)
     }
 
+    /// Reads up to [`BATCHES`] batches from one socket and stages their datagrams in the engine. An index without a socket reads nothing: a client may have
+    /// left.
     fn receive_at(&mut self, place: usize, engine: &mut Engine, clock: &MonotonicClock, heard: &mut Received) -> io::Result<()> {
         let Some(Some(open)) = self.ports.get_mut(place) else { return Ok(()) };
         let port = match (&self.layout, u32::try_from(place).unwrap_or(u32::MAX)) {
@@ -137,18 +153,19 @@ impl Ports {
                 }
             })?;
             heard.count += count;
+            // A batch that is not full has emptied the socket.
             if count < UdpEndpoint::BATCH {
                 break;
             }
             if batch == BATCHES {
-                // There may be more, which came after this one.
+                // The bound ended the reading, not an empty socket. Unread datagrams of this socket arrived no earlier than `last`.
                 heard.until = last.map_or(heard.until, |last| last.min(heard.until));
             }
         }
         Ok(())
     }
 
-    /// Closes the ports of clients that have left, and opens those of clients that have come.
+    /// Closes the sockets of former clients, then opens sockets for new clients.
     #[inline]
     pub(super) fn follow_clients(&mut self, engine: &mut Engine) {
         if let Layout::Proxy { clients } = self.layout {
@@ -156,7 +173,9 @@ impl Ports {
         }
     }
 
+    /// Does the work of [`Ports::follow_clients`] for a proxy.
     fn follow(&mut self, engine: &mut Engine, clients: SocketAddr) {
+        // Closing comes first: a slot that was freed and given to a new client at once is in both lists.
         while let Some(slot) = engine.poll_closed() {
             if let Some(port) = self.ports.get_mut(slot as usize + 1).and_then(Option::take) {
                 self.left.add(&port.socket);
@@ -164,16 +183,19 @@ impl Ports {
         }
         while let Some(slot) = self.opened.pop() {
             if self.open_at(slot as usize + 1, clients).is_err() {
+                // Usually the limit of file descriptors is reached. The relay goes on with the other clients.
                 self.without_socket += 1;
                 engine.close_client(slot);
             }
         }
     }
 
+    /// Opens a socket and puts it at the index `place`, which also becomes its number in epoll.
     fn open_at(&mut self, place: usize, address: SocketAddr) -> Result<(), BindError> {
         let socket = UdpEndpoint::bind(address, self.config)?;
         epoll::add(&self.epoll, &socket, epoll::EventData::new_u64(place as u64), epoll::EventFlags::IN)
             .map_err(|error| BindError { address, source: error.into() })?;
+        // Slots of clients that have no socket yet stay empty.
         while self.ports.len() <= place {
             self.ports.push(None);
         }
@@ -181,7 +203,7 @@ impl Ports {
         Ok(())
     }
 
-    /// Takes from the engine what leaves now, and says whether there is more.
+    /// Queues the datagrams that leave now in their sockets. Returns whether the bound [`RELEASES`] ended the taking, so that more may be left.
     #[inline]
     pub(super) fn take_releases(&mut self, engine: &mut Engine) -> bool {
         for _ in 0..RELEASES {
@@ -191,10 +213,11 @@ impl Ports {
                 Port::Listen => 0,
                 Port::Client(slot) => slot as usize + 1,
             };
-            // Always there: clients without a socket have been sent away.
+            // The socket exists: the engine forgets a client without a socket, and releases nothing for a forgotten client.
             let Some(Some(port)) = self.ports.get_mut(place) else { continue };
+            // A full outbox drops and counts the datagram: then it has no departure either.
             if port.socket.queue(release.to, release.bytes, release.ecn) {
-                // When it should have left had it been offered when it came.
+                // The datagram should have left at this instant, had it been offered on its arrival.
                 let late = u64::try_from(release.late.as_nanos()).unwrap_or(u64::MAX);
                 port.departures.push_back(Instant::from_nanos(release.at.as_nanos().saturating_sub(late)));
                 if !core::mem::replace(&mut port.is_dirty, true) {
@@ -205,13 +228,15 @@ impl Ports {
         true
     }
 
-    /// Sends what was taken, and records how late each is: the time before the call of the kernel, less when it should leave. A datagram that was offered
-    /// to its link later than it came is that much later, too.
+    /// Sends the queued datagrams and records how late each one is: the time of the clock before the call of the kernel, less the instant when the datagram
+    /// should have left. A late offer to the link counts as lateness, too.
     #[inline]
     pub(super) fn send(&mut self, clock: &MonotonicClock, lateness: &mut Lateness) {
         let ports = &mut self.ports;
         self.dirty.retain(|place| {
+            // A socket is missing if its client has left; datagrams still queued there were dropped with the socket.
             let Some(Some(OpenPort { socket, departures, is_dirty })) = ports.get_mut(*place) else { return false };
+            // `count` datagrams were sent or given up, in the order of the queue, so their instants are the first ones.
             socket.flush_with(
                 || clock.now(),
                 |before, count| departures.drain(..count.min(departures.len())).for_each(|at| lateness.record(before.saturating_duration_since(at))),
@@ -221,12 +246,12 @@ impl Ports {
         });
     }
 
-    /// Whether the kernel did not take all that should leave.
+    /// Returns whether queued datagrams wait because the kernel had no room.
     pub(super) fn has_waiting(&self) -> bool {
         !self.dirty.is_empty()
     }
 
-    /// Each port that stands for a program, or that listens, with its name.
+    /// Returns name and address of each port standing for a program, or of the listening port.
     pub(super) fn addresses(&self) -> impl Iterator<Item = (&str, SocketAddr)> {
         let count = match &self.layout {
             Layout::Mesh(names) => names.len(),
@@ -240,12 +265,12 @@ impl Ports {
         ports.filter_map(move |(place, port)| Some((name(place), port.as_ref()?.socket.local_address())))
     }
 
-    /// Clients that were sent away because no socket could be had.
+    /// Returns the number of clients sent away because no socket could be opened.
     pub(super) const fn without_socket(&self) -> u64 {
         self.without_socket
     }
 
-    /// What each port did; those of all clients together.
+    /// Returns the counts of each port. The ports of all clients, past and present, are one entry.
     pub(super) fn report(&self) -> Vec<PortReport> {
         let mut ports: Vec<PortReport> = Vec::new();
         for (place, (name, address)) in self.addresses().enumerate() {
@@ -260,6 +285,7 @@ impl Ports {
             }
         }
         if let Layout::Proxy { .. } = self.layout {
+            // Clients that have left are in the sums already; the socket at index 0 is the listening one.
             let mut tally = self.left;
             self.ports.iter().skip(1).flatten().for_each(|port| tally.add(&port.socket));
             let granted = self.ports.iter().skip(1).flatten().map(|port| port.socket.granted_receive_buffer()).min();
@@ -300,7 +326,7 @@ impl Tally {
     }
 }
 
-/// A free port from which that address can be reached; on loopback nobody else reaches it.
+/// Returns a local address, with port number 0, from which `to` can be reached. For a loopback target it is a loopback address, which no other machine reaches.
 fn beside(to: SocketAddr) -> SocketAddr {
     match (to.is_ipv6(), to.ip().is_loopback()) {
         (true, true) => (Ipv6Addr::LOCALHOST, 0).into(),
@@ -320,7 +346,7 @@ mod tests {
     use super::*;
     use crate::{Limits, Mesh, Program, Proxy};
 
-    /// A client for which no port can be had is forgotten and counted; the next one is not harmed.
+    /// A client whose port cannot be opened is forgotten and counted; the next client is not harmed.
     #[test]
     fn a_client_without_a_port_is_sent_away_and_counted() {
         let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
@@ -328,7 +354,7 @@ mod tests {
         let proxy = Proxy { listen: here, to: SocketAddr::from((Ipv4Addr::LOCALHOST, 9)), forth: link.clone(), back: link, most_clients: 2 };
         let config = RelayConfig { seed: 0, form: Form::Proxy(proxy), limits: Limits::default(), changes: Vec::new() };
         let (mut ports, mut engine) = (Ports::open(&config, EndpointConfig::default()).unwrap(), Engine::new(config).unwrap());
-        // Somebody has it.
+        // The address of this socket is taken, so that opening a port there fails.
         let taken = std::net::UdpSocket::bind(here).unwrap();
         for (clients, expected) in [(taken.local_addr().unwrap(), (0, 1)), (here, (1, 1))] {
             ports.layout = Layout::Proxy { clients };
@@ -341,7 +367,7 @@ mod tests {
         }
     }
 
-    /// A datagram offered to its link later than it came leaves that much later than it should, however soon it is sent then.
+    /// A datagram offered to its link later than it arrived is recorded as late by the same time, even if it is sent at once.
     #[test]
     fn what_was_offered_late_is_released_late() {
         let [left, right] = [SocketAddr::from((Ipv4Addr::LOCALHOST, 9)), SocketAddr::from((Ipv4Addr::LOCALHOST, 10))];

@@ -1,4 +1,4 @@
-//! What a relay says of itself, while it runs and at its end.
+//! Views of a running relay, and the report at the end of the run.
 
 use core::time::Duration;
 use std::net::SocketAddr;
@@ -10,62 +10,63 @@ use cohaptic_wan::{LinkStats, NodeId};
 
 use crate::engine::{Engine, IntakeCounts, LinkCounts};
 
-/// What a relay did, at its end.
+/// Report of a finished run.
 #[derive(Debug)]
 pub struct Report {
-    /// How long it ran.
+    /// Length of the run.
     pub elapsed: Duration,
-    /// What the system granted the thread.
+    /// Requests of the thread, granted or refused by the system.
     pub prepared: Prepared,
-    /// Each directed link, by sender and then by receiver.
+    /// Directed links, ordered by sender and then by receiver.
     pub links: Vec<LinkReport>,
-    /// Each port; of a proxy, the one that listens, and those of all clients together.
+    /// Ports, in the order of the programs. For a proxy: the listening port, then one entry for the ports of all clients.
     pub ports: Vec<PortReport>,
-    /// What came in.
+    /// Counters of arrived datagrams.
     pub intake: IntakeCounts,
-    /// How late each datagram was handed to the kernel: the release error. It includes the share in `clamped`.
+    /// Release error: time from the due departure of a datagram to the call of the kernel, for each datagram handed to the kernel. Includes the share in
+    /// `clamped`.
     pub release: Lateness,
-    /// By how much datagrams were offered later than they came, of those that were.
+    /// Time by which datagrams were offered later than they arrived, of late datagrams only.
     pub clamped: Lateness,
-    /// Still on their way at the end.
+    /// Datagrams in flight at the end, and their payload bytes.
     pub held: (u64, Bytes),
-    /// Clients that were sent away because no socket could be had.
+    /// Clients sent away because no socket could be opened.
     pub without_socket: u64,
-    /// Changes of links that are not there.
+    /// Requested changes of links that do not exist.
     pub refused_changes: u64,
-    /// Whether what left was as late as tolerated.
+    /// Verdict on the release error, by the tolerance of the run.
     pub validity: Validity,
 }
 
-/// What one directed link did.
+/// Counters of one directed link.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LinkReport {
-    /// The name of its sender.
+    /// Name of the sender.
     pub from: String,
-    /// The name of its receiver.
+    /// Name of the receiver.
     pub to: String,
-    /// What the link counts: offered, delivered, dropped by cause, delay.
+    /// Counters and delays kept by the link: offered, delivered, dropped by cause.
     pub stats: LinkStats,
-    /// What the relay counts besides.
+    /// Counters kept by the relay.
     pub counts: LinkCounts,
 }
 
-/// What one port did.
+/// Counters of one port.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct PortReport {
-    /// The name of its program; `listen` and `clients` for a proxy.
+    /// Name of the program; `listen` and `clients` for a proxy.
     pub name: String,
-    /// Where it is; `None` for the ports of clients.
+    /// Local address; `None` for the ports of clients.
     pub address: Option<SocketAddr>,
-    /// What it received and sent, and what it did not.
+    /// Datagrams received, sent and lost at the socket.
     pub counts: EndpointCounts,
-    /// How many bytes may wait in the kernel to be read, as the kernel counts them.
+    /// Size of the receive buffer in the kernel, in the kernel's own count \[bytes\]; the smallest one of the ports of clients.
     pub receive_buffer: usize,
-    /// Datagrams that the kernel dropped because that was full; `None` if the system does not tell.
+    /// Datagrams dropped by the kernel because the receive buffer was full; `None` if the system does not tell.
     pub kernel_drops: Option<u64>,
 }
 
-/// How things stand, while a relay runs.
+/// State of a running relay.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     pub(super) now: Instant,
@@ -74,59 +75,61 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// The logical time.
+    /// Returns the time of the relay's clock at this look.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
     }
 
-    /// Each directed link, by sender and then by receiver. A mesh of N programs has N·(N−1): look at them as often as that allows.
+    /// Returns the counters of each directed link, ordered by sender and then by receiver. A mesh of N programs has N·(N−1) links, and the list is made anew on
+    /// each call.
     #[must_use]
     pub fn links(&self) -> Vec<LinkReport> {
         links(self.engine)
     }
 
-    /// The delays of the latest datagrams that came out of a link, in no order: of 128 at most.
+    /// Returns the delays of the latest datagrams delivered by a link, at most 128, in no particular order.
     #[must_use]
     pub fn recent_delays(&self, from: NodeId, to: NodeId) -> &[Duration] {
         self.engine.recent_delays(from, to)
     }
 
-    /// What came in.
+    /// Returns the counters of arrived datagrams.
     #[must_use]
     pub const fn intake(&self) -> &IntakeCounts {
         self.engine.counts()
     }
 
-    /// The release error so far.
+    /// Returns the release error so far.
     #[must_use]
     pub const fn release(&self) -> &Lateness {
         self.release
     }
 
-    /// How many datagrams are on their way, and how many bytes.
+    /// Returns the number of datagrams in flight, and their payload bytes.
     #[must_use]
     pub fn held(&self) -> (u64, Bytes) {
         self.engine.held()
     }
 
-    /// How many clients there are; for a mesh, none.
+    /// Returns the number of clients; zero for a mesh.
     #[must_use]
     pub fn clients(&self) -> usize {
         self.engine.clients()
     }
 
-    /// Where a program is, if that is known; `None` for a proxy.
+    /// Returns the address of a program, or `None` if the address is not known or the relay is a proxy.
     #[must_use]
     pub fn program_address(&self, program: NodeId) -> Option<SocketAddr> {
         self.engine.program_address(program)
     }
 }
 
-/// What every link did.
+/// Returns the counters of every link of the network, ordered by sender and then by receiver.
 pub(super) fn links(engine: &Engine) -> Vec<LinkReport> {
     let nodes = || (0..).map(NodeId).zip(engine.names());
     let pairs = nodes().flat_map(|from| nodes().map(move |to| (from, to))).filter(|((from, _), (to, _))| from != to);
+    // Every pair has a link, so `?` leaves no pair out.
     let report = |((from, from_name), (to, to_name)): ((NodeId, &String), (NodeId, &String))| {
         let (stats, counts) = engine.link_stats(from, to)?;
         Some(LinkReport { from: from_name.clone(), to: to_name.clone(), stats, counts })
