@@ -1,4 +1,4 @@
-//! The clock: nanoseconds since the run began, and a way to wait for them.
+//! The clock of a run: nanoseconds since the run began, waiting for an instant, and the conversion of the kernel's time stamps.
 
 use std::io;
 use std::os::fd::BorrowedFd;
@@ -10,38 +10,38 @@ use rustix::io::Errno;
 use rustix::thread::clock_nanosleep_absolute;
 use rustix::time::{ClockId, clock_gettime};
 
-/// Tells the time of a run and waits for it. The wall clock is [`MonotonicClock`]; a test has one of its own.
+/// Source of the time of a run, with a way to wait. The wall clock is [`MonotonicClock`]; tests have clocks of their own.
 pub trait Clock {
-    /// The time since the run began.
+    /// Returns the time since the run began.
     fn now(&self) -> Instant;
 
-    /// Blocks until `until` (`None`: for ever), or until one of `readable` can be read, and says whether one can. It may come back early.
+    /// Blocks until `until` (`None`: for ever), or until one of `readable` can be read. Returns whether one can be read. Can return early.
     ///
     /// # Errors
     ///
-    /// What the system says, but for interruption by a signal, which is coming back early.
+    /// The error of the system. Interruption by a signal is no error, but an early return.
     fn block(&self, until: Option<Instant>, readable: &[BorrowedFd<'_>]) -> io::Result<bool>;
 }
 
-/// `CLOCK_MONOTONIC`, counted from the start of the run. No step of the time of day moves it.
+/// `CLOCK_MONOTONIC`, counted from the start of the run. Setting the time of day does not move this clock.
 #[derive(Clone, Copy, Debug)]
 pub struct MonotonicClock {
-    /// `CLOCK_MONOTONIC` at [`Instant::ZERO`] \[ns\].
+    /// Reading of `CLOCK_MONOTONIC` at [`Instant::ZERO`] \[ns\].
     origin: u64,
 }
 
-/// A wait with sockets that is longer than this is cut in two. The kernel adds a slack of a thousandth of the time-out to the waits of `ppoll` (0.1 %,
-/// `select_estimate_accuracy`), 24 µs for the delay of a link; for the last piece it is at most a microsecond.
+/// Last piece of a long wait for sockets. A wait of more than twice this length is cut into two, because the kernel adds a slack of 0.1 % of the time-out to a
+/// wait of `ppoll` (`select_estimate_accuracy`): 24 µs for a delay of 24 ms, but at most a microsecond for the last piece.
 const LAST_PIECE: Duration = Duration::from_millis(1);
 
 impl MonotonicClock {
-    /// A clock that shows zero now.
+    /// Returns a clock that shows zero now.
     #[must_use]
     pub fn start() -> Self {
         Self { origin: nanos(clock_gettime(ClockId::Monotonic)) }
     }
 
-    /// Both clocks now, to place the time stamps of the kernel.
+    /// Reads the clock of the run and the time of day together, for the conversion of the kernel's time stamps.
     #[must_use]
     pub fn stamps(&self) -> KernelStamps {
         let unix = clock_gettime(ClockId::Realtime);
@@ -58,7 +58,7 @@ impl Clock for MonotonicClock {
     fn block(&self, until: Option<Instant>, readable: &[BorrowedFd<'_>]) -> io::Result<bool> {
         match until {
             Some(until) if readable.is_empty() => {
-                // Absolute: whatever happens between reading the clock and this call costs nothing.
+                // The wait is absolute: time that passes between reading the clock and this call does not lengthen the wait.
                 let at = self.origin.saturating_add(until.as_nanos());
                 match clock_nanosleep_absolute(ClockId::Monotonic, &timespec(Duration::from_nanos(at))) {
                     Ok(()) | Err(Errno::INTR) => Ok(false),
@@ -66,6 +66,7 @@ impl Clock for MonotonicClock {
                 }
             }
             until => {
+                // `ppoll` waits for a span, not until an instant. The caller of a cut wait sees an early return and waits again.
                 let timeout = until.map(|until| piece(until.saturating_duration_since(self.now())));
                 let mut waited: Vec<PollFd<'_>> = readable.iter().map(|fd| PollFd::from_borrowed_fd(*fd, PollFlags::IN)).collect();
                 match poll(&mut waited, timeout.map(timespec).as_ref()) {
@@ -78,27 +79,29 @@ impl Clock for MonotonicClock {
     }
 }
 
-/// How long to wait at once, of a wait that is that long.
+/// Returns the length of the next piece of a wait of length `span`.
 fn piece(span: Duration) -> Duration {
     if span > LAST_PIECE * 2 { span - LAST_PIECE } else { span }
 }
 
-/// The clock of the run and the time of day at one moment.
+/// Readings of the clock of the run and of the time of day at the same moment.
 ///
-/// The kernel notes when a datagram came in, but by the time of day. The difference between the two clocks places it in the run, whenever the program gets
-/// round to reading it.
+/// The kernel stamps each arriving datagram with the time of day. The difference between the two readings converts the stamp to an instant of the run,
+/// independent of when the program reads the datagram.
 #[derive(Clone, Copy, Debug)]
 pub struct KernelStamps {
+    /// Reading of the clock of the run.
     now: Instant,
+    /// Reading of the time of day, since 1970-01-01.
     unix: Duration,
 }
 
-/// A stamp that is older than this when it is read is not believed: the time of day was stepped.
+/// Age up to which a stamp is believed. An older stamp means that the time of day was set in between.
 const OLDEST: Duration = Duration::from_secs(1);
 
 impl KernelStamps {
-    /// The instant of the run at which the time of day was `stamp`; now if there is no stamp, or if it lies in the future or more than a second back, which
-    /// happens when the time of day is set.
+    /// Returns the instant of the run at which the time of day was `stamp`. Returns the present instant if `stamp` is `None`, lies in the future, or is more
+    /// than a second old; the last two happen when the time of day is set.
     #[must_use]
     pub fn instant(&self, stamp: Option<Duration>) -> Instant {
         let age = stamp.and_then(|stamp| self.unix.checked_sub(stamp)).filter(|age| *age <= OLDEST);
@@ -108,28 +111,31 @@ impl KernelStamps {
         }
     }
 
-    /// When both clocks were read.
+    /// Returns the instant at which both clocks were read.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
     }
 }
 
-/// The order in which the datagrams of one socket came in.
+/// Keeps the arrival instants of one socket in the order of the datagrams.
 #[derive(Debug)]
 pub(crate) struct ArrivalOrder {
+    /// Latest instant given so far.
     latest: Instant,
 }
 
 impl ArrivalOrder {
-    /// Before the first datagram.
+    /// State before the first datagram.
     pub(crate) const NEW: Self = Self { latest: Instant::ZERO };
 
-    /// Puts the instants of the next datagrams, which came in that order, in order: none is later than one behind it, nor earlier than the last one of those before.
+    /// Corrects the instants of the next datagrams of a socket, given in the order of arrival. Afterwards no instant is later than the instant of a following
+    /// datagram in `arrivals`, and none is earlier than the last instant of the previous call.
     pub(crate) fn put_in_order(&mut self, arrivals: &mut [Instant]) {
         let Some(last) = arrivals.last().copied() else { return };
         let (mut earliest_behind, before) = (last, self.latest);
         self.latest = last.max(before);
+        // From the last to the first: an instant that is too late is lowered to the earliest instant among the datagrams after it.
         for arrival in arrivals.iter_mut().rev() {
             earliest_behind = earliest_behind.min(*arrival);
             *arrival = earliest_behind.max(before);
@@ -137,12 +143,14 @@ impl ArrivalOrder {
     }
 }
 
+/// Converts a reading of a clock to nanoseconds.
 fn nanos(time: Timespec) -> u64 {
-    // Neither clock is negative, and both fit: 584 years of nanoseconds.
+    // Neither clock is negative, and 64 bits hold 584 years of nanoseconds.
     let (seconds, nanos) = (u64::try_from(time.tv_sec).unwrap_or(0), u64::try_from(time.tv_nsec).unwrap_or(0));
     seconds.saturating_mul(1_000_000_000).saturating_add(nanos)
 }
 
+/// Converts a span for the kernel. A span beyond the range of the kernel becomes the longest one.
 fn timespec(span: Duration) -> Timespec {
     Timespec { tv_sec: i64::try_from(span.as_secs()).unwrap_or(i64::MAX), tv_nsec: i64::from(span.subsec_nanos()) }
 }
@@ -157,9 +165,9 @@ mod tests {
         let back = |span: Duration| stamps.instant(Some(stamps.unix - span));
         assert_eq!(back(Duration::ZERO), stamps.now);
         assert_eq!(back(Duration::from_micros(300)), Instant::from_nanos(4_700_000));
-        // Before the run began there is no instant: what waited in the socket came at its beginning.
+        // The datagram waited in the socket before the run began, so it counts from the beginning of the run.
         assert_eq!(back(Duration::from_millis(6)), Instant::ZERO);
-        // The time of day was set in between.
+        // The time of day was set between stamp and reading.
         assert_eq!(back(Duration::from_secs(2)), stamps.now);
         assert_eq!(stamps.instant(Some(stamps.unix + Duration::from_nanos(1))), stamps.now);
         assert_eq!(stamps.instant(None), stamps.now);
@@ -174,9 +182,9 @@ mod tests {
             instants.into_iter().map(Instant::as_nanos).collect::<Vec<u64>>()
         };
         assert_eq!(ordered(&[3, 5, 5, 9]), [3, 5, 5, 9]);
-        // Two were stamped when they were read, at 20, before the kernel stamped those of 10 and 12.
+        // The first two were stamped when they were read, at 20, before the kernel stamped the other two at 10 and 12.
         assert_eq!(ordered(&[20, 20, 10, 12]), [10, 10, 10, 12]);
-        // All of this batch were stamped when they were read, and those of the next ones had come by then.
+        // The whole batch was stamped when it was read. The datagrams of the following batches had arrived by then.
         assert_eq!(ordered(&[25, 25]), [25, 25]);
         assert_eq!(ordered(&[]), []);
         assert_eq!(ordered(&[22, 24, 26]), [25, 25, 26]);

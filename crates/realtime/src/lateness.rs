@@ -1,4 +1,4 @@
-//! How late things were: a histogram of high dynamic range; and when a run in real time counts.
+//! Lateness of events as a histogram, and the verdict on a run in real time.
 
 use core::fmt;
 use std::time::Duration;
@@ -6,16 +6,19 @@ use std::time::Duration;
 use cohaptic_units::print::Span;
 use hdrhistogram::Histogram;
 
-/// How late each tick or packet was.
+/// Distribution of the lateness of ticks or packets.
 ///
-/// A histogram with three significant digits from a nanosecond to an hour (later counts as an hour): 190 kB, and recording allocates nothing.
+/// Histogram with three significant digits from a nanosecond to an hour; more than an hour counts as an hour. The histogram takes 190 kB, and recording
+/// allocates nothing.
 #[derive(Clone, Debug)]
 pub struct Lateness {
+    /// Counts by lateness \[ns\].
     nanos: Histogram<u64>,
+    /// Sum of all recorded values, without the bound of an hour.
     sum: Duration,
 }
 
-/// An hour \[ns\].
+/// Greatest value of the histogram: an hour \[ns\].
 const MOST: u64 = 3_600_000_000_000;
 
 impl Default for Lateness {
@@ -25,47 +28,48 @@ impl Default for Lateness {
 }
 
 impl Lateness {
-    /// Nothing recorded.
+    /// Returns an empty distribution.
     #[must_use]
     #[expect(clippy::missing_panics_doc, reason = "the bounds are constants that the histogram takes")]
     pub fn new() -> Self {
         Self { nanos: Histogram::new_with_bounds(1, MOST, 3).expect("three digits from one nanosecond to an hour can be had"), sum: Duration::ZERO }
     }
 
-    /// One thing was that late. On time is zero.
+    /// Records the lateness of one event; zero if the event was on time.
     #[inline]
     pub fn record(&mut self, lateness: Duration) {
         self.sum = self.sum.saturating_add(lateness);
+        // Clamped first: the histogram refuses values above its bound.
         self.nanos.saturating_record(u64::try_from(lateness.as_nanos()).unwrap_or(MOST).min(MOST));
     }
 
-    /// Adds what another one has recorded.
+    /// Adds all values of another distribution.
     #[expect(clippy::missing_panics_doc, reason = "all have the same bounds")]
     pub fn merge(&mut self, other: &Self) {
         self.sum = self.sum.saturating_add(other.sum);
         self.nanos.add(&other.nanos).expect("all histograms of lateness have the same bounds");
     }
 
-    /// How many were recorded.
+    /// Returns the number of recorded values.
     #[must_use]
     pub fn count(&self) -> u64 {
         self.nanos.len()
     }
 
-    /// How many were later than `limit`, to three digits of `limit`.
+    /// Returns the number of values above `limit`. Values within the third digit of `limit` may count as equal.
     #[must_use]
     pub fn count_later_than(&self, limit: Duration) -> u64 {
         let limit = u64::try_from(limit.as_nanos()).unwrap_or(MOST).min(MOST);
         self.nanos.len() - self.nanos.count_between(0, limit)
     }
 
-    /// The lateness that a share of all, from 0 to 1, does not exceed; zero if nothing was recorded.
+    /// Returns the lateness that the share `share` of all values, from 0 to 1, does not exceed; zero if nothing was recorded.
     #[must_use]
     pub fn quantile(&self, share: f64) -> Duration {
         Duration::from_nanos(self.nanos.value_at_quantile(share))
     }
 
-    /// The usual quantiles.
+    /// Returns count, sum, maximum and the usual quantiles.
     #[must_use]
     pub fn summary(&self) -> LatenessSummary {
         LatenessSummary {
@@ -78,67 +82,67 @@ impl Lateness {
         }
     }
 
-    /// Every value that was recorded, to three digits, with how often: from the least late on.
+    /// Returns each distinct value, to three digits, with its count, in increasing order.
     pub fn recorded(&self) -> impl Iterator<Item = (Duration, u64)> + '_ {
         self.nanos.iter_recorded().map(|step| (Duration::from_nanos(step.value_iterated_to()), step.count_at_value()))
     }
 }
 
-/// The usual quantiles of a [`Lateness`]; all zero if nothing was recorded.
+/// Usual quantiles of a [`Lateness`]; all zero if nothing was recorded.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct LatenessSummary {
-    /// How many were recorded.
+    /// Number of recorded values.
     pub count: u64,
-    /// How late they were together.
+    /// Sum of all values.
     pub sum: Duration,
-    /// The median.
+    /// Median.
     pub p50: Duration,
-    /// 99 of 100 were at most that late.
+    /// Lateness that 99 of 100 values do not exceed.
     pub p99: Duration,
-    /// 999 of 1000 were at most that late.
+    /// Lateness that 999 of 1000 values do not exceed.
     pub p999: Duration,
-    /// The latest.
+    /// Greatest value.
     pub max: Duration,
 }
 
-/// How late things may be for a run to be valid: no more than one in a thousand later than `limit`, or a single one.
+/// Limit of lateness for a valid run: at most one in a thousand values, or a single value, may exceed `limit`.
 ///
-/// One in a thousand and not none, because on a system that does other things too the worst of a million wake-ups says more about that system than
-/// about the run; the worst is reported all the same.
+/// The rule allows one in a thousand, because on a system with other work the worst of a million wake-ups says more about the system than about the run. The
+/// greatest value is reported all the same.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Tolerance {
-    /// Later than this is late.
+    /// Lateness from which on an event counts as late.
     pub limit: Duration,
 }
 
-/// Whether a run counts.
+/// Verdict on a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Validity {
-    /// It was on time.
+    /// The run was on time.
     Valid,
-    /// It was not: what it showed is not what was asked for.
+    /// The run was too late too often: the network or scene shown is not the configured one.
     NotValid {
-        /// The number of things that were late,
+        /// Number of late events.
         late: u64,
-        /// of this number,
+        /// Number of all events.
         of: u64,
-        /// by more than this.
+        /// Limit of the tolerance, see [`Tolerance::limit`].
         limit: Duration,
     },
 }
 
 impl Tolerance {
-    /// Judges what was recorded.
+    /// Judges a distribution.
     #[must_use]
     pub fn judge(&self, lateness: &Lateness) -> Validity {
         let (late, of) = (lateness.count_later_than(self.limit), lateness.count());
-        // A single late one of a few is no fault of a short run: it must be more than one.
+        // A single late event among fewer than a thousand is no fault of a short run.
         if late > 1 && late > of / 1000 { Validity::NotValid { late, of, limit: self.limit } } else { Validity::Valid }
     }
 }
 
 impl Validity {
-    /// Whether the run counts.
+    /// Returns whether the run is valid.
     #[must_use]
     pub const fn is_valid(&self) -> bool {
         matches!(self, Self::Valid)

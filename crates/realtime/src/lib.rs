@@ -1,10 +1,11 @@
 //! Logical time driven by the wall clock.
 //!
-//! Use this crate if a state machine of yours must act on time by the wall clock. It needs Linux.
+//! Use this crate if a state machine of yours must act on time by the wall clock. The crate needs Linux.
 //!
-//! The state machines of this project are told the time. In virtual time a loop tells them; here a [`Clock`] does, and a [`Pacer`] waits until they want to
-//! be called. [`drive()`] is the whole loop: it reads sockets, tells the time, sends and waits. What they are told is always the instant at which a thing was due, never the one at which the program got round to it: a late wake-up makes
-//! one thing late and nothing after it. By how much is recorded ([`Lateness`]), and beyond a [`Tolerance`] a run says of itself that it was not valid.
+//! The state machines of this project do not read a clock; a caller tells them the time. In virtual time the caller is a loop. In real time a [`Clock`] gives
+//! the time, a [`Pacer`] waits for the next deadline, and [`drive`] is the whole loop: it reads sockets, tells the time, sends and waits. A state machine is
+//! always told the instant at which an event was due, never the instant at which the program was ready: a late wake-up makes one event late, and nothing after
+//! the event. The lateness is recorded ([`Lateness`]). A run with more lateness than its [`Tolerance`] reports itself as not valid.
 //!
 //! ```text
 //!            due                     woken
@@ -13,8 +14,8 @@
 //!   handle_timeout(due)         (not handle_timeout(woken))
 //! ```
 //!
-//! [`prepare_thread`] asks the system for what helps: no timer slack, `SCHED_FIFO`, locked memory; each is granted or refused with a plain message.
-//! [`udp`] has sockets that know when each datagram came in. This crate knows nothing of links, peers, or the content of a datagram.
+//! [`prepare_thread`] asks the system for help: no timer slack, `SCHED_FIFO`, locked memory. Each request is granted, or refused with a plain message. [`udp`]
+//! has sockets that record the arrival of each datagram. The crate knows nothing of links, peers, or the content of datagrams.
 //!
 //! ```
 //! use std::time::Duration;

@@ -1,4 +1,4 @@
-//! Waiting for a deadline: sleep until shortly before it, and spin the last of it.
+//! Waiting for a deadline: the thread sleeps until shortly before the deadline and spins for the rest.
 
 use std::io;
 use std::os::fd::BorrowedFd;
@@ -8,29 +8,29 @@ use cohaptic_units::Instant;
 
 use crate::Clock;
 
-/// How to wait.
+/// Way of waiting.
 ///
-/// Either way the system is asked for the thread before the deadline, by a *margin* that follows how late it woke the thread of late. The rest of the margin is waited
-/// out with the clock in view and the processor's pause instruction, where it has one.
+/// In both ways the thread asks the system to be woken before the deadline, earlier by a *margin*. The margin follows the lateness of recent wake-ups. After
+/// the wake-up the thread watches the clock until the deadline, with the processor's pause instruction if there is one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Pacing {
-    /// As early as three of four wake-ups were late at most, to a microsecond, and never more than 100 µs: most deadlines are met to the microsecond, for some
-    /// microseconds of processor time each. The first margin is zero.
+    /// The margin is the lateness, to a microsecond, that three of four wake-ups do not exceed, but at most 100 µs. Most deadlines are met to the microsecond,
+    /// for some microseconds of processor time each. The first margin is zero.
     #[default]
     Sleep,
-    /// As early as 98 of 100 wake-ups were late at most: well below a microsecond late as long as the thread is not moved aside, for a core that is busy during the
-    /// margin.
+    /// The margin is the lateness that 98 of 100 wake-ups do not exceed. Deadlines are met to well below a microsecond unless another thread takes the core. A
+    /// core is busy during the margin.
     Spin {
-        /// The longest margin, which is that of the first wake-ups.
+        /// Longest margin, and the margin of the first wake-up.
         margin: Duration,
     },
 }
 
 impl Pacing {
-    /// Spins long enough for an ordinary machine: 99 % of its wake-ups are less than 100 µs late.
+    /// Spins long enough for an ordinary machine, on which 99 % of the wake-ups are less than 100 µs late.
     pub const SPIN: Self = Self::Spin { margin: Duration::from_micros(120) };
 
-    /// The longest margin.
+    /// Returns the longest margin.
     const fn most(self) -> Duration {
         match self {
             Self::Sleep => Duration::from_micros(100),
@@ -38,7 +38,8 @@ impl Pacing {
         }
     }
 
-    /// The margin while nothing is known, and the number of wake-ups that are thought to have been later than any that is counted.
+    /// Returns the margin before the first wake-up, and the number of imagined wake-ups later than every step. The imagined wake-up of `Spin` keeps the margin
+    /// at its longest until enough real wake-ups outweigh it.
     const fn first(self) -> (Duration, u32) {
         match self {
             Self::Sleep => (Duration::ZERO, 0),
@@ -46,7 +47,7 @@ impl Pacing {
         }
     }
 
-    /// Of 100 wake-ups, how many are to be within the margin.
+    /// Returns the share of wake-ups, in percent, whose lateness the margin covers.
     const fn percent(self) -> u32 {
         match self {
             Self::Sleep => 75,
@@ -55,22 +56,24 @@ impl Pacing {
     }
 }
 
-/// Why a wait came to its end.
+/// Reason why a wait ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Woken {
-    /// The deadline has come. Something may be readable too.
+    /// The deadline has come. A file descriptor may be readable, too.
     Deadline,
-    /// Before the deadline, something can be read.
+    /// A file descriptor is readable before the deadline.
     Readable,
-    /// Before the deadline, and nothing can be read: a signal. Look whether to go on.
+    /// A signal interrupted the wait before the deadline, and nothing is readable. The caller decides whether to go on.
     Early,
 }
 
-/// Waits for absolute deadlines, so that being late for one does not move the next.
+/// Waits for absolute deadlines, so that lateness at one deadline does not move the next.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pacer {
     pacing: Pacing,
+    /// Lateness of recent wake-ups.
     wake_ups: WakeUps,
+    /// Present margin, computed from `wake_ups`.
     margin: Duration,
 }
 
@@ -81,31 +84,31 @@ impl Default for Pacer {
 }
 
 impl Pacer {
-    /// A pacer that waits like that.
+    /// Returns a pacer without knowledge of the machine.
     #[must_use]
     pub const fn new(pacing: Pacing) -> Self {
         let (margin, later) = pacing.first();
         Self { pacing, wake_ups: WakeUps { counts: [0; WakeUps::STEPS], count: later }, margin }
     }
 
-    /// How it waits.
+    /// Returns the way of waiting.
     #[must_use]
     pub const fn pacing(&self) -> Pacing {
         self.pacing
     }
 
-    /// So long before a deadline the thread is to be awake: see [`Pacing`]. It changes with each wake-up, and depends on nothing but how late those so far were.
+    /// Returns the present margin: see [`Pacing`]. The margin changes with each wake-up, and depends only on the lateness of wake-ups so far.
     #[must_use]
     pub const fn margin(&self) -> Duration {
         self.margin
     }
 
-    /// Waits until the deadline (`None`: for ever) has come, or until one of `readable` can be read. A deadline that has passed is [`Woken::Deadline`] at
-    /// once. During the [`Pacer::margin`] it does not look at `readable`.
+    /// Waits until the deadline (`None`: for ever) has come, or until one of `readable` can be read. Returns [`Woken::Deadline`] at once if the deadline has
+    /// passed. `readable` is not watched during the [`Pacer::margin`].
     ///
     /// # Errors
     ///
-    /// What the system says of the wait.
+    /// The error of the system.
     #[inline]
     pub fn wait(&mut self, clock: &impl Clock, deadline: Option<Instant>, readable: &[BorrowedFd<'_>]) -> io::Result<Woken> {
         let woken = self.approach(clock, deadline, readable)?;
@@ -117,17 +120,18 @@ impl Pacer {
         Ok(woken)
     }
 
-    /// Waits like [`wait`](Self::wait), but comes back with [`Woken::Deadline`] as soon as the deadline is no further away than the [`Pacer::margin`]. The rest is the
-    /// caller's, to look at the clock, and to make ready what happens at the deadline.
+    /// Waits like [`wait`](Self::wait), but returns [`Woken::Deadline`] as soon as the deadline is no further away than the [`Pacer::margin`]. The caller
+    /// watches the clock for the rest, and can make ready what happens at the deadline.
     ///
     /// # Errors
     ///
-    /// What the system says of the wait.
+    /// The error of the system.
     #[inline]
     pub(crate) fn approach(&mut self, clock: &impl Clock, deadline: Option<Instant>, readable: &[BorrowedFd<'_>]) -> io::Result<Woken> {
         let Some(deadline) = deadline else {
             return Ok(if clock.block(None, readable)? { Woken::Readable } else { Woken::Early });
         };
+        // An instant before the start of the run becomes the start.
         let asleep_until = Instant::ZERO + deadline.saturating_duration_since(Instant::ZERO).saturating_sub(self.margin());
         let mut now = clock.now();
         while now < asleep_until {
@@ -136,10 +140,12 @@ impl Pacer {
             }
             let woken = clock.now();
             if woken == now {
-                // A clock that does not move while it waits has been interrupted at once, or belongs to a test that wants to be asked.
+                // The clock did not move during the wait. Either a signal interrupted the wait at once, or the clock belongs to a test that moves the clock
+                // itself.
                 return Ok(Woken::Early);
             }
             now = woken;
+            // A wait can end early, such as at the end of a piece; only a wake-up at the asked time tells about the machine.
             if now >= asleep_until {
                 self.learn(now.saturating_duration_since(asleep_until));
             }
@@ -147,27 +153,31 @@ impl Pacer {
         Ok(Woken::Deadline)
     }
 
-    /// The system woke the thread that late.
+    /// Counts a wake-up that was late by `late`, and computes the margin anew.
     #[inline]
     fn learn(&mut self, late: Duration) {
         self.wake_ups.note(late);
+        // Without a bound within the histogram, even the longest margin covers too few wake-ups; the margin is then the longest.
         let most = self.pacing.most();
         self.margin = self.wake_ups.bound(self.pacing.percent()).map_or(most, |bound| bound.min(most));
     }
 }
 
-/// How late the system woke the thread: a histogram in steps of a microsecond, in which a wake-up counts half as much after every thousand or so.
+/// Histogram of the lateness of wake-ups in steps of a microsecond. Old wake-ups lose weight: all counts are halved after about every thousand wake-ups.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct WakeUps {
+    /// Wake-ups by lateness in microseconds, rounded down.
     counts: [u32; Self::STEPS],
-    /// Of all, those later than the last step among them.
+    /// Number of all wake-ups, including those later than the last step.
     count: u32,
 }
 
 impl WakeUps {
+    /// Width of a step.
     const STEP: Duration = Duration::from_micros(1);
+    /// Number of steps: a little more than the longest usual margin.
     const STEPS: usize = 128;
-    /// At this count all counts are halved.
+    /// Count at which all counts are halved.
     const MOST: u32 = 1 << 11;
 
     #[inline]
@@ -178,17 +188,19 @@ impl WakeUps {
         }
         self.count += 1;
         if self.count >= Self::MOST {
+            // Wake-ups later than the last step have no own count: their number is the difference to the sum.
             let later = self.count - self.counts.iter().sum::<u32>();
             self.counts.iter_mut().for_each(|count| *count /= 2);
             self.count = later / 2 + self.counts.iter().sum::<u32>();
         }
     }
 
-    /// That percentage of them were this late at most, to a step; `None` if that is beyond the last step.
+    /// Returns the lateness, rounded down to a step, that `percent` of the wake-ups do not exceed, or `None` if it is beyond the last step.
     #[inline]
     fn bound(&self, percent: u32) -> Option<Duration> {
         let wanted = (self.count * percent).div_ceil(100);
         let mut found = 0;
+        // The first step at which the sum of counts reaches the share.
         let step = (0..).zip(&self.counts).find_map(|(step, count)| {
             found += count;
             (found >= wanted).then_some(step)

@@ -1,4 +1,4 @@
-//! What a thread asks of the system to be on time.
+//! Requests of a thread to the system, so that the thread runs on time.
 
 use core::fmt;
 use core::num::NonZeroU64;
@@ -10,58 +10,58 @@ use thread_priority::{
     Error, RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
-/// What to ask for.
+/// Requests to make.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Wishes {
-    /// `SCHED_FIFO` with this priority, 1 to 99: ahead of every ordinary thread.
+    /// Priority under `SCHED_FIFO`, 1 to 99: the thread runs before every ordinary thread. `None`: no request.
     pub priority: Option<u8>,
-    /// All memory of the process, present and future, stays in memory.
+    /// Whether to lock all present and future memory of the process, so that no page fault delays the thread.
     pub lock_memory: bool,
 }
 
 impl Default for Wishes {
-    /// Both, with a priority in the middle, below the threads of the kernel that serve devices.
+    /// Returns both requests, with a priority in the middle, below the kernel's threads that serve devices.
     fn default() -> Self {
         Self { priority: Some(40), lock_memory: true }
     }
 }
 
 impl Wishes {
-    /// Nothing but what costs nobody anything: no timer slack.
+    /// No request except timer slack, which costs no other thread anything.
     pub const NONE: Self = Self { priority: None, lock_memory: false };
 }
 
-/// One thing that was asked for.
+/// One request.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Wish {
-    /// Wake-ups are not put off to be done together with others: a slack of 1 ns in place of 50 µs.
+    /// Timer slack of 1 ns in place of 50 µs: the kernel does not delay wake-ups to join them with other wake-ups.
     TimerSlack,
-    /// `SCHED_FIFO`.
+    /// Scheduling by `SCHED_FIFO`.
     Priority,
     /// Locked memory.
     LockedMemory,
 }
 
-/// What the system granted.
+/// Answers of the system.
 #[derive(Debug, Default)]
 pub struct Prepared {
-    /// What it granted.
+    /// Granted requests.
     pub granted: Vec<Wish>,
-    /// What it refused: the run goes on without.
+    /// Refused requests. The run goes on without them.
     pub refused: Vec<Refused>,
 }
 
-/// Something that the system refused.
+/// Request refused by the system.
 #[derive(Debug)]
 pub struct Refused {
-    /// What.
+    /// Refused request.
     pub wish: Wish,
-    /// Why.
+    /// Error of the system.
     pub error: io::Error,
 }
 
 impl Wish {
-    /// In a few words.
+    /// Returns the name of the request for messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -71,7 +71,7 @@ impl Wish {
         }
     }
 
-    /// What goes on without, and how to get it.
+    /// Returns the consequence of a refusal, and the permission that lets the request succeed.
     const fn way_out(self) -> &'static str {
         match self {
             Self::TimerSlack => "wake-ups may be 50 µs later",
@@ -87,9 +87,9 @@ impl fmt::Display for Refused {
     }
 }
 
-/// Asks the system for what helps the calling thread to be on time. Whatever is refused, the thread goes on without.
+/// Makes the requests for the calling thread, and timer slack in any case. The thread goes on without refused requests.
 ///
-/// Locked memory is the whole process's, and stays when the thread ends.
+/// Locked memory concerns the whole process, and stays locked when the thread ends.
 #[must_use]
 pub fn prepare_thread(wishes: &Wishes) -> Prepared {
     let mut prepared = Prepared::default();
@@ -97,6 +97,7 @@ pub fn prepare_thread(wishes: &Wishes) -> Prepared {
         Ok(()) => prepared.granted.push(wish),
         Err(error) => prepared.refused.push(Refused { wish, error }),
     };
+    // Timer slack needs no permission, so this request is always made.
     note(Wish::TimerSlack, set_current_timer_slack(NonZeroU64::new(1)).map_err(io::Error::from));
     if let Some(priority) = wishes.priority {
         note(Wish::Priority, first_in_first_out(priority));
@@ -107,6 +108,7 @@ pub fn prepare_thread(wishes: &Wishes) -> Prepared {
     prepared
 }
 
+/// Puts the calling thread under `SCHED_FIFO`. A priority out of range becomes the nearest one in 1 to 99.
 fn first_in_first_out(priority: u8) -> io::Result<()> {
     let value = ThreadPriorityValue::try_from(priority.clamp(1, 99)).map_err(io::Error::other)?;
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
@@ -123,7 +125,7 @@ mod tests {
 
     #[test]
     fn every_wish_is_granted_or_refused_and_a_refusal_says_what_to_do() {
-        // In a thread of its own, which takes its priority with it.
+        // The priority ends with the new thread, so that no other test runs with the priority.
         let prepared = std::thread::spawn(|| prepare_thread(&Wishes { lock_memory: false, ..Wishes::default() })).join().unwrap();
         let mut all = prepared.granted.clone();
         all.extend(prepared.refused.iter().map(|refused| refused.wish));

@@ -1,52 +1,52 @@
-//! What a socket did, and why it did not do the rest.
+//! Counters of a socket, and the reasons why datagrams were lost at the socket.
 
 use std::io;
 use std::os::fd::AsFd;
 
 use rustix::io::Errno;
 
-/// What a socket did so far.
+/// Counters of a socket since it was opened.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct EndpointCounts {
-    /// Datagrams that came in and were handed on.
+    /// Arrived datagrams handed on to the program.
     pub received: u64,
-    /// Datagrams that came in and were dropped, because they were longer than this socket takes.
+    /// Arrived datagrams dropped for a length of more than [`EndpointConfig::largest`](super::EndpointConfig::largest).
     pub oversized: u64,
-    /// Errors on receiving that pass: somebody said that an earlier datagram had not arrived, the network was down for a while, memory was short.
+    /// Passing errors of receiving: a report of an undelivered earlier datagram, a network that was down for a while, a shortage of memory.
     pub receive_errors: u64,
-    /// Datagrams that the kernel took.
+    /// Datagrams taken by the kernel for sending.
     pub sent: u64,
-    /// Datagrams that were not sent.
+    /// Outgoing datagrams that were lost.
     pub failures: SendFailures,
-    /// Calls of the kernel to send: fewer than datagrams where several went in one.
+    /// Calls of the kernel to send. Fewer than datagrams if several went in one call.
     pub send_calls: u64,
 }
 
-/// Datagrams that were not sent, by reason.
+/// Lost outgoing datagrams, by reason.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct SendFailures {
-    /// The kernel's buffer was full, and as many as may wait were waiting, or the datagram was one that does not wait.
+    /// The kernel's buffer was full. Either the datagram may not wait, or as many datagrams as allowed were waiting.
     pub full: u64,
-    /// Nobody listens there. On loopback the kernel may say so of an earlier datagram.
+    /// The receiver's port is closed. On loopback the kernel may report this for an earlier datagram.
     pub refused: u64,
-    /// No route leads there, or the network is down.
+    /// No route leads to the receiver, or the network is down.
     pub unreachable: u64,
-    /// Longer than the way there takes in one piece.
+    /// The datagram is longer than the path takes in one piece.
     pub too_large: u64,
-    /// A rule of this system forbids it.
+    /// A rule of this system, such as a firewall, forbids the datagram.
     pub forbidden: u64,
-    /// Anything else.
+    /// Any other reason.
     pub other: u64,
 }
 
 impl SendFailures {
-    /// All of them.
+    /// Returns the number of lost outgoing datagrams.
     #[must_use]
     pub const fn in_all(&self) -> u64 {
         self.full + self.refused + self.unreachable + self.too_large + self.forbidden + self.other
     }
 
-    /// Each reason with its name in JSON and how often.
+    /// Returns each reason, by its name in JSON, with its count.
     #[must_use]
     pub const fn by_reason(&self) -> [(&'static str, u64); 6] {
         [
@@ -59,7 +59,7 @@ impl SendFailures {
         ]
     }
 
-    /// One datagram was not sent, for this reason.
+    /// Counts one outgoing datagram lost because of `error`.
     pub(super) fn count(&mut self, error: &io::Error) {
         let counter = match Errno::from_io_error(error).unwrap_or(Errno::IO) {
             Errno::AGAIN | Errno::NOBUFS | Errno::NOMEM => &mut self.full,
@@ -73,16 +73,19 @@ impl SendFailures {
     }
 }
 
-/// How many datagrams the kernel has dropped at this socket before anybody could read them, because its buffer was full, from `/proc/net/udp` or `udp6`; `None` if the system does not tell.
+/// Returns the number of datagrams dropped by the kernel at a socket because the receive buffer was full, from `/proc/net/udp` or `udp6`, or `None` if the
+/// table does not list the socket.
 pub(super) fn kernel_drops(socket: impl AsFd, is_ipv6: bool) -> io::Result<Option<u64>> {
     let inode = rustix::fs::fstat(socket)?.st_ino;
+    // `thread-self`: a thread can be in another network namespace than the rest of its process.
     let table = std::fs::read_to_string(if is_ipv6 { "/proc/thread-self/net/udp6" } else { "/proc/thread-self/net/udp" })?;
     Ok(drops_of(&table, inode))
 }
 
-/// The last column of the line whose tenth is the inode (`udp4_format_sock` of Linux).
+/// Returns the last column of the line whose tenth column is the inode (`udp4_format_sock` of Linux).
 fn drops_of(table: &str, inode: u64) -> Option<u64> {
     let inode = inode.to_string();
+    // The first line names the columns.
     let line = table.lines().skip(1).find(|line| line.split_whitespace().nth(9) == Some(&inode))?;
     line.split_whitespace().next_back()?.parse().ok()
 }

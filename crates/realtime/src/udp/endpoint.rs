@@ -1,4 +1,4 @@
-//! The socket, and where datagrams are put when they are read, many at a time.
+//! The socket, and the memory into which many datagrams are read at a time.
 
 use core::fmt;
 use std::io::{self, ErrorKind, IoSliceMut};
@@ -18,58 +18,60 @@ use super::{Ecn, EndpointCounts};
 use crate::MonotonicClock;
 use crate::clock::ArrivalOrder;
 
-/// What to ask for.
+/// Options of a socket.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct EndpointConfig {
-    /// How many bytes should wait in the kernel until they are read. The kernel counts headers and what it keeps itself: a small datagram takes about
-    /// 800 bytes. It may grant less: see [`UdpEndpoint::granted_receive_buffer`].
+    /// Size of the receive buffer in the kernel to ask for \[bytes\]. The kernel counts headers and bookkeeping, too: a small datagram takes about 800 bytes.
+    /// The kernel can grant less: see [`UdpEndpoint::granted_receive_buffer`].
     pub receive_buffer: usize,
-    /// Longer datagrams are dropped when they come in, and counted.
+    /// Longest datagram to accept \[bytes\]. Longer arriving datagrams are dropped and counted.
     pub largest: usize,
-    /// The number of datagrams that may wait to be sent when the kernel's buffer is full; beyond, new ones are dropped and counted.
+    /// Datagrams waiting to be sent while the kernel's buffer is full, at most. Further datagrams are dropped and counted.
     pub waiting: usize,
-    /// Whether the kernel may put datagrams of one sender together before it hands them over, up to 64 of them: less work for each, but one call of
-    /// [`UdpEndpoint::receive`] may then hand on 64 times [`UdpEndpoint::BATCH`] datagrams.
+    /// Whether the kernel can join up to 64 datagrams of one sender before handing over the datagrams. Joining costs less time per datagram, but one call of
+    /// [`UdpEndpoint::receive`] can then hand on 64 times [`UdpEndpoint::BATCH`] datagrams.
     pub joined: bool,
 }
 
 impl Default for EndpointConfig {
-    /// 8 MiB, datagrams of any length, 4096 that wait, and datagrams that the kernel puts together.
+    /// Returns 8 MiB of receive buffer, datagrams of any length, 4096 waiting datagrams, and joined datagrams.
     fn default() -> Self {
         Self { receive_buffer: 8 << 20, largest: 65_535, waiting: 4096, joined: true }
     }
 }
 
-/// Why a socket could not be had.
+/// Failure to open a socket.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot listen on {address}: {source}: expected a free UDP port of an address that this machine has")]
 pub struct BindError {
-    /// The address asked for.
+    /// Address asked for.
     pub address: SocketAddr,
-    /// What the system says.
+    /// Error of the system.
     pub source: io::Error,
 }
 
-/// A datagram that came in.
+/// Datagram received by a socket.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Datagram<'a> {
-    /// The sender.
+    /// Address of the sender.
     pub from: SocketAddr,
-    /// What it carries.
+    /// Payload.
     pub bytes: &'a [u8],
-    /// Its congestion bits; `None`: its ends do not understand them.
+    /// Congestion bits; `None` if the ends do not understand them.
     pub ecn: Option<Ecn>,
-    /// When the kernel saw it come in; where the kernel does not say, no later than it was read or than the kernel saw the next one. Never before the
-    /// datagram that the same socket gave before it.
+    /// Instant of the arrival, as seen by the kernel. If the kernel gives no time stamp: an instant no later than the reading of the datagram, and no later
+    /// than the arrival of the next datagram. Never earlier than the instant of the previous datagram of the same socket.
     pub at: Instant,
 }
 
-/// A UDP socket that never blocks. An IPv6 one takes IPv6 alone, so that every sender has one address.
+/// UDP socket that never blocks. An IPv6 socket takes IPv6 alone, so that every sender has one address.
 #[derive(Debug)]
 pub struct UdpEndpoint {
     socket: UdpSocket,
+    /// Abilities of the socket on this system, such as segmentation offload.
     state: UdpSocketState,
     address: SocketAddr,
+    /// Granted size of the receive buffer, in the kernel's own count \[bytes\].
     granted: usize,
     config: EndpointConfig,
     outbox: Outbox,
@@ -78,11 +80,11 @@ pub struct UdpEndpoint {
 }
 
 impl UdpEndpoint {
-    /// Opens a socket; port 0 is a free one.
+    /// Opens a socket. Port number 0 lets the system choose a free port.
     ///
     /// # Errors
     ///
-    /// [`BindError`] if the address is taken, or is none of this machine's.
+    /// [`BindError`] if the address is taken, or is no address of this machine.
     pub fn bind(address: SocketAddr, config: EndpointConfig) -> Result<Self, BindError> {
         Self::open(address, config).map_err(|source| BindError { address, source })
     }
@@ -93,21 +95,21 @@ impl UdpEndpoint {
         if address.is_ipv6() {
             sockopt::set_ipv6_v6only(&socket, true)?;
         }
-        // Beyond the system's limit with CAP_NET_ADMIN, up to it without.
+        // The first call can exceed the system's limit, but needs CAP_NET_ADMIN. The second call grants at most the limit.
         if sockopt::set_socket_recv_buffer_size_force(&socket, config.receive_buffer).is_err() {
             sockopt::set_socket_recv_buffer_size(&socket, config.receive_buffer)?;
         }
         bind(&socket, &address)?;
         let socket = UdpSocket::from(socket);
         let state = UdpSocketState::new(UdpSockRef::from(&socket))?;
-        // Nobody asks to which of several addresses a datagram came. Told all the same, it would take the room in which the kernel tells the congestion bits
-        // of segments that it has put together.
+        // No caller needs the local address of a datagram. A message of the kernel with the address would take the room of the message with the congestion bits
+        // of joined segments.
         if address.is_ipv6() {
             setsockopt(&socket, Ipv6RecvPacketInfo, &false)?;
         } else {
             setsockopt(&socket, Ipv4PacketInfo, &false)?;
         }
-        // The state has asked for it where the kernel can. An older kernel does not know the option, and puts nothing together.
+        // `UdpSocketState` has switched joining on if the kernel can. An older kernel does not know the option, and joins nothing.
         if !config.joined && state.gro_segments() > 1 {
             setsockopt(&socket, UdpGroSegment, &false)?;
         }
@@ -115,59 +117,62 @@ impl UdpEndpoint {
         Ok(Self { socket, state, address, granted, config, outbox: Outbox::default(), counts: EndpointCounts::default(), order: ArrivalOrder::NEW })
     }
 
-    /// Where it listens.
+    /// Returns the local address, with the port number chosen by the system.
     #[must_use]
     pub const fn local_address(&self) -> SocketAddr {
         self.address
     }
 
-    /// How many bytes may wait in the kernel, as the kernel counts them. It grants twice the size asked for, and on a system that allows no more (`sysctl
-    /// net.core.rmem_max`) less.
+    /// Returns the size of the receive buffer in the kernel's own count \[bytes\]. The kernel grants twice the size asked for, or less if the limit of the
+    /// system (`sysctl net.core.rmem_max`) is lower.
     #[must_use]
     pub const fn granted_receive_buffer(&self) -> usize {
         self.granted
     }
 
-    /// What it did so far.
+    /// Returns the counters so far.
     #[must_use]
     pub const fn counts(&self) -> &EndpointCounts {
         &self.counts
     }
 
-    /// How many datagrams the kernel has dropped because its buffer was full; `None` if the system does not tell. Reads a file: not for a hot loop.
+    /// Returns the number of datagrams dropped by the kernel because the receive buffer was full, or `None` if the system does not tell. Reads a file, which is
+    /// too slow for each packet.
     ///
     /// # Errors
     ///
-    /// What the system says.
+    /// The error of the system.
     pub fn kernel_drops(&self) -> io::Result<Option<u64>> {
         kernel_drops(&self.socket, self.address.is_ipv6())
     }
 
-    /// Hands on what has come in, one batch at most, in the order in which it came, and says how many datagrams the kernel gave: after fewer than
-    /// [`UdpEndpoint::BATCH`] none is left to read. Datagrams that the kernel has put together count as one here ([`EndpointConfig::joined`]). Never blocks. One clock is given to all calls of an endpoint.
+    /// Reads at most one batch and hands each datagram to `take`, in the order of arrival. Returns the number of datagrams given by the kernel; after fewer
+    /// than [`UdpEndpoint::BATCH`] the socket is empty. Datagrams joined by the kernel count as one here ([`EndpointConfig::joined`]). Never blocks. All calls
+    /// on one socket must use the same clock.
     ///
     /// # Errors
     ///
-    /// What the system says, but for what passes: that there is nothing to read, that an earlier datagram did not arrive, or that memory is short.
+    /// The error of the system. Passing conditions are no errors: nothing to read, a report of an undelivered earlier datagram, a shortage of memory.
     pub fn receive(&mut self, buffers: &mut ReceiveBuffers, clock: &MonotonicClock, mut take: impl FnMut(Datagram<'_>)) -> io::Result<usize> {
         let (mut rooms, told) = buffers.rooms();
         let count = match self.state.recv(UdpSockRef::from(&self.socket), &mut rooms, told) {
             Ok(count) => count,
             Err(error) => return self.cannot_receive(error),
         };
-        // After reading: no stamp lies in the future.
+        // The clocks are read after the datagrams, so no stamp lies in the future.
         let stamps = clock.stamps();
         let mut arrivals = [stamps.now(); BATCH_SIZE];
         for (arrival, told) in arrivals.iter_mut().zip(&buffers.told[..count]) {
+            // All stamps of the batch use the same pair of readings, so that their differences stay exact.
             *arrival = stamps.instant(told.timestamp);
         }
-        // The kernel begins to stamp a moment after a socket was opened. What came before is stamped when it is read, later than what came after it; a stamp
-        // that is not believed is the time of reading, too.
+        // The kernel begins to stamp a moment after a socket was opened. An earlier datagram is stamped when it is read, later than the datagrams after it. A
+        // stamp that is not believed is the time of the reading, too.
         self.order.put_in_order(&mut arrivals[..count]);
         for (place, &at) in arrivals[..count].iter().enumerate() {
             let told = buffers.told[place];
             let bytes = buffers.room(place, told.len);
-            // The kernel may have put several of one sender together. An empty datagram is one, too.
+            // The kernel may have joined several datagrams of one sender; each but the last is `stride` bytes long. An empty datagram runs the loop once.
             let mut rest = Some(bytes);
             while let Some(bytes) = rest {
                 let (segment, after) = if told.stride > 0 && bytes.len() > told.stride { bytes.split_at(told.stride) } else { (bytes, &[][..]) };
@@ -183,19 +188,20 @@ impl UdpEndpoint {
         Ok(count)
     }
 
-    /// The number of datagrams that are read at once.
+    /// Datagrams read by one call of the kernel.
     pub const BATCH: usize = BATCH_SIZE;
 
+    /// Decides on an error of reading: passing errors are counted, and the result says whether to read again.
     #[cold]
     fn cannot_receive(&mut self, error: io::Error) -> io::Result<usize> {
         match Errno::from_io_error(&error).unwrap_or(Errno::IO) {
             Errno::AGAIN => Ok(0),
             Errno::CONNREFUSED | Errno::CONNRESET | Errno::HOSTUNREACH | Errno::NETUNREACH => {
                 self.counts.receive_errors += 1;
-                // There may be more behind it.
+                // Another datagram may wait after the report.
                 Ok(Self::BATCH)
             }
-            // They pass.
+            // The condition passes, but reading again at once would not help.
             Errno::NETDOWN | Errno::NOBUFS | Errno::NOMEM => {
                 self.counts.receive_errors += 1;
                 Ok(0)
@@ -204,7 +210,8 @@ impl UdpEndpoint {
         }
     }
 
-    /// Takes a datagram to be sent with the next [`UdpEndpoint::flush`], and says so; beyond [`EndpointConfig::waiting`] it is dropped and counted.
+    /// Queues a datagram for the next [`UdpEndpoint::flush`] and returns `true`. Beyond [`EndpointConfig::waiting`] the datagram is dropped and counted, and
+    /// the result is `false`.
     #[inline]
     pub fn queue(&mut self, to: SocketAddr, bytes: &[u8], ecn: Option<Ecn>) -> bool {
         let has_room = self.outbox.len() < self.config.waiting;
@@ -216,22 +223,21 @@ impl UdpEndpoint {
         has_room
     }
 
-    /// Sends what was queued, in that order, until the kernel's buffer is full; the rest waits for the next call. A datagram that cannot be sent is
-    /// counted, and the others go on.
+    /// Sends the queued datagrams in order until the kernel's buffer is full. The rest waits for the next call. A datagram that cannot be sent is counted, and
+    /// the following ones are still sent.
     ///
-    /// Datagrams to one address, of one length, that were queued one after the other go in one call, which the kernel or the far end cuts (segmentation
-    /// offload). On loopback a datagram of 64 bytes took 1.9 µs alone, 1.1 µs of two together, 0.5 µs of eight, 0.3 µs of sixteen. With `sendmmsg`, which
-    /// takes any datagrams, it took 1.5 µs of sixteen: that is why it is not used.
+    /// Consecutive datagrams to one address and of one length go in one call, and the system later cuts the bytes into datagrams (segmentation offload).
     pub fn flush(&mut self) {
         self.flush_with(|| (), |(), _| ());
     }
 
-    /// The same. `before` is asked before every call of the kernel, such as for the time; `done` is told its answer and how many datagrams the call has
-    /// settled, in the order in which they were queued. Those that wait are told of later.
+    /// Sends like [`UdpEndpoint::flush`]. Before each call of the kernel, `before` is asked, for example for the time. After the call, `done` gets the answer
+    /// of `before` and the number of datagrams that were sent or given up, in the order of the queue. `done` is not called for datagrams that wait.
     pub fn flush_with<T>(&mut self, mut before: impl FnMut() -> T, mut done: impl FnMut(T, usize)) {
         let most = self.state.max_gso_segments();
         while self.outbox.len() > 0 {
             let asked = before();
+            // Always found: the outbox is not empty.
             let Some(run) = self.outbox.next_run(most) else { return };
             self.counts.send_calls += 1;
             let mut settled = run.count;
@@ -241,10 +247,12 @@ impl UdpEndpoint {
                     self.outbox.take(settled);
                 }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    // The datagrams of this run wait, with all datagrams after them.
                     self.outbox.close_up();
                     return;
                 }
                 Err(error) => {
+                    // The first datagram of the run is settled; the loop goes on with the others.
                     settled = 1;
                     self.cannot_send(&error);
                 }
@@ -253,8 +261,8 @@ impl UdpEndpoint {
         }
     }
 
-    /// Sends a datagram at once, or drops and counts it if the kernel's buffer is full or earlier datagrams wait: for a datagram that must not delay others,
-    /// and whose receiver asks for it again.
+    /// Sends a datagram at once, or drops and counts it if the kernel's buffer is full or earlier datagrams wait. Meant for a datagram that must not delay
+    /// other datagrams, and for which the receiver asks again.
     pub fn send_or_drop(&mut self, to: SocketAddr, bytes: &[u8]) {
         if self.has_waiting() {
             self.counts.failures.full += 1;
@@ -267,17 +275,17 @@ impl UdpEndpoint {
         }
     }
 
-    /// Whether anything waits to be sent because the kernel's buffer was full.
+    /// Returns whether datagrams wait to be sent. After a flush they wait because the kernel's buffer is full.
     #[must_use]
     pub fn has_waiting(&self) -> bool {
         self.outbox.len() > 0
     }
 
-    /// The first that waits cannot be sent, alone or with others.
+    /// Settles the first waiting datagram after a call that failed with `error`: sends the datagram alone, or counts its loss.
     #[cold]
     fn cannot_send(&mut self, error: &io::Error) {
         let Some(run) = self.outbox.next_run(1) else { return };
-        // It may have been the company that was at fault.
+        // Another datagram of the same call can have caused the failure.
         let alone = send(&self.socket, &self.state, &run);
         self.counts.send_calls += 1;
         match alone {
@@ -294,20 +302,24 @@ impl AsFd for UdpEndpoint {
     }
 }
 
+/// Sends the datagrams of a run in one call.
 fn send(socket: &UdpSocket, state: &UdpSocketState, run: &Run<'_>) -> io::Result<()> {
+    // A single datagram needs no segmentation, and may be longer than the longest segment.
     let segment_size = (run.count > 1).then_some(run.segment);
     let transmit = Transmit { destination: run.to, ecn: run.ecn, contents: run.bytes, segment_size, src_ip: None };
     state.try_send(UdpSockRef::from(socket), &transmit)
 }
 
-/// Room for one batch, to be shared by all sockets of a thread: 2 MB, of which the kernel gives the touched pages.
+/// Memory for one batch, to be shared by all sockets of a thread. Takes 2 MB of address space, of which only pages in use need memory.
 pub struct ReceiveBuffers {
+    /// Rooms of [`ROOM`] bytes, one per datagram of a batch.
     bytes: Vec<u8>,
+    /// Length, sender and marks of each datagram, as told by the kernel.
     pub(super) told: [RecvMeta; BATCH_SIZE],
 }
 
-/// No datagram is longer than 65,527 bytes (that is IPv6), nor are segments that the kernel has put together: nothing is ever cut off. Not a power of two,
-/// so that the beginnings of all datagrams of a batch do not share one set of the processor's cache.
+/// Size of the room for one datagram \[bytes\]. The longest datagram has 65,527 bytes (IPv6), and joined segments are no longer, so nothing is ever cut off.
+/// The size is not a power of two, because otherwise the beginnings of all datagrams of a batch would share one set of the processor's cache.
 const ROOM: usize = 65_536 + 256;
 
 impl Default for ReceiveBuffers {
@@ -317,19 +329,19 @@ impl Default for ReceiveBuffers {
 }
 
 impl ReceiveBuffers {
-    /// Empty ones.
+    /// Returns empty buffers.
     #[must_use]
     pub fn new() -> Self {
         Self { bytes: vec![0; ROOM * BATCH_SIZE], told: [RecvMeta::default(); BATCH_SIZE] }
     }
 
-    /// The rooms, one for each datagram, and what will be told of each.
+    /// Returns the room and the metadata of each datagram, to be filled by the kernel.
     pub(super) fn rooms(&mut self) -> ([IoSliceMut<'_>; BATCH_SIZE], &mut [RecvMeta; BATCH_SIZE]) {
         let mut rooms = self.bytes.chunks_exact_mut(ROOM);
         (core::array::from_fn(|_| IoSliceMut::new(rooms.next().unwrap_or_default())), &mut self.told)
     }
 
-    /// What was read into that room.
+    /// Returns the first `len` bytes of a room.
     pub(super) fn room(&self, place: usize, len: usize) -> &[u8] {
         let start = place * ROOM;
         self.bytes.get(start..start + len.min(ROOM)).unwrap_or_default()

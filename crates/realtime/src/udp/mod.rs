@@ -1,4 +1,4 @@
-//! UDP sockets that know when each datagram came in, take and send many at once, and count whatever is lost.
+//! UDP sockets that record the arrival of each datagram, receive and send many datagrams at once, and count every loss.
 //!
 //! ```text
 //!   network ─▶ socket buffer of the kernel ─▶ receive ─▶ Datagram { from, bytes, ecn, at }
@@ -7,7 +7,7 @@
 //!                     │ full: kept, up to a bound      │ beyond it: dropped, counted
 //! ```
 //!
-//! A datagram came in when the kernel saw it, not when the program got round to reading it: [`Datagram::at`].
+//! A datagram arrives when the kernel sees the datagram, not when the program reads the datagram: [`Datagram::at`].
 
 mod counts;
 mod endpoint;
@@ -15,5 +15,5 @@ mod outbox;
 
 pub use counts::{EndpointCounts, SendFailures};
 pub use endpoint::{BindError, Datagram, EndpointConfig, ReceiveBuffers, UdpEndpoint};
-/// The two bits of a datagram's IP header that say whether its ends understand congestion marks, and whether it carries one (RFC 3168).
+/// Two bits of a datagram's IP header (RFC 3168). The bits say whether the ends understand congestion marks, and whether the datagram carries a mark.
 pub use quinn_udp::EcnCodepoint as Ecn;

@@ -1,20 +1,23 @@
-//! Datagrams that are to be sent, in one piece of memory, so that several can go in one call.
+//! Datagrams waiting to be sent. The bytes are contiguous, so that several datagrams can go in one call of the kernel.
 
 use std::net::SocketAddr;
 
 use super::Ecn;
 
-/// Datagrams in the order in which they were queued, their bytes one after the other.
+/// Queue of datagrams. The bytes of the datagrams follow each other in the same order.
 #[derive(Debug, Default)]
 pub(super) struct Outbox {
+    /// Datagrams in the order of the queue; the first `done` have left.
     entries: Vec<Entry>,
+    /// Bytes of all datagrams in `entries`.
     bytes: Vec<u8>,
-    /// Those before have been sent or given up.
+    /// Number of entries at the front, already sent or given up.
     done: usize,
-    /// The bytes of those before.
+    /// Number of bytes of the first `done` entries.
     bytes_done: usize,
 }
 
+/// Datagram without its bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Entry {
     to: SocketAddr,
@@ -22,37 +25,45 @@ struct Entry {
     len: usize,
 }
 
-/// Datagrams that can go in one call: all as long as `segment`, but for the last, which may be shorter.
+/// Datagrams that can go in one call. All are `segment` bytes long, except that the last one can be shorter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Run<'a> {
+    /// Receiver of all datagrams.
     pub(super) to: SocketAddr,
+    /// Congestion bits of all datagrams.
     pub(super) ecn: Option<Ecn>,
+    /// Payloads, one after the other.
     pub(super) bytes: &'a [u8],
+    /// Length of the first payload \[bytes\].
     pub(super) segment: usize,
+    /// Number of datagrams, at least one.
     pub(super) count: usize,
 }
 
-/// Longer ones go alone. Every IPv6 network takes 1,280 bytes (RFC 8200, section 5), 48 of them headers: no segment is too long for the way.
+/// Longest datagram that may share a call \[bytes\]. Every IPv6 network takes packets of 1,280 bytes (RFC 8200, section 5), of which 48 are headers, so no
+/// segment exceeds the path.
 const LONGEST_SEGMENT: usize = 1232;
 
-/// The bytes of a call: what fits into one IPv4 datagram, for before it is cut the kernel sees it as one.
+/// Bytes in one call, at most. The kernel treats the call as one IPv4 datagram before it cuts the datagram.
 const MOST_BYTES: usize = 65_000;
 
 impl Outbox {
+    /// Appends a datagram.
     pub(super) fn push(&mut self, to: SocketAddr, bytes: &[u8], ecn: Option<Ecn>) {
         self.entries.push(Entry { to, ecn, len: bytes.len() });
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// How many wait.
+    /// Returns the number of waiting datagrams.
     pub(super) fn len(&self) -> usize {
         self.entries.len() - self.done
     }
 
-    /// The first of those that wait, with those after it that can go in the same call, at most `most`.
+    /// Returns the first waiting datagram together with the following ones that can go in the same call, at most `most`, or `None` if no datagram waits.
     pub(super) fn next_run(&self, most: usize) -> Option<Run<'_>> {
         let waiting = &self.entries[self.done..];
         let (first, rest) = waiting.split_first()?;
+        // An empty datagram goes alone: the kernel would cut no empty segment.
         let (mut count, mut len, mut open) = (1, first.len, first.len > 0 && first.len <= LONGEST_SEGMENT);
         for next in rest.iter().take(most.saturating_sub(1)) {
             let joins = open && next.to == first.to && next.ecn == first.ecn && (1..=first.len).contains(&next.len) && len + next.len <= MOST_BYTES;
@@ -61,27 +72,28 @@ impl Outbox {
             }
             count += 1;
             len += next.len;
-            // A shorter one ends the run: the kernel cuts at every multiple of the length of the first.
+            // A shorter datagram ends the run, because the kernel cuts at every multiple of the first datagram's length.
             open = next.len == first.len;
         }
+        // The bytes of waiting datagrams follow `bytes_done` without gaps.
         let bytes = &self.bytes[self.bytes_done..self.bytes_done + len];
         Some(Run { to: first.to, ecn: first.ecn, bytes, segment: first.len, count })
     }
 
-    /// The first `count` that wait need not wait any more.
+    /// Removes the first `count` waiting datagrams, of which there must be so many.
     pub(super) fn take(&mut self, count: usize) {
         let taken = &self.entries[self.done..self.done + count];
         self.bytes_done += taken.iter().map(|entry| entry.len).sum::<usize>();
         self.done += count;
         if self.done == self.entries.len() {
-            // The memory is kept.
+            // Nothing waits. Both vectors keep their memory.
             self.entries.clear();
             self.bytes.clear();
             (self.done, self.bytes_done) = (0, 0);
         }
     }
 
-    /// Moves those that wait to the front of the memory.
+    /// Moves the waiting datagrams to the front of the memory. Otherwise a socket with a full buffer would keep the datagrams already sent.
     pub(super) fn close_up(&mut self) {
         self.entries.drain(..self.done);
         self.bytes.drain(..self.bytes_done);
@@ -99,7 +111,7 @@ mod tests {
         ([127, 0, 0, 1], port).into()
     }
 
-    /// The lengths of the datagrams that the kernel makes of a run.
+    /// Returns the datagrams made from a run by the kernel.
     fn cut(run: &Run<'_>) -> Vec<Vec<u8>> {
         if run.count == 1 { vec![run.bytes.to_vec()] } else { run.bytes.chunks(run.segment).map(<[u8]>::to_vec).collect() }
     }
@@ -121,7 +133,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is queued comes out once, in order, to whom it was meant, in calls that the kernel takes.
+        /// Each queued datagram comes out once, in order, to its receiver, in calls that the kernel takes.
         #[test]
         fn runs_are_the_datagrams_that_were_queued(
             queued in prop::collection::vec((1_u16..3, 0_usize..40, any::<bool>(), 1_usize..30), 0..60), most in 1_usize..70, closes in any::<bool>(),
