@@ -1,10 +1,10 @@
-//! Segments of devices without devices, for the fuzz target `offload`. Compiled with `--cfg fuzzing` alone.
+//! Cutting and joining of segments without devices, for the fuzz target `offload`. Compiled with `--cfg fuzzing` only.
 
 use std::sync::Arc;
 
 use crate::packet::{self, Join, Packet, slices};
 
-/// The packets of what a device gave: a header of virtio, and a packet or a segment.
+/// Returns the packets in the bytes of a device: a virtio header, and a packet or a segment.
 #[must_use]
 pub fn cut(bytes: &[u8]) -> Vec<Packet> {
     let mut packets = Vec::new();
@@ -12,7 +12,7 @@ pub fn cut(bytes: &[u8]) -> Vec<Packet> {
     packets
 }
 
-/// The number of the first packets that go to a device together, and the bytes that the device gets.
+/// Returns how many of the first packets go to a device together, and the bytes for the device.
 #[must_use]
 pub fn join(packets: &[Arc<Packet>]) -> (usize, Vec<u8>) {
     let mut head = Vec::new();

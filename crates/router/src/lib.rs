@@ -1,10 +1,11 @@
-//! Any IP traffic through the emulator in real time.
+//! Router of any IP traffic through emulated links, in real time.
 //!
-//! Use this crate if your own program puts emulated links between hosts or interfaces. It needs Linux.
+//! Use this crate if your own program puts emulated links between hosts or interfaces. The router needs Linux.
 //!
-//! A [`Router`] stands between two devices: TUN devices, which are ends of the network for their hosts, or two Ethernet interfaces, which it joins like a
-//! cable. What comes in at one goes through the link that the first matching rule names, and leaves at the other one at the instant that the link says: its
-//! *logical* departure, so that lateness never adds up. A seeded link does to the same packets at the same instants what it does in virtual time.
+//! A [`Router`] stands between two devices. Either the devices are TUN devices, each an end of the network for its host, or both are Ethernet interfaces, which
+//! the router joins like a cable. A packet from one device passes the link of the first matching rule and leaves at the other device, at the instant given by
+//! the link. This instant is the packet's *logical* departure, so that lateness never accumulates. With the same seed, packets and instants, a link behaves as
+//! in virtual time.
 //!
 //! ```text
 //!   device ── Packet ──▶ Engine ── Departure ──▶ device        Engine: rules, links, counters; knows no clock
@@ -12,10 +13,10 @@
 //!                        instant
 //! ```
 //!
-//! It does not answer, fragment or route packets, and does not count hops: hosts see a wire. Other frames (ARP) cross at once. Nothing here
-//! prints.
+//! The router does not answer, fragment or route packets, and does not count hops: hosts see a wire. Frames without IP, such as ARP, cross at once. The crate
+//! prints nothing.
 //!
-//! Read [`Engine`] first, then [`Router`]. The file is [`cohaptic_linkfile::router::RouterFile`].
+//! Read [`Engine`] first, then [`Router`]. The format of the configuration file is [`cohaptic_linkfile::router::RouterFile`].
 //!
 //! ```
 //! use std::path::Path;

@@ -1,4 +1,4 @@
-//! The router without devices and without a clock: packets in at an instant from a side, packets out to the other side at their logical departure.
+//! The router without devices and without a clock. Packets from a side come in at an instant, and leave at the other side at their logical departure.
 //!
 //! ```text
 //!             ┌ rules ─┬─ link "wan",  left → right ─┐
@@ -6,8 +6,8 @@
 //!             └        └─ pass ──────────────────────┘
 //! ```
 //!
-//! Every link has a state machine for each direction, with a queue and random numbers of its own: its stream is called `wan.left->wan.right` and
-//! `wan.right->wan.left`. Rules that name the same link share it.
+//! Every link has a state machine for each direction, with a queue and random numbers of its own. The random streams of the link `wan` are named
+//! `wan.left->wan.right` and `wan.right->wan.left`. Rules that name the same link share the link.
 
 mod lane;
 mod snapshot;
@@ -24,50 +24,57 @@ use crate::rules::{Decided, Rules};
 use lane::Lane;
 pub use snapshot::{Count, Counters, LaneSnapshot, Received};
 
-/// The router as a state machine.
+/// State machine of a router.
 ///
-/// The driver hands packets in with [`Engine::handle_packet`], asks with [`Engine::poll_timeout`] when to come back, calls [`Engine::handle_timeout`] then,
-/// and drains [`Engine::poll_departure`] after each call until it gives `None`. Being late costs nothing but lateness: every departure carries the instant
-/// at which it happened. An instant before the last one given counts as that one.
+/// The driver passes packets with [`Engine::handle_packet`], asks [`Engine::poll_timeout`] for the next deadline, calls [`Engine::handle_timeout`] at that
+/// instant, and drains [`Engine::poll_departure`] after each call until it returns `None`. A late driver changes no fate, because every departure carries the
+/// instant at which the packet left its link. An instant before the latest one counts as the latest one.
 #[derive(Clone, Debug)]
 pub struct Engine {
+    /// Latest instant given by the driver.
     now: Instant,
     rules: Rules,
+    /// Names of the links, indexed by link.
     names: Vec<String>,
-    /// Two for each link, one after the other: from the left, from the right.
+    /// Lanes, two per link at the indices of [`lane_of`]: packets from the left, then packets from the right.
     lanes: Vec<Lane>,
+    /// Bounds on packets and bytes inside all links.
     memory: Memory,
-    /// The packets inside all links.
+    /// Packets and bytes inside all links now.
     held: Memory,
+    /// Packets delivered by their links and not polled yet, in the order of instants.
     departures: VecDeque<Departure>,
+    /// Arrived packets, indexed by side.
     received: [Received; 2],
+    /// Packets for which a rule decided, indexed by rule.
     by_rule: Vec<Count>,
+    /// Packets for which a default decided, indexed by side.
     by_default: [Count; 2],
 }
 
-/// A packet that leaves the router.
+/// Packet leaving the router.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Departure {
-    /// When.
+    /// Logical departure.
     pub at: Instant,
-    /// To which side.
+    /// Side at which the packet leaves.
     pub to: Side,
-    /// The packet, with what its link did to it.
+    /// Packet, with the marks and bit errors of its link.
     pub packet: Arc<Packet>,
 }
 
-/// There is no link of that name.
+/// No link has the given name.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("there is no link {name:?}: expected one of {}", known.join(", "))]
 pub struct NoSuchLink {
-    /// What was asked for.
+    /// Name asked for.
     pub name: String,
-    /// Those that there are.
+    /// Names of all links, in the order of the file.
     pub known: Vec<String>,
 }
 
 impl Engine {
-    /// A router without packets.
+    /// Returns a router without packets.
     #[must_use]
     pub fn new(file: &RouterFile) -> Self {
         let lanes = file.links.iter().flat_map(|link| Side::BOTH.map(|from| Lane::new(file.seed, link, from))).collect();
@@ -85,10 +92,11 @@ impl Engine {
         }
     }
 
-    /// Takes a packet that came from a side.
+    /// Passes a packet from a side.
     ///
-    /// A frame without a packet of IP goes to the other side at once; a malformed packet goes nowhere.
+    /// A frame without IP leaves at the other side at once. A malformed packet is dropped and counted.
     pub fn handle_packet(&mut self, now: Instant, from: Side, packet: Packet) {
+        // Earlier packets leave their links first, so that departures stay in the order of instants.
         self.handle_timeout(now);
         let now = self.now;
         let received = &mut self.received[from.index()];
@@ -122,18 +130,21 @@ impl Engine {
             Target::Link(link) => link,
         };
         let place = lane_of(link, from);
+        // The bound holds for all links together. Copies made by a link are not refused, so `held` can exceed the bound.
         if self.held.packets >= self.memory.packets || self.held.bytes.get().saturating_add(info.size.get()) > self.memory.bytes.get() {
             self.lanes[place].overload += 1;
             return;
         }
         self.held.packets += 1;
         self.held.bytes = Bytes::new(self.held.bytes.get() + info.size.get());
+        // A link can deliver at once, for example without a delay, so its events are collected right after the offer.
         self.lanes[place].offer(now, info, packet);
         self.drain(place);
     }
 
-    /// Lets time pass until `now`.
+    /// Lets logical time pass until `now`.
     pub fn handle_timeout(&mut self, now: Instant) {
+        // One lane at a time, always the earliest: departures of different links are queued in the order of instants.
         while let Some((at, place)) = self.next_lane().filter(|(at, _)| *at <= now) {
             self.lanes[place].pass(at);
             self.drain(place);
@@ -141,21 +152,22 @@ impl Engine {
         self.now = self.now.max(now);
     }
 
-    /// When [`Engine::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given, once all departures are
-    /// polled. May change after every call.
+    /// Returns the instant of the next necessary call of [`Engine::handle_timeout`], or `None` if no packet is inside a link. Never before the latest instant
+    /// given, once all departures are polled. Can change with every call.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.next_lane().map(|(at, _)| at)
     }
 
-    /// The next packet that leaves, in the order of instants; of equal ones, in the order of the links in the file. `None` when all have been polled.
+    /// Returns the next packet that leaves, in the order of instants; for equal instants, in the order of the links in the file. Returns `None` when all have
+    /// been polled.
     #[must_use]
     pub fn poll_departure(&mut self) -> Option<Departure> {
         self.departures.pop_front()
     }
 
-    /// Changes a link from `now` on, in one direction or (`None`) in both: see [`cohaptic_wan::Link::set_model`]. `from` is the side from which its packets
-    /// come.
+    /// Changes the model of a link from `now` on, in one direction or, with `None`, in both: see [`cohaptic_wan::Link::set_model`]. `from` is the side from
+    /// which the packets of the direction come.
     ///
     /// # Errors
     ///
@@ -173,7 +185,7 @@ impl Engine {
         Ok(())
     }
 
-    /// What was counted so far. The delays of late ([`LaneSnapshot::recent_delay`]) are those since the last call.
+    /// Returns all counters. The recent delays ([`LaneSnapshot::recent_delay`]) begin anew with each call.
     pub fn counters(&mut self) -> Counters {
         let names = self.names.iter().flat_map(|name| Side::BOTH.map(|from| (name, from)));
         Counters {
@@ -185,22 +197,24 @@ impl Engine {
         }
     }
 
-    /// The last instant given.
+    /// Returns the latest instant given.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
     }
 
-    /// The lane to which something happens next; of several at the same instant the first.
+    /// Returns the lane with the earliest next event, and the instant. Of several lanes with the same instant, the first in the order of the file.
     fn next_lane(&self) -> Option<(Instant, usize)> {
+        // The minimum of pairs compares the lane second, so the first lane wins a tie.
         let due = self.lanes.iter().enumerate().filter_map(|(place, lane)| lane.next_at().map(|at| (at, place)));
         due.min()
     }
 
-    /// Takes what has come out of a lane.
+    /// Collects the events of a lane: deliveries become departures, and every end frees room.
     fn drain(&mut self, place: usize) {
         while let Some(event) = self.lanes[place].link.poll_event() {
             let size = event.size.get();
+            // A copy was made: the copy takes room, and has an end of its own.
             if !event.fate.is_end() {
                 self.held.packets += 1;
                 self.held.bytes = Bytes::new(self.held.bytes.get() + size);
@@ -215,12 +229,12 @@ impl Engine {
     }
 }
 
-/// The place of a link's lane for what comes from that side.
+/// Returns the index of the lane of a link for packets from the side `from`.
 const fn lane_of(link: usize, from: Side) -> usize {
     2 * link + from.index()
 }
 
-/// The side from which the packets of a lane come.
+/// Returns the side from which the packets of a lane come.
 const fn side_of(lane: usize) -> Side {
     Side::BOTH[lane % 2]
 }

@@ -1,83 +1,84 @@
-//! What a router has counted.
+//! Counters of a router.
 
 use cohaptic_linkfile::router::{Memory, Side};
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_units::Bytes;
 use cohaptic_wan::LinkStats;
 
-/// Packets and their bytes: those of IP, without frames.
+/// Number of packets and their bytes. The bytes are bytes of IP, without frame and padding.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Count {
-    /// Packets.
+    /// Number of packets.
     pub packets: u64,
-    /// Their bytes.
+    /// Bytes of IP in the packets.
     pub bytes: u64,
 }
 
 impl Count {
+    /// Adds one packet.
     pub(crate) const fn add(&mut self, size: Bytes) {
         self.packets += 1;
         self.bytes += size.get();
     }
 }
 
-/// What came from one side, and what became of it outside of links.
+/// Packets from one side, and their fates outside of links.
 ///
 /// For each side: `all = not_ip + malformed + passed + dropped + Σ (offered + overload)` over the links from that side.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Received {
-    /// All of it.
+    /// All packets and frames from this side.
     pub all: Count,
-    /// Frames that carry something else than IP, such as ARP: they went to the other side at once.
+    /// Frames without IP, such as ARP, which went to the other side at once.
     pub not_ip: u64,
-    /// What claims to be a packet of IP and is none: it went nowhere.
+    /// Malformed packets of IP, which were dropped.
     pub malformed: u64,
-    /// Packets that a rule, or the default, lets pass.
+    /// Packets passed without a link, by a rule or by the default.
     pub passed: u64,
-    /// Packets that a rule, or the default, drops.
+    /// Packets dropped by a rule or by the default.
     pub dropped: u64,
 }
 
-/// One direction of a link.
+/// Counters of one direction of a link.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct LaneSnapshot {
-    /// The name of the link.
+    /// Name of the link.
     pub link: String,
-    /// The side from which its packets come.
+    /// Side from which the packets come.
     pub from: Side,
-    /// What the link counts.
+    /// Counters and delays kept by the link.
     pub stats: LinkStats,
-    /// The bytes of the packets that came out of it.
+    /// Bytes of IP in the delivered packets.
     pub delivered_bytes: u64,
-    /// Packets that were not handed to it because too much was inside all links (cause `overload`).
+    /// Packets not offered to the link, because too many packets or bytes were inside all links (cause `overload`).
     pub overload: u64,
-    /// How long the packets were in it that came out since the counters were last asked for.
+    /// Delays of the packets delivered since the previous snapshot.
     pub recent_delay: LatenessSummary,
 }
 
-/// Everything that a router has counted.
+/// All counters of a router.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Counters {
-    /// By side: left, right.
+    /// Arrived packets, indexed by side: left, right.
     pub received: [Received; 2],
-    /// What each rule decided, in the order of the file.
+    /// Packets for which each rule decided, in the order of the file.
     pub by_rule: Vec<Count>,
-    /// What no rule decided, by the side that it came from.
+    /// Packets for which no rule decided, indexed by the side from which the packets came.
     pub by_default: [Count; 2],
-    /// Each link from the left and then from the right, in the order of the file.
+    /// Directions of links in the order of the file: each link from the left and then from the right.
     pub lanes: Vec<LaneSnapshot>,
-    /// The packets inside all links now.
+    /// Packets and bytes inside all links now.
     pub held: Memory,
 }
 
 impl Counters {
-    /// One direction of a link; `None` if there is none of that name.
+    /// Returns one direction of a link, or `None` if no link has this name.
     #[must_use]
     pub fn lane(&self, link: &str, from: Side) -> Option<&LaneSnapshot> {
         self.lanes.iter().find(|lane| lane.link == link && lane.from == from)
     }
 
-    /// Packets that are lost for any reason: by rules, as malformed, by overload, and by what the links are there for.
+    /// Returns the number of packets lost for any reason: dropped by rules, malformed, overload, and dropped by links.
     #[must_use]
     pub fn dropped(&self) -> u64 {
         let outside: u64 = self.received.iter().map(|received| received.malformed + received.dropped).sum();

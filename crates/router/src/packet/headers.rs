@@ -1,4 +1,4 @@
-//! The headers of IPv4 (RFC 791) and IPv6 (RFC 8200), just far enough to tell one packet from another.
+//! Headers of IPv4 (RFC 791) and IPv6 (RFC 8200), read just far enough for the rules of a router and for checksums.
 
 use core::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
@@ -6,60 +6,60 @@ use cohaptic_linkfile::router::Protocol;
 
 use super::checksum;
 
-/// What the headers of a packet say.
+/// Contents of a packet's headers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Headers {
-    /// Where the packet comes from.
+    /// Address of the sender.
     pub source: IpAddr,
-    /// Where it goes to.
+    /// Address of the receiver.
     pub destination: IpAddr,
-    /// What it carries, behind all extension headers.
+    /// Protocol after all extension headers.
     pub protocol: Protocol,
-    /// The ports of source and destination, if it is TCP or UDP and they are in this packet: of a packet that was cut into fragments they are in the
-    /// first alone.
+    /// Ports of source and destination, or `None` if the protocol is neither TCP nor UDP or the ports are not in this packet. Of a fragmented packet, only the
+    /// first fragment has ports.
     pub ports: Option<[u16; 2]>,
-    /// What it says of congestion.
+    /// Congestion bits.
     pub ecn: Ecn,
-    /// The bytes of the fixed header and, with IPv4, its options: what its checksum covers.
+    /// Length of the fixed header and, with IPv4, its options \[bytes\]. The checksum of the IPv4 header covers these bytes.
     pub(super) covered: usize,
-    /// Where the header of the transport protocol begins; `None` if it is not in this packet.
+    /// Index of the first byte of the transport header, or `None` if the header is not in this packet.
     pub(super) transport: Option<usize>,
-    /// Whether it is no fragment.
+    /// Whether the packet is no fragment.
     pub(super) is_whole: bool,
-    /// The bytes of the packet, at most as many as were read.
+    /// Length of the packet \[bytes\], at most the number of bytes read.
     pub length: usize,
 }
 
-/// Why the bytes are no packet.
+/// Reason why bytes are no packet of IP.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Malformed {
-    /// There is no whole header.
+    /// The bytes end within the fixed header.
     Short,
-    /// Neither version 4 nor 6.
+    /// The version is neither 4 nor 6.
     Version,
-    /// The header says that it is longer than the packet, or shorter than any.
+    /// The length of the header exceeds the packet, or is less than the fixed header.
     HeaderLength,
-    /// The packet says that it is longer than what came, or shorter than its header.
+    /// The length of the packet exceeds the bytes received, or is less than the header.
     Length,
-    /// The device says of it what it is not: a segment of another protocol or length, a checksum that is not in it.
+    /// The virtio header contradicts the packet: a segment of another protocol or length, or a checksum outside of the packet.
     Offload,
 }
 
-/// What a packet says of congestion (RFC 3168): the two bits.
+/// Congestion bits of a packet (RFC 3168).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Ecn(u8);
 
 impl Ecn {
-    /// Congestion experienced.
+    /// Codepoint "congestion experienced".
     pub(crate) const CONGESTION: Self = Self(0b11);
 
-    /// Whether both ends understand it: any codepoint but 00.
+    /// Returns whether both ends understand congestion marks: any codepoint but 00.
     #[must_use]
     pub const fn is_capable(self) -> bool {
         self.0 != 0
     }
 
-    /// The two bits.
+    /// Returns the two bits.
     #[must_use]
     pub const fn bits(self) -> u8 {
         self.0
@@ -67,11 +67,11 @@ impl Ecn {
 }
 
 impl Headers {
-    /// Reads them. Bytes beyond the length that the packet says it has are padding.
+    /// Reads the headers. Bytes beyond the length given in the packet are padding.
     ///
     /// # Errors
     ///
-    /// [`Malformed`]. Extension headers that are cut off are no error: the protocol is then that of the first one that is not whole.
+    /// [`Malformed`]. Extension headers that are cut off are no error: the protocol is then the number of the first incomplete header.
     pub fn read(bytes: &[u8]) -> Result<Self, Malformed> {
         match bytes.first().map(|byte| byte >> 4) {
             None => Err(Malformed::Short),
@@ -81,7 +81,7 @@ impl Headers {
         }
     }
 
-    /// Sets both bits in the bytes that were read.
+    /// Sets both congestion bits in `bytes`, from which the headers were read. Corrects the checksum of an IPv4 header.
     pub(super) fn mark_congestion(&mut self, bytes: &mut [u8]) {
         match self.source {
             IpAddr::V4(_) => {
@@ -89,20 +89,23 @@ impl Headers {
                 bytes[1] |= Ecn::CONGESTION.0;
                 checksum::change(bytes, V4_CHECKSUM, u16::from_be_bytes(before), u16::from_be_bytes([bytes[0], bytes[1]]));
             }
-            // The traffic class lies across two bytes: its lowest bits are the middle of the second.
+            // The traffic class of IPv6 spans two bytes; its two lowest bits are bits 4 and 5 of the second byte.
             IpAddr::V6(_) => bytes[1] |= Ecn::CONGESTION.0 << 4,
         }
         self.ecn = Ecn::CONGESTION;
     }
 }
 
-/// Where the checksum stands in a header of IPv4.
+/// Index of the checksum in an IPv4 header.
 pub(super) const V4_CHECKSUM: usize = 10;
 
+/// Reads an IPv4 header.
 fn read_v4(bytes: &[u8]) -> Result<Headers, Malformed> {
     let fixed: &[u8; 20] = bytes.first_chunk().ok_or(Malformed::Short)?;
+    // The header length counts words of four bytes.
     let header = usize::from(fixed[0] & 0xf) * 4;
     let length = usize::from(u16::from_be_bytes([fixed[2], fixed[3]]));
+    // Checked before the length, which is compared with the header.
     if header < fixed.len() || header > bytes.len() {
         return Err(Malformed::HeaderLength);
     }
@@ -110,7 +113,7 @@ fn read_v4(bytes: &[u8]) -> Result<Headers, Malformed> {
         return Err(Malformed::Length);
     }
     let fragment = u16::from_be_bytes([fixed[6], fixed[7]]);
-    // 13 bits of offset; the bit above says that more follow.
+    // The lower 13 bits are the offset of the fragment. The next bit announces more fragments.
     let (offset, more) = (fragment & 0x1fff, fragment & 0x2000 != 0);
     let protocol = Protocol(fixed[9]);
     let transport = (offset == 0).then_some(header);
@@ -127,9 +130,11 @@ fn read_v4(bytes: &[u8]) -> Result<Headers, Malformed> {
     })
 }
 
+/// Reads an IPv6 header with its extension headers.
 fn read_v6(bytes: &[u8]) -> Result<Headers, Malformed> {
     const FIXED: usize = 40;
     let fixed: &[u8; FIXED] = bytes.first_chunk().ok_or(Malformed::Short)?;
+    // The length field counts the bytes after the fixed header.
     let length = FIXED + usize::from(u16::from_be_bytes([fixed[4], fixed[5]]));
     if length > bytes.len() {
         return Err(Malformed::Length);
@@ -149,25 +154,29 @@ fn read_v6(bytes: &[u8]) -> Result<Headers, Malformed> {
     })
 }
 
-/// What stands behind the extension headers.
+/// Result of a walk over the extension headers.
 struct Found {
+    /// Protocol after the last complete extension header.
     protocol: Protocol,
+    /// Index of the transport header, or `None` if the header is not in this packet.
     at: Option<usize>,
+    /// Whether the packet is no fragment.
     whole: bool,
 }
 
-/// Goes from one extension header to the next (RFC 8200, section 4; RFC 4302; RFC 6564).
+/// Walks over the extension headers (RFC 8200, section 4; RFC 4302; RFC 6564), from the header of kind `first` at index `begin`.
 fn walk(packet: &[u8], first: u8, begin: usize) -> Found {
     const FRAGMENT: u8 = 44;
     const AUTHENTICATION: u8 = 51;
     let (mut next, mut at, mut whole) = (first, begin, true);
     loop {
         let unit = match next {
-            // Hop-by-hop, routing, destination options, mobility, host identity, shim6.
+            // Hop-by-hop options, routing, destination options, mobility, host identity, shim6: lengths count units of eight bytes.
             0 | 43 | 60 | 135 | 139 | 140 => 8,
             FRAGMENT | AUTHENTICATION => 4,
             _ => return Found { protocol: Protocol(next), at: Some(at), whole },
         };
+        // A header that is cut off ends the walk without a transport header.
         let Some(&[following, size, high, low]) = packet.get(at..).and_then(|rest| rest.first_chunk()) else { break };
         let length = match next {
             FRAGMENT => 8,
@@ -177,6 +186,7 @@ fn walk(packet: &[u8], first: u8, begin: usize) -> Found {
         if at + length > packet.len() {
             break;
         }
+        // An offset or the flag for more fragments makes a fragment; an offset of zero still has the transport header. The two reserved bits are ignored.
         if next == FRAGMENT {
             let fragment = u16::from_be_bytes([high, low]);
             whole = whole && fragment & !0b110 == 0;
@@ -189,6 +199,7 @@ fn walk(packet: &[u8], first: u8, begin: usize) -> Found {
     Found { protocol: Protocol(next), at: None, whole }
 }
 
+/// Returns the ports at the index `at` of the transport header, or `None` if the protocol has no ports or the packet ends before them.
 fn ports(packet: &[u8], protocol: Protocol, at: usize) -> Option<[u16; 2]> {
     if !protocol.has_ports() {
         return None;

@@ -1,11 +1,11 @@
-//! Packets: as much of their headers as it takes to choose a link, and what a link may do to their bytes.
+//! Packets with the header fields for the choice of a link, and the changes of bytes made by links.
 //!
 //! ```text
 //!   frame  │ Ethernet, VLAN tags │ IPv4 or IPv6 header, extensions │ ports … │ data │ padding │
 //!          0                     ip                                transport        end
 //! ```
 //!
-//! Nothing here believes what a packet says of itself: any bytes are read without a panic, and what makes no sense is [`Content::Malformed`].
+//! The module trusts no header: any bytes are read without a panic, and contradictions become [`Content::Malformed`].
 
 mod checksum;
 mod headers;
@@ -21,42 +21,44 @@ use headers::V4_CHECKSUM;
 pub use headers::{Ecn, Headers, Malformed};
 pub(crate) use segments::{Join, cut, join, slices};
 
-/// How the bytes of a device are framed.
+/// Framing of the bytes of a device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Framing {
     /// Packets of IP, as from a TUN device.
     Ip,
-    /// Frames of Ethernet.
+    /// Ethernet frames.
     Ethernet,
 }
 
-/// A packet on its way, with all its bytes.
+/// Packet in the router, with all its bytes.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Packet {
+    /// All bytes, as received or as changed since then.
     bytes: Vec<u8>,
     content: Content,
     /// Whether the checksum of TCP or UDP is known to be right, by the word of the device that gave the packet.
     is_checked: bool,
 }
 
-/// What a packet is.
+/// Kind of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Content {
-    /// A packet of IP that begins at this byte.
+    /// Packet of IP.
     Ip {
-        /// Its first byte.
+        /// Index of the first byte of the IP header.
         at: usize,
-        /// What its headers say.
+        /// Contents of the headers.
         headers: Headers,
     },
-    /// A frame of Ethernet that carries something else, such as ARP.
+    /// Ethernet frame without IP, such as ARP.
     NotIp,
-    /// It says that it is a packet of IP and is none.
+    /// Bytes that claim to be a packet of IP, but contradict themselves.
     Malformed(Malformed),
 }
 
 impl Packet {
-    /// Reads the headers of what a device gave. A checksum that the sender left to its network device, as Linux does on virtual devices, is computed.
+    /// Reads the headers in the bytes of a device. If the sender left a checksum to the network device, as Linux does on virtual devices, the checksum is
+    /// computed.
     #[must_use]
     pub fn new(mut bytes: Vec<u8>, framing: Framing) -> Self {
         let at = match framing {
@@ -74,19 +76,19 @@ impl Packet {
         Self { bytes, content, is_checked: false }
     }
 
-    /// What it is.
+    /// Returns the kind of the packet, with the headers.
     #[must_use]
     pub const fn content(&self) -> &Content {
         &self.content
     }
 
-    /// All its bytes, as they go to a device.
+    /// Returns all bytes, as they go to a device.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// What a link needs to know of it: the length of the packet of IP, without frame and padding, and whether its ends understand ECN.
+    /// Returns the properties that a link needs: the length of the IP packet without frame and padding, and whether the ends understand ECN.
     #[must_use]
     pub fn info(&self) -> PacketInfo {
         match &self.content {
@@ -95,17 +97,17 @@ impl Packet {
         }
     }
 
-    /// Says in its header that there was congestion (RFC 3168).
+    /// Marks the packet with congestion (RFC 3168), unless it is no packet of IP.
     pub fn mark_congestion(&mut self) {
         if let Content::Ip { at, headers } = &mut self.content {
             headers.mark_congestion(&mut self.bytes[*at..]);
         }
     }
 
-    /// Flips bits of the packet of IP, counted from its first, and sets right the checksums that cover them, so that the damage is not found: see
-    /// [`cohaptic_wan::Checksum::Passes`]. Bits beyond the end of the packet are left out.
+    /// Flips bits of the IP packet, counted from its first bit, and corrects the checksums that cover them, so that no receiver detects the damage: see
+    /// [`cohaptic_wan::Checksum::Passes`]. Bits beyond the end of the packet are ignored.
     pub fn damage(&mut self, damage: &Damage) {
-        // What was damaged goes out as it is, and alone: in a segment its checksum would be computed anew.
+        // A damaged packet goes out alone and unchanged: in a segment its checksum would be computed anew.
         self.is_checked = false;
         if let Content::Ip { at, headers } = &self.content {
             let end = at + headers.length;
@@ -114,18 +116,18 @@ impl Packet {
     }
 }
 
-/// The tags of VLANs (IEEE 802.1Q) in frames of Ethernet (IEEE 802.3).
+/// Types of VLAN tags (IEEE 802.1Q) in Ethernet frames (IEEE 802.3).
 const TAGGED: [u16; 2] = [0x8100, 0x88a8];
 const IPV4: u16 = 0x0800;
 const IPV6: u16 = 0x86dd;
 
-/// Two addresses of six bytes.
+/// Bytes of the two addresses at the beginning of a frame.
 const ADDRESSES: usize = 12;
 
-/// A tag within a tag is what providers use; more are not in use.
+/// Tags in a frame, at most: providers use a tag within a tag, and nothing deeper is in use.
 const MOST_TAGS: usize = 2;
 
-/// Where the packet of IP begins; `None` if the frame carries something else.
+/// Returns the index of the first byte of the IP header, or `None` if the frame carries something else.
 fn network_layer(frame: &[u8]) -> Option<usize> {
     let mut at = ADDRESSES;
     for _ in 0..=MOST_TAGS {
@@ -133,7 +135,7 @@ fn network_layer(frame: &[u8]) -> Option<usize> {
         at += 2;
         match kind {
             IPV4 | IPV6 => return Some(at),
-            // The tag itself, and then the kind again.
+            // After the type of a tag come two bytes of the tag, then the next type.
             kind if TAGGED.contains(&kind) => at += 2,
             _ => return None,
         }
@@ -141,19 +143,20 @@ fn network_layer(frame: &[u8]) -> Option<usize> {
     None
 }
 
-/// Flips the bits of a packet. A checksum that was right is right afterwards, and one that was wrong is as wrong as before: a flipped bit of a checksum is
-/// therefore flipped back.
+/// Flips bits of a packet. A right checksum is right afterwards, and a wrong checksum is as wrong as before; a flipped bit of a checksum is therefore flipped
+/// back.
 ///
-/// Of a header the checksum is set right and nothing else: a packet whose addresses were hit goes where they say now. A fragment that is not the first
-/// has no checksum that could be set right.
+/// Of a header only the checksum is corrected: a packet with damaged addresses goes to the new addresses. A later fragment has no checksum to correct.
 fn apply(packet: &mut [u8], headers: &Headers, damage: &Damage) {
     let covered = headers.covered;
     let is_v4 = headers.source.is_ipv4();
     let field = transport_field(packet, headers);
+    // Without a transport header the sum covers no bytes.
     let begin = headers.transport.unwrap_or(packet.len());
-    // The addresses are part of the pseudo-header.
+    // The addresses belong to the pseudo-header, which the checksum of the transport protocol covers.
     let addresses = if is_v4 { 12..20 } else { 8..40 };
     let of_transport = |packet: &[u8]| [sum(&packet[addresses.clone()]), sum(&packet[begin..])];
+    // Sums before and after the damage are enough to correct a checksum: see `checksum::change`.
     let before = (sum(&packet[..covered]), of_transport(packet));
     damage.apply(packet);
     if is_v4 {
@@ -162,11 +165,12 @@ fn apply(packet: &mut [u8], headers: &Headers, damage: &Damage) {
     }
     if let Some(field) = field {
         let now = of_transport(packet);
+        // The checksum of ICMP for IPv4 has no pseudo-header.
         if headers.protocol != Protocol::ICMP {
             change(packet, field, before.1[0], now[0]);
         }
         change(packet, field, before.1[1], now[1]);
-        // Zero would say that there is no checksum; both are zero in ones' complement.
+        // Zero would mean that the datagram has no checksum. In ones' complement, all ones are equal to zero.
         if headers.protocol == Protocol::UDP && packet[field..field + 2] == [0, 0] {
             packet[field..field + 2].fill(0xff);
         }

@@ -1,4 +1,4 @@
-//! What a running router says of itself.
+//! Counters of a running router.
 
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_units::Instant;
@@ -6,22 +6,23 @@ use cohaptic_units::Instant;
 use crate::engine::Counters;
 use crate::side::Sent;
 
-/// What was handed to the device of one side.
+/// Packets handed to the device of one side.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Written {
-    /// Packets that it took.
+    /// Packets taken by the device.
     pub packets: u64,
-    /// Their bytes, with frames.
+    /// Bytes of the taken packets, with frames.
     pub bytes: u64,
-    /// Packets for which it had no room. They are lost: the router never waits for a device.
+    /// Packets for which the device had no room. Such packets are lost, because the router never waits for a device.
     pub full: u64,
-    /// Packets that were longer than it takes.
+    /// Packets longer than the device takes.
     pub too_long: u64,
-    /// Packets that it refused for another reason, such as being down.
+    /// Packets refused for another reason, such as a device that is down.
     pub refused: u64,
 }
 
 impl Written {
+    /// Counts a packet of `length` bytes.
     pub(super) fn add(&mut self, sent: Sent, length: usize) {
         match sent {
             Sent::Sent => {
@@ -34,34 +35,34 @@ impl Written {
         }
     }
 
-    /// Packets that the device did not take.
+    /// Returns the number of packets not taken by the device.
     #[must_use]
     pub const fn lost(&self) -> u64 {
         self.full + self.too_long + self.refused
     }
 }
 
-/// Everything that a running router has counted.
+/// All counters of a running router.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Report {
-    /// How old the run is.
+    /// Time since the run began.
     pub elapsed: Instant,
-    /// Packets, links and rules.
+    /// Counters of packets, links and rules.
     pub counters: Counters,
-    /// By side: left, right.
+    /// Packets handed to the devices, indexed by side: left, right.
     pub written: [Written; 2],
-    /// How late packets left after their logical departure.
+    /// Release error: time from the logical departure of a packet to the call of the device.
     pub release: LatenessSummary,
 }
 
 impl Report {
-    /// Packets that came in.
+    /// Returns the number of arrived packets.
     #[must_use]
     pub fn packets(&self) -> u64 {
         self.counters.received.iter().map(|received| received.all.packets).sum()
     }
 
-    /// Packets that did not come out, for any reason, and will not: packets on the way are not among them.
+    /// Returns the number of packets lost for any reason. Packets inside links are not counted.
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.counters.dropped() + self.written.iter().map(Written::lost).sum::<u64>()

@@ -1,4 +1,4 @@
-//! The router in real time: one thread that reads both devices and writes what leaves, in the loop of [`cohaptic_realtime::drive()`].
+//! The router in real time: one thread reads both devices and writes departing packets, in the loop of [`cohaptic_realtime::drive()`].
 
 mod counts;
 
@@ -19,39 +19,41 @@ use crate::packet::Packet;
 use crate::side::{AnyDevice, Device, OpenError};
 pub use counts::{Report, Written};
 
-/// A router between two devices.
+/// Router between two devices.
 #[derive(Debug)]
 pub struct Router<D = AnyDevice, C = MonotonicClock> {
     engine: Engine,
-    /// Left, right.
+    /// Devices of the left and of the right side.
     devices: [D; 2],
     clock: C,
     pacing: Pacing,
+    /// Release error of every packet handed to a device.
     release: Lateness,
+    /// Packets handed to the devices, indexed by side.
     written: [Written; 2],
-    /// What one reading gave.
+    /// Packets of the current reading, empty between readings.
     incoming: Vec<Packet>,
-    /// What has left the engine, to the left and to the right.
+    /// Packets from the engine, indexed by the side of their departure.
     leaving: [Leaving; 2],
 }
 
-/// Packets on their way to a device, and when they left the engine.
+/// Packets for one device, with their logical departures. Both vectors have the same length.
 #[derive(Debug, Default)]
 struct Leaving {
     packets: Vec<Arc<Packet>>,
     at: Vec<Instant>,
 }
 
-/// Why a router came to an end by itself.
+/// Reason why a router stopped by itself.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
     /// A device gives no more packets.
     #[error("{}: cannot read the device: {source}", side.name())]
     Device {
-        /// Which side.
+        /// Side of the device.
         side: Side,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
     /// The system does not let the thread wait.
@@ -59,18 +61,18 @@ pub enum RunError {
     Wait(#[from] io::Error),
 }
 
-/// To read a packet and to deal with it takes about as long.
+/// Approximate time to read a packet and to deal with it.
 const READING: Duration = Duration::from_micros(10);
 
-/// The number of packets from one device after which those that leave are written, and the other one has its turn.
+/// Packets read from one device before departures are written and the other device gets its turn.
 const IN_TURN: usize = 64;
 
 impl Router {
-    /// Opens both devices. The clock of the run begins here.
+    /// Opens both devices. The clock of the run starts with this call.
     ///
     /// # Errors
     ///
-    /// [`OpenError`]: which side, what was tried, and what the system says.
+    /// [`OpenError`] with the side, the failed step and the error of the system.
     pub fn open(file: &RouterFile, pacing: Pacing) -> Result<Self, OpenError> {
         let devices = AnyDevice::open_both(&file.left, &file.right)?;
         Ok(Self::with(file, devices, MonotonicClock::start(), pacing))
@@ -78,23 +80,23 @@ impl Router {
 }
 
 impl<D: Device, C: Clock> Router<D, C> {
-    /// A router between these devices, left and right, by this clock. The devices that the file names are not looked at.
+    /// Returns a router between the given devices, left and right, with the given clock. The devices named in the file are ignored.
     #[must_use]
     pub fn with(file: &RouterFile, devices: [D; 2], clock: C, pacing: Pacing) -> Self {
         let (written, leaving) = ([Written::default(); 2], [Leaving::default(), Leaving::default()]);
         Self { engine: Engine::new(file), devices, clock, pacing, release: Lateness::new(), written, incoming: Vec::new(), leaving }
     }
 
-    /// Routes packets until `stop` is set, or until the run is `until` old. `look` is called on this thread at the end, and `every` so often or up to 50 ms
-    /// later: packets wait meanwhile, so it should take microseconds.
+    /// Routes packets until `stop` is set, or until the run is `until` old. `look` is called on this thread at the end, and about every `every`, at most 50 ms
+    /// late. Packets wait during `look`, so it should take microseconds.
     ///
-    /// Packets inside the links at the end stay there: a further call goes on.
+    /// Packets inside the links at the end stay there, and a further call continues with them.
     ///
     /// # Errors
     ///
     /// [`RunError`] if a device is gone.
     pub fn run(&mut self, stop: &AtomicBool, until: Option<Instant>, every: Duration, mut look: impl FnMut(&mut Self)) -> Result<(), RunError> {
-        // A stop is noticed as often.
+        // `stop` is read at least this often.
         const NEVER_LONGER: Duration = Duration::from_millis(50);
         let every = every.max(Duration::from_millis(1));
         let mut next_look = self.clock.now().saturating_add(every);
@@ -102,6 +104,7 @@ impl<D: Device, C: Clock> Router<D, C> {
         drive(self, &schedule, |router, now| {
             if now >= next_look {
                 look(router);
+                // Counted from this look, so that slow looks do not pile up.
                 next_look = now.saturating_add(every);
             }
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -110,36 +113,37 @@ impl<D: Device, C: Clock> Router<D, C> {
         Ok(())
     }
 
-    /// Changes a link from now on, in one direction or (`None`) in both: see [`Engine::set_link`].
+    /// Changes the model of a link from now on, in one direction or, with `None`, in both: see [`Engine::set_link`].
     ///
     /// # Errors
     ///
     /// [`NoSuchLink`]; nothing was changed.
     pub fn set_link(&mut self, name: &str, from: Option<Side>, model: &LinkModel) -> Result<(), NoSuchLink> {
         self.engine.set_link(self.clock.now(), name, from, model)?;
+        // The change may have released packets.
         self.take_departures();
         self.send();
         Ok(())
     }
 
-    /// Everything that was counted so far. The delays of late are those since the last call.
+    /// Returns all counters. The recent delays begin anew with each call.
     pub fn report(&mut self) -> Report {
         Report { elapsed: self.clock.now(), counters: self.engine.counters(), written: self.written, release: self.release.summary() }
     }
 
-    /// How late packets left after their logical departure, of all so far: from the departure until they were handed to the device.
+    /// Returns the release error so far: the time from the logical departure of each packet to the call of the device.
     #[must_use]
     pub const fn lateness(&self) -> &Lateness {
         &self.release
     }
 
-    /// The same in a few numbers.
+    /// Returns a summary of the release error so far.
     #[must_use]
     pub fn release_error(&self) -> LatenessSummary {
         self.release.summary()
     }
 
-    /// Takes from the engine what has left it.
+    /// Moves departures from the engine to the queues of the devices.
     fn take_departures(&mut self) {
         while let Some(Departure { at, to, packet }) = self.engine.poll_departure() {
             let leaving = &mut self.leaving[to.index()];
@@ -153,7 +157,7 @@ impl<D: Device, C: Clock> Driven for Router<D, C> {
     type Clock = C;
     type Error = RunError;
 
-    /// A packet that comes meanwhile is read that much late.
+    /// A packet that arrives while a departure is made ready is read late by up to this time.
     const AHEAD: Option<Duration> = Some(READING);
     const RESTS: bool = false;
 
@@ -165,10 +169,10 @@ impl<D: Device, C: Clock> Driven for Router<D, C> {
         self.devices.each_ref().map(Device::readable)
     }
 
-    /// Reads the packets that are there, in turns.
+    /// Reads waiting packets from both devices in turns.
     fn receive(&mut self, now: Instant) -> Result<Received, RunError> {
-        // A packet counts from when it is read, so that departures need not wait for packets that are unread: those that are late already leave first. If
-        // all that are due left first, more packets would leave alone, in a call of the kernel each.
+        // A packet counts from its reading, so departures need not wait for unread packets: departures that are already late leave first. If all due departures
+        // left first, more packets would leave alone, each in a call of the kernel.
         if self.engine.poll_timeout().is_some_and(|due| now.saturating_duration_since(due) >= READING) {
             self.handle_timeout(now);
             self.send();
@@ -181,13 +185,13 @@ impl<D: Device, C: Clock> Driven for Router<D, C> {
                 if !is_read.map_err(|source| RunError::Device { side, source })? {
                     break;
                 }
-                // The packets of a segment came at one instant.
+                // All packets of a segment arrived at one instant.
                 let now = self.clock.now();
                 count += self.incoming.len();
                 self.incoming.drain(..).for_each(|packet| self.engine.handle_packet(now, side, packet));
             }
             received += count;
-            // After each turn those leave whose time has come meanwhile: together, as far as a device takes them so.
+            // Departures that have become due leave after each turn, as many in one call as the device takes together.
             self.take_departures();
             self.send();
         }
@@ -204,15 +208,17 @@ impl<D: Device, C: Clock> Driven for Router<D, C> {
         false
     }
 
-    /// Writes what has left the engine.
+    /// Writes the packets from the engine to the devices.
     fn send(&mut self) -> u64 {
         let before = self.release.count();
         for ((device, written), Leaving { packets, at }) in self.devices.iter_mut().zip(&mut self.written).zip(&mut self.leaving) {
             let mut rest = packets.as_slice();
             let mut at = at.drain(..);
             while !rest.is_empty() {
+                // Lateness is measured before the call, which hands over all packets of the group at once.
                 let now = self.clock.now();
                 let (count, sent) = device.send(rest);
+                // At least one packet is settled by each call, so that the loop ends.
                 let (gone, left) = rest.split_at(count.clamp(1, rest.len()));
                 for (packet, at) in gone.iter().zip(&mut at) {
                     self.release.record(now.saturating_duration_since(at));

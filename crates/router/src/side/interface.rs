@@ -1,7 +1,8 @@
-//! An interface that is there, through a packet socket (packet(7)): the router hears every frame that comes in at it and sends frames out of it.
+//! Existing interface, used through a packet socket (packet(7)): the router receives every frame that arrives at the interface, and sends frames out of the
+//! interface.
 //!
-//! Frames keep their addresses, so two interfaces with a router between them behave like one cable. The host itself hears the frames too; it should have no
-//! addresses on these interfaces, so that it does not answer them.
+//! Frames keep their addresses, so two interfaces with a router between them behave like one cable. The host itself receives the frames, too. The host should
+//! have no addresses on these interfaces, or it answers the frames.
 
 use std::io;
 use std::os::fd::{AsFd as _, AsRawFd as _, BorrowedFd, OwnedFd};
@@ -19,27 +20,29 @@ use super::netlink::Netlink;
 use super::{Device, Failed, LONGEST, Sent};
 use crate::packet::{Framing, Packet};
 
-/// `ARPHRD_ETHER`.
+/// `ARPHRD_ETHER`, the type of Ethernet interfaces.
 const ETHERNET: u16 = 1;
 
-/// `PACKET_OUTGOING`: what this host has sent out of the interface.
+/// `PACKET_OUTGOING`, the type of frames sent by this host.
 const OUTGOING: u8 = 4;
 
-/// How much may wait in the socket until we read it \[bytes\].
+/// Receive buffer of the socket \[bytes\].
 const WAITING: usize = 8 << 20;
 
-/// An interface that was there.
+/// Existing Ethernet interface.
 #[derive(Debug)]
 pub struct Interface {
     socket: OwnedFd,
+    /// Index of the interface.
     index: usize,
+    /// Memory for one frame.
     buffer: Vec<u8>,
-    /// To be told to hear only its own packets again, when this is dropped.
+    /// Socket and index for leaving promiscuous mode on drop; `None` if the interface was in promiscuous mode before.
     restore: Option<(Netlink, u32)>,
 }
 
 impl Interface {
-    /// Begins to hear everything that comes in at the interface.
+    /// Opens a packet socket on the interface and switches promiscuous mode on.
     pub(super) fn open(spec: &InterfaceSpec) -> Result<Self, Failed> {
         let (address, hears_all) = find(spec)?;
         if address.hatype() != ETHERNET {
@@ -49,12 +52,13 @@ impl Interface {
         let opened = socket(AddressFamily::Packet, SockType::Raw, flags, SockProtocol::EthAll).map_err(io::Error::from);
         let socket = opened.map_err(Failed::system("open a packet socket"))?;
         bind(socket.as_raw_fd(), &address).map_err(io::Error::from).map_err(Failed::system("bind a packet socket to it"))?;
-        // The first takes CAP_NET_ADMIN over the machine; without, the second gives as much as the system allows.
+        // The first call can exceed the system's limit, but needs CAP_NET_ADMIN on the whole machine. The second call grants at most the limit.
         if setsockopt(&socket, sockopt::RcvBufForce, &WAITING).is_err() {
             setsockopt(&socket, sockopt::RcvBuf, &WAITING).map_err(io::Error::from).map_err(Failed::system("let packets wait in its socket"))?;
         }
         let index = u32::try_from(address.ifindex()).map_err(io::Error::other).map_err(Failed::system("use its number"))?;
         let netlink = Netlink::open().map_err(Failed::system("speak to the kernel through rtnetlink"))?;
+        // Promiscuous mode that somebody else has switched on stays on at the end.
         let restore = if hears_all {
             None
         } else {
@@ -68,13 +72,13 @@ impl Interface {
 impl Drop for Interface {
     fn drop(&mut self) {
         if let Some((netlink, index)) = &self.restore {
-            // The interface may be gone: then there is nothing to restore.
+            // The interface may be gone. Then nothing is left to restore.
             drop(netlink.promiscuous(*index, false));
         }
     }
 }
 
-/// The address of an interface as a socket names it, and whether it hears everything already.
+/// Returns the address of an interface for a packet socket, and whether the interface is in promiscuous mode already.
 fn find(spec: &InterfaceSpec) -> Result<(LinkAddr, bool), Failed> {
     let mut all = getifaddrs().map_err(io::Error::from).map_err(Failed::system("list the network interfaces"))?;
     let found = all.find_map(|entry| {
@@ -97,13 +101,13 @@ impl Device for Interface {
     fn receive(&mut self, packets: &mut Vec<Packet>) -> io::Result<bool> {
         loop {
             match recvfrom::<LinkAddr>(self.socket.as_raw_fd(), &mut self.buffer) {
-                // Not what this host sends itself, and not what came from elsewhere before the socket was bound.
+                // Skipped are frames sent by this host, and frames of other interfaces that arrived before the socket was bound.
                 Ok((length, Some(from))) if from.pkttype() != OUTGOING && from.ifindex() == self.index => {
                     packets.push(Packet::new(self.buffer[..length].to_vec(), Framing::Ethernet));
                     return Ok(true);
                 }
                 Ok(_) => {}
-                // A device that goes down says so once, and may come up again.
+                // An interface that goes down reports so once, and may come up again.
                 Err(Errno::EAGAIN | Errno::EINTR | Errno::ENETDOWN) => return Ok(false),
                 Err(error) => return Err(error.into()),
             }

@@ -1,4 +1,4 @@
-//! The two ends of the router: devices that give packets and take them.
+//! The two sides of the router: devices from which packets are read and to which packets are written.
 
 mod interface;
 mod namespace;
@@ -15,42 +15,43 @@ use crate::packet::Packet;
 pub use interface::Interface;
 pub use tun::Tun;
 
-/// A device that gives packets and takes them, and never makes its caller wait.
+/// Device that gives and takes packets without ever blocking.
 pub trait Device {
-    /// What becomes readable when there is a packet.
+    /// Returns a file descriptor, readable when a packet waits.
     fn readable(&self) -> BorrowedFd<'_>;
 
-    /// Reads once, and appends the packet that came, or the packets of the segment that came; says whether anything did.
+    /// Reads once, and appends the packet, or the packets of a segment, to `packets`. Returns whether anything was read.
     ///
     /// # Errors
     ///
-    /// What the system says: the device gives no more packets.
+    /// The error of the system. The device gives no more packets.
     fn receive(&mut self, packets: &mut Vec<Packet>) -> io::Result<bool>;
 
-    /// Hands over the first of these packets, with as many of the following ones as go with it. Says how many, at least one, and what became of them.
+    /// Hands over the first packet, together with as many following packets as go in the same call. Returns the number of packets handed over (at least 1) and
+    /// the common fate.
     fn send(&mut self, packets: &[Arc<Packet>]) -> (usize, Sent);
 }
 
-/// No packet of IP is longer; and what stands before it.
+/// Bytes of one reading, at most: the longest IP packet, and the headers before the packet.
 const LONGEST: usize = (1 << 16) + 64;
 
-/// What became of a packet that was handed to a device.
+/// Fate of a packet handed to a device.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Sent {
-    /// The device has it.
+    /// The device took the packet.
     Sent,
     /// The device had no room.
     Full,
-    /// It is longer than the device takes.
+    /// The packet is longer than the device takes.
     TooLong,
-    /// The device refused it for another reason, such as being down.
+    /// The device refused the packet for another reason, such as being down.
     Refused,
 }
 
 impl Sent {
-    /// What the system said of a write.
+    /// Returns the fate in the result of a write.
     fn of(written: io::Result<usize>) -> Self {
-        // Linux's names for numbers that `ErrorKind` does not tell apart.
+        // Error numbers of Linux that `ErrorKind` does not tell apart.
         const NO_BUFFER_SPACE: i32 = nix::errno::Errno::ENOBUFS as i32;
         const MESSAGE_TOO_LONG: i32 = nix::errno::Errno::EMSGSIZE as i32;
         match written {
@@ -65,16 +66,17 @@ impl Sent {
     }
 }
 
-/// Either kind of device.
+/// Device of either kind.
 #[derive(Debug)]
 pub enum AnyDevice {
-    /// A TUN device.
+    /// TUN device.
     Tun(Tun),
-    /// An interface that was there.
+    /// Existing interface.
     Interface(Interface),
 }
 
 impl AnyDevice {
+    /// Opens the device of a side, inside the network namespace of the device.
     fn open(side: Side, attachment: &Attachment) -> Result<Self, OpenError> {
         let opened = namespace::within(attachment.namespace(), || match attachment {
             Attachment::Tun(tun) => Tun::open(tun).map(Self::Tun),
@@ -87,9 +89,10 @@ impl AnyDevice {
     ///
     /// # Errors
     ///
-    /// [`OpenError`] with what was tried and what the system says, and if both sides are one device, whatever its namespace is called: each packet would
-    /// come back again and again.
+    /// [`OpenError`] with the failed step and the error of the system, or if both sides are one device, even under different names of one namespace. Each
+    /// packet would then come back again and again.
     pub(crate) fn open_both(left: &Attachment, right: &Attachment) -> Result<[Self; 2], OpenError> {
+        // Namespaces are compared only if the device names are equal, because comparing opens files.
         if left.device() == right.device() {
             let failed = match namespace::are_one(left.namespace(), right.namespace()) {
                 Ok(true) => Some(Failed::SameDevice),
@@ -125,15 +128,15 @@ impl Device for AnyDevice {
     }
 }
 
-/// A side could not be opened.
+/// Failure to open the device of a side.
 #[derive(Debug, thiserror::Error)]
 #[error("{}, device {device}: {failed}", side.name())]
 pub struct OpenError {
-    /// Which.
+    /// Side of the device.
     pub side: Side,
-    /// Its device.
+    /// Name of the device.
     pub device: String,
-    /// Why.
+    /// Reason of the failure.
     #[source]
     pub failed: Failed,
 }
@@ -144,42 +147,43 @@ impl OpenError {
     }
 }
 
-/// Why a device could not be opened.
+/// Reason why a device could not be opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Failed {
-    /// Both sides name it.
+    /// Both sides name the same device.
     #[error("it is the device of the other side, in the same network namespace: expected two devices")]
     SameDevice,
-    /// The system refused something.
+    /// The system refused a step.
     #[error("cannot {what}: {source}{}", way_out(source))]
     System {
-        /// What was tried.
+        /// Failed step.
         what: String,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
-    /// A device that should be there is not.
+    /// A device that should exist does not exist.
     #[error("there is no such device in {namespace}: expected one that is there; without `existing = true` a tun is made")]
     NoDevice {
-        /// Where it was looked for.
+        /// Namespace in which the device was looked for.
         namespace: String,
     },
-    /// An interface that does not carry Ethernet.
+    /// The interface does not carry Ethernet.
     #[error("it does not carry Ethernet (type {kind}): expected an Ethernet or a veth interface, or a tun")]
     NotEthernet {
-        /// The type as Linux numbers it, `ARPHRD_…`.
+        /// Type of the interface as numbered by Linux, `ARPHRD_…`.
         kind: u16,
     },
 }
 
 impl Failed {
+    /// Returns a function that turns an error of the system into the failure of the step `what`.
     fn system(what: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
         |source| Self::System { what: what.into(), source }
     }
 }
 
-/// What most refusals need.
+/// Returns the permission that most refused steps need, for the message.
 fn way_out(error: &io::Error) -> &'static str {
     if error.kind() == io::ErrorKind::PermissionDenied {
         ": it takes root, CAP_NET_ADMIN (and CAP_NET_RAW for an interface), or namespaces of your own: `unshare --map-root-user --net`"

@@ -1,4 +1,4 @@
-//! Network namespaces: a device is opened in the one that it belongs to, and keeps working from outside.
+//! Network namespaces: a device is opened inside its namespace, and can then be used from outside.
 
 use std::fs::{self, File};
 use std::os::unix::fs::MetadataExt as _;
@@ -8,17 +8,18 @@ use nix::sched::{CloneFlags, setns};
 
 use super::Failed;
 
-/// The namespace of the calling thread.
+/// Path of the namespace of the calling thread.
 const OWN: &str = "/proc/thread-self/ns/net";
 
-/// Where `ip netns` keeps the namespaces that it has given a name.
+/// Folder of the namespaces named by `ip netns`.
 const NAMED: &str = "/run/netns";
 
-/// Does something in a namespace, with this thread alone, and comes back. `None`: here.
+/// Runs `does` inside a namespace, on this thread alone, and returns to the former namespace. `None`: the namespace stays the same.
 pub(super) fn within<T>(namespace: Option<&str>, does: impl FnOnce() -> Result<T, Failed>) -> Result<T, Failed> {
     let Some(namespace) = namespace else { return does() };
     let path = path(namespace);
     let open = |path: &Path| File::open(path).map_err(Failed::system(format!("open the network namespace {}", path.display())));
+    // The own namespace is opened first: without it there would be no way back.
     let (own, other) = (open(Path::new(OWN))?, open(&path)?);
     let enter = |to: &File, what: String| setns(to, CloneFlags::CLONE_NEWNET).map_err(|error| Failed::system(what)(error.into()));
     enter(&other, format!("enter the network namespace {}", path.display()))?;
@@ -27,17 +28,19 @@ pub(super) fn within<T>(namespace: Option<&str>, does: impl FnOnce() -> Result<T
     done
 }
 
-/// Whether two namespaces are one, whatever they are called: a name, the path that the name stands for, and the namespace of this program have several names.
+/// Returns whether two namespaces are the same one. A namespace has several names: a name of `ip netns`, the path behind the name, and `None` for the program's
+/// own namespace.
 pub(super) fn are_one(one: Option<&str>, other: Option<&str>) -> Result<bool, Failed> {
     let identity = |namespace: Option<&str>| {
         let path = namespace.map_or_else(|| PathBuf::from(OWN), path);
         let metadata = fs::metadata(&path).map_err(Failed::system(format!("open the network namespace {}", path.display())))?;
+        // Device number and inode identify a namespace.
         Ok((metadata.dev(), metadata.ino()))
     };
     Ok(one == other || identity(one)? == identity(other)?)
 }
 
-/// A name is one that `ip netns` gave; what has a slash is a path.
+/// Returns the path of a namespace: with a slash it is a path already, otherwise a name of `ip netns`.
 fn path(namespace: &str) -> PathBuf {
     if namespace.contains('/') { PathBuf::from(namespace) } else { Path::new(NAMED).join(namespace) }
 }

@@ -1,4 +1,5 @@
-//! The few requests of rtnetlink (rtnetlink(7)) that a device needs: switched on, its length of packets, its addresses, and that it hears everything.
+//! The few requests of rtnetlink (rtnetlink(7)) that a device needs: its state, the length of its packets and of its queue, its addresses, and promiscuous
+//! mode.
 
 use core::net::IpAddr;
 use std::io;
@@ -7,26 +8,35 @@ use std::os::fd::{AsRawFd as _, OwnedFd};
 use cohaptic_linkfile::router::Network;
 use nix::sys::socket::{AddressFamily, MsgFlags, NetlinkAddr, SockFlag, SockProtocol, SockType, bind, recv, send, socket};
 
-/// A socket to the kernel. It speaks of the network namespace in which it was opened.
+/// Netlink socket. The requests concern the network namespace in which the socket was opened.
 #[derive(Debug)]
 pub(super) struct Netlink {
     socket: OwnedFd,
 }
 
+/// `RTM_NEWLINK`.
 const NEW_LINK: u16 = 16;
+/// `RTM_NEWADDR`.
 const NEW_ADDRESS: u16 = 20;
-/// Request, and answer it.
+/// `NLM_F_REQUEST` and `NLM_F_ACK`: a request that the kernel answers.
 const REQUEST: u16 = 0x1 | 0x4;
-/// Make it, and do not mind if it is there.
+/// `NLM_F_CREATE` and `NLM_F_REPLACE`: an object that exists already is no error.
 const CREATE: u16 = 0x400 | 0x100;
+/// `IFLA_MTU`.
 const ATTRIBUTE_MTU: u16 = 4;
+/// `IFLA_TXQLEN`.
 const ATTRIBUTE_QUEUE: u16 = 13;
+/// `IFA_ADDRESS`.
 const ATTRIBUTE_ADDRESS: u16 = 1;
+/// `IFA_LOCAL`.
 const ATTRIBUTE_LOCAL: u16 = 2;
+/// `IFF_UP`.
 const FLAG_UP: u32 = 0x1;
+/// `IFF_PROMISC`.
 const FLAG_PROMISCUOUS: u32 = 0x100;
 
 impl Netlink {
+    /// Opens a socket in the network namespace of the calling thread.
     pub(super) fn open() -> io::Result<Self> {
         let socket = socket(AddressFamily::Netlink, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::NetlinkRoute)?;
         bind(socket.as_raw_fd(), &NetlinkAddr::new(0, 0))?;
@@ -38,31 +48,32 @@ impl Netlink {
         self.ask(NEW_LINK, REQUEST, &link(index, FLAG_UP, FLAG_UP))
     }
 
-    /// Lets a device hear packets for others, or not.
+    /// Switches promiscuous mode of a device on or off: whether it accepts frames for other addresses.
     pub(super) fn promiscuous(&self, index: u32, hears_all: bool) -> io::Result<()> {
         self.ask(NEW_LINK, REQUEST, &link(index, if hears_all { FLAG_PROMISCUOUS } else { 0 }, FLAG_PROMISCUOUS))
     }
 
-    /// The largest packet that a device takes.
+    /// Sets the length of the longest packet for a device \[bytes\].
     pub(super) fn mtu(&self, index: u32, mtu: u16) -> io::Result<()> {
         self.number(index, ATTRIBUTE_MTU, mtu.into())
     }
 
-    /// How many packets wait in a device. The older way to say so, an ioctl, takes root over the whole machine.
+    /// Sets the number of packets that can wait in a device. The older ioctl for this needs root rights on the whole machine.
     pub(super) fn waiting(&self, index: u32, packets: u32) -> io::Result<()> {
         self.number(index, ATTRIBUTE_QUEUE, packets)
     }
 
+    /// Sets a numeric attribute of a device.
     fn number(&self, index: u32, kind: u16, value: u32) -> io::Result<()> {
         let mut body = link(index, 0, 0);
         attribute(&mut body, kind, &value.to_ne_bytes());
         self.ask(NEW_LINK, REQUEST, &body)
     }
 
-    /// Gives a device an address.
+    /// Adds an address with its prefix to a device.
     pub(super) fn address(&self, index: u32, network: Network) -> io::Result<()> {
         let family = if network.address().is_ipv4() { AddressFamily::Inet } else { AddressFamily::Inet6 };
-        // struct ifaddrmsg: family, prefix, flags, scope, index.
+        // Fields of `struct ifaddrmsg`: family, prefix, flags, scope, index.
         let mut body = vec![u8::try_from(family as i32).map_err(io::Error::other)?, network.prefix(), 0, 0];
         body.extend(index.to_ne_bytes());
         match network.address() {
@@ -72,7 +83,7 @@ impl Netlink {
         self.ask(NEW_ADDRESS, REQUEST | CREATE, &body)
     }
 
-    /// Sends a request and waits for the answer.
+    /// Sends a request and waits for the answer. Returns the error in the answer.
     fn ask(&self, kind: u16, flags: u16, body: &[u8]) -> io::Result<()> {
         send(self.socket.as_raw_fd(), &message(kind, flags, body), MsgFlags::empty())?;
         let mut answer = [0; 4096];
@@ -81,7 +92,7 @@ impl Netlink {
     }
 }
 
-/// A message: its length, its kind, its flags, a number, and no particular asker (struct nlmsghdr).
+/// Returns a message with its header (`struct nlmsghdr`): length, kind, flags, the sequence number 1, and the port 0.
 fn message(kind: u16, flags: u16, body: &[u8]) -> Vec<u8> {
     const HEADER: u32 = 16;
     let length = HEADER + u32::try_from(body.len()).unwrap_or(u32::MAX - HEADER);
@@ -94,19 +105,19 @@ fn message(kind: u16, flags: u16, body: &[u8]) -> Vec<u8> {
     message
 }
 
-/// struct ifinfomsg: no family, no type, the index, flags, and which of them are meant.
+/// Returns a `struct ifinfomsg`: no family, no type, the index of the device, flags, and the mask of the flags to change.
 fn link(index: u32, flags: u32, meant: u32) -> Vec<u8> {
     [0, index, flags, meant].map(u32::to_ne_bytes).concat()
 }
 
-/// struct rtattr: length, kind, value. All values here are multiples of four bytes, so nothing is padded.
+/// Appends a `struct rtattr`: length, kind, value. All values here are multiples of four bytes long, so no padding is needed.
 fn attribute(body: &mut Vec<u8>, kind: u16, value: &[u8]) {
     let length = 4 + u16::try_from(value.len()).unwrap_or(u16::MAX - 4);
     body.extend([length, kind].map(u16::to_ne_bytes).concat());
     body.extend(value);
 }
 
-/// The error in an answer: zero is none, others are negative numbers of errors.
+/// Returns the verdict in an answer: zero is success, and a negative number is the negated error number.
 fn verdict(answer: &[u8]) -> io::Result<()> {
     const ERROR: u16 = 2;
     let strange = || io::Error::new(io::ErrorKind::InvalidData, "the kernel's answer is none that is known");

@@ -1,7 +1,7 @@
-//! A TUN device: the host that has it sends packets of IP into it and finds those in it that we write.
+//! TUN device: the host sends IP packets into the device, and receives the packets written to the device by the router.
 //!
-//! With offloads (`IFF_VNET_HDR`, `TUNSETOFFLOAD`) the host leaves it to us to cut large segments of TCP and UDP and to compute checksums, and takes such
-//! segments from us: one system call for up to 64 packets, which is most of what a packet costs.
+//! With offloads (`IFF_VNET_HDR`, `TUNSETOFFLOAD`) the host leaves to the router to cut large segments of TCP and UDP and to compute checksums, and takes such
+//! segments from the router. One system call then carries up to 64 packets.
 
 use std::io;
 use std::os::fd::{AsFd as _, BorrowedFd};
@@ -15,17 +15,18 @@ use super::netlink::Netlink;
 use super::{Device, Failed, LONGEST, Sent};
 use crate::packet::{Framing, Join, Packet, cut, join, slices};
 
-/// How many packets wait in a device that we made until we read them. More than a burst, so that losses are those of a link.
+/// Packets waiting in a device made by the router, at most. More than a burst, so that packets are lost in the links and not in the device.
 const WAITING: u32 = 2_000;
 
-/// A TUN device. One that we made is gone when this is dropped.
+/// TUN device. A device made by the router disappears with this value.
 pub struct Tun {
     device: SyncDevice,
     name: String,
-    /// Which packets are joined for it; `None` without offloads.
+    /// Kinds of packets joined for the device; `None` without offloads.
     offloads: Option<Join>,
+    /// Memory for one reading.
     buffer: Vec<u8>,
-    /// What stands before the data of a segment.
+    /// Memory for the bytes before the data of a segment.
     head: Vec<u8>,
 }
 
@@ -36,9 +37,10 @@ impl std::fmt::Debug for Tun {
 }
 
 impl Tun {
-    /// Makes the device, gives it its addresses and switches it on; or attaches to one that is there.
+    /// Creates the device, adds its addresses and switches it on, or attaches to an existing device.
     pub(super) fn open(spec: &TunSpec) -> Result<Self, Failed> {
         let name = spec.name.as_str();
+        // Without this check, `/dev/net/tun` would create a missing device.
         if spec.existing && if_nametoindex(name).is_err() {
             let namespace =
                 spec.namespace.clone().map_or_else(|| "the network namespace of the program".to_owned(), |name| format!("network namespace {name}"));
@@ -56,6 +58,7 @@ impl Tun {
         Ok(tun)
     }
 
+    /// Sets queue length, packet length and addresses of a new device, and switches the device on.
     fn configure(&self, spec: &TunSpec) -> Result<(), Failed> {
         let index = self.device.if_index().map_err(Failed::system("look up its number"))?;
         let netlink = Netlink::open().map_err(Failed::system("speak to the kernel through rtnetlink"))?;
@@ -66,6 +69,7 @@ impl Tun {
         for address in &spec.addresses {
             netlink.address(index, *address).map_err(Failed::system(format!("give it the address {address}")))?;
         }
+        // Last, so that no packet arrives at a device that is only half configured.
         netlink.up(index).map_err(Failed::system("switch it on"))
     }
 }

@@ -1,4 +1,4 @@
-//! From packets to a segment.
+//! Joins packets into a segment.
 
 use std::io::IoSlice;
 use std::sync::Arc;
@@ -12,25 +12,25 @@ use crate::packet::checksum::{self, pseudo_header, sum};
 use crate::packet::headers::V4_CHECKSUM;
 use crate::packet::{Content, Headers, Packet};
 
-/// The longest segment, with its headers: what the length of IPv4 can say.
+/// Length of a segment with its headers, at most \[bytes\]: the limit of the length field of IPv4.
 const LONGEST: usize = 65_535;
 
-/// The most packets in a segment. Linux joins as many of UDP; of TCP, packets of a usual size fill the length before.
+/// Packets in a segment, at most. Linux joins as many UDP datagrams; TCP packets of a usual size reach the longest length first.
 const MOST: usize = 64;
 
-/// Which packets may be joined.
+/// Kinds of packets to join.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Join {
-    /// Those of TCP. Linux takes no segments of UDP before 6.2.
+    /// TCP only: before version 6.2, Linux takes no UDP segments.
     Tcp,
-    /// Those of TCP and of UDP.
+    /// TCP and UDP.
     TcpAndUdp,
 }
 
-/// Says how many of the first packets go to a device together, at least one, and writes what stands before their data: a header of virtio and, if there is
-/// more than one packet, the headers of the segment.
+/// Returns how many of the first packets go to a device together, at least one. Writes the bytes before their data to `head`: a virtio header and, for more
+/// than one packet, the headers of the segment.
 ///
-/// Cutting the segment gives the same packets, but for the identification of packets of IPv4 that must not be cut further, which has no meaning (RFC 6864).
+/// Cutting the segment gives the same packets, except for the identification of unfragmentable IPv4 packets, which has no meaning (RFC 6864).
 pub(crate) fn join(packets: &[Arc<Packet>], which: Join, head: &mut Vec<u8>) -> usize {
     head.clear();
     let first = packets.first().and_then(|packet| Part::of(packet, which));
@@ -42,43 +42,50 @@ pub(crate) fn join(packets: &[Arc<Packet>], which: Join, head: &mut Vec<u8>) -> 
     count
 }
 
-/// What goes to the device behind the headers.
+/// Returns the bytes for the device: `head`, then the data of each packet.
 pub(crate) fn slices<'a>(packets: &'a [Arc<Packet>], head: &'a [u8]) -> Vec<IoSlice<'a>> {
+    // A single packet has no headers in `head`, so that its slice is the whole packet.
     let headers = head.len() - Offload::LENGTH;
     let data = packets.iter().map(|packet| IoSlice::new(&packet.bytes[headers..]));
     std::iter::once(IoSlice::new(head)).chain(data).collect()
 }
 
-/// A packet that may be one of a segment.
+/// Candidate for a segment.
 struct Part<'a> {
     bytes: &'a [u8],
     headers: &'a Headers,
+    /// Index of the TCP or UDP header.
     transport: usize,
-    /// Where the data begins.
+    /// Index of the data.
     data: usize,
 }
 
 impl<'a> Part<'a> {
-    /// A packet whose checksums are known to be right, without options of IP, whose header says nothing out of the ordinary.
+    /// Returns the packet as a candidate, or `None`. A candidate has right checksums and no IP options, and ordinary TCP flags.
     fn of(packet: &'a Packet, which: Join) -> Option<Self> {
+        // Packets in Ethernet frames do not begin with IP, and interfaces take no segments.
         let Content::Ip { at: 0, headers } = &packet.content else { return None };
         let bytes = packet.bytes.as_slice();
         let transport = headers.transport.filter(|at| *at == if headers.source.is_ipv4() { 20 } else { 40 })?;
         let segment = &bytes[transport..];
         let data = transport + transport_length(headers.protocol, segment)?;
         let is_plain = match headers.protocol {
+            // Only flags that cutting restores, beside the acknowledgement.
             Protocol::TCP => segment[TCP_FLAGS] & !(FIN | PUSH | ECHO | CWR) == ACKNOWLEDGES,
             _ => which == Join::TcpAndUdp && usize::from(u16::from_be_bytes([segment[UDP_LENGTH], segment[UDP_LENGTH + 1]])) == segment.len(),
         };
+        // A damaged IPv4 header must stay damaged, but a segment's header gets a new checksum.
         let is_header_right = !headers.source.is_ipv4() || sum(&bytes[..transport]) == 0xffff;
         let is_joinable = packet.is_checked && headers.is_whole && headers.length == bytes.len() && is_plain && is_header_right;
         is_joinable.then_some(Self { bytes, headers, transport, data })
     }
 
+    /// Returns the TCP flags, or zero for UDP.
     fn flags(&self) -> u8 {
         if self.headers.protocol == Protocol::TCP { self.bytes[self.transport + TCP_FLAGS] } else { 0 }
     }
 
+    /// Returns the TCP sequence number, or zero for UDP.
     fn sequence(&self) -> u32 {
         if self.headers.protocol != Protocol::TCP {
             return 0;
@@ -86,7 +93,8 @@ impl<'a> Part<'a> {
         self.bytes[self.transport + TCP_SEQUENCE..].first_chunk().map_or(0, |bytes| u32::from_be_bytes(*bytes))
     }
 
-    /// The identification, and whether it has no meaning: IPv6 has none, and that of a packet that must not be cut is not looked at.
+    /// Returns the identification, and whether it has no meaning. IPv6 has no identification, and the identification of an unfragmentable IPv4 packet is not
+    /// used.
     fn identification(&self) -> (u16, bool) {
         const DO_NOT_FRAGMENT: u8 = 0x40;
         if self.headers.source.is_ipv6() {
@@ -96,20 +104,23 @@ impl<'a> Part<'a> {
         }
     }
 
+    /// Returns the length of the data \[bytes\].
     fn payload(&self) -> usize {
         self.bytes.len() - self.data
     }
 
-    /// How many packets the segment has that begins with this one, and the last of them, if that is another.
+    /// Returns the number of packets in the segment that begins with this packet, and the last of them if there are several.
     fn joined<'b>(&self, rest: &'b [Arc<Packet>], which: Join) -> (usize, Option<Part<'b>>) {
         let (mut count, mut last, mut length, mut sequence) = (1, None, self.bytes.len(), self.sequence());
         let (identification, has_none) = self.identification();
         let (mut is_end, mut step) = (self.flags() & (FIN | PUSH) != 0, None);
         for packet in rest.iter().take(MOST - 1) {
+            // FIN, PSH or a shorter packet ends a segment, because cutting gives them to the last packet only.
             let Some(next) = Part::of(packet, which).filter(|_| !is_end) else { break };
             if self.headers.protocol == Protocol::TCP {
                 sequence = sequence.wrapping_add(u32::try_from(self.payload()).unwrap_or(0));
             }
+            // Identifications must count up as cutting makes them. Identifications without a meaning may also be constant; the first pair decides.
             let found = next.identification().0.wrapping_sub(identification);
             let step = *step.get_or_insert(if found == 0 && has_none { 0 } else { 1 });
             let is_next = self.is_alike(&next)
@@ -121,6 +132,7 @@ impl<'a> Part<'a> {
                 break;
             }
             is_end = next.flags() & (FIN | PUSH) != 0 || next.payload() < self.payload();
+            // Here `next` continues the segment; a break above leaves it for the next segment.
             length += next.payload();
             count += 1;
             last = Some(next);
@@ -128,11 +140,11 @@ impl<'a> Part<'a> {
         (count, last)
     }
 
-    /// Whether the headers are the same but for what differs from one packet of a segment to the next.
+    /// Returns whether the headers are equal in all fields that packets of one segment share.
     fn is_alike(&self, next: &Part<'_>) -> bool {
         let same = |begin: usize, end: usize| self.bytes[begin..end] == next.bytes[begin..end];
         let of_network = if self.headers.source.is_ipv4() {
-            // Not the length, the identification and the checksum.
+            // Compared is everything but length, identification and checksum.
             same(0, 2) && same(6, V4_CHECKSUM) && same(V4_CHECKSUM + 2, 20)
         } else {
             same(0, 4) && same(6, 40)
@@ -140,7 +152,7 @@ impl<'a> Part<'a> {
         let at = self.transport;
         let of_transport = || {
             if self.headers.protocol == Protocol::TCP {
-                // Not the sequence number and the checksum; of the flags, not those that begin or end a segment.
+                // Compared is everything but sequence number and checksum. FIN and PSH may differ at the end of a segment, and CWR at its beginning.
                 let flags = self.flags() ^ (next.flags() & !(FIN | PUSH));
                 same(at, at + 4)
                     && same(at + 8, at + 13)
@@ -155,8 +167,9 @@ impl<'a> Part<'a> {
         self.transport == next.transport && self.data == next.data && self.headers.protocol == next.headers.protocol && of_network && of_transport()
     }
 
-    /// Writes the headers of the segment that begins with this packet.
+    /// Writes the virtio header and the headers of the segment that begins with this packet.
     fn write(&self, packets: &[Arc<Packet>], last: &Part<'_>, head: &mut Vec<u8>) {
+        // The segment has the first packet's headers once, and the data of every packet.
         let length = self.bytes.len() + packets[1..].iter().map(|packet| packet.bytes.len() - self.data).sum::<usize>();
         let word = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
         let (is_v4, is_tcp) = (self.headers.source.is_ipv4(), self.headers.protocol == Protocol::TCP);
@@ -172,6 +185,7 @@ impl<'a> Part<'a> {
         head.extend_from_slice(&self.bytes[..self.data]);
         let bytes = &mut head[Offload::LENGTH..];
         if is_v4 {
+            // The checksum of the header follows the change of the length.
             let old = u16::from_be_bytes([bytes[2], bytes[3]]);
             bytes[2..4].copy_from_slice(&word(length).to_be_bytes());
             checksum::change(bytes, V4_CHECKSUM, old, word(length));
@@ -184,6 +198,7 @@ impl<'a> Part<'a> {
         } else {
             bytes[at + UDP_LENGTH..at + UDP_LENGTH + 2].copy_from_slice(&word(length - at).to_be_bytes());
         }
+        // The field gets the sum of the pseudo-header alone: the device or its driver computes the rest.
         let pseudo = pseudo_header(&Headers { length, ..*self.headers }, at);
         bytes[at + field..at + field + 2].copy_from_slice(&pseudo.to_be_bytes());
     }

@@ -1,11 +1,11 @@
-//! Large segments: packets of one flow that a device gives, or takes, with one system call.
+//! Large segments: packets of one flow that a device gives or takes in one system call.
 //!
 //! ```text
 //!   device ── header of virtio │ IP │ TCP │ 64 kB of data ──▶ cut ──▶ packets ──▶ link ──▶ packets ──▶ join ──▶ device
 //! ```
 //!
-//! A link meets packets as they would be on a wire. A segment is cut into packets of the size that its header asks for, each with its checksums, and packets
-//! that leave at the same time are joined again where cutting gives the very same packets.
+//! A link must see packets as on a wire. A segment is therefore cut into packets of the size given in the virtio header, each with its own checksums. Packets
+//! that leave together are joined again if cutting the result gives exactly the same packets.
 
 mod cut;
 mod join;
@@ -17,48 +17,53 @@ use cohaptic_linkfile::router::Protocol;
 pub(crate) use cut::cut;
 pub(crate) use join::{Join, join, slices};
 
-/// What a device says of the bytes behind it, and is told: `struct virtio_net_hdr` (Virtual I/O Device 1.2, section 5.1.6), in the byte order of the machine.
+/// Header before each packet or segment of a device: `struct virtio_net_hdr` (Virtual I/O Device 1.2, section 5.1.6), in the byte order of the machine.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Offload {
+    /// [`NEEDS_CHECKSUM`] and [`VALID`].
     flags: u8,
+    /// Kind of segment, such as [`TCP_V4`], with [`REDUCED`] as an additional bit.
     kind: u8,
-    /// The bytes of all headers. Linux says something else when it forwards, so nothing believes it.
+    /// Length of all headers \[bytes\]. Never read, because Linux gives another number when it forwards.
     headers: u16,
-    /// The bytes of data in each packet but the last.
+    /// Bytes of data in each packet but the last.
     size: u16,
-    /// Where the checksum begins to count.
+    /// Index of the first byte covered by the checksum.
     begin: u16,
-    /// Where its field is, counted from there.
+    /// Index of the checksum, counted from `begin`.
     field: u16,
 }
 
-/// The checksum is left to the device: its field holds the sum of the pseudo-header.
+/// Flag: the checksum is left to the device, and its field holds the sum of the pseudo-header.
 const NEEDS_CHECKSUM: u8 = 1;
-/// The checksum was found to be right.
+/// Flag: the checksum was verified.
 const VALID: u8 = 2;
 const NO_SEGMENT: u8 = 0;
 const TCP_V4: u8 = 1;
 const TCP_V6: u8 = 4;
 const UDP: u8 = 5;
-/// Beside the kind: the first packet of the segment says that the sender has reduced its window (RFC 3168).
+/// Additional bit of the kind: the first packet of the segment carries CWR, "congestion window reduced" (RFC 3168).
 const REDUCED: u8 = 0x80;
 
 impl Offload {
+    /// Length of the header \[bytes\].
     const LENGTH: usize = 10;
 
+    /// Splits bytes into the header and the rest, or returns `None` if the header is incomplete.
     fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let (header, packet) = bytes.split_first_chunk::<{ Self::LENGTH }>()?;
         let word = |at: usize| u16::from_ne_bytes([header[at], header[at + 1]]);
         Some((Self { flags: header[0], kind: header[1], headers: word(2), size: word(4), begin: word(6), field: word(8) }, packet))
     }
 
+    /// Appends the header to `into`.
     fn write(self, into: &mut Vec<u8>) {
         into.extend([self.flags, self.kind]);
         into.extend([self.headers, self.size, self.begin, self.field].map(u16::to_ne_bytes).as_flattened());
     }
 }
 
-/// The bits of TCP's byte of flags.
+/// Bits in the flags of a TCP header.
 const FIN: u8 = 0x01;
 const PUSH: u8 = 0x08;
 const ACKNOWLEDGES: u8 = 0x10;
@@ -69,7 +74,7 @@ const TCP_OFFSET: usize = 12;
 const TCP_FLAGS: usize = 13;
 const UDP_LENGTH: usize = 4;
 
-/// The bytes of the header of TCP or UDP, which is whole and shorter than its packet.
+/// Returns the length of a TCP or UDP header \[bytes\], or `None` unless the header is complete and data follows.
 fn transport_length(protocol: Protocol, segment: &[u8]) -> Option<usize> {
     let length = match protocol {
         Protocol::TCP => Some(usize::from(*segment.get(TCP_OFFSET)? >> 4) * 4).filter(|length| *length >= 20)?,

@@ -8,16 +8,18 @@ use crate::packet::checksum::{self, pseudo_header, sum};
 use crate::packet::headers::V4_CHECKSUM;
 use crate::packet::{Content, Headers, Malformed, Packet};
 
-/// The words of a segment.
+/// Recipe for a segment.
 #[derive(Clone, Debug)]
 struct Wanted {
     is_v4: bool,
     is_tcp: bool,
-    /// Of TCP, beside the acknowledgement.
+    /// TCP flags beside the acknowledgement.
     flags: u8,
+    /// Words of four bytes with TCP options.
     options: u8,
     sequence: u32,
     identification: u16,
+    /// Bytes of data in each packet but the last.
     size: usize,
     data: Vec<u8>,
 }
@@ -26,7 +28,7 @@ fn wanted() -> impl Strategy<Value = Wanted> {
     let flags = prop::sample::select(vec![0, PUSH, FIN, PUSH | FIN, ECHO, CWR, CWR | ECHO | PUSH]);
     let words = (any::<[bool; 3]>(), flags, 0_u8..=10, any::<u32>(), any::<u16>(), any::<u64>());
     (words, 1_usize..1400, 1_usize..20_000).prop_map(|(([is_v4, is_tcp, is_even], flags, options, sequence, identification, seed), size, more)| {
-        // More than one packet, and no more than are joined.
+        // The segment has more than one packet, and no more packets than `join` puts together.
         let length = (size + more).min(size * MOST_PACKETS).min(60_000);
         let length = if is_even { length.next_multiple_of(size) } else { length };
         let data = (0..length as u64).map(|place| (seed.wrapping_mul(place + 1) >> 56) as u8).collect();
@@ -36,7 +38,7 @@ fn wanted() -> impl Strategy<Value = Wanted> {
 
 const MOST_PACKETS: usize = 64;
 
-/// The bytes that a kernel gives for it.
+/// Returns the bytes that a kernel gives for the segment: the virtio header and the segment.
 fn segment(wanted: &Wanted) -> Vec<u8> {
     let Wanted { is_v4, is_tcp, flags, options, sequence, identification, size, data } = wanted;
     let builder = if *is_v4 { PacketBuilder::ipv4([10, 1, 0, 1], [10, 2, 0, 1], 64) } else { PacketBuilder::ipv6([0xfd; 16], [0xfe; 16], 64) };
@@ -53,7 +55,7 @@ fn segment(wanted: &Wanted) -> Vec<u8> {
     }
     if *is_v4 {
         packet[4..6].copy_from_slice(&identification.to_be_bytes());
-        // May be cut further, so that its identification has a meaning.
+        // Without the flag that forbids fragments, the identification has a meaning.
         packet[6] = 0;
     }
     correct(&mut packet);
@@ -78,7 +80,7 @@ fn segment(wanted: &Wanted) -> Vec<u8> {
     bytes
 }
 
-/// Sets the checksums right.
+/// Computes the checksums of a packet.
 fn correct(packet: &mut [u8]) {
     let headers = Headers::read(packet).unwrap();
     if headers.source.is_ipv4() {
@@ -111,7 +113,7 @@ fn shared(packets: Vec<Packet>) -> Vec<Arc<Packet>> {
 }
 
 proptest! {
-    /// As `etherparse` reads them: every packet is whole, its checksums are right, and together they carry the data of the segment.
+    /// `etherparse` reads every packet as complete, with right checksums, and the packets together carry the data of the segment.
     #[test]
     fn the_packets_of_a_segment_are_right(wanted in wanted()) {
         let packets = cut_all(&segment(&wanted));
@@ -164,13 +166,13 @@ proptest! {
         prop_assert_eq!((count, bytes), (wanted.data.len().div_ceil(wanted.size), segment));
     }
 
-    /// Whatever the packets of a flow are, with headers that differ in any byte: cutting what was joined gives them again, and none is left out.
+    /// Any packets of a flow, with headers changed in any byte: cutting the joined packets gives the same packets, and no packet is lost.
     #[test]
     fn joined_and_cut_packets_are_what_they_were(
         wanted in wanted(), changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..48, 1_u8..), 0..8),
     ) {
         let mut packets = cut_all(&segment(&wanted));
-        // The segment that follows it in the flow.
+        // The next segment of the same flow.
         let sequence = wanted.sequence.wrapping_add(u32::try_from(wanted.data.len()).unwrap());
         let identification = wanted.identification.wrapping_add(u16::try_from(packets.len()).unwrap());
         packets.extend(cut_all(&segment(&Wanted { sequence, identification, ..wanted })));
@@ -202,13 +204,13 @@ proptest! {
         }
     }
 
-    /// Neither joined nor given a new checksum, wherever it stands.
+    /// A damaged packet is neither joined nor given a new checksum, at any place in the flow.
     #[test]
     fn a_damaged_packet_goes_out_alone_as_it_is(wanted in wanted(), which in any::<prop::sample::Index>(), place in any::<prop::sample::Index>()) {
         let mut packets = cut_all(&segment(&wanted));
         let which = which.index(packets.len());
         let place = place.index(packets[which].bytes.len());
-        // What a link does to it, without the correction of checksums.
+        // The damage of a link, without the correction of checksums.
         packets[which].is_checked = false;
         packets[which].bytes[place] ^= 0x10;
         let packets = shared(packets);
@@ -220,7 +222,7 @@ proptest! {
         prop_assert_eq!(&bytes[..Offload::LENGTH], &[0; Offload::LENGTH]);
     }
 
-    /// Random bytes, and a segment with some bytes changed: every packet cut from them can be handled, and all other bytes count as malformed.
+    /// Random bytes, and a segment with some bytes changed: every packet cut from such bytes can be handled, and all other bytes count as malformed.
     #[test]
     fn hostile_bytes_are_refused(
         mut noise in prop::collection::vec(any::<u8>(), 0..200), wanted in wanted(),
@@ -269,7 +271,7 @@ fn a_header_that_contradicts_its_packet_is_malformed() {
         |offload| offload.flags = 0,
         |offload| offload.begin = 24,
         |offload| offload.field = 6,
-        // No segment, and a checksum behind its end.
+        // A packet that is no segment, with a checksum beyond its end.
         |offload| (offload.kind, offload.field) = (NO_SEGMENT, 10_000),
     ];
     for (number, change) in changes.into_iter().enumerate() {
@@ -278,7 +280,7 @@ fn a_header_that_contradicts_its_packet_is_malformed() {
     }
     let short = cut_all(&good[..9]);
     assert_eq!(*short[0].content(), Content::Malformed(Malformed::Offload));
-    // Longer than its packet says, and shorter.
+    // One byte more than the length in the header, and one byte less.
     assert_eq!(*cut_all(&[good.as_slice(), &[0]].concat())[0].content(), Content::Malformed(Malformed::Offload));
     assert_eq!(*cut_all(&good[..good.len() - 1])[0].content(), Content::Malformed(Malformed::Length));
 }
@@ -292,7 +294,7 @@ fn a_packet_with_a_wrong_checksum_of_its_header_is_not_joined() {
     assert_eq!((joined(&packets).0, joined(&packets[1..]).0), (1, 1));
 }
 
-/// Packets of IPv4 that must not be cut further mostly have the identification zero.
+/// Unfragmentable IPv4 packets mostly have the identification zero.
 #[test]
 fn datagrams_without_an_identification_are_joined() {
     let datagram = |number: u8, identification: u16, flags: u8| {
