@@ -215,7 +215,7 @@ mod tests {
 
     use super::*;
 
-    /// A clock that moves by a step each time it is read, wakes late, and writes down what it was asked.
+    /// Artificial clock that moves by a step at each reading, wakes late, and logs the ends of the waits asked for.
     struct Fake {
         now: Cell<u64>,
         step: u64,
@@ -256,12 +256,12 @@ mod tests {
             let clock = fake(10, 50_000);
             assert_eq!(Pacer::new(pacing).wait(&clock, at(1_000_000), &[]).unwrap(), Woken::Deadline);
             assert_eq!(*clock.asked.borrow(), [asleep_until], "it sleeps once");
-            // Woken 50 µs later, then in steps of 10 ns, one for each look, to the deadline if that has not passed.
+            // The wake-up is 50 µs late. Then the clock moves by 10 ns with each reading, until the deadline if it has not passed yet.
             assert_eq!(clock.now.get(), 1_000_000.max(asleep_until + 50_020));
         }
     }
 
-    /// How late the ticks of a pacer are on a clock whose wake-ups are that late \[ns\], and what its margin is at the end \[µs\].
+    /// Returns the lateness of each tick \[ns\] and the margin at the end \[µs\]. Wake-up number n is late by `late(n)` \[ns\].
     fn lateness(pacing: Pacing, ticks: u64, late: impl Fn(u64) -> u64) -> (Vec<u64>, u128) {
         let (mut pacer, clock) = (Pacer::new(pacing), fake(10, 0));
         let tick = |tick: u64| {
@@ -272,7 +272,7 @@ mod tests {
         ((1..=ticks).map(tick).collect(), pacer.margin().as_micros())
     }
 
-    /// Of 100 wake-ups one is 0.5 µs late, one 1.5 µs, and so on up to 99.5 µs, in an order that mixes them.
+    /// Returns the lateness of a wake-up \[ns\]. Of 100 wake-ups one is 0.5 µs late, one 1.5 µs, and so on up to 99.5 µs, in a mixed order.
     fn evenly(tick: u64) -> u64 {
         (tick * 37 % 100) * 1000 + 500
     }
@@ -291,7 +291,7 @@ mod tests {
     fn rare_wake_ups_that_are_late_by_milliseconds_do_not_move_it() {
         let with_outliers = |tick: u64| if tick.is_multiple_of(10) { 3_000_000 } else { 40_500 };
         assert_eq!(lateness(Pacing::Sleep, 1000, with_outliers).1, 40);
-        // Among 100 there are too many of them for one that is to have 98 in time: then it does what it may.
+        // Ten of 100 are too many for a margin that must cover 98, so the margin is the longest one.
         assert_eq!(lateness(Pacing::SPIN, 1000, with_outliers).1, 120);
     }
 

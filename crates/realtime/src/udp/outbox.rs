@@ -80,7 +80,7 @@ impl Outbox {
         Some(Run { to: first.to, ecn: first.ecn, bytes, segment: first.len, count })
     }
 
-    /// Removes the first `count` waiting datagrams, of which there must be so many.
+    /// Removes the first `count` waiting datagrams. At least `count` datagrams must be waiting.
     pub(super) fn take(&mut self, count: usize) {
         let taken = &self.entries[self.done..self.done + count];
         self.bytes_done += taken.iter().map(|entry| entry.len).sum::<usize>();

@@ -1,4 +1,4 @@
-//! The clock and the pacer on a real system: only what no load on the machine can break.
+//! The clock and the pacer on a real system. Asserted is only what no load on the machine can break.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::io::Write as _;
@@ -31,7 +31,7 @@ fn a_wait_with_sockets_ends_at_its_deadline_or_when_one_can_be_read() {
     assert_eq!(pacer.wait(&clock, Some(due), &[receiver.as_fd()]).unwrap(), Woken::Deadline);
     assert!(clock.now() >= due);
     sender.write_all(b"x").unwrap();
-    // An hour away: only what can be read can end this wait.
+    // The deadline is an hour away, so only the readable socket can end this wait.
     let far = clock.now() + Duration::from_secs(3600);
     assert_eq!(pacer.wait(&clock, Some(far), &[receiver.as_fd()]).unwrap(), Woken::Readable);
     assert_eq!(pacer.wait(&clock, None, &[receiver.as_fd()]).unwrap(), Woken::Readable);
@@ -40,7 +40,7 @@ fn a_wait_with_sockets_ends_at_its_deadline_or_when_one_can_be_read() {
 #[test]
 fn the_two_clocks_read_together_place_a_stamp_of_now_at_now() {
     let clock = MonotonicClock::start();
-    // Whether it is placed between two readings around it, and not when it was read.
+    // Returns whether a stamp taken between two readings is placed between them, and not at the later reading of the stamps.
     let is_placed = || {
         let before = clock.now();
         let unix = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
@@ -51,7 +51,7 @@ fn the_two_clocks_read_together_place_a_stamp_of_now_at_now() {
         assert!(before <= placed && placed <= stamps.now(), "{before:?} {placed:?} {stamps:?}");
         placed <= after
     };
-    // The clocks are read a moment apart, and a busy machine may make that moment long: not each time.
+    // The two clocks are read a moment apart, and a busy machine can make this moment long, so not every attempt succeeds.
     assert!((0..1000).any(|_| is_placed()));
 }
 

@@ -1,4 +1,4 @@
-//! Sockets on loopback: every datagram is there, whole, once and in order; nothing here depends on how fast.
+//! Sockets on loopback: every datagram arrives complete, once and in order. Nothing here depends on speed.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::AsFd as _;
@@ -16,7 +16,7 @@ fn endpoint(address: &str, config: EndpointConfig) -> UdpEndpoint {
     UdpEndpoint::bind(address.parse().unwrap(), config).unwrap()
 }
 
-/// Reads until there are so many; the wait is for a machine that is busy, and ends as soon as they are there.
+/// Reads until `count` datagrams have arrived. The bound is for a busy machine; the wait ends with the last datagram.
 fn receive(endpoint: &mut UdpEndpoint, clock: &MonotonicClock, count: usize) -> Vec<Received> {
     let (mut buffers, mut received) = (ReceiveBuffers::new(), Vec::new());
     let end = clock.now() + Duration::from_secs(60);
@@ -36,7 +36,7 @@ fn what_goes_out_together_comes_in_one_by_one_in_order_with_its_congestion_bits(
         let ecn = |n: usize| [None, Some(Ecn::Ect0), Some(Ecn::Ect1), Some(Ecn::Ce)][n / 50];
         let before = clock.now();
         let mut received = Vec::new();
-        // In parts, so that the smallest buffer that a system may grant takes each of them.
+        // Sent in parts, so that even the smallest receive buffer of a system holds each part.
         for part in 0..10 {
             for (n, length) in lengths.iter().enumerate().skip(part * 20).take(20) {
                 let content: Vec<u8> = (0..*length).map(|place| u8::try_from((n + place) % 256).unwrap()).collect();
@@ -86,11 +86,11 @@ fn one_that_cannot_be_sent_is_counted_and_the_others_go_on() {
     let there = receiver.local_address();
     let nobody = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     sender.queue(there, b"first", None);
-    // No port 0 can be sent to.
+    // Port number 0 cannot be a target.
     sender.queue("127.0.0.1:0".parse().unwrap(), b"nowhere", None);
-    // An IPv6 address from an IPv4 socket.
+    // An IPv4 socket cannot send to an IPv6 address.
     sender.queue("[::1]:9".parse().unwrap(), b"nowhere", None);
-    // Nobody listens: the kernel takes it all the same.
+    // No socket listens at this port. The kernel accepts the datagram all the same.
     sender.queue(nobody, b"nobody", None);
     sender.queue(there, b"last", None);
     sender.flush();
@@ -103,7 +103,7 @@ fn one_that_cannot_be_sent_is_counted_and_the_others_go_on() {
 #[test]
 fn what_waits_is_bounded_and_what_the_kernel_drops_is_known() {
     let mut sender = endpoint("127.0.0.1:0", EndpointConfig { waiting: 3, ..EndpointConfig::default() });
-    // The least buffer that Linux grants takes a few datagrams.
+    // The smallest receive buffer of Linux holds a few datagrams.
     let small = endpoint("127.0.0.1:0", EndpointConfig { receive_buffer: 1, ..EndpointConfig::default() });
     assert!(small.granted_receive_buffer() > 0);
     for _ in 0..5 {
@@ -119,7 +119,7 @@ fn what_waits_is_bounded_and_what_the_kernel_drops_is_known() {
     assert!(small.kernel_drops().unwrap().unwrap() > 0);
 }
 
-/// A sender that has the kernel cut one long call into 64 datagrams: at a socket that takes single ones, a batch is as many datagrams as it says.
+/// The sender has the kernel cut one long call into 64 datagrams. At a socket without joining, a batch has at most [`UdpEndpoint::BATCH`] datagrams.
 #[test]
 fn a_batch_of_single_datagrams_has_no_more_than_it_says() {
     let clock = MonotonicClock::start();
@@ -164,10 +164,10 @@ fn an_address_that_is_taken_is_refused_with_the_address() {
     let error = UdpEndpoint::bind(first.local_address(), EndpointConfig::default()).unwrap_err();
     assert_eq!(error.address, first.local_address());
     assert!(error.to_string().starts_with(&format!("cannot listen on {}: ", first.local_address())), "{error}");
-    // The same port of the other family is another socket.
+    // The same port number in the other address family is another socket.
     let v4 = SocketAddr::new([127, 0, 0, 1].into(), first.local_address().port());
     if let Err(error) = UdpEndpoint::bind(v4, EndpointConfig::default()) {
-        // Somebody else may have it.
+        // Another program may hold the port.
         assert_eq!(error.source.kind(), std::io::ErrorKind::AddrInUse);
     }
 }
@@ -177,7 +177,7 @@ fn what_came_while_the_kernel_did_not_stamp_yet_is_not_placed_behind_what_came_l
     let clock = MonotonicClock::start();
     let mut receiver = endpoint("127.0.0.1:0", EndpointConfig::default());
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
-    // The kernel begins to stamp some milliseconds after the first socket has asked for it: now and then in the midst of these.
+    // The kernel begins to stamp some milliseconds after the first request for stamps, which is sometimes in the middle of these datagrams.
     for n in 0..200_u8 {
         sender.send_to(&[n], receiver.local_address()).unwrap();
         std::thread::sleep(Duration::from_micros(50));

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 
 use super::{address, at, link, mesh};
 
-/// Program `n` sends from port 9000 + n.
+/// Returns a mesh of three programs. Program number n sends from port 9000 + n.
 fn three(usual: LinkModel, own: &[((usize, usize), LinkModel)]) -> RelayConfig {
     let program = |n: u16| (["a", "b", "c"][usize::from(n)], address(7000 + n), Some(address(9000 + n)));
     mesh(&[program(0), program(1), program(2)], usual, own)
@@ -21,7 +21,7 @@ fn arrival<'a>(when: Instant, from: u16, to: u16, bytes: &'a [u8], ecn: Option<E
     Arrival { at: when, port: Port::Program(NodeId(to)), from: address(9000 + from), bytes, ecn }
 }
 
-/// A datagram that was sent or that left: when, from whom to whom, what, marked how.
+/// Datagram sent or released: instant, sender, receiver, payload, congestion bits.
 type Passing = (Instant, u16, u16, Vec<u8>, Option<Ecn>);
 
 fn drain(engine: &mut Engine, left: &mut Vec<Passing>) {
@@ -40,7 +40,7 @@ fn run_out(engine: &mut Engine, left: &mut Vec<Passing>) {
     }
 }
 
-/// The same datagrams offered to a network: what it delivers.
+/// Offers the same datagrams to a network, and returns the datagrams that the network delivers.
 fn virtual_time(config: &RelayConfig, offers: &[Passing]) -> Vec<Passing> {
     let Form::Mesh(Mesh { programs, links }) = &config.form else { panic!() };
     let nodes = programs.iter().map(|program| program.name.clone()).collect();
@@ -69,7 +69,7 @@ fn virtual_time(config: &RelayConfig, offers: &[Passing]) -> Vec<Passing> {
     left
 }
 
-/// Links of every kind: direct ones, stages, copies, damage, marks, and the kernel's netem.
+/// Links of every kind: direct links, stages, copies, damage, marks, and the kernel's netem.
 const LINKS: [&[&str]; 7] = [
     &[],
     &["delay=24ms"],
@@ -87,7 +87,8 @@ fn any_link() -> impl Strategy<Value = LinkModel> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// What leaves, when, with which bits and marks, is what a network in virtual time delivers to the same offers; and every datagram is accounted for.
+    /// The releases, with their instants, bits and marks, equal the deliveries of a network in virtual time for the same offers, and every datagram is
+    /// accounted for.
     #[test]
     fn the_fates_are_those_of_virtual_time(
         usual in any_link(), own in any_link(),
@@ -121,7 +122,7 @@ proptest! {
         }
     }
 
-    /// Datagrams that were read from several sockets in any order are offered in the order in which they came.
+    /// Datagrams read from several sockets in any order are offered in the order of their arrival.
     #[test]
     fn what_is_staged_is_offered_in_order_of_time(mut instants in prop::collection::vec(0_u64..1000, 1..50)) {
         let mut engine = Engine::new(three(link(&["delay=1ms"]), &[])).unwrap();
@@ -148,7 +149,7 @@ fn strangers_and_those_who_speak_to_themselves_are_dropped_and_counted() {
     let stranger = Arrival { from: address(1), ..arrival(at(0), 0, 1, b"x", None) };
     assert_eq!(engine.handle_datagram(stranger), Intake::Stranger);
     assert_eq!(engine.handle_datagram(Arrival { port: Port::Listen, ..arrival(at(0), 0, 1, b"x", None) }), Intake::Stranger);
-    // The same port number at another address is somebody else.
+    // The same port number at another address is another sender.
     let elsewhere = Arrival { from: "[::1]:9000".parse().unwrap(), ..stranger };
     assert_eq!(engine.handle_datagram(elsewhere), Intake::Stranger);
     assert_eq!(engine.handle_datagram(arrival(at(0), 1, 1, b"x", None)), Intake::ToItself);
@@ -163,7 +164,7 @@ fn beyond_the_bounds_the_datagram_that_comes_is_dropped_and_its_link_counts_it()
     let mut take = |micros, from, to, length: usize| engine.handle_datagram(arrival(at(micros), from, to, &vec![0; length], None));
     assert_eq!((0..6).map(|n| take(n, 0, 1, 10)).collect::<Vec<_>>()[3..], [Intake::Offered, Intake::Overload, Intake::Overload]);
     assert_eq!(take(7, 2, 0, 0), Intake::Overload, "an empty one is one too");
-    // All four have left: room for packets, and for a hundred bytes.
+    // All four datagrams have left, so there is room for packets and for a hundred bytes.
     engine.handle_timeout(at(10_003));
     let mut left = Vec::new();
     drain(&mut engine, &mut left);
@@ -172,7 +173,7 @@ fn beyond_the_bounds_the_datagram_that_comes_is_dropped_and_its_link_counts_it()
     assert_eq!([take(10_004, 0, 1, 60), take(10_004, 0, 1, 41), take(10_004, 1, 2, 40)], [Intake::Offered, Intake::Overload, Intake::Offered]);
     let overload = |from, to| engine.link_stats(NodeId(from), NodeId(to)).unwrap().1.overload;
     assert_eq!([overload(0, 1), overload(2, 0), overload(1, 2), engine.counts().overload], [3, 1, 0, 4]);
-    // What the link was offered and what was dropped before it are all that came.
+    // The datagrams offered to the link and the datagrams dropped before the link are all that arrived.
     assert_eq!(engine.link_stats(NodeId(0), NodeId(1)).unwrap().0.offered(), 5);
 }
 
@@ -186,7 +187,7 @@ fn what_comes_to_a_program_that_nobody_has_heard_of_is_counted() {
     assert_eq!(engine.poll_release(), None);
     assert_eq!(engine.link_stats(NodeId(0), NodeId(1)).unwrap().1.undeliverable, 1);
     assert_eq!((engine.program_address(NodeId(0)), engine.program_address(NodeId(1))), (Some(address(4000)), None));
-    // b is heard of while the second hello is on its way.
+    // Program b becomes known while the second hello is in flight.
     engine.handle_datagram(hello(2000, 4000, 1));
     engine.handle_datagram(hello(2500, 4001, 0));
     engine.handle_timeout(at(3000));
@@ -207,7 +208,7 @@ fn what_came_before_time_was_let_pass_is_late_and_says_by_how_much() {
     // Time never goes back.
     engine.handle_timeout(at(100));
     assert_eq!(engine.poll_timeout(), Some(at(1500)));
-    // The next one, in the memory of the first, is on time.
+    // The next datagram reuses the memory of the first, and is on time.
     for (due, late) in [(1500, 300), (2600, 0)] {
         engine.handle_timeout(at(due));
         let release = engine.poll_release().unwrap();
@@ -215,7 +216,7 @@ fn what_came_before_time_was_let_pass_is_late_and_says_by_how_much() {
         assert_eq!(engine.poll_release(), None);
         engine.handle_datagram(arrival(at(1600), 0, 1, b"y", None));
     }
-    // Being late is no delay of the link.
+    // A late offer is no delay of the link.
     assert_eq!(engine.recent_delays(NodeId(0), NodeId(1)), [Duration::from_millis(1); 2]);
     assert_eq!(engine.recent_delays(NodeId(1), NodeId(0)), []);
 }

@@ -7,7 +7,7 @@ use cohaptic_relay::{ConfigError, Form, Limits, Proxy, Relay, RelayConfig, Relay
 
 use super::{link, mesh};
 
-/// A relay that sends to a port of its own is refused by whatever name the port is called, also where a program has the port already.
+/// A relay that sends to a port of its own is refused under every name of the port, even if another program already holds the port.
 #[test]
 fn a_relay_to_itself_is_refused() {
     let holder = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -22,7 +22,7 @@ fn a_relay_to_itself_is_refused() {
         let config = RelayConfig { seed: 0, form: Form::Proxy(proxy), limits: Limits::default(), changes: Vec::new() };
         assert_eq!(refused(config), (to, listen));
     }
-    // In a mesh, the port that stands for another program.
+    // In a mesh, a program's address must not be the port standing for another program.
     let [left, right] = ["127.0.0.1:7001", "127.0.0.1:7002"].map(|text| text.parse().unwrap());
     let programs = [("left", left, None), ("right", right, Some(left))];
     assert_eq!(refused(mesh(&programs, link(&[]), &[])), (left, left));

@@ -1,4 +1,4 @@
-//! The relay on loopback: asserted is what no load can break: what arrives, in which order, how it is marked, and that nothing is early.
+//! The relay on loopback. Asserted is only what no load can break: which datagrams arrive, in which order, with which marks, and that none is early.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::AsFd as _;
@@ -16,10 +16,10 @@ use cohaptic_wan::{Fate, Network, NetworkConfig, NodeId};
 
 use super::{link, mesh};
 
-/// Long enough for any machine; it is the end of a test that fails.
+/// Bound of every wait. Any machine is faster; only a failing test waits so long.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A relay in a thread of its own.
+/// Relay on a thread of its own.
 struct Running {
     ports: Vec<SocketAddr>,
     control: Sender<Control>,
@@ -58,7 +58,7 @@ fn run(mut relay: Relay, pacing: Pacing) -> Running {
 }
 
 impl Running {
-    /// Waits until it has read so many.
+    /// Waits until the relay has offered `count` datagrams to its links.
     fn has_offered(&self, count: u64) {
         let end = Instant::now() + PATIENCE;
         while self.offered.load(Ordering::Relaxed) < count {
@@ -101,7 +101,7 @@ fn nothing_is_early_or_out_of_order_and_a_seeded_link_loses_what_it_loses_in_vir
         let seed = config.seed;
         let relay = start(config, pacing);
 
-        // What the link loses in virtual time: one draw a packet, whenever it comes.
+        // The losses of the link in virtual time: one draw per packet, at any instant.
         let nodes = vec!["left".to_owned(), "right".to_owned()];
         let mut network = Network::new(NetworkConfig { seed, nodes, general: false }, |_, _| model.clone());
         for sequence in 0..COUNT {
@@ -138,12 +138,12 @@ fn nothing_is_early_or_out_of_order_and_a_seeded_link_loses_what_it_loses_in_vir
         let sent = sender.join().unwrap();
         assert_eq!(received.iter().map(|(sequence, ..)| *sequence).collect::<Vec<_>>(), delivered);
         for (sequence, from, when) in received {
-            // From the port that stands for the sender, so that the receiver can answer.
+            // The datagram comes from the port standing for the sender, so that the receiver can answer.
             assert_eq!(from, relay.ports[0]);
             let delay = when - sent[usize::try_from(sequence).unwrap()];
             assert!(delay >= Duration::from_millis(8), "number {sequence} after {delay:?}");
         }
-        // The last ones may be among those that are lost.
+        // The last datagrams may be among the lost ones, so the relay may not have read them yet.
         relay.has_offered(COUNT);
         let report = relay.end();
         assert_eq!((report.intake.offered, report.release.count(), report.held.0), (COUNT, delivered.len() as u64, 0));
@@ -159,7 +159,7 @@ fn nothing_is_early_or_out_of_order_and_a_seeded_link_loses_what_it_loses_in_vir
 fn three_programs_speak_to_each_other_through_their_own_links() {
     let programs = [program("127.0.0.1:0"), program("127.0.0.1:0"), program("127.0.0.1:0")];
     let port = "127.0.0.1:0".parse().unwrap();
-    // The third one is learnt.
+    // The address of the third program is learnt.
     let place = |n: usize| (n < 2).then(|| programs[n].local_addr().unwrap());
     let config =
         mesh(&[("a", port, place(0)), ("b", port, place(1)), ("c", port, place(2))], link(&["delay=1ms"]), &[((1, 0), link(&["loss=100%"]))]);
@@ -171,7 +171,7 @@ fn three_programs_speak_to_each_other_through_their_own_links() {
             programs[from].send_to(&name.to_le_bytes(), relay.ports[to]).unwrap();
             offered += 1;
         }
-        // The last one first, so that it is known before anybody speaks to it.
+        // The third program sends first, so that its address is known before any other program sends to it.
         relay.has_offered(offered);
     }
     for (to, expected) in [(0, vec![20]), (1, vec![1, 21]), (2, vec![2, 12])] {
@@ -184,7 +184,7 @@ fn three_programs_speak_to_each_other_through_their_own_links() {
         found.sort_unstable();
         assert_eq!(found, expected);
     }
-    // The answer goes where the question came from.
+    // The answer goes to the address of the question.
     programs[2].send_to(&7_u64.to_le_bytes(), relay.ports[0]).unwrap();
     let (name, from) = receive(&programs[0]);
     programs[0].send_to(&8_u64.to_le_bytes(), from).unwrap();
@@ -237,7 +237,7 @@ fn a_link_changes_when_it_is_told_and_one_that_is_not_there_is_counted() {
     relay.control.send(set(0, 0)).unwrap();
     relay.control.send(set(1, 1)).unwrap();
     relay.control.send(set(0, 1)).unwrap();
-    // It is heard within 2 ms or as late as the machine likes: ask until it is.
+    // The relay reads the message within 2 ms, or later on a busy machine, so the sender repeats until a datagram passes.
     right.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
     let mut bytes = [0; 8];
     let mut tries = 0;
@@ -250,7 +250,7 @@ fn a_link_changes_when_it_is_told_and_one_that_is_not_there_is_counted() {
     assert_eq!(report.refused_changes, 2);
 }
 
-/// More wait at a port than are read at once. No time is let pass before all of them have been read, so that none is offered later than it came.
+/// More datagrams wait at a port than are read at once. Time does not pass before all of them have been read, so no datagram is offered late.
 #[test]
 fn what_waits_at_a_port_is_read_before_time_passes() {
     const COUNT: u64 = 1000;
@@ -264,7 +264,7 @@ fn what_waits_at_a_port_is_read_before_time_passes() {
         left.send_to(&sequence.to_le_bytes(), there).unwrap();
     }
     let relay = run(relay, Pacing::Sleep);
-    // The kernel may have had no room for some.
+    // The kernel may have had no room for some datagrams.
     let end = Instant::now() + Duration::from_millis(300);
     while Instant::now() < end && relay.offered.load(Ordering::Relaxed) < COUNT {
         std::thread::sleep(Duration::from_millis(1));
@@ -306,7 +306,7 @@ fn clients_of_a_proxy_reach_the_server_and_get_their_answers() {
             }
         }
         let froms = echo.join().unwrap();
-        // Each client has a port of its own, and keeps it.
+        // Each client has a port of its own, and keeps the port.
         assert!(froms.iter().all(|(client, from)| froms.iter().all(|(other, port)| (client == other) == (from == port))));
         let report = relay.end();
         assert_eq!(report.without_socket, 0);
@@ -315,7 +315,7 @@ fn clients_of_a_proxy_reach_the_server_and_get_their_answers() {
     }
 }
 
-/// What the port of a client did is not forgotten with the client.
+/// The counts of a client's port outlast the client.
 #[test]
 fn a_client_that_has_left_is_still_in_the_report() {
     let (server, client) = (program("127.0.0.1:0"), program("127.0.0.1:0"));
@@ -324,14 +324,14 @@ fn a_client_that_has_left_is_still_in_the_report() {
     let limits = Limits { forget_after: Duration::from_millis(200), ..Limits::default() };
     let relay = start(RelayConfig { seed: 1, form: Form::Proxy(proxy), limits, changes: Vec::new() }, Pacing::Sleep);
     server.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
-    // One that is read so late that its sender is forgotten by then goes nowhere: ask until one arrives.
+    // A datagram read so late that its sender is forgotten by then goes nowhere, so the client repeats until one arrives.
     let mut bytes = [0; 8];
     let arrived = (0..3000).any(|_| {
         client.send_to(&[1; 8], relay.ports[0]).unwrap();
         server.recv(&mut bytes).is_ok()
     });
     assert!(arrived);
-    // The first look after its datagram was read shows it, unless it has left by then.
+    // The first look after the reading shows the client, unless the client is forgotten by then.
     relay.has_offered(1);
     let end = Instant::now() + PATIENCE;
     while relay.clients.load(Ordering::Relaxed) > 0 {

@@ -1,4 +1,4 @@
-//! The relay as its users see it: without sockets in virtual time, and on loopback with nothing asserted that a busy machine can break.
+//! The relay as its users see it: without sockets in virtual time, and on loopback. Nothing is asserted that a busy machine can break.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 mod engine;
@@ -26,7 +26,7 @@ fn address(port: u16) -> SocketAddr {
     ([127, 0, 0, 1], port).into()
 }
 
-/// Programs `a`, `b`, …, all links alike but those given.
+/// Returns the configuration of a mesh of the given programs. All links equal `usual`, except for the links in `own`.
 fn mesh(programs: &[(&str, SocketAddr, Option<SocketAddr>)], usual: LinkModel, own: &[((usize, usize), LinkModel)]) -> RelayConfig {
     let program =
         |(name, port, address): &(&str, SocketAddr, Option<SocketAddr>)| Program { name: (*name).to_owned(), port: *port, address: *address };

@@ -46,7 +46,7 @@ fn each_client_has_a_port_of_its_own_and_gets_its_own_answers() {
     assert_eq!(forth(&mut engine, at(1), 2), Intake::FromNewClient(1));
     assert_eq!(forth(&mut engine, at(2), 1), Intake::Offered);
     assert_eq!(back(&mut engine, at(3), 1, SERVER), Intake::Offered);
-    // Only the server answers there.
+    // Only the server may answer at a client's port.
     assert_eq!(back(&mut engine, at(4), 1, "[2001:db8::3]:5000"), Intake::Stranger);
     assert_eq!(back(&mut engine, at(5), 2, SERVER), Intake::Stranger);
     engine.handle_timeout(second(1));
@@ -68,7 +68,7 @@ fn clients_are_bounded_and_idle_ones_are_forgotten() {
     forth(&mut engine, second(20), 2);
     assert_eq!(forth(&mut engine, second(21), 3), Intake::NoRoom);
     while engine.poll_release().is_some() {}
-    // What is on its way, and then the first client's end.
+    // First the datagrams in flight end, then the silence of the first client.
     engine.handle_timeout(at(20_010_000));
     while engine.poll_release().is_some() {}
     assert_eq!(engine.poll_timeout(), Some(second(30)));
@@ -83,7 +83,7 @@ fn an_answer_to_a_client_that_has_left_reaches_nobody_else() {
     let mut engine = engine(1);
     forth(&mut engine, second(0), 1);
     back(&mut engine, at(29_990_000), 0, SERVER);
-    // A port could not be had after all.
+    // Stands for a port that could not be opened.
     engine.close_client(0);
     assert_eq!(engine.poll_closed(), Some(0));
     assert_eq!(forth(&mut engine, at(29_991_000), 2), Intake::FromNewClient(0));
@@ -92,7 +92,7 @@ fn an_answer_to_a_client_that_has_left_reaches_nobody_else() {
     while let Some(release) = engine.poll_release() {
         left.push((release.port, release.to));
     }
-    // The first ask left long before; the answer is dropped; the ask of the second client goes on.
+    // The first client's ask left long before, the answer is dropped, and the second client's ask goes on.
     assert_eq!(left, [(Port::Client(0), SERVER.parse().unwrap())]);
     assert_eq!(engine.link_stats(NodeId(1), NodeId(0)).unwrap().1.undeliverable, 1);
 }

@@ -1,4 +1,4 @@
-//! Flipped bits: those of the link and no others, but for checksums, which stay as right or as wrong as they were.
+//! Flipped bits are the bits of the link and no others, except for checksums, which stay as right or as wrong as before.
 
 use cohaptic_router::{Content, Framing, Packet};
 use cohaptic_units::{Bytes, Instant, Probability};
@@ -6,7 +6,7 @@ use cohaptic_wan::{Chance, Checksum, Corruption, Damage, Fate, Flips, Link, Link
 use etherparse::{NetSlice, PacketBuilder, SlicedPacket, TransportSlice};
 use proptest::prelude::*;
 
-/// The damage that a link does to a packet of that size.
+/// Returns the damage that a link does to a packet of `size` bytes.
 fn damage(seed: u64, size: u64, count: u32, within: Option<core::ops::Range<u64>>) -> Damage {
     let bits = Flips::Bits { packets: Chance::independent(Probability::ONE), count };
     let config = LinkConfig { corruption: Some(Corruption { bits, within, checksum: Checksum::Passes }), ..LinkConfig::default() };
@@ -33,7 +33,7 @@ fn packet(kind: u8, data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Whether all checksums are right, as `etherparse` computes them.
+/// Returns whether all checksums are right, as computed by `etherparse` and by this function.
 fn is_right(bytes: &[u8]) -> bool {
     let sliced = SlicedPacket::from_ip(bytes).unwrap();
     let (NetSlice::Ipv4(_) | NetSlice::Ipv6(_)) = sliced.net.as_ref().unwrap() else { unreachable!() };
@@ -72,7 +72,7 @@ fn icmp(segment: &[u8]) -> bool {
 }
 
 proptest! {
-    /// In the data, where a flip changes nothing but itself and the checksum: exactly these bits are flipped, and the checksum is right.
+    /// Flips in the data change only the data and the checksum: exactly the damaged bits are flipped, and the checksum is right.
     #[test]
     fn the_bits_of_the_data_are_flipped_and_no_checksum_notices(
         kind in 0_u8..6, data in prop::collection::vec(any::<u8>(), 1..100), seed in any::<u64>(), count in 1_u32..20,
@@ -89,7 +89,8 @@ proptest! {
         prop_assert!(is_right(packet.bytes()));
     }
 
-    /// The addresses are covered by the checksum of IPv4 and, but for ICMP, by that of what it carries: both are right for the addresses that it has now.
+    /// The checksum of IPv4 covers the addresses and so does the checksum of the transport protocol, except ICMP for IPv4. Both are right for the damaged
+    /// addresses.
     #[test]
     fn the_bits_of_the_addresses_are_flipped_and_no_checksum_notices(kind in 0_u8..6, seed in any::<u64>(), count in 1_u32..20) {
         let before = packet(kind, b"some data");
@@ -104,7 +105,7 @@ proptest! {
         prop_assert!(is_right(packet.bytes()));
     }
 
-    /// Anywhere in the packet: nothing panics, bits outside of checksums are those of the link, and padding is not touched.
+    /// Flips at any place: nothing panics, bits outside of checksums are the bits of the link, and padding stays the same.
     #[test]
     fn any_bit_may_be_flipped(kind in 0_u8..6, data in prop::collection::vec(any::<u8>(), 0..40), seed in any::<u64>(), count in 1_u32..40, padding in 0_usize..9) {
         let before = packet(kind, &data);
@@ -139,7 +140,7 @@ fn a_wrong_checksum_stays_wrong_and_none_stays_none() {
     assert!(matches!(none.content(), Content::Ip { .. }));
 }
 
-/// A checksum of UDP that comes out as zero is written as its other zero: zero would say that there is none (RFC 768).
+/// A UDP checksum that comes out as zero is written as all ones: zero would mean that there is no checksum (RFC 768).
 #[test]
 fn a_checksum_that_comes_out_as_zero_does_not_vanish() {
     let damaged = |last: [u8; 2]| {
@@ -148,7 +149,7 @@ fn a_checksum_that_comes_out_as_zero_does_not_vanish() {
         packet.damage(&damage(5, bytes.len() as u64, 3, Some(28..30)));
         packet.bytes().to_vec()
     };
-    // What is missing to all ones is the checksum itself.
+    // A checksum is the difference to all ones. Put into the data, it makes the new checksum zero.
     let checksum = <[u8; 2]>::try_from(&damaged([0; 2])[26..28]).unwrap();
     let found = damaged(checksum);
     assert_eq!((&found[26..28], is_right(&found)), (&[0xff; 2][..], true));

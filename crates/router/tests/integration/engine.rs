@@ -19,7 +19,7 @@ fn departures(engine: &mut Engine) -> Vec<Departure> {
     std::iter::from_fn(|| engine.poll_departure()).collect()
 }
 
-/// Lets everything happen that is on the way, one instant after the other.
+/// Lets time pass from event to event until no packet is inside a link, and returns all departures.
 fn finish(engine: &mut Engine) -> Vec<Departure> {
     let mut all = departures(engine);
     while let Some(due) = engine.poll_timeout() {
@@ -71,7 +71,7 @@ fn packets_leave_in_the_order_of_their_instants_whichever_link_they_took() {
     assert_eq!((counters.dropped(), engine.now()), (1, at(10_500)));
 }
 
-/// Being late does not change what happens, only when it is noticed.
+/// A late driver does not change the events, only the time at which they are noticed.
 #[test]
 fn an_engine_that_is_asked_late_gives_the_same_departures() {
     let text = "router = { seed = 3, default = \"x\" }\nlinks = { x = { delay = \"5ms\", jitter = \"2ms\", loss = \"10%\", rate = \"2Mbit\" } }";
@@ -88,7 +88,7 @@ fn an_engine_that_is_asked_late_gives_the_same_departures() {
     assert_eq!(seen(&found), seen(&expected));
 }
 
-/// A link of the router does to its packets what the link of that name and seed does by itself, whatever goes through other links.
+/// A link of the router treats its packets like a single link with the same name and seed, independent of packets in other links.
 #[test]
 fn fates_are_those_of_the_link_alone() {
     let keys = ["loss=20%", "duplicate=5%", "delay=3ms", "jitter=1ms"];
@@ -160,7 +160,7 @@ fn what_is_no_packet_of_ip_crosses_and_what_pretends_to_be_one_does_not() {
     engine.handle_packet(at(5), Side::Right, Packet::new(arp.clone(), Framing::Ethernet));
     engine.handle_packet(at(5), Side::Right, Packet::new([[0xff; 12].as_slice(), &[8, 0], &[1; 28]].concat(), Framing::Ethernet));
     engine.handle_packet(at(6), Side::Right, udp([1, 2], 0));
-    // An instant before the last one counts as that one.
+    // An instant before the latest one counts as the latest one.
     engine.handle_packet(at(1), Side::Right, Packet::new(arp.clone(), Framing::Ethernet));
     let left = departures(&mut engine);
     assert_eq!(
@@ -172,7 +172,7 @@ fn what_is_no_packet_of_ip_crosses_and_what_pretends_to_be_one_does_not() {
     assert_eq!(engine.poll_timeout(), None);
 }
 
-/// A copy that is damaged leaves the other one whole, and congestion is marked where the sender understands it.
+/// A damaged copy leaves the other copy whole, and congestion is marked if the sender understands marks.
 #[test]
 fn what_a_link_does_to_one_copy_it_does_not_do_to_the_other() {
     let text = "router = { seed = 2, default = \"x\" }\nlinks = { x = { duplicate = \"100%\", corrupt = { probability = \"50%\", checksum = \"passes\", bytes = \"28-47\" } } }";
@@ -202,7 +202,7 @@ fn what_a_link_does_to_one_copy_it_does_not_do_to_the_other() {
 }
 
 proptest! {
-    /// Whatever comes, nothing is lost without a name, and departures are in order and never before the packet.
+    /// For any packets, every loss has a counter, and departures are in order and never before the packet.
     #[test]
     fn everything_is_counted(packets in prop::collection::vec((0_u64..3_000, any::<bool>(), 0_u16..7, 0_usize..600), 1..120), late in 0_u64..20_000) {
         let text = "router = { seed = 5, default = { left-to-right = \"a\", right-to-left = \"b\" }, memory = { packets = 40 } }\n\

@@ -1,4 +1,4 @@
-//! Headers against `etherparse`, an implementation of somebody else.
+//! Headers compared with `etherparse`, an independent implementation.
 
 use std::net::IpAddr;
 
@@ -37,7 +37,7 @@ fn options_lie_between_the_header_and_the_ports() {
     assert_eq!(read(&bytes).ports, Some([7, 8]));
 }
 
-/// Hop-by-hop, destination options, routing and authentication before UDP: the lengths are counted in three different units.
+/// Hop-by-hop options, destination options, routing and authentication before UDP: the lengths count three different units.
 #[test]
 fn extension_headers_are_walked() {
     let chain: [(u8, &[u8]); 4] = [
@@ -57,7 +57,7 @@ fn extension_headers_are_walked() {
     bytes.extend(udp);
     let headers = read(&bytes);
     assert_eq!((headers.protocol, headers.ports), (Protocol::UDP, Some([7, 8])));
-    // Cut off in the middle of the chain: what is known is the header that is not whole.
+    // The chain is cut off in the routing header, so the protocol is the number of this incomplete header.
     bytes.truncate(40 + 8 + 16 + 4);
     let length = u16::try_from(bytes.len() - 40).unwrap().to_be_bytes();
     bytes[4..6].copy_from_slice(&length);
@@ -100,13 +100,13 @@ fn what_is_no_packet_is_told_by_its_fault() {
     assert_eq!(Headers::read(&v6[..39]), Err(Malformed::Short));
     v6[4..6].copy_from_slice(&[0, 1]);
     assert_eq!(Headers::read(&v6), Err(Malformed::Length));
-    // In a frame too, where it is told from what is no packet at all.
+    // In an Ethernet frame, a malformed packet differs from a frame without IP.
     let frame = |kind: [u8; 2]| Packet::new([[0; 12].as_slice(), &kind, &good[..10]].concat(), Framing::Ethernet);
     assert_eq!(*frame([8, 0]).content(), Content::Malformed(Malformed::Short));
     assert_eq!(*frame([8, 6]).content(), Content::NotIp);
 }
 
-/// Frames have at least 60 bytes: what is behind the packet is not part of it.
+/// Frames have at least 60 bytes: the bytes after the packet do not belong to the packet.
 #[test]
 fn padding_does_not_count() {
     let packet = udp_bytes([1, 2], b"ab");
@@ -143,7 +143,7 @@ fn congestion_is_marked_and_the_checksum_follows() {
     assert_eq!(packet.bytes(), bytes, "only the two bits changed");
 }
 
-/// A frame and its packet, built by `etherparse`, whatever is in it.
+/// Returns a packet built by `etherparse`, with its protocol and ports.
 fn built() -> impl Strategy<Value = (Vec<u8>, Protocol, Option<[u16; 2]>)> {
     let data = prop::collection::vec(any::<u8>(), 0..200);
     (any::<bool>(), 0_u8..3, any::<[u8; 16]>(), any::<[u8; 16]>(), any::<[u16; 2]>(), data).prop_map(
@@ -170,7 +170,7 @@ proptest! {
             *byte = first;
         }
         if bytes.len() > 6 && first == 0x60 {
-            // A length that fits, so that the chain of headers is walked.
+            // The length fits, so that the chain of headers is walked.
             let length = u16::try_from(bytes.len().saturating_sub(40)).unwrap().to_be_bytes();
             bytes[4..6].copy_from_slice(&length);
         }
@@ -198,7 +198,7 @@ proptest! {
         }
     }
 
-    /// A checksum that was left to the device, which holds the sum of the pseudo-header, becomes the right one; a right one stays.
+    /// A checksum field with only the sum of the pseudo-header becomes the right checksum, and a right checksum stays the same.
     #[test]
     fn a_checksum_that_was_left_out_is_computed((bytes, protocol, _) in built()) {
         prop_assume!(protocol.has_ports());
@@ -222,16 +222,16 @@ proptest! {
     }
 }
 
-/// One that is computed and comes out as zero is written as its other zero: zero would say that there is none (RFC 768).
+/// A computed checksum that comes out as zero is written as all ones: zero would mean that there is no checksum (RFC 768).
 #[test]
 fn a_checksum_that_is_computed_and_comes_out_as_zero_does_not_vanish() {
     let field = 26..28;
-    // What is missing to all ones is the checksum itself.
+    // A checksum is the difference to all ones. Put into the data, it makes the new checksum zero.
     let missing = udp_bytes([1, 2], &[0; 2])[field.clone()].to_vec();
     let whole = udp_bytes([1, 2], &missing);
     assert_eq!(whole[field.clone()], [0xff; 2]);
     let mut partial = whole.clone();
-    // From 10.1.0.1 to 10.2.0.1, UDP, 10 bytes: the sum of the pseudo-header.
+    // Sum of the pseudo-header: from 10.1.0.1 to 10.2.0.1, UDP, 10 bytes.
     partial[field].copy_from_slice(&(0x0a01_u16 + 0x0001 + 0x0a02 + 0x0001 + 17 + 10).to_be_bytes());
     assert_eq!(Packet::new(partial, Framing::Ip).bytes(), whole);
 }

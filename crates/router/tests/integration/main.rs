@@ -1,5 +1,5 @@
-//! The router from outside: its packets against those of another implementation, its engine in virtual time, its loop by a clock that is made up, and real
-//! traffic between network namespaces.
+//! The router from outside: its packets compared with another implementation, its engine in virtual time, its loop with an artificial clock, and real traffic
+//! between network namespaces.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, clippy::print_stdout, reason = "tests")]
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "tests count small numbers")]
 

@@ -1,4 +1,4 @@
-//! Rules against a table of packets.
+//! Rules compared with a table of packets.
 
 use cohaptic_linkfile::router::{Side, Target};
 use cohaptic_router::{Decided, Framing, Headers, Packet, Rules};
@@ -57,7 +57,7 @@ fn the_first_rule_that_applies_decides() {
         (Side::Left, udp_bytes([9, 6000], &[]), Decided::Default, up),
         (Side::Left, v4(one, two, "tcp", [80, 9999]), rule(1), web),
         (Side::Right, v4(two, one, "tcp", [9999, 80]), rule(1), web),
-        // Both of the next two rules would apply: the first one does.
+        // Both of the next two rules apply, and the first one decides.
         (Side::Left, v4(nine, two, "tcp", [80, 1]), rule(1), web),
         (Side::Left, v4(nine, two, "tcp", [81, 1]), rule(2), Target::Drop),
         (Side::Left, v4(nine, [10, 2, 1, 1], "tcp", [81, 1]), Decided::Default, up),
@@ -76,7 +76,7 @@ fn the_first_rule_that_applies_decides() {
     }
 }
 
-/// What has no ports is not matched by a rule that asks for one, whatever its range.
+/// A rule that names a port does not apply to a packet without ports, for any range of ports.
 #[test]
 fn a_packet_without_ports_has_none_that_matches() {
     let rules = Rules::new(&file("router = { default = \"pass\" }\nrules = [{ port = \"0-65535\", link = \"drop\" }]"));

@@ -1,4 +1,4 @@
-//! The loop by a clock that is made up: it moves when it is read and when it is waited for, and packets come at instants of a script.
+//! The loop with an artificial clock, which moves by readings and by waits. Packets arrive at the instants of a script.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -18,20 +18,20 @@ use cohaptic_units::Instant;
 
 use crate::support::{file, udp_bytes};
 
-/// An instant \[ns\] and what came or left then.
+/// Instant \[ns\], and the packet that arrived or left then.
 type At = (u64, Vec<u8>);
 
 type Log = Rc<RefCell<Vec<At>>>;
 
-/// The time, and what will come at which side.
+/// The artificial clock, and the packets still to arrive at each side.
 struct World {
     now: Cell<u64>,
-    /// How long it takes to read the clock \[ns\].
+    /// Time for reading the clock \[ns\].
     step: u64,
-    /// How late the system wakes \[ns\].
+    /// Lateness of each wake-up \[ns\].
     late: u64,
     coming: [RefCell<VecDeque<At>>; 2],
-    /// Somebody stops the run then \[ns\].
+    /// Instant at which `stop` is set \[ns\].
     stop_at: Cell<u64>,
     stop: AtomicBool,
 }
@@ -128,35 +128,35 @@ fn run(router: &mut Router<Wire, Watch>) {
 
 #[test]
 fn a_late_system_makes_packets_late_but_lateness_does_not_add_up() {
-    // Later than the longest margin, so that no learning makes up for it.
+    // Wake-ups are later than the longest margin, so learning cannot compensate for the lateness.
     let (mut router, logs) = router(DELAY, 0, 180_000, [every_millisecond(100), Vec::new()], Sent::Sent, Pacing::Sleep);
     run(&mut router);
     let left = logs[1].borrow();
     assert_eq!(left.len(), 100);
     for (number, (at, bytes)) in left.iter().enumerate() {
-        // Read 180 µs after it came, which is its instant, and written at most 180 µs after its departure.
+        // The packet is read 180 µs after its arrival, which is then its instant, and written at most 180 µs after its departure.
         let came = number as u64 * 1_000_000 + 500_000;
         assert!((came + 5_180_000..=came + 5_360_000).contains(at), "{number} left at {at}");
         assert_eq!(u16::from_be_bytes([bytes[20], bytes[21]]), number as u16);
     }
     let error = router.release_error();
     assert_eq!(error.count, 100);
-    // To the three digits of the histogram.
+    // The bound includes the three digits of the histogram.
     assert!(error.max <= Duration::from_nanos(180_200), "{error:?}");
-    // From the departure, 5 ms after it was read, until it was written.
+    // Lateness counts from the departure, 5 ms after the reading, until the packet is written.
     let late: u64 = left.iter().zip(0_u64..).map(|((at, _), number)| at - (number * 1_000_000 + 500_000 + 180_000 + 5_000_000)).sum();
     assert!(late > 0);
     assert_eq!(error.sum, Duration::from_nanos(late));
-    // 20 bytes of IPv4 and 8 of UDP each.
+    // Each packet has 20 bytes of IPv4 and 8 of UDP.
     assert_eq!(router.report().written.map(|written| (written.packets, written.bytes)), [(0, 0), (100, 2800)]);
     assert_eq!((router.report().packets(), router.report().dropped()), (100, 0));
 }
 
-/// While it spins, the router reads what comes at once, and departures are on time to a few readings of the clock.
+/// While the thread spins, the router reads an arriving packet at once, and departures are on time to a few readings of the clock.
 #[test]
 fn spinning_neither_makes_departures_late_nor_packets_wait() {
     let margin = Duration::from_micros(120);
-    // A packet comes 60 µs before the departure of the first one: in the middle of the margin.
+    // The second packet arrives 60 µs before the departure of the first one, in the middle of the margin.
     let coming = vec![(1_000_000, udp_bytes([1, 9], &[])), (5_950_000, udp_bytes([2, 9], &[]))];
     let (mut router, logs) = router(DELAY, 50, 10_000, [coming, Vec::new()], Sent::Sent, Pacing::Spin { margin });
     run(&mut router);
@@ -199,9 +199,9 @@ fn it_looks_up_as_often_as_asked_and_links_can_be_changed_then() {
             }
         })
         .unwrap();
-    // The first two wait for the packet that leaves half a millisecond later, and the last is that at the end.
+    // The first two looks wait for the packet that leaves half a millisecond later, and the last look is the one at the end.
     assert_eq!(looks, [50_500_000, 100_500_000, 150_500_000, 200_000_000]);
-    // Of 100 packets, 51 came before the change.
+    // Of 100 packets, 51 arrived before the change.
     assert_eq!(logs[1].borrow().len(), 51);
     assert_eq!(router.report().dropped(), 49);
 }
@@ -220,7 +220,7 @@ fn a_stop_is_noticed() {
     assert_eq!(looks, 4, "and a last look at the end");
 }
 
-/// Nothing comes, nothing is due and nobody looks for an hour.
+/// No packet arrives, nothing is due, and the next look is an hour away.
 #[test]
 fn a_stop_is_noticed_however_seldom_it_is_looked_at() {
     let (mut router, _, world) = router_and_world(DELAY, 0, 0, [Vec::new(), Vec::new()], Sent::Sent, Pacing::Sleep);

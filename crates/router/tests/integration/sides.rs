@@ -1,4 +1,4 @@
-//! Devices of a router, where they are refused before they are opened: without privileges.
+//! Devices that are refused before they are opened, so that the tests need no privileges.
 
 use std::path::Path;
 
@@ -6,7 +6,8 @@ use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_realtime::Pacing;
 use cohaptic_router::{Failed, Router};
 
-/// The loopback interface is in each namespace and carries no Ethernet: it is refused as such if it is opened at all.
+/// Opens a router between two loopback interfaces and returns the refusal. The loopback interface exists in each namespace and carries no Ethernet, so a
+/// refusal for another reason shows that the interface was not opened.
 fn refused(left: &str, right: &str) -> (Side, Failed) {
     let text = format!("router = {{ default = \"pass\" }}\nleft = {{ interface = \"lo\"{left} }}\nright = {{ interface = \"lo\"{right} }}\n");
     let file = RouterFile::parse(&text, Path::new("router.toml"), &[]).unwrap();
@@ -21,7 +22,7 @@ fn one_device_is_refused_by_whatever_name_its_namespace_is_called() {
         let (side, failed) = refused(left, right);
         assert!(side == Side::Right && matches!(failed, Failed::SameDevice), "{left} {right}: {failed}");
     }
-    // A namespace that cannot be looked at is named, and nothing is opened.
+    // The message names a namespace that cannot be opened, and no device is opened.
     let (_, failed) = refused("", ", namespace = \"/no/such/namespace\"");
     assert!(matches!(failed, Failed::System { .. }) && failed.to_string().contains("/no/such/namespace"), "{failed}");
 }

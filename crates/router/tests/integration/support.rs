@@ -1,4 +1,4 @@
-//! Packets and files that several tests use.
+//! Packets and files for several tests.
 
 use std::path::Path;
 
@@ -6,13 +6,13 @@ use cohaptic_linkfile::router::RouterFile;
 use cohaptic_router::{Framing, Packet};
 use etherparse::PacketBuilder;
 
-/// A router with these links, rules and default, between two TUN devices.
+/// Returns the configuration with the given links, rules and default, between two TUN devices.
 pub(crate) fn file(text: &str) -> RouterFile {
     let sides = "left = { tun = \"a\" }\nright = { tun = \"b\" }\n";
     RouterFile::parse(&format!("{sides}{text}"), Path::new("router.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A packet of UDP with so many bytes of data, from 10.1.0.1 to 10.2.0.1.
+/// Returns a UDP packet from 10.1.0.1 to 10.2.0.1 with `data` bytes of data.
 pub(crate) fn udp(ports: [u16; 2], data: usize) -> Packet {
     Packet::new(udp_bytes(ports, &vec![7; data]), Framing::Ip)
 }

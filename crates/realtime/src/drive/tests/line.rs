@@ -1,4 +1,4 @@
-//! A line with a made-up clock, which writes down what the loop does with it.
+//! Line with an artificial clock, which logs the calls of the loop.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -9,15 +9,15 @@ use std::rc::Rc;
 use super::super::*;
 use super::MILLI;
 
-/// A clock that moves by a step at each look at it, and by waiting.
+/// Artificial clock and arrivals. The clock moves by a step at each reading, and by waiting.
 pub(super) struct World {
     pub(super) now: Cell<u64>,
     pub(super) step: u64,
-    /// How late the system wakes the thread.
+    /// Lateness of each wake-up \[ns\].
     pub(super) late: u64,
-    /// Instants at which packets come.
+    /// Instants of the arrivals still to come \[ns\].
     pub(super) coming: RefCell<VecDeque<u64>>,
-    /// Until when the thread slept, and whether for packets too.
+    /// End of each wait \[ns\], and whether an arrival could end the wait.
     pub(super) slept: RefCell<Vec<(u64, bool)>>,
 }
 
@@ -43,19 +43,19 @@ pub(super) enum Did {
     Sent(u64),
 }
 
-/// A line with a delay of 5 ms. `AHEAD` is in nanoseconds; 0 is `None`.
+/// Line with a delay of 5 ms. `AHEAD` is in nanoseconds; 0 stands for `None`.
 pub(super) struct Line<const AHEAD: u64, const RESTS: bool> {
     pub(super) world: Rc<World>,
     pub(super) socket: File,
-    /// Packets read at most at once.
+    /// Packets in one reading, at most.
     pub(super) batch: usize,
-    /// Packets that one call makes ready at most.
+    /// Packets made ready by one call, at most.
     pub(super) ready_at_once: usize,
     pub(super) under_way: VecDeque<u64>,
     pub(super) ready: u64,
     pub(super) over_after: u64,
     pub(super) sent: u64,
-    /// When what was done.
+    /// Calls of the loop with their instants \[ns\].
     pub(super) log: Vec<(u64, Did)>,
 }
 
@@ -109,7 +109,7 @@ impl<const AHEAD: u64, const RESTS: bool> Driven for Line<AHEAD, RESTS> {
         }
         drop(coming);
         self.note(Did::Read(count));
-        // More may have come after the last one.
+        // A full reading may have left later packets unread.
         Ok(Received { count, until: if count == self.batch { Instant::from_nanos(last) } else { now } })
     }
 

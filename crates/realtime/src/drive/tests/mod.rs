@@ -1,4 +1,4 @@
-//! The loop by a made-up clock, around a line that delays what comes: each reading, instant and sending is written down.
+//! The loop with an artificial clock, around a line that delays packets. The line logs each reading, each instant told and each sending.
 
 mod line;
 
@@ -45,7 +45,7 @@ fn without_an_instant_ahead_nothing_is_read_or_told_before_the_deadline() {
     assert!((due..due + 300).contains(&line.departures()[0]));
 }
 
-/// A hundred packets wait, of which one reading takes ten.
+/// A hundred packets wait, and one reading takes ten.
 #[test]
 fn time_passes_only_up_to_the_packets_that_were_read() {
     let mut line = Line::<{ 3 * MICRO }, false>::new(50, 0, (0..100).map(|number| number * MICRO));
@@ -69,7 +69,7 @@ fn what_is_left_to_be_made_ready_leaves_before_the_thread_sleeps() {
     assert!(sent[0] >= 6 * MILLI && sent[2] < 6 * MILLI + MICRO, "{sent:?}");
 }
 
-/// Instants of looks every 10 ms at a line through which a packet passes every `gap`.
+/// Returns the instants of looks every 10 ms, and of departures, of a line with a packet every `gap` \[ns\].
 fn looks(gap: u64) -> (Vec<u64>, Vec<u64>) {
     let mut line = Line::<{ 3 * MICRO }, false>::new(0, 0, (1..100 * MILLI / gap).map(|number| number * gap));
     let schedule = Schedule { pacing: Pacing::Sleep, end: Some(Instant::from_nanos(100 * MILLI)), look_every: Duration::from_millis(10) };
@@ -85,11 +85,11 @@ fn looks(gap: u64) -> (Vec<u64>, Vec<u64>) {
 
 #[test]
 fn a_look_waits_for_a_deadline_that_is_near_and_for_no_other() {
-    // Departures every 0.7 ms: each look but the first follows one.
+    // Departures every 0.7 ms: each look but the first follows a departure.
     let (at, sent) = looks(700 * MICRO);
     assert!((9..=10).contains(&at.len()), "{at:?}");
     assert!(at[1..].iter().all(|at| sent.contains(at) || at % (700 * MICRO) == 0), "{at:?}");
-    // Departures every 8 ms: a look that none follows within a millisecond has a wake-up of its own.
+    // Departures every 8 ms: a look without a departure in the next millisecond gets a wake-up of its own.
     let (at, sent) = looks(8 * MILLI);
     assert!((9..=10).contains(&at.len()), "{at:?}");
     assert!(at.windows(2).all(|pair| pair[1] - pair[0] <= 11 * MILLI), "{at:?}");
@@ -116,7 +116,7 @@ fn it_ends_at_its_end_when_the_program_is_over_and_when_a_look_breaks() {
     assert_eq!(line.world.now.get(), 2_000 * MILLI);
 }
 
-/// 100,000 packets a second for 20 ms.
+/// Returns the number of rests with 100,000 packets a second for 20 ms.
 fn rests<const RESTS: bool>(pacing: Pacing) -> usize {
     let mut line = Line::<{ 3 * MICRO }, RESTS>::new(50, 0, (0..2000).map(|number| number * 10 * MICRO));
     line.run(pacing, 40 * MILLI);
@@ -126,7 +126,7 @@ fn rests<const RESTS: bool>(pacing: Pacing) -> usize {
 
 #[test]
 fn under_load_it_rests_if_the_program_may_and_the_thread_sleeps() {
-    // 20 ms of arrivals, and 5 ms until the last one leaves, in pieces of 50 µs.
+    // 20 ms of arrivals and 5 ms until the last departure, in pieces of 50 µs.
     assert!((400..=520).contains(&rests::<true>(Pacing::Sleep)));
     assert_eq!(rests::<true>(Pacing::SPIN), 0);
     assert_eq!(rests::<false>(Pacing::Sleep), 0);

@@ -1,4 +1,4 @@
-//! Between two Ethernet interfaces, as between the two cards of a machine: here the ends of two veth pairs.
+//! Between two Ethernet interfaces, as between the two cards of a machine. Here the interfaces are the ends of two veth pairs.
 
 use std::io::{Read as _, Write as _};
 use std::net::{IpAddr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
@@ -12,13 +12,13 @@ use cohaptic_router::{OpenError, Router};
 use super::hosts::{Host, PATIENCE, Running};
 use super::sandbox::inside;
 
-/// Runs `ip` with these words; says why not.
+/// Runs `ip` with the given words, and returns the reason of a failure.
 pub(super) fn ip(words: &str) -> Result<(), String> {
     let output = Command::new("ip").args(words.split_whitespace()).output().map_err(|error| error.to_string())?;
     if output.status.success() { Ok(()) } else { Err(format!("ip {words}: {}", String::from_utf8_lossy(&output.stderr))) }
 }
 
-/// A host at the far end of a cable whose near end is `device` here.
+/// Returns a host at the far end of a cable. The near end is `device` in the namespace of the test.
 fn cable(device: &'static str, number: u8) -> Result<Host, String> {
     let host = Host::new();
     let far = format!("h{number}");
@@ -28,7 +28,7 @@ fn cable(device: &'static str, number: u8) -> Result<Host, String> {
     host.does(move || {
         ip(&format!("address add 10.1.0.{number}/24 dev {far}"))?;
         ip(&format!("address add fd00::{number}/64 dev {far} nodad"))?;
-        // Without this the host hands over packets of TCP that are longer than any frame, for the device to cut.
+        // Otherwise the host hands over TCP segments longer than any frame, for the device to cut.
         ip(&format!("link set {far} gso_max_segs 1"))?;
         ip(&format!("link set {far} up"))
     })?;
@@ -36,7 +36,7 @@ fn cable(device: &'static str, number: u8) -> Result<Host, String> {
     Ok(host)
 }
 
-/// ARP and neighbour discovery, UDP and TCP cross; a checksum that the sender leaves to its device, as Linux does on veth, is right at the other end.
+/// ARP, neighbour discovery, UDP and TCP cross the router. A checksum that the sender leaves to its device, as Linux does on veth, is right at the other end.
 #[test]
 fn hosts_on_two_cables_reach_each_other() {
     const DELAY: Duration = Duration::from_millis(10);
@@ -103,7 +103,7 @@ fn what_cannot_be_opened_says_why() {
             let found = found.unwrap();
             assert!(found.starts_with(expected), "{found}");
         }
-        // Devices are gone with the router, so that the same names can be had again.
+        // Devices disappear with the router, so the same names can be used again.
         assert_eq!(open("{ tun = \"t0\" }", "{ tun = \"t1\" }"), None);
         assert_eq!(open("{ tun = \"t0\", addresses = [\"10.0.0.1/24\", \"10.0.1.1/24\", \"fd00::1/64\"], mtu = 1300 }", "{ tun = \"t1\" }"), None);
     });

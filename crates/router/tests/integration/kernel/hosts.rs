@@ -14,13 +14,13 @@ use cohaptic_router::{Report, Router};
 use nix::sched::{CloneFlags, unshare};
 use nix::unistd::gettid;
 
-/// What is waited for takes milliseconds; this is how long a machine may be busy with something else.
+/// Bound of every wait. The waits take milliseconds; the rest is for a machine with other work.
 pub(super) const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A thread in a network namespace of its own. Sockets that it opens belong there, whoever uses them.
+/// Thread in a network namespace of its own. Sockets opened by the thread belong to this namespace, even if another thread uses them.
 pub(super) struct Host {
     work: Sender<Box<dyn FnOnce() + Send>>,
-    /// The path of the namespace.
+    /// Path of the namespace.
     pub(super) namespace: String,
 }
 
@@ -36,14 +36,14 @@ impl Host {
         Self { work, namespace: is_ready.recv_timeout(PATIENCE).unwrap() }
     }
 
-    /// Does something on this host.
+    /// Runs `work` on this host, and returns the result.
     pub(super) fn does<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> T {
         let (done, is_done) = channel();
         self.work.send(Box::new(move || drop(done.send(work())))).unwrap();
         is_done.recv_timeout(PATIENCE).unwrap()
     }
 
-    /// Waits until it has an address: one of IPv6 is there only once the kernel has noticed, some time after, that its device is up.
+    /// Waits until the host has an address. An IPv6 address appears only some time after the device is up, when the kernel has noticed.
     pub(super) fn has(&self, address: IpAddr) {
         self.does(move || {
             let begin = Instant::now();
@@ -60,7 +60,7 @@ impl Host {
     }
 }
 
-/// A router that runs until it is stopped.
+/// Router that runs until it is stopped.
 pub(super) struct Running {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<Report>>,
@@ -71,7 +71,7 @@ impl Running {
         Self::begin_with(text, Pacing::Sleep, &Wishes::NONE)
     }
 
-    /// With that pacing, in a thread that asks the system for these things.
+    /// Starts a router with the given pacing, on a thread that makes the given requests to the system.
     pub(super) fn begin_with(text: &str, pacing: Pacing, wishes: &Wishes) -> Self {
         let wishes = *wishes;
         let file = RouterFile::parse(text, Path::new("router.toml"), &[]).unwrap_or_else(|error| panic!("{error}"));
@@ -89,7 +89,7 @@ impl Running {
         Self { stop, thread: Some(thread) }
     }
 
-    /// Stops it and looks whether everything was counted.
+    /// Stops the router, checks that the counters account for every packet, and returns the report.
     pub(super) fn end(mut self) -> Report {
         self.stop.store(true, Ordering::Relaxed);
         let report = self.thread.take().unwrap().join().unwrap();

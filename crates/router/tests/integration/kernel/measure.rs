@@ -1,5 +1,5 @@
-//! How late packets leave, for `docs/measured-router.md`: `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 measure`. The
-//! figures depend on the machine, so nothing is asked of them here.
+//! Release error of the router, for `docs/measured-router.md`: `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 measure`. The
+//! figures depend on the machine, so nothing is asserted about them.
 
 use std::net::SocketAddr;
 use std::thread;
@@ -12,7 +12,8 @@ use super::hosts::{Host, PATIENCE, Running};
 use super::sandbox::inside_as_root;
 use super::tun::sides;
 
-/// Sends packets with that much data from left to right for some seconds, `every` so often, and gives the report, how many were sent, and how many arrived.
+/// Sends a packet with `data` bytes of data from left to right `every` so often for some seconds. Returns the report, the number of packets sent, and the
+/// number of packets that arrived.
 fn measure(text: &str, pacing: Pacing, data: usize, every: Duration, seconds: u64) -> (Report, u64, u64) {
     let (left, right) = (Host::new(), Host::new());
     let running = Running::begin_with(&format!("{}{text}", sides(&left, &right)), pacing, &Wishes { lock_memory: false, ..Wishes::default() });

@@ -1,8 +1,8 @@
-//! Real traffic: two hosts in network namespaces of their own with the router between them. Everything is made by the tests themselves, without root where the
-//! system lets a user have namespaces; where it does not they say so and are skipped.
+//! Real traffic: two hosts in network namespaces of their own, with the router between them. The tests create all namespaces and devices, without root if the
+//! system lets users create namespaces; otherwise the tests say so and are skipped.
 //!
-//! Nothing here depends on how fast the machine is: a packet is never earlier than its link says, however late it may be, and what becomes of a packet does
-//! not depend on time where the test looks at it.
+//! No assertion depends on the speed of the machine: a packet is never earlier than its link says, however late the packet may be, and the tests look only at
+//! fates that do not depend on time.
 
 mod ethernet;
 mod hosts;

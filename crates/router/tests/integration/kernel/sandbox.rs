@@ -1,17 +1,17 @@
-//! A process in namespaces of its own.
+//! Process in namespaces of its own.
 
 use std::env;
 use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Set in the process inside.
+/// Variable that is set in the inner process.
 const INSIDE: &str = "COHAPTIC_ROUTER_TEST_INSIDE";
 
-/// A test that takes longer has hung: each of its waits has an end that is far shorter.
+/// Bound of a test. Every wait of a test ends far earlier, so a longer test hangs.
 const LONGEST: Duration = Duration::from_secs(300);
 
-/// Ends the process, whatever happens to the test.
+/// Child process that is killed when this value is dropped, even if the test panics.
 struct Killed(Child);
 
 impl Drop for Killed {
@@ -21,12 +21,12 @@ impl Drop for Killed {
     }
 }
 
-/// Runs the test of that name again in a process with a network and a user of its own, where `body` is done.
+/// Runs the test `name` again in a process with a network and a user of its own, and `body` there.
 pub(super) fn inside(name: &str, body: impl FnOnce()) {
     inside_one_of(["-Urn", "-n"], name, body);
 }
 
-/// The same, but with the user that there is, if that is root: the root of a user namespace gets no `SCHED_FIFO`.
+/// Like [`inside`], but keeps the present user if that user is root, because the root of a user namespace gets no `SCHED_FIFO`.
 pub(super) fn inside_as_root(name: &str, body: impl FnOnce()) {
     inside_one_of(["-n", "-Urn"], name, body);
 }

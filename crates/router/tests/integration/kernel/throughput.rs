@@ -1,6 +1,5 @@
-//! What the router carries at most, beside what the same two devices carry with nothing but a copy between them, and beside a bridge of the kernel:
-//! `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 throughput`. The figures depend on the machine, so nothing is asked of
-//! them here.
+//! Throughput of the router, compared with a copy between the same two devices and with a bridge of the kernel: `cargo test --release -p cohaptic-router --
+//! --ignored --nocapture --test-threads=1 throughput`. The figures depend on the machine, so nothing is asserted about them.
 
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -23,20 +22,20 @@ const SPAN: Duration = Duration::from_secs(2);
 const RUNS: usize = 3;
 const THERE: [u8; 4] = [10, 1, 0, 2];
 
-/// The processor time that this process has had, the system's part included \[s\]: sender, router and receiver are its threads.
+/// Returns the processor time of this process, including the time in the system \[s\]. Sender, router and receiver are threads of this process.
 fn spent() -> f64 {
     let line = fs::read_to_string("/proc/self/stat").unwrap();
-    // Behind the name, in hundredths of a second (proc(5)).
+    // The fields after the name of the process, in hundredths of a second (proc(5)).
     let fields: Vec<&str> = line.rsplit(')').next().unwrap().split_whitespace().collect();
     fields[11..13].iter().map(|ticks| ticks.parse::<f64>().unwrap() / 100.0).sum()
 }
 
-/// A rate per second, and per second of processor time: the one depends on what else the machine does.
+/// Rate per second, and rate per second of processor time. The first depends on the other work of the machine.
 type Rates = [f64; 2];
 
-/// The bits that one connection carries.
+/// Returns the bits carried by one connection.
 fn tcp(left: &Host, right: &Host) -> Rates {
-    // Four gigabits for 50 ms are 25 MB.
+    // Four gigabits per second for 50 ms are 25 MB.
     left.does(|| fs::write("/proc/sys/net/ipv4/tcp_wmem", "4096 1000000 67108864").unwrap());
     right.does(|| fs::write("/proc/sys/net/ipv4/tcp_rmem", "4096 1000000 67108864").unwrap());
     let there = SocketAddr::from((THERE, 5001));
@@ -66,7 +65,8 @@ fn tcp(left: &Host, right: &Host) -> Rates {
     rates
 }
 
-/// Packets of 64 bytes that arrive. The sender has at most so many on the way: what it sent beyond them would be lost, and the time with it.
+/// Returns the number of arriving packets of 64 bytes. At most `on_the_way` packets are under way: further packets would be lost, and the time for sending them
+/// wasted.
 fn datagrams(left: &Host, right: &Host, on_the_way: u32) -> Rates {
     const PATIENCE: Duration = Duration::from_millis(100);
     let (from, to) = (left.udp([10, 1, 0, 1].into(), 0), right.udp(THERE.into(), 7));
@@ -97,21 +97,21 @@ fn datagrams(left: &Host, right: &Host, on_the_way: u32) -> Rates {
             begin = Instant::now();
         }
     }
-    // Without the last wait, which found nothing.
+    // The last wait found no packet, so its time is subtracted.
     let took = begin.elapsed().saturating_sub(Duration::from_millis(300));
     sender.join().unwrap();
     [took.as_secs_f64(), spent() - cost].map(|seconds| f64::from(arrived.load(Ordering::Relaxed)) / seconds)
 }
 
 fn print(name: &str, left: &Host, right: &Host, delay: u32) {
-    // What waits in a device, and 400,000 packets in a second.
+    // The room of a device, and 400,000 packets per second for the delay.
     let on_the_way = 1_500 + 400 * delay;
     let tcp: Vec<Rates> = (0..RUNS).map(|_| tcp(left, right).map(|rate| (rate / 1e7).round() / 100.0)).collect();
     let packets: Vec<Rates> = (0..RUNS).map(|_| datagrams(left, right, on_the_way).map(|rate| (rate / 1e3).round())).collect();
     println!("{name}, per second and per second of processor time: TCP {tcp:?} Gbit, packets of 64 bytes {packets:?} thousand");
 }
 
-/// One link with that delay \[ms\].
+/// Measures the router with one link of `delay` \[ms\].
 fn through_the_router(name: &str, delay: u32) {
     let (left, right) = (Host::new(), Host::new());
     let side = |name: &str, host: u8, namespace: &str| {
@@ -125,7 +125,7 @@ fn through_the_router(name: &str, delay: u32) {
     println!("   release error {:?}, lost at the devices {:?}", report.release, report.written.map(|written| written.lost()));
 }
 
-/// Two devices and a thread that copies what it reads from one to the other, as it is.
+/// Measures two devices with a thread that copies every packet or segment from one device to the other.
 fn through_a_copy(name: &str, offloads: bool) {
     let (left, right) = (Host::new(), Host::new());
     let device = |host: &Host, number: u8| {
@@ -168,7 +168,7 @@ fn copy(devices: &[SyncDevice; 2], stop: &AtomicBool) {
     }
 }
 
-/// Two veth pairs and a bridge of the kernel between them.
+/// Measures two veth pairs with a bridge of the kernel between them.
 fn through_a_bridge(name: &str, segments: &'static str) -> Result<(), String> {
     let (left, right) = (Host::new(), Host::new());
     ip("link add bridge0 type bridge")?;

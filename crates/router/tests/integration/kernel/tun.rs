@@ -23,7 +23,7 @@ fn v6(host: u16) -> IpAddr {
     Ipv6Addr::new(0xfd00, 0, 0, 0, 0, 0, 0, host).into()
 }
 
-/// Two hosts, 1 on the left and 2 on the right, and the router between them.
+/// Starts two hosts, number 1 on the left and number 2 on the right, and the router between them.
 fn hosts(text: &str) -> (Host, Host, Running) {
     let (left, right) = (Host::new(), Host::new());
     let running = Running::begin(&format!("{}{text}", sides(&left, &right)));
@@ -32,7 +32,7 @@ fn hosts(text: &str) -> (Host, Host, Running) {
     (left, right, running)
 }
 
-/// A TUN device in the namespace of each host, with an address of either family.
+/// Returns the configuration of a TUN device in the namespace of each host, with an IPv4 and an IPv6 address.
 pub(super) fn sides(left: &Host, right: &Host) -> String {
     let tun = |name: &str, host: u8, namespace: &str| {
         format!(
@@ -44,7 +44,7 @@ pub(super) fn sides(left: &Host, right: &Host) -> String {
     tun("left", 1, &left.namespace) + &tun("right", 2, &right.namespace)
 }
 
-/// Sends echo requests and gives the times until they were answered.
+/// Sends echo requests, and returns the time until each answer.
 fn ping(host: &Host, to: IpAddr, count: u16) -> Vec<Duration> {
     let (domain, protocol, kind, header) =
         if to.is_ipv4() { (Domain::IPV4, Protocol::ICMPV4, [8, 0], 20) } else { (Domain::IPV6, Protocol::ICMPV6, [128, 129], 0) };
@@ -73,7 +73,7 @@ fn ping(host: &Host, to: IpAddr, count: u16) -> Vec<Duration> {
 
 const DELAY: Duration = Duration::from_millis(20);
 
-/// No packet is earlier than its link says, and all arrive. How late they are is the machine's doing; that the link itself adds nothing is seen in its counters.
+/// Checks that no packet is earlier than its link says. Lateness is the machine's; the counters of the link show that the link itself adds none.
 fn check_round_trips(times: &[Duration], least: Duration) {
     assert!(times.iter().all(|time| *time >= least), "{times:?}");
 }
@@ -115,7 +115,7 @@ fn ping_udp_and_tcp_take_as_long_as_asked_with_ipv4_and_ipv6() {
             stream.write_all(b"hello").unwrap();
             let mut word = [0; 5];
             stream.read_exact(&mut word).unwrap();
-            // One round trip to connect, one for the word.
+            // One round trip is for the connection, one for the word.
             assert!(begin.elapsed() >= 4 * DELAY);
             assert_eq!(&word, b"hello");
             server.join().unwrap();
@@ -126,13 +126,13 @@ fn ping_udp_and_tcp_take_as_long_as_asked_with_ipv4_and_ipv6() {
     });
 }
 
-/// What is lost is what the seeded link loses in virtual time, packet by packet; the others arrive in order and whole.
+/// The losses are the losses of the seeded link in virtual time, packet by packet. The other packets arrive complete and in order.
 #[test]
 fn exactly_those_packets_are_lost_that_the_seeded_link_loses_in_virtual_time() {
     const PACKETS: u16 = 300;
     inside("kernel::tun::exactly_those_packets_are_lost_that_the_seeded_link_loses_in_virtual_time", || {
         let keys = ["delay=3ms", "loss={ gilbert-elliott = { p = 0.05, r = 0.3 } }"].map(str::to_owned);
-        // Only the packets of the test take the link: whatever else a host sends by itself goes past it.
+        // Only the packets of the test take the link. Other packets of a host pass without the link.
         let text = "router = { seed = 42, default = \"pass\" }\n\
             links = { wan = { delay = \"3ms\", loss = { gilbert-elliott = { p = 0.05, r = 0.3 } } } }\n\
             rules = [{ protocol = \"udp\", port = 7000, link = \"wan\" }]";
@@ -149,7 +149,7 @@ fn exactly_those_packets_are_lost_that_the_seeded_link_loses_in_virtual_time() {
             assert!((200..290).contains(&survivors.len()), "the test needs losses and arrivals: {}", survivors.len());
             let (sender, receiver) = (from_host.udp(here, 0), to_host.udp(there, 7000));
             let mut found = Vec::new();
-            // A few at a time, so that nothing is lost in a buffer of the host.
+            // A few packets at a time, so that no buffer of a host overflows.
             for first in (0..PACKETS).step_by(20) {
                 let numbers = first..first + 20;
                 for number in numbers.clone() {
@@ -162,7 +162,7 @@ fn exactly_those_packets_are_lost_that_the_seeded_link_loses_in_virtual_time() {
                 }
             }
             assert_eq!(found, survivors.into_iter().collect::<Vec<_>>());
-            // The last ones may be among the lost: what is sent after them and arrives says that they were read.
+            // The last packets may be among the lost ones. The arrival of a later packet shows that the router has read them.
             let behind = to_host.udp(there, 7001);
             sender.send_to(b"!", SocketAddr::new(there, 7001)).unwrap();
             assert_eq!(behind.recv(&mut [0; 2]).unwrap(), 1);
@@ -176,7 +176,7 @@ fn exactly_those_packets_are_lost_that_the_seeded_link_loses_in_virtual_time() {
     });
 }
 
-/// TCP gets at most the rate: what has arrived after a time t is at most R·t, however the machine is loaded; and all of it arrives as it was sent.
+/// TCP gets at most the rate: the data arrived until a time t is at most R·t under any load of the machine, and all data arrives unchanged.
 #[test]
 fn tcp_gets_no_more_than_the_rate() {
     const AMOUNT: usize = 400_000;
@@ -205,7 +205,7 @@ fn tcp_gets_no_more_than_the_rate() {
     });
 }
 
-/// A host hands over segments of many packets, of TCP and of UDP, and the link meets packets, with offloads as without.
+/// A host hands over segments of many TCP or UDP packets, and the link meets packets, with and without offloads.
 #[test]
 fn a_link_meets_packets_and_not_segments() {
     const AMOUNT: usize = 2_000_000;
@@ -231,7 +231,7 @@ fn a_link_meets_packets_and_not_segments() {
                 assert!(received == sent);
                 writer.join().unwrap();
             }
-            // Ten datagrams of 100 bytes and one of 50, with one call.
+            // Ten datagrams of 100 bytes and one of 50 bytes, in one call.
             let (from, to) = (left.udp(v4(1), 0), right.udp(v4(2), 80));
             socket2::SockRef::from(&from).connect(&SocketAddr::new(v4(2), 80).into()).unwrap();
             nix::sys::socket::setsockopt(&from, nix::sys::socket::sockopt::UdpGsoSegment, &100).unwrap();
@@ -245,7 +245,7 @@ fn a_link_meets_packets_and_not_segments() {
             let rule = report.counters.by_rule[0];
             let lane = report.counters.lane("x", Side::Left).unwrap();
             assert!(lane.delivered_bytes >= 2 * AMOUNT as u64);
-            // No packet is longer than the mtu.
+            // No packet is longer than the MTU.
             assert!(lane.delivered_bytes <= lane.stats.delivered() * 1400);
             assert_eq!((rule.packets, report.dropped()), (report.counters.lanes.iter().map(|lane| lane.stats.offered()).sum(), 0));
         }
@@ -279,12 +279,12 @@ fn rules_choose_the_link_of_real_traffic() {
         assert_eq!([offered("slow", Side::Left), offered("quick", Side::Left), offered("never", Side::Left)], [1, 5, 1]);
         assert_eq!([offered("slow", Side::Right), offered("quick", Side::Right)], [0, 0]);
         assert_eq!(report.counters.received[0].dropped, 1);
-        // The answers to the echoes.
+        // The answers to the echo requests.
         assert!(report.counters.received[1].passed >= 3);
     });
 }
 
-/// The receiver takes what was damaged, because its checksums were set right; and what its checksum is to find, it never sees.
+/// The receiver takes a damaged packet if its checksums were corrected. A packet whose checksum shows the damage never arrives.
 #[test]
 fn damaged_packets_arrive_or_do_not_as_asked() {
     inside("kernel::tun::damaged_packets_arrive_or_do_not_as_asked", || {
