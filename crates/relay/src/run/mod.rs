@@ -173,7 +173,7 @@ impl Driven for Running<'_> {
     type Clock = MonotonicClock;
     type Error = io::Error;
 
-    /// Making a release ready takes less than a microsecond when the caches are warm. A datagram that arrives during this time is offered late.
+    /// Longer than making a release ready takes. A datagram that arrives during this time is offered late.
     const AHEAD: Option<Duration> = Some(Duration::from_micros(3));
     const RESTS: bool = true;
 

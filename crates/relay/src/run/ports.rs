@@ -111,7 +111,7 @@ impl Ports {
     /// every arrived datagram was handed on. The caller must not let logical time pass that instant: a datagram that is still unread would be offered late.
     pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock, now: Instant) -> io::Result<Received> {
         let mut heard = Received { count: 0, until: now };
-        // A proxy without clients has one socket, and needs no call of epoll.
+        // A proxy has one socket until its first client comes, and needs no call of epoll until then.
         if self.ports.len() == 1 {
             self.receive_at(0, engine, clock, &mut heard)?;
         } else {

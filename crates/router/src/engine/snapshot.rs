@@ -5,7 +5,7 @@ use cohaptic_realtime::LatenessSummary;
 use cohaptic_units::Bytes;
 use cohaptic_wan::LinkStats;
 
-/// Number of packets and their bytes. The bytes are bytes of IP, without frame and padding.
+/// Number of packets and their bytes. The bytes are bytes of IP, without frame and padding; of a frame without IP and of a malformed packet, all bytes count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Count {
     /// Number of packets.

@@ -81,7 +81,7 @@ impl<'a> Segment<'a> {
         let (transport, size) = (headers.transport?, usize::from(offload.size));
         let data = transport + transport_length(headers.protocol, &packet[transport..])?;
         let field = transport + checksum::offset(headers.protocol)?;
-        // A segment needs every condition: otherwise cutting would write beyond its headers or invent a checksum.
+        // Cutting relies on every condition: a whole packet, a size above zero, and a checksum at the place of its protocol.
         let agrees = is_kind
             && headers.is_whole
             && headers.length == packet.len()

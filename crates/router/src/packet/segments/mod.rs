@@ -20,7 +20,7 @@ pub(crate) use join::{Join, join, slices};
 /// Header before each packet or segment of a device: `struct virtio_net_hdr` (Virtual I/O Device 1.2, section 5.1.6), in the byte order of the machine.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Offload {
-    /// [`NEEDS_CHECKSUM`] and [`VALID`].
+    /// Bits [`NEEDS_CHECKSUM`] and [`VALID`].
     flags: u8,
     /// Kind of segment, such as [`TCP_V4`], with [`REDUCED`] as an additional bit.
     kind: u8,
