@@ -71,7 +71,7 @@ macro_rules! pages {
 
 pages! {
     readme: "README.md",
-    python: "docs/python.md",
+    python_in_the_book: "docs/python.md",
     contributing: "CONTRIBUTING.md",
     releasing: "RELEASING.md",
     security: "SECURITY.md",
