@@ -1,4 +1,6 @@
-//! A campaign in its folder, and its watcher.
+//! A campaign bound to its folder: opening, judging, running, merging and comparing; and the trait of its watcher.
+//!
+//! The module decides the order of these steps. The files are read and written by `folder`, `kept`, `table` and `verdicts`; the runs are made by `work`.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -14,13 +16,13 @@ use crate::table::{Column, Head, TableError, columns};
 use crate::verdicts::{Journal, Judge, Judgement, Lines, judge, read_whole, write_all};
 use crate::work::{Keep, Work};
 
-/// How often parts are put together at most: each time but the last, a part that turns out to be damaged is computed again.
+/// Most attempts of one call to merge the parts. After each attempt but the last, a part found damaged is computed again.
 const MOST_MERGES: u32 = 3;
 
-/// What helps where the table is not as it was written.
+/// Advice to the user about a damaged table, printed with the error.
 const TABLE_WAY_OUT: &str = "remove the folder, or choose another one";
 
-/// A campaign in its folder, which no other process works on as long as this value lives.
+/// A campaign in its folder. A campaign opened with [`Campaign::open`] keeps the folder locked against other processes as long as the value lives.
 #[derive(Debug)]
 pub struct Campaign {
     pub(crate) plan: CampaignPlan,
@@ -28,33 +30,33 @@ pub struct Campaign {
     pub(crate) accepted: Accepted,
     pub(crate) parts: Parts,
     columns: Vec<Column>,
-    /// The hash of the manifest, which the digest of each part names.
+    /// Hash of the manifest. The digest of each part contains this hash.
     pub(crate) hash: String,
     pub(crate) folder: Folder,
-    /// One for each combination; none while they are not known, or not asked for.
+    /// Judgements, indexed by combination. Empty before [`Campaign::judge`] has judged every combination, and always empty for a plan without verdicts.
     judgements: Arc<[Judgement]>,
 }
 
-/// How [`Campaign::run`] ended.
+/// End of a call of [`Campaign::run`].
 #[derive(Clone, PartialEq, Debug)]
 pub enum Outcome {
-    /// All runs are done, and the table is there.
+    /// All runs are done, and the table is written.
     Finished(Report),
-    /// The watch ended it. The same plan in the same folder goes on.
+    /// The watch stopped the campaign. The same plan in the same folder continues it.
     Interrupted {
-        /// How many runs are kept, those of earlier times among them.
+        /// Number of runs stored in the folder, including the runs of earlier calls.
         kept: u64,
     },
 }
 
 impl Campaign {
-    /// Begins a campaign in a folder, or goes on with the one there if it is the same. A new one is checked first, every combination, on all threads of the
-    /// pool that it is called in; nothing is written before.
+    /// Begins a campaign in a folder, or continues the campaign found in the folder if the plans are equal. A new campaign first checks every combination, on
+    /// all threads of the current thread pool; nothing is written before all are accepted.
     ///
     /// # Errors
     ///
-    /// [`CampaignError`] if a combination is refused, if the folder is no folder, has other files or another campaign in it, if another process works on it,
-    /// or if it cannot be read or written.
+    /// [`CampaignError`] if a combination is refused, if the path is no folder, if the folder holds foreign files or another campaign, if another process works
+    /// on the folder, or if the folder cannot be read or written.
     pub fn open(plan: CampaignPlan, folder: &Path, watch: &dyn Watch) -> Result<Self, CampaignError> {
         let campaign = Self::open_in(plan, folder, None, watch)?;
         campaign.folder.has_no_shards()?;
@@ -62,12 +64,14 @@ impl Campaign {
         Ok(campaign)
     }
 
-    /// The plan of the campaign in a folder, for a program of that name and version: what it is in the folder, the scene's text as it was when the campaign began.
+    /// Returns the plan of the campaign in a folder, with the text of the scene as of the beginning of the campaign. `program`: name and version of the calling
+    /// program, as in [`PlanSpec::program`](crate::PlanSpec::program).
     ///
     /// # Errors
     ///
-    /// [`CampaignError::NoCampaign`] if the folder has none; [`CampaignError`] if the folder cannot be read or what says which campaign it is makes no sense;
-    /// [`CampaignError::Other`] for a comparison, which leaves combinations out and whose command knows why.
+    /// [`CampaignError::NoCampaign`] if the folder has no campaign; [`CampaignError`] if the folder cannot be read or its manifest makes no sense;
+    /// [`CampaignError::Other`] for a campaign of another program, and for a comparison, because its manifest does not store the overrides of
+    /// [`CampaignPlan::leaving_out`].
     pub fn plan_in(folder: &Path, program: &str) -> Result<CampaignPlan, CampaignError> {
         if !Folder::has_campaign(folder)? {
             return Err(CampaignError::NoCampaign { path: folder.to_path_buf() });
@@ -78,41 +82,45 @@ impl Campaign {
         if differences.is_empty() { Ok(plan) } else { Err(CampaignError::Other { path: folder.to_path_buf(), differences }) }
     }
 
-    /// [`Campaign::open`] of one whose runs are all done, by shards or otherwise, to put the table together.
+    /// Opens a campaign like [`Campaign::open`], and requires all of its runs to be done, by shards or otherwise. [`Campaign::run`] then only merges the parts
+    /// into the table.
     ///
     /// # Errors
     ///
-    /// Those of [`Campaign::open`]; [`CampaignError::NoCampaign`] if the folder has none, [`CampaignError::Missing`] if parts of it are not done.
+    /// The errors of [`Campaign::open`]; [`CampaignError::NoCampaign`] if the folder has no campaign, [`CampaignError::Missing`] if parts are not done.
     pub fn open_whole(plan: CampaignPlan, folder: &Path) -> Result<Self, CampaignError> {
         if !Folder::has_campaign(folder)? {
             return Err(CampaignError::NoCampaign { path: folder.to_path_buf() });
         }
         let campaign = Self::open_in(plan, folder, None, &NoWatch)?;
         if !campaign.is_finished() {
-            // By their names alone: parts that are damaged are computed again by `run`.
+            // The names of the files suffice here: `run` reads every part, and computes damaged parts again.
             let missing = campaign.absent()?;
             if !missing.is_empty() {
                 let missing = Missing { piece: "part", count: campaign.parts.count(), pieces: missing };
                 return Err(CampaignError::Missing { path: folder.to_path_buf(), missing });
             }
         }
-        // A worker may still do what another one has done too, and is let to.
+        // A worker may still repeat a finished shard, which is harmless. Its partial files must not be removed then.
         if campaign.folder.has_no_shards().is_ok() {
             campaign.folder.sweep()?;
         }
         Ok(campaign)
     }
 
-    /// Opens the campaign for this process alone, or for one of several workers.
+    /// Opens the campaign for this process alone (`worker` is `None`), or for one of several workers with that name.
     pub(crate) fn open_in(plan: CampaignPlan, folder: &Path, worker: Option<&str>, watch: &dyn Watch) -> Result<Self, CampaignError> {
+        // A new campaign is checked before the folder is created, so that a refused plan leaves nothing behind.
         let begun = Folder::has_campaign(folder)?;
         let new = if begun { None } else { Some(Self::new_manifest(&plan, watch)?) };
         let folder = if worker.is_none() { Folder::take(folder)? } else { Folder::share(folder)? };
+        // The folder is created only now, after the check of a new campaign has accepted every combination.
         let manifest = match new {
-            // Unless somebody else began one meanwhile.
+            // Another worker may have written a manifest since `has_campaign`. Then the plan must match that manifest.
             Some(manifest) if !folder.manifest().exists() => {
                 let manifest = manifest.of_file(plan.file(), folder.path());
                 if let Err(error) = manifest.write(&folder.manifest(), worker) {
+                    // The folder may have been created a moment ago. Without a manifest it would be an empty folder nobody asked for.
                     folder.give_up();
                     return Err(error);
                 }
@@ -123,7 +131,7 @@ impl Campaign {
         Ok(Self::of(plan, manifest, folder))
     }
 
-    /// The campaign that a manifest in a folder says.
+    /// Returns the campaign with this manifest, without reading any file.
     pub(crate) fn of(plan: CampaignPlan, manifest: Manifest, folder: Folder) -> Self {
         let accepted = manifest.accepted(&plan);
         let parts = manifest.parts(accepted.runs());
@@ -138,52 +146,59 @@ impl Campaign {
         Ok(Manifest::new(plan, plan.fingerprint_of(&checked.numbers), checked, parts))
     }
 
-    /// The manifest in the folder, which must be that of this plan.
+    /// Reads the manifest in the folder, and checks it against the plan and against the files named by the scene.
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError::Other`] with all differences if the manifest is of another campaign.
     pub(crate) fn same_manifest(plan: &CampaignPlan, folder: &Folder) -> Result<Manifest, CampaignError> {
         let manifest = Manifest::read(&folder.manifest())?;
         let mut differences = manifest.differences(plan);
         if differences.is_empty() && !manifest.has_fingerprint(plan.fingerprint()?) {
+            // Equal texts can still name a changed file, such as a trace. Only the fingerprint covers the content of files.
             differences.push("a file that the scene names says something else there than it does here".to_owned());
         }
         if differences.is_empty() { Ok(manifest) } else { Err(CampaignError::Other { path: folder.path().to_path_buf(), differences }) }
     }
 
-    /// The plan.
+    /// Returns the plan.
     #[must_use]
     pub const fn plan(&self) -> &CampaignPlan {
         &self.plan
     }
 
-    /// The columns of the table.
+    /// Returns the columns of the table.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
 
-    /// The combinations that are left out, each with its reason.
+    /// Returns the left out combinations, each with its reason.
     #[must_use]
     pub const fn refused(&self) -> &Refused {
         &self.manifest.refused
     }
 
-    /// How many runs there are, without those of combinations that are left out.
+    /// Returns the number of runs, without the runs of left out combinations.
     #[must_use]
     pub const fn runs(&self) -> u64 {
         self.accepted.runs()
     }
 
-    /// Whether the table is there.
+    /// Returns `true` if the table exists.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         self.table_file().exists()
     }
 
-    /// Judges the combinations that are not judged yet, on all threads of the pool that it is called in. Each judgement is kept as soon as it is known.
-    /// Gives how many combinations have none: above 0 if the watch or the judge ended it. Of a plan without verdicts none is missing.
+    /// Judges the combinations without a judgement, on all threads of the current thread pool. Each judgement is written to the journal at once.
+    ///
+    /// Returns the number of combinations still without a judgement: above 0 if the watch or the judge stopped the work. For a plan without verdicts the number
+    /// is 0.
     ///
     /// # Errors
     ///
-    /// [`CampaignError::File`] if a judgement cannot be kept, [`CampaignError::Damaged`] if the judgements are not as they were written.
+    /// [`CampaignError::File`] if a judgement cannot be written, [`CampaignError::Damaged`] if the table of judgements is not as it was written.
     pub fn judge(&mut self, by: &dyn Judge, watch: &dyn Watch) -> Result<u64, CampaignError> {
         if !self.plan.has_verdicts() || !self.judgements.is_empty() {
             return Ok(0);
@@ -197,35 +212,36 @@ impl Campaign {
         }
     }
 
-    /// Judges the combinations as [`Campaign::judge`] does, for a plan without verdicts: the judgements stand in `stability.csv` and not in the table. `Err` with
-    /// the number of combinations that have none if the watch or the judge ended it.
+    /// Judges the combinations like [`Campaign::judge`], for a plan without verdicts: the judgements are written to `stability.csv` and not to the table.
+    /// `Ok(Err)` holds the number of combinations without a judgement, if the watch or the judge stopped the work.
     ///
     /// # Errors
     ///
-    /// Those of [`Campaign::judge`].
+    /// The errors of [`Campaign::judge`].
     pub fn judge_apart(&self, by: &dyn Judge, watch: &dyn Watch) -> Result<Result<Vec<Judgement>, u64>, CampaignError> {
         self.judged(&self.folder.stability(), by, watch)
     }
 
-    /// The file of the table, which is there once the campaign is finished.
+    /// Returns the path of the table. The file exists once the campaign is finished.
     #[must_use]
     pub fn table_file(&self) -> PathBuf {
         self.folder.table(self.plan.format())
     }
 
-    /// The file of [`Campaign::judge`]; `None` of a plan without verdicts.
+    /// Returns the path of the judgements made by [`Campaign::judge`]; `None` for a plan without verdicts.
     #[must_use]
     pub fn verdicts_file(&self) -> Option<PathBuf> {
         self.plan.has_verdicts().then(|| self.folder.verdicts())
     }
 
-    /// The file of [`Campaign::judge_apart`].
+    /// Returns the path of the judgements made by [`Campaign::judge_apart`].
     #[must_use]
     pub fn stability_file(&self) -> PathBuf {
         self.folder.stability()
     }
 
-    /// The judgements in the table of that name, which is made if it is not there; `Err` with how many are missing.
+    /// Judges all combinations into the table of judgements at `path`, and returns the judgements, indexed by combination. `Ok(Err)` holds the number of
+    /// missing judgements.
     fn judged(&self, path: &Path, by: &dyn Judge, watch: &dyn Watch) -> Result<Result<Vec<Judgement>, u64>, CampaignError> {
         let judgements = self.judge_some(path, None, &|_| true, by, watch)?;
         let missing = judgements.iter().filter(|judgement| judgement.is_none()).count() as u64;
@@ -233,17 +249,21 @@ impl Campaign {
             return Ok(Err(missing));
         }
         let judgements: Vec<Judgement> = judgements.into_iter().flatten().collect();
-        // A table of before the end is written anew: nothing says that it is as it was written.
+        // Before the campaign is finished, an existing table of judgements has no digest and may be damaged. The journals have digests, so the table is rebuilt
+        // from them.
         if !self.is_finished() || !path.exists() {
+            // Written as a whole, in the order of the combinations, whatever the order of the journal.
             write_all(path, &self.plan, &judgements)?;
         }
         if self.is_finished() {
+            // The journals stay until the end of the campaign, because only their lines have digests.
             self.folder.remove_journals(path)?;
         }
         Ok(Ok(judgements))
     }
 
-    /// The judgements that are known, by whichever worker, and then those of the wanted combinations; `None` where there is none.
+    /// Returns the judgements, indexed by combination: first the known judgements of all workers, then new judgements of the wanted combinations. An entry is
+    /// `None` if its combination is neither known nor judged now. `worker` names the journal to write.
     pub(crate) fn judge_some(
         &self,
         path: &Path,
@@ -252,7 +272,8 @@ impl Campaign {
         by: &dyn Judge,
         watch: &dyn Watch,
     ) -> Result<Vec<Option<Judgement>>, CampaignError> {
-        // A campaign goes on from journals, whose lines have digests. The table of judgements has none: only a finished campaign shows what it says.
+        // A running campaign continues from the journals, because every line has a digest. The table of judgements has no digest, so only a finished campaign
+        // reads it.
         if self.is_finished()
             && let Some(judgements) = read_whole(path, &self.plan)?
         {
@@ -262,6 +283,7 @@ impl Campaign {
         let mut judgements = vec![None; usize::try_from(combinations).unwrap_or_default()];
         let refused = self.refused().iter().map(|(combination, reason)| (*combination, Judgement::Refused(reason.as_str().into())));
         let mut known = refused.collect::<Vec<_>>();
+        // All workers judge alike, so the judgement of a combination found in two journals is the same, and the order of the journals does not matter.
         for journal in self.folder.journals(path)? {
             let Lines { known: lines, damaged, .. } = Journal::read(&journal, &self.hash, combinations)?;
             known.extend(lines);
@@ -273,6 +295,7 @@ impl Campaign {
             judgements[usize::try_from(combination).unwrap_or_default()] = Some(judgement);
         }
         watch.judged(judgements.iter().flatten().count() as u64);
+        // Refused combinations are known above, so the judge never sees a scene which cannot be read.
         let missing: Vec<u64> = (0..)
             .zip(&judgements)
             .filter(|(combination, known)| known.is_none() && is_wanted(*combination))
@@ -281,17 +304,18 @@ impl Campaign {
         if missing.is_empty() {
             return Ok(judgements);
         }
+        // Each worker appends to a journal of its own, so no lock is needed between workers.
         let (mut file, _) = Journal::open(Folder::journal(path, worker), &self.hash, combinations)?;
         judge(&self.plan, by, watch, &mut file, &missing, judgements)
     }
 
-    /// Does the runs that are missing, on all threads of the pool that it is called in, and puts the table together. A campaign that is finished is left as
-    /// it is.
+    /// Does the missing runs, on all threads of the current thread pool, and merges the parts into the table. A finished campaign is left unchanged.
     ///
     /// # Errors
     ///
-    /// [`CampaignError::File`] if a file cannot be written: whole parts are kept, of others nothing is left, and once there is room the campaign goes on.
-    /// [`CampaignError::Damaged`] if a part or the table is not as it was written. [`CampaignError::NotJudged`] if verdicts are asked for and not known.
+    /// [`CampaignError::File`] if a file cannot be written: whole parts stay, unfinished parts are removed, and the campaign can be continued once there is
+    /// room. [`CampaignError::Damaged`] if a part or the table is not as it was written. [`CampaignError::NotJudged`] if the plan has verdicts and
+    /// [`Campaign::judge`] has not finished.
     pub fn run(&mut self, watch: &dyn Watch) -> Result<Outcome, CampaignError> {
         if self.plan.has_verdicts() && self.judgements.is_empty() {
             return Err(CampaignError::NotJudged);
@@ -301,19 +325,23 @@ impl Campaign {
             let missing = self.missing(&|_| true, watch)?;
             let done = self.compute(&missing, &self.judgements, &|part, rows| self.keep(None, part, rows), watch)?;
             computed += done;
+            // Runs of a part count only once the whole part is stored.
             let left = self.runs_of(&missing) - done;
             if left > 0 {
                 return Ok(Outcome::Interrupted { kept: self.runs() - left });
             }
             merges += 1;
+            // The merge cannot be stopped by the watch: it only copies bytes.
             watch.puts_together();
             match self.merge() {
-                // The part was damaged since it was looked at. The next look names it. A disk that does so again and again is an error.
+                // The part was damaged after `missing` had read it. The next pass names and repeats the part. A disk that fails again and again ends with the
+                // error.
                 Err(CampaignError::Damaged { .. }) if merges < MOST_MERGES => {}
                 merged => merged?,
             }
         }
         let report = self.report(computed)?;
+        // The parts and journals are removed last: a process killed before this line finds everything again.
         self.folder.remove_parts(self.parts.count(), self.plan.format())?;
         self.folder.remove_journals(&self.folder.verdicts())?;
         if self.folder.stability().exists() {
@@ -323,24 +351,25 @@ impl Campaign {
         Ok(Outcome::Finished(report))
     }
 
-    /// Does these parts, and gives how many runs have been put away.
+    /// Computes these parts, and returns the number of stored runs. `judgements` is indexed by combination.
     pub(crate) fn compute(&self, parts: &[u64], judgements: &[Judgement], keep: &Keep<'_>, watch: &dyn Watch) -> Result<u64, CampaignError> {
         let (plan, roster, accepted) = (&self.plan, &self.manifest.roster, &self.accepted);
         Work { plan, roster, judgements, accepted, parts: self.parts, watch, keep }.run(parts)
     }
 
-    /// Compares the values of the first key, which are [`Strategies`](crate::Strategies), by the table of a finished campaign.
+    /// Compares the values of the first varied key, which must be [`Strategies`](crate::Strategies), from the table of a finished campaign.
     ///
     /// # Errors
     ///
-    /// [`CampaignError::File`] if the table cannot be read, [`CampaignError::Damaged`] if it is not as it was written, [`CampaignError::Size`] if it has more than
-    /// [`MOST_NUMBERS_COMPARED`](crate::MOST_NUMBERS_COMPARED) numbers.
+    /// [`CampaignError::File`] if the table cannot be read, [`CampaignError::Damaged`] if the table is not as it was written, [`CampaignError::Size`] if the
+    /// comparison needs more than [`MOST_NUMBERS_COMPARED`](crate::MOST_NUMBERS_COMPARED) numbers.
     pub fn compare(&self) -> Result<Comparison, CampaignError> {
         let measures = compared(&self.columns, self.runs())?;
         let path = self.table_file();
         let file = File::open(&path).map_err(|error| CampaignError::File { verb: "read", path: path.clone(), error })?;
         let names: Vec<&str> = measures.iter().map(|measure| measure.name.as_str()).collect();
         let columns = self.plan.format().read_columns(file, &names).map_err(|error| unread(&path, error, TABLE_WAY_OUT))?;
+        // The table has no digest. The number of its rows shows a truncated table.
         let (found, runs) = (columns.complete.len() as u64, self.runs());
         if found != runs || columns.columns.iter().any(|column| column.len() != columns.complete.len()) {
             return Err(CampaignError::Damaged { path, message: format!("{found} rows: expected {runs}"), way_out: TABLE_WAY_OUT });
@@ -352,10 +381,11 @@ impl Campaign {
         Head { columns: &self.columns, about, program: self.plan.program() }
     }
 
-    /// Sums the table up.
+    /// Reads the table and sums it up. `computed`: number of runs done by this call.
     fn report(&self, computed: u64) -> Result<Report, CampaignError> {
         let path = self.table_file();
         let file = File::open(&path).map_err(|error| CampaignError::File { verb: "read", path: path.clone(), error })?;
+        // The report comes from the table and not from the rows in memory: most rows may be from earlier calls.
         let mut tally = Tally::new(self.plan.runs_of_each(), self.plan.combinations(), &self.accepted);
         let read = self.plan.format().read_gists(file, &mut |gist| tally.add(gist));
         read.map_err(|error| unread(&path, error, TABLE_WAY_OUT))?;
@@ -370,6 +400,7 @@ impl Campaign {
 }
 
 pub(crate) fn unwritten(path: &Path, error: TableError) -> CampaignError {
+    // The caller knows one kind of failed write, so a fault in the content becomes an error of input and output.
     let error = match error {
         TableError::Io(error) => error,
         error @ (TableError::Content(_) | TableError::Part { .. }) => std::io::Error::other(error.to_string()),
@@ -386,33 +417,33 @@ pub(crate) fn unread(path: &Path, error: TableError, way_out: &'static str) -> C
     }
 }
 
-/// Is told how far a campaign has come, and can end it. Called from many threads.
+/// An observer of a campaign, which can also stop it. The methods are called from many threads.
 pub trait Watch: Sync {
-    /// Whether to go on. PlanSpec before every few combinations that are checked, before each that is judged, and before every few runs.
+    /// Returns whether to go on. Asked before every few checked combinations, before each judged combination, and before every few runs.
     fn keep_going(&self) -> bool {
         true
     }
 
-    /// All runs are done, and their table is put together now. [`Watch::keep_going`] is not asked any more.
+    /// Called when all runs are done and the merge of the parts begins. [`Watch::keep_going`] is not asked any more.
     fn puts_together(&self) {}
 
-    /// This number of combinations was checked since the last call.
+    /// Reports the number of combinations checked since the last call.
     fn checked(&self, _combinations: u64) {}
 
-    /// A number of combinations more have been judged.
+    /// Reports the number of combinations judged since the last call.
     fn judged(&self, _combinations: u64) {}
 
-    /// This number of runs was done since the last call.
+    /// Reports the number of runs done since the last call.
     fn ran(&self, _runs: u64) {}
 
-    /// A file that a campaign goes on from is not as it was written. `fault`: the difference, and the work that is done again, in words.
+    /// Reports a damaged file, which the campaign does not continue from. `fault` describes the difference and the work to be repeated, in words.
     fn damaged(&self, _file: &Path, _fault: &str) {}
 
-    /// A part was put away, which has this number of runs.
+    /// Reports a stored part with its number of runs.
     fn kept(&self, _part: u64, _runs: u64) {}
 }
 
-/// Nobody looks on.
+/// A watch without any effect: the campaign runs to its end.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoWatch;
 

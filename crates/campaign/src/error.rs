@@ -1,4 +1,4 @@
-//! Why there is no campaign, or why it ended.
+//! Reasons for a campaign to be refused or to end early.
 
 use std::io;
 use std::path::PathBuf;
@@ -8,10 +8,10 @@ use cohaptic_scene::SceneError;
 use crate::shard::Missing;
 use crate::vary::VaryError;
 
-/// Why there is no campaign, or why it ended.
+/// Why a campaign cannot begin, or why it ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// A text does not vary a key.
+    /// A text does not describe a variation of a key.
     #[error(transparent)]
     Vary(#[from] VaryError),
     /// A key is varied twice.
@@ -20,45 +20,45 @@ pub enum CampaignError {
         /// The key.
         key: String,
     },
-    /// No runs, or too many.
+    /// The number of runs, combinations, parts or compared numbers is zero or too large, or rows do not fit the campaign.
     #[error("{0}")]
     Size(String),
-    /// The seeds of the runs are more than one thing.
+    /// The plan varies the seed, and also asks for several runs per combination, whose seeds count up.
     #[error(
         "scene.seed is varied, and the {runs} runs of each combination have seeds of their own: expected one of both; seeds count up from that of the scene"
     )]
     Seeds {
-        /// How many runs of each combination.
+        /// Number of runs per combination.
         runs: u64,
     },
     /// The scene is refused with the values of one combination.
     #[error("{error}")]
     Scene {
-        /// Why, and where.
+        /// The fault in the scene, and its place.
         error: Box<SceneError>,
-        /// What the combination puts into the scene: texts `KEY=VALUE`.
+        /// Overrides of the combination, as texts `KEY=VALUE`.
         varied: Vec<String>,
     },
-    /// The scene of one combination can be read and not be run.
+    /// The scene of one combination can be read but not be run.
     #[error("{message}")]
     NotRun {
-        /// Why.
+        /// The reason.
         message: String,
-        /// What the combination puts into the scene.
+        /// Overrides of the combination, as texts `KEY=VALUE`.
         varied: Vec<String>,
     },
-    /// There is something else than a folder.
+    /// The path names something other than a folder.
     #[error("{} is no folder: expected one for the campaign, which need not exist yet", path.display())]
     NoFolder {
-        /// The name of the thing found there.
+        /// The path.
         path: PathBuf,
     },
-    /// The folder holds files and no campaign.
+    /// The folder holds files but no campaign.
     #[error("{} holds files, {found} among them, and no campaign: expected a folder of its own for the campaign, which need not exist yet", path.display())]
     Foreign {
         /// The folder.
         path: PathBuf,
-        /// The first of the files by name.
+        /// The first foreign file by name.
         found: String,
     },
     /// The folder holds another campaign.
@@ -66,17 +66,17 @@ pub enum CampaignError {
     Other {
         /// The folder.
         path: PathBuf,
-        /// The differences, in words.
+        /// The differences between the two campaigns, in words.
         differences: Vec<String>,
     },
-    /// What the folder holds is not as it was written.
+    /// A file of the campaign is not as it was written.
     #[error("{} is not as a campaign writes it ({message}): {way_out}", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
         /// The fault.
         message: String,
-        /// What helps.
+        /// Advice to the user.
         way_out: &'static str,
     },
     /// Another process works on the folder.
@@ -93,11 +93,11 @@ pub enum CampaignError {
     Shards {
         /// The folder.
         path: PathBuf,
-        /// One of the workers.
+        /// Owner of the lock: one of the workers.
         worker: String,
-        /// Its shard.
+        /// The shard of that worker.
         shard: String,
-        /// How long ago it renewed its lock \[s\].
+        /// Time since that worker last renewed its lock \[s\].
         age_s: u64,
     },
     /// The folder holds no campaign.
@@ -111,29 +111,29 @@ pub enum CampaignError {
     Missing {
         /// The folder.
         path: PathBuf,
-        /// The parts that are missing.
+        /// The missing parts.
         missing: Missing,
     },
     /// A file cannot be read or written. Finished parts are kept.
     #[error("cannot {verb} {}: {error}", path.display())]
     File {
-        /// What cannot be done to it.
+        /// The refused operation, such as `read` or `write`.
         verb: &'static str,
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error of the operating system.
         error: io::Error,
     },
-    /// Verdicts are asked for and not known.
+    /// The plan has verdicts, and not every combination is judged.
     #[error("the combinations of this campaign are not judged yet: expected Campaign::judge before Campaign::run")]
     NotJudged,
-    /// It was ended while the combinations were checked: nothing is written yet.
+    /// The watch stopped the check of the combinations: nothing is written yet.
     #[error("ended while the combinations were checked: nothing is written")]
     Stopped,
 }
 
 impl CampaignError {
-    /// Whether the system refuses something, as opposed to input that makes no sense.
+    /// Returns `true` if the state of the system or of its files is the cause, `false` if the input makes no sense.
     #[must_use]
     pub fn is_io(&self) -> bool {
         match self {

@@ -1,26 +1,26 @@
-//! Many runs of one scene: keys varied over ranges and lists, seeds counted up, on all threads, kept in parts so that a campaign can be stopped anywhere and
-//! continued, and put together as one table.
+//! Campaigns: many runs of one scene, over varied values of its keys and over consecutive seeds.
 //!
 //! Use this crate if you run one scene many times from Rust, over values of its keys and over seeds.
 //!
-//! A [`CampaignPlan`] is a scene, keys that are [varied](Variation), and how many runs there are of each combination. [`Campaign::open`] checks all
-//! of it before anything is written, and binds it to a folder; [`Campaign::run`] does the runs that are missing. The table is the same to the last byte
-//! whatever the number of threads and however often it was interrupted, by Ctrl-C, a full disk or the loss of power.
+//! A [`CampaignPlan`] is a scene, keys to [vary](Variation), and the number of runs per combination of values. [`Campaign::open`] checks every combination
+//! before it writes anything, and binds the plan to a folder; [`Campaign::run`] does the missing runs on all threads. Finished parts stay in the folder, so a
+//! campaign can be stopped at any time and continued later. The bytes of the table depend neither on the number of threads nor on interruptions by Ctrl-C, a
+//! full disk or a loss of power.
 //!
-//! Every run is the run that [`cohaptic_harness::Simulation`] makes of the same scene with the same seed, to the last bit.
+//! Every run equals, to the last bit, the run of [`cohaptic_harness::Simulation`] over the same scene with the same seed.
 //!
-//! A plan [with verdicts](CampaignPlan::with_verdicts) has each combination judged once, by a [`Judge`] that its caller brings, before anything runs.
+//! A plan [with verdicts](CampaignPlan::with_verdicts) lets a [`Judge`] of the caller judge each combination once, before the first run.
 //!
-//! A campaign over [`Strategies`] is [compared](Campaign::compare): the mean of every measure for each strategy, its difference to the first one seed by seed, and
-//! intervals of both. Combinations that a strategy refuses are [left out](CampaignPlan::leaving_out), and known before anything runs.
+//! A campaign over [`Strategies`] can be [compared](Campaign::compare): the mean of every measure per strategy, the difference to the first strategy seed by
+//! seed, and the intervals of both. The combinations refused by a strategy are [left out](CampaignPlan::leaving_out), and are known before the first run.
 //!
-//! Each part is kept with its SHA-256, its number and the campaign that it belongs to, and checked before a campaign goes on from it: a damaged part is
-//! [named](Watch::damaged) and computed again.
+//! Each part is stored with a digest: its SHA-256, its number and its campaign. A continued campaign checks every part against the digest; the watch is
+//! [told](Watch::damaged) of a damaged part, and the part is computed again.
 //!
-//! A [`Shard`] of a campaign is done in the same folder by each of several processes, on any machines that share it ([`SharedCampaign`]);
-//! [`Campaign::open_whole`] then puts the table together, to the same bytes.
+//! Several processes, on any machines with a shared folder, can each do a [`Shard`] of one campaign ([`SharedCampaign`]); [`Campaign::open_whole`] then merges
+//! the parts into a table with the same bytes.
 //!
-//! Nothing here is printed and no clock is read.
+//! The crate prints nothing and reads no clock.
 //!
 //! ```
 //! use cohaptic_campaign::{PlanSpec, Campaign, Format, NoWatch, Outcome, CampaignPlan, Variation};

@@ -1,4 +1,4 @@
-//! What a campaign comes to, and the quantiles of the runs of a combination.
+//! The summary of a campaign, and the quantiles of the runs of a combination.
 
 use std::sync::Arc;
 
@@ -6,66 +6,67 @@ use crate::plan::{Accepted, Refused};
 use crate::table::Gist;
 use crate::verdicts::Judgement;
 
-/// What a campaign comes to, taken from its table.
+/// Summary of a campaign, computed from its table.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Report {
-    /// How many runs it has.
+    /// Number of runs.
     pub runs: u64,
-    /// How many of them were done this time; the others were there already.
+    /// Number of runs done by this call; the other runs were stored before.
     pub computed: u64,
-    /// The combinations, in order; those that are left out have no runs.
+    /// Summaries, indexed by combination. Left out combinations have 0 runs.
     pub combinations: Vec<CombinationReport>,
-    /// The quantiles of each combination, `None` where all of its runs diverged. Empty if they would take too much memory: beyond
-    /// [`MOST_RUNS_OF_QUANTILES`] or [`MOST_COMBINATIONS_OF_QUANTILES`].
+    /// Quantiles, indexed by combination; `None` if no run of the combination came to its end. Empty beyond [`MOST_RUNS_OF_QUANTILES`] or
+    /// [`MOST_COMBINATIONS_OF_QUANTILES`], where the memory would not suffice.
     pub quantiles: Vec<Option<Quantiles>>,
-    /// The judgement of each combination; empty without verdicts.
+    /// Judgements, indexed by combination; empty without verdicts.
     pub judgements: Arc<[Judgement]>,
-    /// The combinations that are left out, each with its reason.
+    /// Left out combinations, each with its reason.
     pub refused: Refused,
 }
 
-/// What the runs of one combination come to.
+/// Summary of the runs of one combination.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct CombinationReport {
-    /// How many runs there are.
+    /// Number of runs.
     pub runs: u64,
-    /// How many of them diverged.
+    /// Number of diverged runs.
     pub diverged: u64,
-    /// The mean over those that did not of the largest distance along an axis between two copies \[m\]; `None` if all diverged.
+    /// Mean, over the runs without divergence, of the largest distance along an axis between two copies \[m\]; `None` if all runs diverged.
     pub mean_discrepancy: Option<f64>,
-    /// The largest of these distances \[m\]; `None` if all diverged.
+    /// Largest of these distances \[m\]; `None` if all runs diverged.
     pub largest_discrepancy: Option<f64>,
-    /// The run that it is from: the first of those that have it.
+    /// Number of the run with the largest distance, the first of equals; `None` if all runs diverged.
     pub worst_run: Option<u64>,
 }
 
 impl Report {
-    /// How many runs diverged.
+    /// Returns the number of diverged runs.
     #[must_use]
     pub fn diverged(&self) -> u64 {
         self.combinations.iter().map(|combination| combination.diverged).sum()
     }
 
-    /// The combination with the largest discrepancy among runs that did not diverge; `None` if all did.
+    /// Returns the combination with the largest discrepancy among runs without divergence, the first of equals; `None` if all runs diverged.
     #[must_use]
     pub fn worst(&self) -> Option<&CombinationReport> {
         let discrepancy = |combination: &CombinationReport| combination.largest_discrepancy.unwrap_or(f64::NEG_INFINITY);
+        // `max_by` returns the last of equals, so the reversed order gives the first.
         let worst = self.combinations.iter().rev().max_by(|one, other| discrepancy(one).total_cmp(&discrepancy(other)));
         worst.filter(|worst| worst.largest_discrepancy.is_some())
     }
 }
 
-/// Takes the runs one by one, in order.
+/// Sums up the runs of a table, in the order of the rows.
 #[derive(Debug)]
 pub(crate) struct Tally<'a> {
     accepted: &'a Accepted,
-    /// How many combinations there are, those that are left out among them.
+    /// Number of all combinations, including left out combinations.
     all: u64,
     runs: u64,
-    /// How many runs of the combination at hand are still to come.
+    /// Number of runs still to come for the current combination.
     left: u64,
     combinations: Vec<CombinationReport>,
-    /// Of the runs of the combination at hand that did not diverge; `None` if no quantiles are kept.
+    /// Largest discrepancies \[m\] of the runs of the current combination without divergence; `None` if the quantiles would take too much memory.
     discrepancies: Option<Vec<f64>>,
     quantiles: Vec<Option<Quantiles>>,
 }
@@ -77,7 +78,7 @@ impl<'a> Tally<'a> {
     }
 
     pub(crate) fn add(&mut self, gist: Gist) {
-        // Divisions for every run would take as long as all else.
+        // Only the first run of a combination looks the combination up, so most runs need neither a division nor a search.
         if self.left == 0 {
             self.begin(self.accepted.run(self.runs).0 + 1);
             self.left = self.accepted.of_each();
@@ -85,8 +86,10 @@ impl<'a> Tally<'a> {
         let place = self.runs;
         self.left -= 1;
         self.runs += 1;
+        // `begin` has added the combination of this run before.
         let Some(combination) = self.combinations.last_mut() else { return };
         combination.runs += 1;
+        // A diverged run may have an infinite distance or NaN, which would spoil mean and quantiles.
         if gist.diverged {
             combination.diverged += 1;
             return;
@@ -94,20 +97,21 @@ impl<'a> Tally<'a> {
         if let Some(discrepancies) = &mut self.discrepancies {
             discrepancies.push(gist.max_discrepancy);
         }
-        // The sum for now.
+        // The field holds the sum until `finish` divides it.
         combination.mean_discrepancy = Some(combination.mean_discrepancy.unwrap_or(0.0) + gist.max_discrepancy);
+        // Strictly larger, so that the first of equal runs is reported.
         if combination.largest_discrepancy.is_none_or(|largest| gist.max_discrepancy > largest) {
             combination.largest_discrepancy = Some(gist.max_discrepancy);
             combination.worst_run = Some(self.accepted.number(place));
         }
     }
 
-    /// How many runs were taken.
+    /// Returns the number of runs added so far.
     pub(crate) const fn runs(&self) -> u64 {
         self.runs
     }
 
-    /// Ends combinations up to this number of them: those before the last are left out.
+    /// Ends the current combination, and begins combinations until there are `count`. The combinations in between are left out, and stay empty.
     fn begin(&mut self, count: u64) {
         while (self.combinations.len() as u64) < count {
             self.end_combination();
@@ -115,7 +119,7 @@ impl<'a> Tally<'a> {
         }
     }
 
-    /// Puts away what the combination that is over has.
+    /// Computes the quantiles of the current combination, if there is one.
     fn end_combination(&mut self) {
         if let Some(discrepancies) = self.discrepancies.as_mut().filter(|_| !self.combinations.is_empty()) {
             self.quantiles.push(Quantiles::of(discrepancies));
@@ -123,8 +127,9 @@ impl<'a> Tally<'a> {
         }
     }
 
-    /// What the combinations come to, and their quantiles.
+    /// Returns the summaries and the quantiles, both indexed by combination.
     pub(crate) fn finish(mut self) -> (Vec<CombinationReport>, Vec<Option<Quantiles>>) {
+        // Left out combinations after the last run still need an empty report.
         self.begin(self.all);
         self.end_combination();
         for combination in &mut self.combinations {
@@ -136,35 +141,37 @@ impl<'a> Tally<'a> {
     }
 }
 
-/// The most runs of a combination of which quantiles are kept: all of them are held at once, 128 MB at most.
+/// Most runs per combination with quantiles: all discrepancies of a combination are in memory at once, at most 128 MB.
 pub const MOST_RUNS_OF_QUANTILES: u64 = 16_000_000;
-/// The most combinations of which quantiles are kept: 144 MB at most.
+/// Most combinations with quantiles: at most 144 MB.
 pub const MOST_COMBINATIONS_OF_QUANTILES: u64 = 3_000_000;
 
-/// Quantiles of the largest discrepancy of those runs of a combination that did not diverge \[m\].
+/// Quantiles of the largest discrepancy \[m\], over the runs of a combination without divergence.
 ///
-/// The quantile of p % of n runs is the smallest of their values that at least p % of them do not exceed: by rank, the ⌈p·n/100⌉-th smallest, counted from 1.
+/// The quantile of p % of n runs is the smallest value not exceeded by at least p % of the values: by rank, the ⌈p·n/100⌉-th smallest, counted from 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Quantiles {
-    /// Of 5 %.
+    /// Quantile of 5 % \[m\].
     pub p5: f64,
-    /// Of 25 %.
+    /// Quantile of 25 % \[m\].
     pub p25: f64,
-    /// Of 50 %.
+    /// Quantile of 50 % \[m\].
     pub median: f64,
-    /// Of 75 %.
+    /// Quantile of 75 % \[m\].
     pub p75: f64,
-    /// Of 95 %.
+    /// Quantile of 95 % \[m\].
     pub p95: f64,
 }
 
 impl Quantiles {
-    /// Of these values, whose order changes; `None` of none.
+    /// Returns the quantiles of these values; `None` for an empty slice. The order of the values changes.
     pub(crate) fn of(values: &mut [f64]) -> Option<Self> {
         let count = values.len();
         let mut rest = (0, values);
-        // Each lies behind the one before: putting all in order would take four times as long.
+        // Each selection leaves the larger values to the right, so the next quantile is searched there only. `rest` holds the index of its first value and
+        // these values.
         let mut of = |percent: usize| {
+            // The rank ⌈p·n/100⌉ as an index from 0. The count is bounded, so the product cannot overflow.
             let place = (percent * count).div_ceil(100).checked_sub(1)?;
             let (from, values) = (rest.0, std::mem::take(&mut rest.1));
             let (_, value, _) = values.select_nth_unstable_by(place - from, f64::total_cmp);
@@ -216,11 +223,11 @@ mod tests {
         assert_eq!(quantiles.iter().map(Option::is_some).collect::<Vec<_>>(), [false, true, false, false]);
     }
 
-    /// The definition itself: the least value that at least p % do not exceed.
+    /// Compares with the definition: the least value not exceeded by at least p % of the values.
     #[test]
     fn a_quantile_is_the_least_value_that_its_share_does_not_exceed() {
         for count in 1..=203_u32 {
-            // 7 is prime to every count but its multiples, which repeat values: ties are part of the definition.
+            // For a count without the factor 7, the multiples are a permutation. For a multiple of 7, values repeat: ties are part of the definition.
             let mut values: Vec<f64> = (0..count).map(|n| f64::from(n * 7 % count)).collect();
             let defined = |percent: u32| {
                 let enough = |value: &f64| values.iter().filter(|other| *other <= value).count() * 100 >= (percent * count) as usize;

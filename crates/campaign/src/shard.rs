@@ -1,12 +1,13 @@
-//! Shards: shares of the parts of a campaign, each done by a worker of its own.
+//! Shards: shares of numbered work, each done by a worker of its own. The names of a worker's lease and log are defined here; the locks are taken by the
+//! callers.
 
 use core::fmt;
 use core::str::FromStr;
 
-/// A share of work that is cut into numbered pieces: of N shares the I-th, written `I/N`, has the pieces I − 1, I − 1 + N, I − 1 + 2·N and so on, counted from 0.
+/// A share of numbered pieces of work. Share I of N, written `I/N`, has the pieces I − 1, I − 1 + N, I − 1 + 2·N and so on, counted from 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Shard {
-    /// From 1.
+    /// Number of the shard, from 1 to `count`.
     index: u64,
     count: u64,
 }
@@ -15,36 +16,36 @@ pub struct Shard {
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("\"{}\" names no shard: expected I/N, with I from 1 to N: 3/8 is the third of eight", found.escape_debug())]
 pub struct ShardError {
-    /// The text.
+    /// The text of the user.
     found: String,
 }
 
 impl Shard {
-    /// The shard with this number, counted from 1, of a number of shards; `None` if there is none.
+    /// Returns shard `index`, counted from 1, of `count` shards; `None` if `index` is outside of 1 to `count`.
     #[must_use]
     pub const fn new(index: u64, count: u64) -> Option<Self> {
         if 1 <= index && index <= count { Some(Self { index, count }) } else { None }
     }
 
-    /// Whether a piece is one of this shard.
+    /// Returns `true` if the shard has a piece, counted from 0.
     #[must_use]
     pub const fn has(self, piece: u64) -> bool {
         piece % self.count == self.index - 1
     }
 
-    /// How many shards there are.
+    /// Returns the number of shards.
     #[must_use]
     pub const fn count(self) -> u64 {
         self.count
     }
 
-    /// The file that a worker holds as long as it works on the shard.
+    /// Returns the name of the lock file held by a worker of the shard.
     #[must_use]
     pub fn lease(self) -> String {
         format!("{LEASE}{}-of-{}{LEASE_END}", self.index, self.count)
     }
 
-    /// The shard of such a file.
+    /// Returns the shard of a lock file with this name; `None` for other names.
     #[must_use]
     pub fn of_lease(name: &str) -> Option<Self> {
         let (index, count) = name.strip_prefix(LEASE)?.strip_suffix(LEASE_END)?.split_once("-of-")?;
@@ -57,18 +58,18 @@ const LEASE_END: &str = ".lock";
 const LOG: &str = "worker-";
 const LOG_END: &str = ".log";
 
-/// Whether a file is held by a worker for its shard.
+/// Returns `true` for the name of a shard's lock file.
 pub(crate) fn is_lease(name: &str) -> bool {
     Shard::of_lease(name).is_some()
 }
 
-/// The file in which a worker says what it did.
+/// Returns the name of the log of a worker.
 #[must_use]
 pub fn worker_log(worker: &str) -> String {
     format!("{LOG}{worker}{LOG_END}")
 }
 
-/// Whether a file is such a log.
+/// Returns `true` for the name of a worker's log.
 #[must_use]
 pub fn is_log(name: &str) -> bool {
     name.starts_with(LOG) && name.ends_with(LOG_END)
@@ -92,19 +93,19 @@ impl FromStr for Shard {
     }
 }
 
-/// The pieces of shared work that are not done.
+/// Missing pieces of shared work.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Missing {
-    /// What a piece is called: a part of a campaign, a row of a map.
+    /// Name of a piece in the singular, such as `part` of a campaign or `row` of a map.
     pub piece: &'static str,
-    /// How many pieces there are.
+    /// Number of all pieces.
     pub count: u64,
-    /// The pieces that are missing, counted from 0, in order.
+    /// Missing pieces, counted from 0, in rising order.
     pub pieces: Vec<u64>,
 }
 
 impl Missing {
-    /// The shards of that number of shards which have a missing piece, as they are written; the first of them if they are many.
+    /// Returns the shards with a missing piece, of `of` shards, in words. At most [`MOST_RANGES`] ranges are listed.
     fn shards(&self, of: u64) -> String {
         let mut shards: Vec<u64> = self.pieces.iter().map(|piece| piece % of + 1).collect();
         shards.sort_unstable();
@@ -112,7 +113,7 @@ impl Missing {
         ranges(&shards)
     }
 
-    /// In words, with the shards that do it where their number is known.
+    /// Returns the message, with the shards to repeat if the number of shards is known.
     #[must_use]
     pub fn words(&self, shards: Option<u64>) -> String {
         let mut text = self.to_string();
@@ -130,10 +131,10 @@ impl fmt::Display for Missing {
     }
 }
 
-/// Ranges beyond these are counted.
+/// Most ranges in a message. Further numbers are only counted.
 const MOST_RANGES: usize = 20;
 
-/// Numbers that rise, `1, 3 to 5`.
+/// Returns rising numbers as a list of ranges: `1, 3 to 5`.
 fn ranges(numbers: &[u64]) -> String {
     let mut ranges: Vec<(u64, u64)> = Vec::new();
     for number in numbers {

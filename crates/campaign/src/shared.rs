@@ -1,4 +1,4 @@
-//! A campaign in a folder that several workers share, each of which does a shard of it.
+//! A campaign in a folder shared by several workers. Each worker does a shard.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -11,59 +11,59 @@ use crate::shard::Shard;
 use crate::table::Row;
 use crate::verdicts::{Judge, Judgement};
 
-/// A campaign in its folder, in which other workers may work at the same time, on this machine and on others.
+/// A campaign in a folder in which other workers may work at the same time, on this machine and on others.
 ///
-/// No two workers write the same file, and a file gets its name when it is whole. All workers make the same part of the same number, so it does no harm if two workers make
-/// it: locks between them only save work, and are their callers' to take ([`Shard::lease`]).
+/// No two workers write the same file, and a file gets its final name only when whole. All workers make the same bytes for a part, so a part made twice does no
+/// harm. A lock per shard only saves work, and is taken by the caller ([`Shard::lease`]).
 #[derive(Debug)]
 pub struct SharedCampaign {
     campaign: Campaign,
     worker: String,
-    /// One for each combination; of those that are not this worker's to judge, nothing that is ever looked at.
+    /// Judgements, indexed by combination. Entries of combinations outside of `judged` are placeholders, never read.
     judgements: Vec<Judgement>,
-    /// The parts whose combinations are judged: those that were missing when the worker judged.
+    /// Parts with judged combinations: the parts missing at the time of the judging.
     judged: BTreeSet<u64>,
 }
 
-/// What became of a shard.
+/// Result of the work on a shard.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ShardReport {
-    /// How many parts the shard has.
+    /// Number of parts of the shard.
     pub parts: u64,
-    /// How many runs these have.
+    /// Number of runs of these parts.
     pub runs: u64,
-    /// How many of the runs were done this time.
+    /// Number of runs done by this call.
     pub computed: u64,
-    /// How many are not done, because the watch ended it.
+    /// Number of runs not done, because the watch stopped the work.
     pub left: u64,
 }
 
-/// A part of a campaign.
+/// State of a part of a campaign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PartState {
-    /// How many runs it has.
+    /// Number of runs of the part.
     pub runs: u64,
-    /// Whether they are done.
+    /// Whether the runs are done.
     pub is_done: bool,
 }
 
 impl SharedCampaign {
-    /// Begins a campaign in a folder, or goes on with the one there if that has an equal plan. `worker` is a name that no other worker has; it becomes part of names of
-    /// files.
+    /// Begins a campaign in a folder, or continues the campaign found in the folder if the plans are equal. `worker`: a name different from the names of all
+    /// other workers, used in names of files.
     ///
     /// # Errors
     ///
-    /// Those of [`Campaign::open`], but for other workers.
+    /// The errors of [`Campaign::open`], except for the errors about other workers.
     pub fn open(plan: CampaignPlan, folder: &Path, worker: &str, watch: &dyn Watch) -> Result<Self, CampaignError> {
         let campaign = Campaign::open_in(plan, folder, Some(worker), watch)?;
         Ok(Self { campaign, worker: worker.to_owned(), judgements: Vec::new(), judged: BTreeSet::new() })
     }
 
-    /// The parts of the campaign in a folder. Nothing is written.
+    /// Returns the states of the parts of the campaign in a folder, indexed by part. Nothing is written.
     ///
     /// # Errors
     ///
-    /// [`CampaignError::NoCampaign`] if the folder has none; [`CampaignError::Other`] if it has another one.
+    /// [`CampaignError::NoCampaign`] if the folder has no campaign; [`CampaignError::Other`] if the folder has another campaign.
     pub fn parts_in(plan: CampaignPlan, folder: &Path) -> Result<Vec<PartState>, CampaignError> {
         if !Folder::has_campaign(folder)? {
             return Err(CampaignError::NoCampaign { path: folder.to_path_buf() });
@@ -77,21 +77,25 @@ impl SharedCampaign {
         Ok((0..campaign.parts.count()).map(state).collect())
     }
 
-    /// Judges those combinations of the shard that have no verdict yet, if the plan asks for verdicts. Gives how many have none: above 0 if the watch or the
-    /// judge ended it.
+    /// Judges the combinations of the shard without a judgement, if the plan has verdicts. Returns the number of combinations still without a judgement: above
+    /// 0 if the watch or the judge stopped the work.
     ///
     /// # Errors
     ///
-    /// Those of [`Campaign::judge`].
+    /// The errors of [`Campaign::judge`].
     pub fn judge(&mut self, shard: Shard, by: &dyn Judge, watch: &dyn Watch) -> Result<u64, CampaignError> {
         if !self.campaign.plan.has_verdicts() || self.campaign.is_finished() {
             return Ok(0);
         }
         let mut is_wanted = vec![false; usize::try_from(self.campaign.plan.combinations()).unwrap_or_default()];
+        // Only missing parts need judgements: the rows of stored parts have theirs already.
         let parts = self.campaign.missing(&|part| shard.has(part), watch)?;
         for part in &parts {
             let runs = self.campaign.parts.range(*part);
+            // A part has at least one run, so `runs.end - 1` is a run of the part.
             let [first, last] = [runs.start, runs.end - 1].map(|run| usize::try_from(self.campaign.accepted.run(run).0).unwrap_or_default());
+            // A part has consecutive runs, so its combinations lie between the combinations of its first and last run. Refused combinations in between have a
+            // judgement already.
             is_wanted[first..=last].fill(true);
         }
         let is_wanted = |combination: u64| usize::try_from(combination).is_ok_and(|place| is_wanted[place]);
@@ -104,11 +108,12 @@ impl SharedCampaign {
         Ok(unjudged as u64)
     }
 
-    /// Judges a share of the combinations for [`Campaign::judge_apart`]. Gives how many of them have no verdict: above 0 if the watch or the judge ended it.
+    /// Judges a share of the combinations for [`Campaign::judge_apart`]. Returns the number of combinations of the share still without a judgement: above 0 if
+    /// the watch or the judge stopped the work.
     ///
     /// # Errors
     ///
-    /// Those of [`Campaign::judge`].
+    /// The errors of [`Campaign::judge`].
     pub fn judge_apart(&self, shard: Shard, by: &dyn Judge, watch: &dyn Watch) -> Result<u64, CampaignError> {
         let judgements = self.judge_wanted(&self.campaign.folder.stability(), &|combination| shard.has(combination), by, watch)?;
         Ok((0..).zip(&judgements).filter(|(combination, judgement)| shard.has(*combination) && judgement.is_none()).count() as u64)
@@ -121,24 +126,26 @@ impl SharedCampaign {
         by: &dyn Judge,
         watch: &dyn Watch,
     ) -> Result<Vec<Option<Judgement>>, CampaignError> {
+        // A process alone in the folder would not expect a second journal.
         self.campaign.folder.is_shared()?;
         self.campaign.judge_some(path, Some(&self.worker), is_wanted, by, watch)
     }
 
-    /// Does those runs of the shard that are missing, on all threads of the pool that it is called in.
+    /// Does the missing runs of the shard, on all threads of the current thread pool.
     ///
     /// # Errors
     ///
-    /// [`CampaignError::Busy`] if a process works on the folder alone; [`CampaignError::File`] if a file cannot be written, as in [`Campaign::run`];
-    /// [`CampaignError::NotJudged`] if verdicts are asked for and not known.
+    /// [`CampaignError::Busy`] if another process works on the folder alone; [`CampaignError::File`] if a file cannot be written, as in [`Campaign::run`];
+    /// [`CampaignError::NotJudged`] if the plan has verdicts and [`SharedCampaign::judge`] was not called.
     pub fn run(&self, shard: Shard, watch: &dyn Watch) -> Result<ShardReport, CampaignError> {
         let campaign = &self.campaign;
         let parts = || (0..campaign.parts.count()).filter(|part| shard.has(*part));
         let runs = |parts: &mut dyn Iterator<Item = u64>| parts.map(|part| campaign.parts.len(part)).sum::<u64>();
         let all = ShardReport { parts: parts().count() as u64, runs: runs(&mut parts()), computed: 0, left: 0 };
         campaign.folder.is_shared()?;
+        // Parts stored by earlier workers of the same shard are not computed again.
         let mut missing = campaign.missing(&|part| shard.has(part), watch)?;
-        // Asked after the parts: they go when the table is there.
+        // Asked after the parts: the merge writes the table first and removes the parts afterwards, so missing parts of a finished campaign are no work.
         if campaign.is_finished() {
             return Ok(all);
         }
@@ -146,7 +153,7 @@ impl SharedCampaign {
             return Err(CampaignError::NotJudged);
         }
         if campaign.plan.has_verdicts() {
-            // A part that was damaged since then has combinations without judgements. The next command for the shard finds it.
+            // A part damaged since the judging has no judgements here. The next command for the shard computes it.
             missing.retain(|part| self.judged.contains(part));
         }
         let keep = |part: u64, rows: &[Row]| {
@@ -158,7 +165,7 @@ impl SharedCampaign {
         Ok(ShardReport { computed, left: campaign.runs_of(&missing) - computed, ..all })
     }
 
-    /// The campaign.
+    /// Returns the campaign.
     #[must_use]
     pub const fn campaign(&self) -> &Campaign {
         &self.campaign

@@ -1,7 +1,7 @@
-//! The runs that are missing, on all threads.
+//! Computes missing runs on all threads.
 //!
-//! Chunks of runs are handed out in order. A part is written by the thread that finishes its last chunk; so no more parts are open at once than there are
-//! threads, and one, and memory stays bounded however long the campaign is.
+//! The threads take chunks of runs in order. The thread which finishes the last chunk of a part passes the part on. So at most one part more than there are
+//! threads is open at once, and the memory stays bounded however long the campaign is.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -17,46 +17,47 @@ use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts};
 use crate::table::{Roster, Row, RunId, row};
 use crate::verdicts::Judgement;
 
-/// Keeps the rows of the part of that number.
+/// Stores the rows of the part with this number.
 pub(crate) type Keep<'a> = dyn Fn(u64, &[Row]) -> Result<(), CampaignError> + Sync + 'a;
 
 /// The work of a campaign.
 pub(crate) struct Work<'a> {
     pub(crate) plan: &'a CampaignPlan,
     pub(crate) roster: &'a Roster,
-    /// One for each combination; none if none are asked for.
+    /// Judgements, indexed by combination; empty without verdicts.
     pub(crate) judgements: &'a [Judgement],
     pub(crate) accepted: &'a Accepted,
     pub(crate) parts: Parts,
     pub(crate) watch: &'a dyn Watch,
-    /// Puts a whole part away.
+    /// Stores a whole part.
     pub(crate) keep: &'a Keep<'a>,
 }
 
-/// Some runs of a part.
+/// Consecutive runs of a part, computed by one thread.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chunk {
     pub(crate) part: u64,
-    /// Its place in the part.
+    /// Index of the chunk within its part.
     pub(crate) place: usize,
     pub(crate) start: u64,
     pub(crate) end: u64,
 }
 
-/// A part some chunks of which are done.
+/// A part with some finished chunks.
 struct Open {
     chunks: Vec<Vec<Row>>,
     left: usize,
 }
 
-/// Scenes of the combinations that were last asked for.
+/// Scenes of the recently used combinations, by combination.
 #[derive(Default)]
 pub(crate) struct Scenes(Mutex<BTreeMap<u64, Arc<Scene>>>);
 
 impl Work<'_> {
-    /// Does the missing parts, on all threads of the pool that it is called in, until all are done or the watch ends it; parts that are not whole are then
-    /// forgotten. Gives how many runs have been put away.
+    /// Computes the missing parts, on all threads of the current thread pool, until all are done or the watch stops the work. The rows of unfinished parts are
+    /// then dropped. Returns the number of stored runs.
     pub(crate) fn run(&self, missing: &[u64]) -> Result<u64, CampaignError> {
+        // `Relaxed` suffices for both: they carry no data, and the locks below order the rows.
         let (next, ended) = (AtomicU64::new(0), AtomicBool::new(false));
         let open: Mutex<BTreeMap<u64, Open>> = Mutex::default();
         let failed: Mutex<Option<CampaignError>> = Mutex::new(None);
@@ -65,10 +66,12 @@ impl Work<'_> {
         rayon::broadcast(|_| {
             while !ended.load(Ordering::Relaxed) && self.watch.keep_going() {
                 let Some(chunk) = self.chunk(next.fetch_add(1, Ordering::Relaxed), missing) else { break };
+                // A chunk is finished even if the watch stops the work meanwhile. Its rows are stored only if its part is whole.
                 let done = self.rows(chunk, &scenes).and_then(|rows| self.put(chunk, rows, &open));
                 match done {
                     Ok(runs) => *lock(&kept) += runs,
                     Err(error) => {
+                        // The other threads finish their chunk, see `ended` and stop. The first error is returned.
                         lock(&failed).get_or_insert(error);
                         ended.store(true, Ordering::Relaxed);
                     }
@@ -82,9 +85,10 @@ impl Work<'_> {
         }
     }
 
-    /// The chunk of this number among those of the missing parts; `None` behind the last.
+    /// Returns chunk `number` of the missing parts, counted from 0; `None` after the last chunk.
     fn chunk(&self, number: u64, missing: &[u64]) -> Option<Chunk> {
-        // Only the last part may have fewer chunks than the others, and nothing comes behind it.
+        // Only the last part of a campaign may have fewer chunks than the other parts, and it is the last of the missing parts. So a chunk beyond its end is
+        // the end of all chunks.
         let of_each = self.parts.size.div_ceil(CHUNK);
         let (part, place) = (*missing.get(usize::try_from(number / of_each).ok()?)?, number % of_each);
         let runs = self.parts.range(part);
@@ -92,18 +96,20 @@ impl Work<'_> {
         (start < runs.end).then(|| Chunk { part, place: usize::try_from(place).unwrap_or_default(), start, end: (start + CHUNK).min(runs.end) })
     }
 
-    /// Runs a chunk.
+    /// Computes the rows of a chunk.
     pub(crate) fn rows(&self, chunk: Chunk, known: &Scenes) -> Result<Vec<Row>, CampaignError> {
         let runs = chunk.start..chunk.end;
         let scenes = runs.clone().map(|run| self.scene(run, known)).collect::<Result<Vec<Scene>, CampaignError>>()?;
+        // Runs without measures share one pass over eight scenes, see `cohaptic_harness::run_side_by_side`.
         let outcomes: Vec<(Summary, Vec<MeasuredValue>)> = if scenes.iter().all(|scene| scene.measure.is_none()) {
             run_side_by_side(&scenes).into_iter().map(|summary| (summary, Vec::new())).collect()
         } else {
-            // Scenes with measures are watched, one run after the other.
+            // A measure needs an observer of its run, so these scenes are run one after the other.
             scenes.iter().map(|scene| Measures::run(scene, Model::Least)).collect()
         };
         let rows = runs.zip(scenes.iter().zip(&outcomes)).map(|(run, (scene, (summary, measured)))| {
             let (combination, _) = self.accepted.run(run);
+            // The table numbers the runs of refused combinations too, while `run` counts accepted runs only.
             let place = RunId { run: self.accepted.number(run), combination, seed: scene.seed };
             let judgement = usize::try_from(combination).ok().and_then(|place| self.judgements.get(place));
             row(place, self.plan.values(combination), judgement, (summary, measured), self.roster)
@@ -113,15 +119,16 @@ impl Work<'_> {
         Ok(rows)
     }
 
-    /// The scene of a run: that of its combination with a seed of its own.
+    /// Returns the scene of the run at a place: the scene of its combination with the run's own seed.
     fn scene(&self, run: u64, known: &Scenes) -> Result<Scene, CampaignError> {
         let (combination, of_it) = self.accepted.run(run);
+        // Only the seed differs between the runs of a combination, so the runs share the scene which was read for the combination.
         let mut scene = Scene::clone(&*known.get(combination, self.plan)?);
         scene.seed += of_it;
         Ok(scene)
     }
 
-    /// Puts the rows of a chunk to their part, and puts that away if it is whole: then gives how many runs it has.
+    /// Adds the rows of a chunk to their part. Stores a part with all chunks and returns the number of its runs; returns 0 for an unfinished part.
     fn put(&self, chunk: Chunk, rows: Vec<Row>, open: &Mutex<BTreeMap<u64, Open>>) -> Result<u64, CampaignError> {
         let whole = {
             let mut open = lock(open);
@@ -130,37 +137,40 @@ impl Work<'_> {
                 Open { chunks: vec![Vec::new(); left], left }
             });
             part.chunks[chunk.place] = rows;
+            // Each chunk is handed out once, so the count reaches 0 with the last chunk of the part.
             part.left -= 1;
+            // Removed under the lock, stored after it.
             if part.left == 0 { open.remove(&chunk.part) } else { None }
         };
         let Some(whole) = whole else { return Ok(0) };
         let rows: Vec<Row> = whole.chunks.into_iter().flatten().collect();
+        // Outside of the lock: writing a file must not hold up the other threads.
         (self.keep)(chunk.part, &rows)?;
         Ok(rows.len() as u64)
     }
 }
 
 impl Scenes {
-    /// The most that are kept.
+    /// Most scenes kept at once.
     const MOST: usize = 64;
 
     fn get(&self, combination: u64, plan: &CampaignPlan) -> Result<Arc<Scene>, CampaignError> {
         if let Some(scene) = lock(&self.0).get(&combination) {
             return Ok(scene.clone());
         }
-        // Not under the lock: two threads may read the same scene, which is no more than wasted work.
+        // The lock is not held while a scene is read. Two threads may then read the same scene, and both get equal scenes.
         let scene = Arc::new(plan.scene(combination)?);
         let mut known = lock(&self.0);
         known.insert(combination, scene.clone());
         if known.len() > Self::MOST {
-            // Runs come in order, so the first will be asked for no more, or by few.
+            // Runs come in order, so the combination with the lowest number is needed least.
             known.pop_first();
         }
         Ok(scene)
     }
 }
 
-/// What a thread that panicked leaves is never looked at: its panic ends the whole.
+/// Locks a mutex, also after a panic of another thread: rayon passes the panic on, and the data are not used.
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

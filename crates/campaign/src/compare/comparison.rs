@@ -1,10 +1,10 @@
-//! The runs of strategies, paired by their seeds.
+//! The figures of a comparison, from runs paired by seed.
 //!
-//! A strategy is compared with the baseline, the first one, at equal values of all other keys. Runs of one seed have equal random numbers, so the difference of
-//! two of them is that of the strategies, and its interval is narrower than those of the two means. A pair counts where both runs came to their end and both have
-//! the measure.
+//! A strategy is compared with the baseline, the first strategy, at equal values of all other keys. Runs of one seed have equal random numbers, so the
+//! difference of two runs is due to the strategies, and the interval of the differences is narrower than the intervals of the two means. A pair counts if both
+//! runs came to their end and both have the measure.
 //!
-//! A run that [diverged](cohaptic_harness::Summary::has_diverged) counts for no mean: a mean over 10³⁰ m says nothing.
+//! A run which [diverged](cohaptic_harness::Summary::has_diverged) counts in no mean: a mean with a value of 10³⁰ m would be useless.
 
 use super::interval::{Estimate, Share};
 use super::measured::{MeasuredColumn, measured};
@@ -12,45 +12,45 @@ use crate::error::CampaignError;
 use crate::plan::{Accepted, CampaignPlan, Refused};
 use crate::table::{Column, RunColumns};
 
-/// The most numbers that are compared, runs times measures: 800 MB.
+/// Most numbers in a comparison, runs times measures: 800 MB of memory.
 pub const MOST_NUMBERS_COMPARED: u64 = 100_000_000;
 
-/// Strategies side by side.
+/// A comparison of strategies.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Comparison {
-    /// The strategies as they are written; the first is the baseline.
+    /// The strategies as written by the user; the first is the baseline.
     pub strategies: Vec<String>,
-    /// The measures that any run has, in the order of the table.
+    /// Measures with a value in at least one run, in the order of the table.
     pub measures: Vec<MeasuredColumn>,
-    /// A cell for each combination, in order: those of the baseline first.
+    /// Cells, indexed by combination: the combinations of the baseline come first.
     pub cells: Vec<Cell>,
 }
 
-/// What the runs of one combination come to.
+/// The figures of the runs of one combination.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Cell {
-    /// Why the strategy refuses the scene with these values; `None` if it runs.
+    /// Why the strategy refuses the scene with these values; `None` if the strategy runs.
     pub refused: Option<String>,
-    /// Share of the runs that diverged; `None` if there are no runs.
+    /// Share of diverged runs; `None` if the combination has no runs.
     pub diverged: Option<Share>,
-    /// The figures of each of [`Comparison::measures`].
+    /// Figures, indexed like [`Comparison::measures`].
     pub figures: Vec<Figures>,
 }
 
-/// A measure of one combination.
+/// Mean of a measure over the runs of one combination, and mean difference to the baseline.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Figures {
-    /// The mean over the runs that came to their end and have the measure; `None` if none has.
+    /// Mean over the runs which came to their end and have the measure; `None` if there are no such runs.
     pub mean: Option<Estimate>,
-    /// The mean difference to the baseline over the seeds of which both runs did; `None` if there are none, and of the baseline itself.
+    /// Mean difference to the baseline, over the seeds with a counted run in both strategies; `None` if there are no such seeds, and for the baseline itself.
     pub difference: Option<Estimate>,
 }
 
-/// Returns the columns that are compared, in the order of the table. `runs`: the number of its rows.
+/// Returns the compared columns, in the order of the table. `runs`: number of rows of the table.
 ///
 /// # Errors
 ///
-/// [`CampaignError::Size`] if they have more than [`MOST_NUMBERS_COMPARED`] numbers.
+/// [`CampaignError::Size`] if the columns have more than [`MOST_NUMBERS_COMPARED`] numbers.
 pub(crate) fn compared(columns: &[Column], runs: u64) -> Result<Vec<MeasuredColumn>, CampaignError> {
     let measures = measured(columns);
     let numbers = runs.saturating_mul(measures.len() as u64);
@@ -61,13 +61,17 @@ pub(crate) fn compared(columns: &[Column], runs: u64) -> Result<Vec<MeasuredColu
 }
 
 impl Comparison {
-    /// The comparison of the first key of a plan. `columns` are those of `measures`, by run.
+    /// Compares the values of the first key of a plan. `columns` holds the values of `measures`, in the same order, indexed by run.
     pub(crate) fn of(plan: &CampaignPlan, accepted: &Accepted, refused: &Refused, measures: Vec<MeasuredColumn>, columns: &RunColumns) -> Self {
+        // `complete` and every column have one entry per run: `Campaign::compare` and `SpreadCampaign::compare` check the numbers of rows.
         let is_whole = |run: usize| columns.complete[run];
         let strategies: Vec<String> = plan.variations().first().map_or_else(Vec::new, |vary| vary.texts().map(str::to_owned).collect());
         let each = usize::try_from(plan.runs_of_each()).unwrap_or(usize::MAX);
         let starts = starts(plan.combinations(), accepted, each);
+        // The first key varies slowest, so each strategy has one block of `others` combinations, and `combination % others` is the baseline at the same other
+        // values.
         let others = starts.len() / strategies.len().max(1);
+        // A measure without any value is left out, such as a measure of a peer absent from every run.
         let has = |column: &Vec<f64>| column.iter().enumerate().any(|(run, value)| value.is_finite() && is_whole(run));
         let known: Vec<bool> = columns.columns.iter().map(has).collect();
         let cell = |(combination, start): (usize, &Option<usize>)| {
@@ -87,27 +91,28 @@ impl Comparison {
         Self { strategies, measures, cells }
     }
 
-    /// How many combinations of the other keys there are; 1 if nothing else is varied.
+    /// Returns the number of combinations of the other keys; 1 if only the strategy is varied.
     #[must_use]
     pub const fn others(&self) -> usize {
         self.cells.len() / self.strategies.len()
     }
 
-    /// The cell of a strategy at a combination of the other keys.
+    /// Returns the cell of a strategy at a combination of the other keys, both counted from 0.
     ///
     /// # Panics
     ///
-    /// If there are fewer.
+    /// If the strategy or the combination does not exist.
     #[must_use]
     pub fn cell(&self, strategy: usize, other: usize) -> &Cell {
         &self.cells[strategy * self.others() + other]
     }
 }
 
-/// In which place of the table the runs of each combination begin; `None` of those that are left out.
+/// Returns the row of the table with the first run of each combination, indexed by combination; `None` for left out combinations.
 fn starts(combinations: u64, accepted: &Accepted, each: usize) -> Vec<Option<usize>> {
     let mut starts = vec![None; usize::try_from(combinations).unwrap_or_default()];
     let runs = usize::try_from(accepted.runs()).unwrap_or_default();
+    // Accepted combinations have `each` consecutive rows, so every step begins another combination.
     for place in (0..runs).step_by(each) {
         let (combination, _) = accepted.run(place as u64);
         starts[usize::try_from(combination).unwrap_or_default()] = Some(place);
@@ -116,9 +121,11 @@ fn starts(combinations: u64, accepted: &Accepted, each: usize) -> Vec<Option<usi
 }
 
 impl Figures {
-    /// Of the values of each seed, with those of the baseline; none where the baseline is not run, or is meant itself.
+    /// Returns the figures of one combination from the values per seed. `baseline` holds the values of the baseline, and is empty if the baseline is refused or
+    /// is this combination.
     fn of(values: impl Iterator<Item = Option<f64>> + Clone, baseline: impl Iterator<Item = Option<f64>>) -> Self {
         let own: Vec<f64> = values.clone().flatten().collect();
+        // `zip` pairs equal seeds, because both iterators start at the first seed.
         let differences: Vec<f64> = values.zip(baseline).filter_map(|(value, baseline)| Some(value? - baseline?)).collect();
         Self { mean: Estimate::of(&own), difference: Estimate::of(&differences) }
     }
@@ -152,7 +159,7 @@ mod tests {
 
     #[test]
     fn pairs_are_of_one_seed_and_of_equal_values_of_the_other_keys() {
-        // Baseline at both losses, then the two others; one run of three each diverged in places.
+        // The baseline at both losses, then the two other strategies, three runs each. One run diverged in the first cell and one in the third.
         let values: Vec<f64> = vec![1.0, 2.0, 3.0, 10.0, 20.0, 30.0, 2.0, 9.0, 5.0, 11.0, 20.0, 33.0, 0.0, 0.0, 0.0, 7.0, 7.0, 7.0];
         let mut complete = vec![true; 18];
         (complete[0], complete[7]) = (false, false);
@@ -161,9 +168,9 @@ mod tests {
         let figures = |strategy, other| comparison.cell(strategy, other).figures[0];
         let mean = |estimate: Option<Estimate>| estimate.map(|estimate| (estimate.count, estimate.mean));
         assert_eq!((mean(figures(0, 0).mean), figures(0, 0).difference), (Some((2, 2.5)), None));
-        // Without the seed that diverged here, and the one that diverged in the baseline: 5 − 3 is left.
+        // The seed of the diverged run and the seed of the diverged run of the baseline do not count: 5 − 3 remains.
         assert_eq!((mean(figures(1, 0).mean), mean(figures(1, 0).difference)), (Some((2, 3.5)), Some((1, 2.0))));
-        // 1, 0 and 3, whose deviation is √(7/3): the interval is that of the differences, far narrower than that of the means.
+        // The differences 1, 0 and 3 have the deviation √(7/3). The interval of the differences is far narrower than the intervals of the means.
         let paired = figures(1, 1).difference.unwrap();
         let half = 4.302_652_729_911_275 * (7.0_f64 / 3.0 / 3.0).sqrt();
         assert_eq!((paired.count, paired.mean), (3, 4.0 / 3.0));

@@ -1,33 +1,34 @@
-//! Which columns of a table are measures, with their units and meanings.
+//! The measures among the columns of a table, with units and meanings.
 
 use cohaptic_scene::{Measure, Scope};
 
 use crate::table::{Column, Kind};
 
-/// The column that every table has.
+/// Name of the measure in every table: the largest discrepancy of a run.
 pub(super) const LARGEST: &str = "max_discrepancy_m";
 
-/// A column with one number for each run that says how good or bad the run was.
+/// A column with one number per run, by which runs are judged.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MeasuredColumn {
-    /// Its name in the table.
+    /// Name of the column in the table.
     pub name: String,
-    /// Its unit.
+    /// Unit of the values.
     pub unit: String,
-    /// Its meaning, without the last full stop.
+    /// Meaning of the measure, without a final full stop.
     pub about: String,
 }
 
-/// The columns that are measures, in the order of the table.
+/// Returns the columns of measures, in the order of the table.
 pub(crate) fn measured(columns: &[Column]) -> Vec<MeasuredColumn> {
     columns.iter().filter(|column| column.kind == Kind::Number).filter_map(|column| words(&column.name)).collect()
 }
 
-/// The unit and the meaning of a column; `None` if it is no measure.
+/// Returns name, unit and meaning of a column; `None` if the column is no measure.
 fn words(column: &str) -> Option<MeasuredColumn> {
     let (unit, about) = if column == LARGEST {
         ("m", "Largest distance along an axis between two copies, over instants")
     } else {
+        // `peers.PEER.MEASURE`: the name of a peer may contain dots, so the last dot begins the measure.
         let name = column.strip_prefix("peers.").and_then(|rest| rest.rsplit_once('.')).map_or(column, |(_, name)| name);
         let scope = if name == column { Scope::Run } else { Scope::Peer };
         let measure = Measure::ALL.iter().find(|measure| measure.name() == name && measure.scope() == scope)?;

@@ -1,4 +1,4 @@
-//! Strategies side by side: the runs of a campaign whose first key is the strategy, summed up by strategy and compared seed by seed.
+//! Comparison of strategies: the runs of a campaign whose first key is the strategy, summed up per strategy and compared seed by seed.
 
 mod comparison;
 mod interval;

@@ -1,4 +1,4 @@
-//! Strategies to be compared, as they are written: `average-position,local-damping{damping=58}`.
+//! Reads the list of strategies of a comparison: `average-position,local-damping{damping=58}`.
 
 use cohaptic_linkfile::document::quote;
 use cohaptic_linkfile::reading::one_of;
@@ -6,29 +6,29 @@ use cohaptic_peer::Coordination;
 
 use crate::vary::{Variation, VaryError, split_at_commas};
 
-/// Two strategies or more, of which the first is the baseline. As a campaign they are the values of `coordination.strategy`.
+/// Two or more strategies; the first is the baseline. In a campaign, the strategies are the values of `coordination.strategy`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Strategies {
     variation: Variation,
 }
 
-/// Why a text names no strategies to be compared.
+/// Why a text is no list of comparable strategies.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum StrategiesError {
-    /// There is one alone, or none.
+    /// The list has fewer than two strategies.
     #[error(
         "{found} cannot be compared with another: expected at least two strategies with a comma between them, such as average-position,extrapolated"
     )]
     TooFew {
-        /// The text as given.
+        /// The text of the user.
         found: String,
     },
     /// No strategy has that name.
     #[error("unknown strategy {}: expected {expected}", quote(name))]
     Unknown {
-        /// The name.
+        /// The unknown name.
         name: String,
-        /// Those that there are.
+        /// The known names, in words.
         expected: String,
     },
     /// The strategy has no such parameter.
@@ -39,32 +39,32 @@ pub enum StrategiesError {
     UnknownParameter {
         /// The strategy.
         strategy: String,
-        /// The key within its braces.
+        /// The unknown key within the braces.
         key: String,
-        /// Those that there are.
+        /// The known parameters, in words.
         expected: String,
     },
-    /// A strategy is there twice with equal settings.
+    /// The list has a strategy twice with equal settings.
     #[error("{strategy} is there twice: expected different strategies, or one with different settings, such as extrapolated{{horizon=50ms}}")]
     Twice {
-        /// The strategy as it is written.
+        /// The strategy as written.
         strategy: String,
     },
-    /// The values are no list of strategies with settings.
+    /// The text is no list of strategies with settings.
     #[error(transparent)]
     Values(#[from] VaryError),
 }
 
 impl Strategies {
-    /// The key whose values they are.
+    /// Key of a scene whose values are the strategies.
     pub const KEY: &'static str = "coordination.strategy";
 
-    /// Reads strategies with commas between them. Behind a name, in braces, stand values of its own parameters, and of other keys of the scene by their
-    /// dotted paths.
+    /// Reads strategies separated by commas. Braces after a name hold values of the strategy's own parameters, and of other keys of the scene by their dotted
+    /// paths.
     ///
     /// # Errors
     ///
-    /// [`StrategiesError`], which says what was expected. Whether values are such as their keys take is found out when the campaign is planned.
+    /// [`StrategiesError`] with the expected form. The values themselves are checked later, when the campaign checks its scenes.
     pub fn parse(text: &str) -> Result<Self, StrategiesError> {
         let texts: Vec<String> = split_at_commas(text).iter().map(|text| with_long_name(text)).collect();
         for text in &texts {
@@ -77,6 +77,7 @@ impl Strategies {
             Err(VaryError::Twice { value, .. }) => return Err(StrategiesError::Twice { strategy: value }),
             variation => variation?,
         };
+        // `Variation::parse` finds equal texts only. Sorted overrides also find settings in another order.
         let sets: Vec<Vec<String>> = (0..variation.count()).map(|place| sorted(variation.overrides(place))).collect();
         if let Some(place) = (1..sets.len()).find(|place| sets[..*place].contains(&sets[*place])) {
             return Err(StrategiesError::Twice { strategy: variation.value_text(place).to_owned() });
@@ -84,7 +85,7 @@ impl Strategies {
         Ok(Self { variation })
     }
 
-    /// Every strategy of the registry, each with its parameters as the scene has them.
+    /// Returns every strategy of the registry, each with the parameters of the scene.
     ///
     /// # Panics
     ///
@@ -95,22 +96,22 @@ impl Strategies {
         Self::parse(&names.join(",")).expect("names of the registry are different strategies, and more than one")
     }
 
-    /// The key of a campaign that they vary.
+    /// Returns the variation of [`Strategies::KEY`] over the strategies.
     #[must_use]
     pub fn variation(&self) -> Variation {
         self.variation.clone()
     }
 
-    /// The strategies as they are written, in order.
+    /// Returns the strategies as written, in order.
     pub fn names(&self) -> impl ExactSizeIterator<Item = &str> {
         self.variation.texts()
     }
 
-    /// What a strategy does, and the dotted paths of its own parameters with their defaults as a scene has them, by its place.
+    /// Returns the description of a strategy, and the dotted paths of its own parameters with their default values. `place`: index of the strategy, from 0.
     ///
     /// # Panics
     ///
-    /// If there are fewer strategies.
+    /// If `place` is not below the number of strategies.
     #[must_use]
     pub fn registered(&self, place: usize) -> (&'static str, Vec<(String, &'static str)>) {
         let name = name(self.variation.value_text(place));
@@ -119,27 +120,28 @@ impl Strategies {
         (strategy.about(), parameters.collect())
     }
 
-    /// With these overrides on top a scene is run by a strategy that refuses no scene: a scene that is refused with another one, and is not with them, is refused by that
-    /// strategy.
+    /// Returns overrides which select the strategy that accepts every scene. A scene refused without these overrides and accepted with them is refused because
+    /// of its strategy.
     #[must_use]
     pub fn fallback() -> Vec<String> {
         vec![format!("{}={}", Self::KEY, Coordination::AveragePosition.name())]
     }
 }
 
-/// The name of a strategy as it is written, without its settings.
+/// Returns the name of a written strategy, without settings and quotes.
 fn name(text: &str) -> &str {
     text.split('{').next().unwrap_or_default().trim().trim_matches(['"', '\''])
 }
 
-/// A strategy as it is written, by its long name if it has a short one: `AP` and `average-position` are the same.
+/// Replaces a short name of a strategy by the long name: `AP` becomes `average-position`.
 fn with_long_name(text: &str) -> String {
     let short = name(text);
     let long = Coordination::named(short).map_or(short, |strategy| strategy.name());
+    // An empty name would match at the beginning of the text.
     text.replacen(short, long, usize::from(!short.is_empty()))
 }
 
-/// That a strategy and the parameters within its braces exist.
+/// Checks the name of a strategy and the names of the parameters within its braces.
 fn check(text: &str) -> Result<(), StrategiesError> {
     let settings = text.split_once('{').map_or("", |(_, settings)| settings);
     let name = name(text);
@@ -148,8 +150,10 @@ fn check(text: &str) -> Result<(), StrategiesError> {
         return Err(StrategiesError::Unknown { name: name.to_owned(), expected });
     };
     for setting in split_at_commas(settings.strip_suffix('}').unwrap_or(settings)) {
+        // `Variation::parse` refuses malformed settings later, with an error of its own.
         let Some((key, _)) = setting.split_once('=') else { continue };
         let key = key.trim();
+        // key.contains('.')||// A dotted path is a key of the scene, which the scene's reader checks.
         if key.is_empty() || key.contains('.') || strategy.parameters().iter().any(|parameter| parameter.key == key) {
             continue;
         }

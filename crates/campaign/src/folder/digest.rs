@@ -1,11 +1,12 @@
-//! The digest of a part: a small file beside the part, which says whose part it is and what its bytes hash to.
+//! The digest of a part: a small file beside the part, with the identity of the part and the hash of its bytes.
 //!
 //! ```text
 //! # part 0 of campaign 6f0c…: 16384 runs, 5242880 bytes
 //! 9b74…  part-00000.parquet
 //! ```
 //!
-//! `sha256sum --check part-*.sha256` checks the same. The digest gets its name before its part. A part without a digest, as earlier versions of the program wrote it, is computed again.
+//! `sha256sum --check part-*.sha256` does the same check. The digest gets its name before its part. A part without a digest, as written by early versions of
+//! the program, is computed again.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, Write};
@@ -13,13 +14,13 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest as _, Sha256};
 
-/// How the name of a digest ends, after the name of its part.
+/// End of the name of a digest, after the name of its part.
 pub(crate) const DIGEST: &str = ".sha256";
 
-/// The most bytes that are read of a digest: several times what one has.
+/// Most bytes read from a digest, several times the length of a digest \[bytes\].
 const MOST: u64 = 4096;
 
-/// The hash of some bytes, in 64 hexadecimal digits.
+/// Returns the SHA-256 of some bytes, in 64 hexadecimal digits.
 pub(crate) fn hash(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
@@ -28,37 +29,38 @@ fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The part that a file must be.
+/// Identity of a part, as its digest must state it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Label<'a> {
     pub(crate) part: u64,
-    /// How many runs the part has.
+    /// Number of runs of the part.
     pub(crate) runs: u64,
-    /// The hash of the campaign's manifest.
+    /// Hash of the campaign's manifest.
     pub(crate) campaign: &'a str,
 }
 
-/// The difference between a part and the part that was written, in words.
+/// Difference between a part and its digest, in words.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Fault(pub(crate) String);
 
 impl Label<'_> {
-    /// The first line of the digest: the part, but for the content of its bytes.
+    /// Returns the first line of the digest: the identity and the length \[bytes\] of the part.
     fn head(self, bytes: u64) -> String {
         let Self { part, runs, campaign } = self;
         format!("# part {part} of campaign {campaign}: {runs} runs, {bytes} bytes\n")
     }
 
-    /// The digest of the part with this file, as text.
+    /// Returns the whole text of the digest of the part at `path`.
     fn text(self, path: &Path, bytes: u64, hash: &str) -> String {
         let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
         format!("{}{hash}  {name}\n", self.head(bytes))
     }
 
-    /// Opens a part that is as it was written, at its beginning. `Ok(Err)`: the file is another one.
+    /// Opens a part after a check of its bytes, positioned at the beginning. `Ok(Err)`: the file is not the part.
     ///
-    /// The bytes are checked through the handle that is returned, so that nobody can replace the file in between.
+    /// The bytes are checked through the returned handle, so nobody can replace the file between the check and the use.
     pub(crate) fn open(self, path: &Path) -> io::Result<Result<File, Fault>> {
+        // The digest is read first: without a digest, nothing else about the file matters.
         let digest = match read_digest(&name_of(path)) {
             Ok(digest) => digest,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Err(Fault("it has no digest".to_owned()))),
@@ -68,6 +70,7 @@ impl Label<'_> {
         // A wrong length or a wrong part is found without reading the part.
         let head = self.head(file.metadata()?.len());
         let Some(rest) = digest.strip_prefix(head.as_bytes()) else {
+            // The digest may hold arbitrary bytes, so they are escaped before they go into a message.
             let found = digest.split(|byte| *byte == b'\n').next().unwrap_or_default();
             let found = String::from_utf8_lossy(found).escape_debug().to_string();
             return Ok(Err(Fault(format!("its digest says \"{found}\": expected \"{}\"", head.trim_end()))));
@@ -75,6 +78,7 @@ impl Label<'_> {
         let mut hashing = HashingWriter::new(io::sink());
         io::copy(&mut file, &mut hashing)?;
         let (bytes, hash) = hashing.finish();
+        // The digest also contains the name of the part, so a renamed part with its old digest is refused.
         let expected = self.text(path, bytes, &hash);
         if digest != expected.as_bytes() {
             let said = String::from_utf8_lossy(rest.split(|byte| *byte == b' ').next().unwrap_or_default()).escape_debug().to_string();
@@ -85,7 +89,7 @@ impl Label<'_> {
     }
 }
 
-/// The digest of the part with this file.
+/// Returns the path of the digest of the part at `path`.
 pub(crate) fn name_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(DIGEST);
@@ -94,12 +98,12 @@ pub(crate) fn name_of(path: &Path) -> PathBuf {
 
 fn read_digest(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    // A longer file is no digest, whatever follows.
+    // A longer file is no digest, whatever its content.
     File::open(path)?.take(MOST).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// Hashes all that is written through it.
+/// A writer which hashes all bytes on their way to another writer.
 pub(crate) struct HashingWriter<W> {
     to: W,
     state: Sha256,
@@ -111,7 +115,7 @@ impl<W: Write> HashingWriter<W> {
         Self { to, state: Sha256::new(), bytes: 0 }
     }
 
-    /// How many bytes were written, and their hash.
+    /// Returns the number of written bytes and their hash.
     pub(crate) fn finish(self) -> (u64, String) {
         (self.bytes, hexadecimal(&self.state.finalize()))
     }
@@ -120,6 +124,7 @@ impl<W: Write> HashingWriter<W> {
 impl<W: Write> Write for HashingWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.to.write(bytes)?;
+        // A writer may accept fewer bytes than offered. The caller offers the rest again.
         self.state.update(&bytes[..written]);
         self.bytes += written as u64;
         Ok(written)
@@ -130,7 +135,7 @@ impl<W: Write> Write for HashingWriter<W> {
     }
 }
 
-/// Writes the digest of a part of this number of bytes and this hash. `write_whole` writes a file of that name.
+/// Writes the digest of the part at `path`, with this number of bytes and this hash. `write_whole` writes the file.
 pub(crate) fn write<E>(
     label: Label<'_>,
     path: &Path,
@@ -146,7 +151,7 @@ mod tests {
 
     const LABEL: Label<'static> = Label { part: 3, runs: 2, campaign: "c0ffee" };
 
-    /// A part of that name and content with its digest.
+    /// Writes a part with this content, and its digest.
     fn written(path: &Path, content: &[u8]) {
         std::fs::write(path, content).unwrap();
         let mut hashing = HashingWriter::new(io::sink());
@@ -158,7 +163,7 @@ mod tests {
         label.open(path).unwrap().err().map(|Fault(words)| words)
     }
 
-    /// SHA-256 of "abc", from FIPS 180-4's examples.
+    /// Source: FIPS 180-4, example "abc".
     #[test]
     fn the_hash_is_that_of_the_standard() {
         assert_eq!(hash(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
@@ -202,7 +207,7 @@ mod tests {
             let fault = fault(label, &path).unwrap();
             assert!(fault.contains(words), "{fault}");
         }
-        // Under another name, with its digest.
+        // The part under the name of another part: first without a digest, then with the digest of its old name.
         let other = folder.path().join("part-00004.csv");
         std::fs::copy(&path, &other).unwrap();
         assert_eq!(fault(LABEL, &other).unwrap(), "it has no digest");

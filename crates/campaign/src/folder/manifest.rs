@@ -1,4 +1,4 @@
-//! What a campaign is, as a file in its folder: the same command goes on, another one is refused.
+//! The manifest: the file which states the identity of the campaign in a folder. The same command continues the campaign; another command is refused.
 
 use std::io::Write as _;
 use std::path::{Component, Path, PathBuf};
@@ -11,44 +11,44 @@ use crate::plan::{Accepted, CampaignPlan, Checked, Parts, PlanSpec, Refused};
 use crate::table::{Format, Roster};
 use crate::vary::Variation;
 
-/// How files of a campaign are laid out. Another layout is another number.
+/// Number of the layout of a campaign's files. A change of the layout needs another number.
 const LAYOUT: u32 = 1;
 
-/// What a campaign is.
+/// Identity of a campaign: its plan, and the results of the check of its combinations.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Manifest {
     layout: u32,
     program: String,
-    /// Way to the scene's file from the folder of the campaign; absent of a scene that came from standard input, and of campaigns of earlier versions. It is
-    /// no part of what the campaign is.
+    /// Path of the scene's file, relative to the folder of the campaign. Absent for a scene from standard input, and for campaigns of earlier versions. The
+    /// path is not part of the identity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     file: Option<String>,
-    /// The text of the scene.
+    /// Text of the scene.
     scene: String,
-    /// Of the scenes, with what the files say that they name.
+    /// Fingerprint of the scenes and of the files named by the scenes, in 16 hexadecimal digits.
     fingerprint: String,
     set: Vec<String>,
     vary: Vec<String>,
-    /// Of each combination.
+    /// Number of runs per combination.
     runs: u64,
-    /// Parquet or CSV.
+    /// Format of the table: `parquet` or `csv`.
     format: String,
-    /// As asked for; absent if that was left to the program.
+    /// Number of runs per part chosen by the user; absent if the program chose `part_runs`.
     part: Option<u64>,
-    /// How many runs a part has.
+    /// Number of runs per part.
     part_runs: u64,
-    /// Whether combinations are judged.
+    /// Whether the plan has verdicts.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     verdicts: bool,
     pub(crate) roster: Roster,
-    /// The combinations that are left out.
+    /// Left out combinations, each with its reason.
     #[serde(default, skip_serializing_if = "Refused::is_empty")]
     pub(crate) refused: Refused,
 }
 
 impl Manifest {
-    /// Of a plan that was checked.
+    /// Returns the manifest of a checked plan.
     pub(crate) fn new(plan: &CampaignPlan, fingerprint: u64, checked: Checked, parts: Parts) -> Self {
         Self {
             layout: LAYOUT,
@@ -72,23 +72,25 @@ impl Manifest {
         let bytes = cohaptic_files::read_bytes(path).map_err(|error| CampaignError::File { verb: "read", path: path.to_path_buf(), error })?;
         let damaged =
             |message: String| CampaignError::Damaged { path: path.to_path_buf(), message, way_out: "choose another folder, or remove this one" };
+        // The layout is read first: a manifest of another layout may have unknown fields, and the error should name the layout.
         let layout = serde_json::from_slice::<Layout>(&bytes).map_err(|error| damaged(error.to_string()))?.layout;
         if layout != LAYOUT {
             return Err(damaged(format!("layout {layout}: expected {LAYOUT}")));
         }
         let manifest: Self = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
+        // `Parts` divides by the number of runs per part.
         if manifest.part_runs == 0 {
             return Err(damaged("parts of 0 runs".to_owned()));
         }
         Ok(manifest)
     }
 
-    /// The same with where the scene's file is from that folder, which exists.
+    /// Returns the manifest with the path of the scene's file relative to the folder. The folder must exist.
     pub(crate) fn of_file(self, file: &Path, folder: &Path) -> Self {
         Self { file: from_folder(file, folder), ..self }
     }
 
-    /// The plan of which this is the campaign, in that folder.
+    /// Rebuilds the plan from the manifest of this folder, for the program with that name and version.
     pub(crate) fn plan(&self, folder: &Path, program: &str) -> Result<CampaignPlan, CampaignError> {
         let damaged = |message: String| CampaignError::Damaged {
             path: folder.join(super::MANIFEST),
@@ -104,12 +106,13 @@ impl Manifest {
         Ok(if self.verdicts { plan.with_verdicts() } else { plan })
     }
 
-    /// The text of the file without the way to the scene. Tables hold this text, and are the same wherever they are made.
+    /// Returns the text of the manifest without the path of the scene's file. The tables contain this text, and so their bytes do not depend on the place of
+    /// the folder.
     pub(crate) fn about(&self) -> String {
         Self { file: None, ..self.clone() }.text()
     }
 
-    /// Writes the file, which other workers may be writing too if this is one of them.
+    /// Writes the manifest. As a worker (`worker` is its name) other workers may write the same file at the same time.
     pub(crate) fn write(&self, path: &Path, worker: Option<&str>) -> Result<(), CampaignError> {
         let text = self.text();
         let write = |file: &mut WholeFile| file.write_all(text.as_bytes());
@@ -120,25 +123,26 @@ impl Manifest {
         written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
     }
 
-    /// As it stands in the file.
+    /// Returns the text of the manifest's file.
     pub(crate) fn text(&self) -> String {
-        // Text and numbers always have a form in JSON.
+        // Text and numbers always have a form in JSON, so the serialisation cannot fail.
         let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
         text.push('\n');
         text
     }
 
-    /// The parts that a campaign of a number of runs is cut into.
+    /// Returns the parts of a campaign with this number of runs.
     pub(crate) const fn parts(&self, runs: u64) -> Parts {
         Parts { runs, size: self.part_runs }
     }
 
-    /// The combinations that are run.
+    /// Returns the accepted combinations of the plan.
     pub(crate) fn accepted(&self, plan: &CampaignPlan) -> Accepted {
         Accepted::new(plan.combinations(), plan.runs_of_each(), self.refused.keys().copied())
     }
 
-    /// What this campaign, which is there, has that the plan has not, in words; nothing if it is the same one. Files that scenes name are not compared.
+    /// Returns the differences between this manifest and a plan, in words; empty if both are the same campaign. The files named by the scenes are not compared:
+    /// the fingerprint covers their content.
     pub(crate) fn differences(&self, plan: &CampaignPlan) -> Vec<String> {
         let mut differences = Vec::new();
         let mut compare = |what: &str, there: String, here: String| {
@@ -159,20 +163,22 @@ impl Manifest {
         if !self.refused.is_empty() && !plan.may_leave_out() {
             differences.push(format!("combinations that are refused, {} of them, are left out there and not here", self.refused.len()));
         }
+        // The differing line says more to a user than two hashes would.
         if self.scene != plan.text() {
             differences.push(different_line(&self.scene, plan.text()));
         }
         differences
     }
 
-    /// Whether the scenes and the files that they name say what they said when the campaign began.
+    /// Returns `true` if the scenes and the files named by the scenes are unchanged since the campaign began.
     pub(crate) fn has_fingerprint(&self, fingerprint: u64) -> bool {
         self.fingerprint == format!("{fingerprint:016x}")
     }
 }
 
-/// The way from a folder to a file, both of which exist; `None` if there is none, as between drives.
+/// Returns the path from a folder to a file, with slashes. Both must exist. `None` if there is no relative path, as between drives.
 fn from_folder(file: &Path, folder: &Path) -> Option<String> {
+    // Both paths are resolved, so that symbolic links and `..` do not hide a common folder.
     let (file, folder) = (file.canonicalize().ok()?, folder.canonicalize().ok()?);
     let shared = file.components().zip(folder.components()).take_while(|(one, other)| one == other).count();
     if shared == 0 {
@@ -180,10 +186,11 @@ fn from_folder(file: &Path, folder: &Path) -> Option<String> {
     }
     let up = folder.components().skip(shared).map(|_| Component::ParentDir);
     let way: PathBuf = up.chain(file.components().skip(shared)).collect();
+    // Slashes work on every system, so the folder can be moved between systems.
     way.to_str().map(|way| way.replace('\\', "/"))
 }
 
-/// What every layout has.
+/// The part of the manifest found in every layout.
 #[derive(Deserialize)]
 struct Layout {
     layout: u32,
@@ -193,7 +200,7 @@ fn list(texts: &[String]) -> String {
     if texts.is_empty() { "not given".to_owned() } else { texts.join(" ") }
 }
 
-/// Where two texts of scenes part.
+/// Returns, in words, the first different line of two scenes.
 fn different_line(there: &str, here: &str) -> String {
     let (mut there, mut here) = (there.lines(), here.lines());
     let mut number = 1;

@@ -1,24 +1,24 @@
-//! The folder of a campaign: which files there are, and in which order they come and go.
+//! The folder of a campaign: names of the files, and the order in which files appear and disappear.
 //!
 //! ```text
-//! cohaptic.lock            as long as one process works on it alone
-//! campaign.json            what the campaign is; the first file with its own name
-//! verdicts.part.csv        judgements as they are made, until the table is there
-//! verdicts.csv             all judgements
-//! stability.part.csv       judgements of a campaign whose table has none
-//! stability.csv
+//! cohaptic.lock            held while one process works on the folder alone
+//! campaign.json            the manifest, the first file with its final name
+//! verdicts.part.csv        the journal of judgements, until the table of judgements is written
+//! verdicts.csv             the table of all judgements
+//! stability.part.csv       the journal of judgements of a campaign whose table has none
+//! stability.csv            the table of these judgements
 //! part-00000.parquet …     whole parts
-//! part-00000.parquet.sha256 …  what each of them must be
-//! runs.parquet             the table; the parts go when it is there
+//! part-00000.parquet.sha256 …  the digest of each part
+//! runs.parquet             the table; the parts are removed once the table is written
 //! ```
 //!
-//! Workers that do shards of it at the same time, on any machines, have files of their own besides, and no two of them write the same file:
+//! Workers may do shards of the campaign at the same time, on any machines. Each worker has files of its own, and no two workers write the same file:
 //!
 //! ```text
-//! shard-3-of-8.lock                      as long as a worker works on that shard
-//! worker-WORKER.log                      what it did
-//! verdicts.WORKER.part.csv               judgements that it made
-//! part-00000.parquet.WORKER.partial …    what it is writing
+//! shard-3-of-8.lock                      held while a worker works on that shard
+//! worker-WORKER.log                      log of the worker
+//! verdicts.WORKER.part.csv               journal of the worker's judgements
+//! part-00000.parquet.WORKER.partial …    file being written by the worker
 //! ```
 
 mod digest;
@@ -41,41 +41,43 @@ pub(crate) use manifest::Manifest;
 use digest::DIGEST;
 
 pub(crate) const MANIFEST: &str = "campaign.json";
-/// How the names of files of judgements end as they are made.
+/// End of the names of journals.
 const JOURNAL: &str = "part.csv";
 
-/// A folder that this process works on, as long as this value lives.
+/// A folder on which this process works, as long as the value lives.
 #[derive(Debug)]
 pub(crate) struct Folder {
     path: PathBuf,
-    /// As long as it works there alone; `None` if workers share the folder.
+    /// Lock of a process working alone; `None` if workers share the folder.
     lock: Option<Lock>,
-    /// Whether it was made for this campaign.
+    /// Whether the folder was created for this campaign.
     is_new: bool,
 }
 
 impl Folder {
-    /// Whether there is a campaign in a folder, looked at without changing anything.
+    /// Returns `true` if the folder holds a campaign, and changes nothing.
     ///
     /// # Errors
     ///
-    /// If something else is there: a file, or a folder with files of others.
+    /// [`CampaignError::NoFolder`] if the path is a file, [`CampaignError::Foreign`] if the folder holds foreign files.
     pub(crate) fn has_campaign(path: &Path) -> Result<bool, CampaignError> {
         let unreadable = |error| CampaignError::File { verb: "read", path: path.to_path_buf(), error };
         match std::fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => {}
             Ok(_) => return Err(CampaignError::NoFolder { path: path.to_path_buf() }),
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+            // A parent of the path is a file.
             Err(error) if error.kind() == io::ErrorKind::NotADirectory => return Err(CampaignError::NoFolder { path: path.to_path_buf() }),
             Err(error) => return Err(unreadable(error)),
         }
+        // Sorted, so that the error names the same file on every system.
         let mut others = BTreeSet::new();
         for entry in std::fs::read_dir(path).map_err(unreadable)? {
             let name = entry.map_err(unreadable)?.file_name();
             if name == MANIFEST {
                 return Ok(true);
             }
-            // What a campaign leaves that was killed before it had a manifest.
+            // A campaign killed before its manifest was written leaves such files.
             if name != FOLDER_LOCK && !is_partial(Path::new(&name)) && !is_of_shards(&name) {
                 others.insert(name);
             }
@@ -86,7 +88,7 @@ impl Folder {
         }
     }
 
-    /// Makes the folder if there is none, and locks it.
+    /// Creates the folder if necessary, and locks it for this process.
     pub(crate) fn take(path: &Path) -> Result<Self, CampaignError> {
         let is_new = !path.exists();
         std::fs::create_dir_all(path).map_err(|error| CampaignError::File { verb: "make the folder", path: path.to_path_buf(), error })?;
@@ -98,19 +100,19 @@ impl Folder {
         }
     }
 
-    /// Makes the folder if there is none, for work that other processes do at the same time.
+    /// Creates the folder if necessary, for work shared with other processes.
     pub(crate) fn share(path: &Path) -> Result<Self, CampaignError> {
         let is_new = !path.exists();
         std::fs::create_dir_all(path).map_err(|error| CampaignError::File { verb: "make the folder", path: path.to_path_buf(), error })?;
         Ok(Self { path: path.to_path_buf(), lock: None, is_new })
     }
 
-    /// That no process works on the folder alone, as far as this machine and its file system know.
+    /// Checks that no process has locked the folder for itself, as far as this machine and its file system know.
     pub(crate) fn is_shared(&self) -> Result<(), CampaignError> {
         if Lock::is_held(&self.path.join(FOLDER_LOCK)) { Err(CampaignError::Busy { path: self.path.clone() }) } else { Ok(()) }
     }
 
-    /// That no worker does a shard here.
+    /// Checks that no worker does a shard in the folder.
     pub(crate) fn has_no_shards(&self) -> Result<(), CampaignError> {
         let held = cohaptic_files::leases(&self.path, &Owner::here(0), is_lease);
         let held = held.map_err(|error| CampaignError::File { verb: "read", path: self.path.clone(), error })?;
@@ -120,12 +122,12 @@ impl Folder {
         Err(CampaignError::Shards { path: self.path.clone(), worker, shard, age_s: holder.age.as_secs() })
     }
 
-    /// Leaves nothing behind where nothing could be written.
+    /// Gives the folder back after nothing could be written, and removes the folder if it was created for this campaign.
     pub(crate) fn give_up(self) {
         let Self { path, lock, is_new } = self;
         drop(lock);
         if is_new {
-            // Unless somebody else has put something there by now.
+            // Another process may have written to the folder by now. Then the removal fails, as it should.
             let _ = std::fs::remove_dir(path);
         }
     }
@@ -134,27 +136,27 @@ impl Folder {
         &self.path
     }
 
-    /// The file that says what the campaign is.
+    /// Returns the path of the manifest.
     pub(crate) fn manifest(&self) -> PathBuf {
         self.path.join(MANIFEST)
     }
 
-    /// The table.
+    /// Returns the path of the table.
     pub(crate) fn table(&self, format: Format) -> PathBuf {
         self.path.join(format!("runs.{}", format.name()))
     }
 
-    /// All judgements.
+    /// Returns the path of the table of judgements.
     pub(crate) fn verdicts(&self) -> PathBuf {
         self.path.join("verdicts.csv")
     }
 
-    /// All judgements of a campaign whose table has none.
+    /// Returns the path of the table of judgements made apart from the table of runs.
     pub(crate) fn stability(&self) -> PathBuf {
         self.path.join("stability.csv")
     }
 
-    /// The file of judgements as they are made, before they are all in the table of that name: each worker has its own.
+    /// Returns the path of the journal for the table `judgements`. Each worker has a journal of its own.
     pub(crate) fn journal(judgements: &Path, worker: Option<&str>) -> PathBuf {
         match worker {
             None => judgements.with_extension(JOURNAL),
@@ -162,13 +164,13 @@ impl Folder {
         }
     }
 
-    /// All such files.
+    /// Returns the paths of all journals for the table `judgements`, sorted.
     pub(crate) fn journals(&self, judgements: &Path) -> Result<Vec<PathBuf>, CampaignError> {
         let begin = judgements.file_stem().map(|stem| format!("{}.", stem.to_string_lossy())).unwrap_or_default();
         self.named(|name| name.starts_with(&begin) && name.ends_with(&format!(".{JOURNAL}")))
     }
 
-    /// Which parts are there by their names, each with its digest or without. Whether their bytes are those that were written is not looked at.
+    /// Returns the parts present by name, with or without a digest. The bytes are not read.
     pub(crate) fn parts(&self, format: Format) -> Result<BTreeSet<u64>, CampaignError> {
         let end = format!(".{}", format.name());
         let mut parts = BTreeSet::new();
@@ -176,7 +178,7 @@ impl Folder {
         Ok(parts)
     }
 
-    /// Of [`Folder::parts`], those with a digest.
+    /// Returns the parts of [`Folder::parts`] with a digest.
     pub(crate) fn parts_with_digests(&self, format: Format) -> Result<BTreeSet<u64>, CampaignError> {
         let end = format!(".{}{DIGEST}", format.name());
         let (mut digests, parts) = (BTreeSet::new(), self.parts(format)?);
@@ -185,7 +187,7 @@ impl Folder {
         Ok(digests)
     }
 
-    /// The files with such names, sorted.
+    /// Returns the paths of the files with names accepted by `is_meant`, sorted.
     fn named(&self, is_meant: impl Fn(&str) -> bool) -> Result<Vec<PathBuf>, CampaignError> {
         let mut found = Vec::new();
         self.each(|name| found.extend(is_meant(name).then(|| self.path.join(name))))?;
@@ -193,7 +195,7 @@ impl Folder {
         Ok(found)
     }
 
-    /// Takes the names of all files.
+    /// Calls `take` with the name of every file.
     fn each(&self, mut take: impl FnMut(&str)) -> Result<(), CampaignError> {
         let unreadable = |error| CampaignError::File { verb: "read", path: self.path.clone(), error };
         for entry in std::fs::read_dir(&self.path).map_err(unreadable)? {
@@ -207,17 +209,17 @@ impl Folder {
         self.path.join(format!("part-{part:05}.{}", format.name()))
     }
 
-    /// Removes what was being written when a campaign was killed.
+    /// Removes the partial files of a killed process.
     pub(crate) fn sweep(&self) -> Result<(), CampaignError> {
         self.named(|name| is_partial(Path::new(name)))?.into_iter().try_for_each(remove)
     }
 
-    /// Removes the judgements as they were made, which are all in their table.
+    /// Removes the journals of the table `judgements`, once the table holds all judgements.
     pub(crate) fn remove_journals(&self, judgements: &Path) -> Result<(), CampaignError> {
         self.journals(judgements)?.into_iter().try_for_each(remove)
     }
 
-    /// Removes what workers leave that are at work no more.
+    /// Removes the leases and logs of finished workers. Nothing is removed while a worker is active.
     pub(crate) fn remove_traces_of_shards(&self) -> Result<(), CampaignError> {
         if self.has_no_shards().is_err() {
             return Ok(());
@@ -225,7 +227,7 @@ impl Folder {
         self.named(|name| is_of_shards(name.as_ref()))?.into_iter().try_for_each(remove)
     }
 
-    /// Removes the parts, which are all in the table, and their digests.
+    /// Removes the parts, now contained in the table, and their digests.
     pub(crate) fn remove_parts(&self, parts: u64, format: Format) -> Result<(), CampaignError> {
         for part in 0..parts {
             let path = self.part(part, format);
@@ -236,24 +238,24 @@ impl Folder {
     }
 }
 
-/// The number of the part that a name with this end has.
+/// Returns the number of the part with this name; `None` for other names. `end`: end of the names of parts.
 fn number(name: &str, end: &str) -> Option<u64> {
     name.strip_prefix("part-")?.strip_suffix(end)?.parse().ok()
 }
 
-/// Whether a file of a campaign was being written: `campaign.json.partial`, `part-….partial`, `runs.….partial`, `verdicts.csv.partial`.
+/// Returns `true` for a partial file of a campaign: `campaign.json.partial`, `part-….partial`, `runs.….partial`, `verdicts.csv.partial`.
 fn is_partial(path: &Path) -> bool {
     const BEGINS: [&str; 7] = ["campaign.", "part-", "runs.", "verdicts.", "stability.", "shard-", "leases."];
     let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
     name.ends_with(PARTIAL) && BEGINS.iter().any(|begin| name.starts_with(begin))
 }
 
-/// Whether a file says what a worker does or did.
+/// Returns `true` for the leases and logs of workers.
 fn is_of_shards(name: &OsStr) -> bool {
     name.to_str().is_some_and(|name| is_lease(name) || is_log(name))
 }
 
-/// Removes a file if it is there.
+/// Removes a file. An absent file is no error.
 fn remove(path: PathBuf) -> Result<(), CampaignError> {
     match std::fs::remove_file(&path) {
         Ok(()) => Ok(()),

@@ -1,17 +1,17 @@
-//! Which combinations are run, where a campaign leaves out those that are refused.
+//! The accepted combinations of a campaign which leaves out refused combinations.
 
 use std::collections::BTreeMap;
 
-/// Combinations that are left out, with the reason of each.
+/// Left out combinations, each with the reason of its refusal.
 pub type Refused = BTreeMap<u64, String>;
 
-/// The combinations that are run. Runs are counted from 0 without gaps here; the number of a run in the table counts those of refused combinations too, so
-/// that it says which combination and which seed it is.
+/// The accepted combinations. A *place* counts the accepted runs from 0 without gaps. A *number*, the identity of a run in the table, also counts the runs of
+/// refused combinations, and so gives combination and seed.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Accepted {
     of_each: u64,
     count: u64,
-    /// In order.
+    /// Refused combinations in rising order.
     refused: Vec<u64>,
 }
 
@@ -21,20 +21,21 @@ impl Accepted {
         Self { of_each, count: combinations - refused.len() as u64, refused }
     }
 
-    /// How many runs a combination has.
+    /// Returns the number of runs per combination.
     pub(crate) const fn of_each(&self) -> u64 {
         self.of_each
     }
 
-    /// How many runs there are.
+    /// Returns the number of runs of all accepted combinations.
     pub(crate) const fn runs(&self) -> u64 {
         self.count * self.of_each
     }
 
-    /// The combination of the run in that place, and which of its runs it is.
+    /// Returns the combination of the run at a place, and the index of the run within the combination.
     pub(crate) fn run(&self, place: u64) -> (u64, u64) {
         let number = place / self.of_each;
-        // Before the i-th refused combination c there are c − i that are run.
+        // Before the i-th refused combination c there are c − i accepted combinations, a number which never falls with i. The search finds the count of refused
+        // combinations before the wanted accepted combination.
         let (mut low, mut high) = (0, self.refused.len());
         while low < high {
             let middle = usize::midpoint(low, high);
@@ -43,7 +44,7 @@ impl Accepted {
         (number + low as u64, place % self.of_each)
     }
 
-    /// The number in the table of the run in that place.
+    /// Returns the number, in the table, of the run at a place.
     pub(crate) fn number(&self, place: u64) -> u64 {
         let (combination, of_it) = self.run(place);
         combination * self.of_each + of_it

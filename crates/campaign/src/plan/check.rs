@@ -1,4 +1,4 @@
-//! Reads the scene of every combination before anything runs; and what tells the scenes of a campaign from others.
+//! Reads the scene of every combination before the first run, and computes the fingerprint of a campaign's scenes.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,39 +11,40 @@ use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::table::Roster;
 
-/// The number of combinations that are checked between two looks at whether to go on.
+/// Number of combinations checked between two questions to the watch.
 const BLOCK: u64 = 64;
 
-/// What the scenes of a campaign have in common.
+/// Result of the check of all combinations.
 #[derive(Clone, Debug)]
 pub(crate) struct Checked {
     pub(crate) roster: Roster,
-    /// How many events the longest run has, about: ticks and packets.
+    /// Approximate number of events (ticks and packets) of the longest run.
     pub(crate) events: u64,
-    /// The numbers of those scenes that the fingerprint looks at, by combination: to read them a second time would take as long as the check.
+    /// Fingerprints of the scenes covered by the fingerprint of the campaign, by combination. Kept here because reading these scenes again would repeat the
+    /// check.
     pub(crate) numbers: BTreeMap<u64, u64>,
-    /// The combinations that are left out.
+    /// Left out combinations.
     pub(crate) refused: Refused,
 }
 
-/// What a block of combinations comes to.
+/// Result of the check of one block of combinations.
 #[derive(Default)]
 struct Block {
-    /// Their roster, and the events of the longest run; `None` if all of them are left out.
+    /// Roster of the accepted combinations, and number of events of the longest run; `None` if all combinations are left out.
     runs: Option<(Roster, u64)>,
     numbers: BTreeMap<u64, u64>,
     refused: Refused,
 }
 
 impl CampaignPlan {
-    /// Checks every combination, on all threads of the pool that it is called in.
+    /// Checks every combination, on all threads of the current thread pool.
     ///
     /// # Errors
     ///
-    /// Of the first combination that is refused; [`CampaignError::Stopped`] if nobody wanted to know any more.
+    /// The error of the first refused combination; [`CampaignError::Stopped`] if the watch stopped the check.
     pub(crate) fn check(&self, watch: &dyn Watch) -> Result<Checked, CampaignError> {
         let blocks = self.combinations.div_ceil(BLOCK);
-        // Blocks behind one that is refused need not be looked at: the first error is the one that is shown.
+        // Number of the first refused block so far. Later blocks need no check, because only the error of the first refused block is reported.
         let refused = AtomicU64::new(u64::MAX);
         let check = |block: u64| {
             if refused.load(Ordering::Relaxed) < block {
@@ -57,13 +58,15 @@ impl CampaignPlan {
         };
         let checked: Vec<Result<Block, CampaignError>> = (0..blocks).into_par_iter().map(check).collect();
         let mut all = Block::default();
+        // In the order of the blocks: the first error in this order is reported, whatever the number of threads. A block skipped above comes after the refused
+        // block.
         for checked in checked {
             all.join(checked?);
         }
         let Block { runs, numbers, refused } = all;
         match (runs, refused.keys().next()) {
             (Some((roster, events)), _) => Ok(Checked { roster, events, numbers, refused }),
-            // Nothing is left to be run: the first refusal says why.
+            // No combination is left to run. The first refusal gives the reason.
             (None, Some(first)) => Err(self.scene(*first).map_or_else(|error| error, |_| CampaignError::Stopped)),
             (None, None) => Err(CampaignError::Stopped),
         }
@@ -82,6 +85,7 @@ impl CampaignPlan {
                 Some(reason) => drop(all.refused.insert(combination, reason)),
                 None => all.add(Roster::of(&scene), events(&scene)),
             }
+            // The fingerprint also covers left out combinations, since a value may name a file there.
             if self.is_looked_at(combination) {
                 all.numbers.insert(combination, scene.fingerprint().get());
             }
@@ -90,12 +94,13 @@ impl CampaignPlan {
         Ok(all)
     }
 
-    /// The scene of a combination; of one that is left out its scene with the fallback, and why it is left out.
+    /// Returns the scene of a combination. For a left out combination, returns its scene with the fallback, and the reason of the refusal.
     fn scene_or_fallback(&self, combination: u64) -> Result<(Scene, Option<String>), CampaignError> {
         let error = match self.scene(combination) {
             Ok(scene) => return Ok((scene, None)),
             Err(error) => error,
         };
+        // Only a refused scene may be left out. Seeds beyond their range are an error with every strategy.
         let reason = match (&self.fallback, &error) {
             (Some(fallback), CampaignError::Scene { error: refused, .. }) => {
                 let reason = refused.diagnostic().map_or_else(|| refused.to_string(), |diagnostic| diagnostic.message().to_owned());
@@ -127,22 +132,23 @@ impl Block {
     }
 }
 
-/// Ticks of all peers, and packets on all links.
+/// Returns the number of ticks of all peers plus the number of packets on all links.
 fn events(scene: &Scene) -> u64 {
     let count = |period: std::time::Duration| scene.duration.as_nanos() / period.as_nanos().max(1);
     let ticks: u128 = scene.peers.iter().map(|peer| count(peer.clock.tick)).sum();
     let peers = scene.peers.len() as u128;
+    // Every peer sends to every other peer once per update.
     let packets = count(scene.coordination.update) * peers * (peers - 1);
     u64::try_from(ticks + packets).unwrap_or(u64::MAX)
 }
 
 impl CampaignPlan {
-    /// A number for all that the scenes say, and the files that they name. Looked at are those scenes in which every value of every key appears once: whatever file a value names is
-    /// among them. A combination that is left out is looked at with the fallback.
+    /// Returns the fingerprint of the scenes and of the files named by the scenes. The fingerprint covers the scenes in which at most one key differs from its
+    /// first value: every value of every key occurs there, and so does every file named by a value. A left out combination counts with its fallback.
     ///
     /// # Errors
     ///
-    /// If one of these scenes is refused: the first.
+    /// The error of the first of these scenes to be refused.
     pub(crate) fn fingerprint(&self) -> Result<u64, CampaignError> {
         let numbers: Vec<Result<u64, CampaignError>> = self
             .looked_at()
@@ -152,21 +158,22 @@ impl CampaignPlan {
         Ok(all_of(numbers.into_iter().collect::<Result<Vec<u64>, CampaignError>>()?))
     }
 
-    /// The same of scenes that have been read already: the fingerprints of those that are looked at, by combination.
+    /// Returns the same number as [`CampaignPlan::fingerprint`], from scenes read before. `numbers`: fingerprints of the covered scenes, by combination.
     pub(crate) fn fingerprint_of(&self, numbers: &BTreeMap<u64, u64>) -> u64 {
         all_of(self.looked_at().into_iter().filter_map(|combination| numbers.get(&combination).copied()))
     }
 
-    /// Whether the fingerprint looks at a combination: one in which at most one key has another value than its first.
+    /// Returns `true` if the fingerprint covers a combination: at most one key differs from its first value.
     pub(super) fn is_looked_at(&self, combination: u64) -> bool {
         self.places(combination).into_iter().filter(|place| *place > 0).count() <= 1
     }
 
-    /// The combinations that the fingerprint looks at, in its order.
+    /// Returns the combinations covered by the fingerprint, in the order of the fingerprint.
     fn looked_at(&self) -> Vec<u64> {
         let first = vec![0; self.variations.len()];
         let mut combinations = vec![0];
         for (key, vary) in self.variations.iter().enumerate() {
+            // The first combination has the first value of every key. Each further value is combined with the first values of the other keys.
             combinations.extend((1..vary.count()).map(|place| {
                 let mut places = first.clone();
                 places[key] = place;
@@ -177,7 +184,7 @@ impl CampaignPlan {
     }
 }
 
-/// One number for many, in their order.
+/// Returns one number for many, sensitive to their order.
 fn all_of(numbers: impl IntoIterator<Item = u64>) -> u64 {
     Fingerprint::of(numbers.into_iter().map(|number| format!("{number:016x}")).collect::<String>()).get()
 }

@@ -1,4 +1,4 @@
-//! The plan of a campaign: which runs there are, and the scene of each.
+//! The plan of a campaign: the numbering of its runs, and the scene of each run. The plan knows nothing of folders and threads.
 
 mod accepted;
 mod check;
@@ -21,34 +21,34 @@ pub use accepted::Refused;
 pub(crate) use check::Checked;
 pub(crate) use parts::{CHUNK, Parts};
 
-/// The most combinations of values.
+/// Most combinations of values of a plan.
 pub const MOST_COMBINATIONS: u64 = 10_000_000;
 
-/// The most runs of a campaign.
+/// Most runs of a campaign.
 pub const MOST_RUNS: u64 = 1_000_000_000;
 
-/// What a user asks for.
+/// The request of a user, from which a [`CampaignPlan`] is made.
 #[derive(Clone, Debug)]
 pub struct PlanSpec<'a> {
-    /// The text of the scene.
+    /// Text of the scene.
     pub text: &'a str,
-    /// Its file, for messages; its folder is where files that the scene names are looked for.
+    /// File of the scene, for messages. Files named by the scene are searched in the folder of this file.
     pub file: &'a Path,
-    /// Texts `KEY=VALUE` that replace values of the scene in every run.
+    /// Overrides `KEY=VALUE` for every run.
     pub set: &'a [String],
-    /// The keys that are varied; every combination of their values is run, the last key varying fastest.
+    /// Varied keys. Every combination of their values is run; the last key varies fastest.
     pub variations: Vec<Variation>,
-    /// How many runs there are of each combination: with the seed of the scene, with the next one, and so on.
+    /// Number of runs per combination: the first with the seed of the scene, each further run with the next seed.
     pub runs: u64,
-    /// As what the table is written.
+    /// Format of the table.
     pub format: Format,
-    /// How many runs are kept together as a part; `None`: what takes some seconds.
+    /// Number of runs per part; `None` for a size of some seconds of work.
     pub part: Option<u64>,
-    /// The program and its version; another one does not continue the campaign.
+    /// Name and version of the program. Another program does not continue the campaign.
     pub program: &'a str,
 }
 
-/// A campaign as it is asked for: its runs are numbered from 0, combination by combination.
+/// The plan of a campaign, with a checked number of runs. Runs are numbered from 0, combination by combination.
 #[derive(Clone, Debug)]
 pub struct CampaignPlan {
     text: String,
@@ -61,20 +61,22 @@ pub struct CampaignPlan {
     part: Option<u64>,
     program: String,
     verdicts: bool,
-    /// With these overrides on top a combination is accepted that may be left out; `None`: none may.
+    /// Overrides which tell a refusal that may be left out from a fault: a refused combination is left out if its scene is accepted with these overrides on
+    /// top. `None`: no combination may be left out.
     fallback: Option<Vec<String>>,
 }
 
 impl CampaignPlan {
-    /// Puts a plan together. The scene is not read yet.
+    /// Makes a plan, without reading the scene.
     ///
     /// # Errors
     ///
-    /// [`CampaignError`] if a key is varied twice, if there are no runs, too many, or too many combinations, if a part is of no runs, or if seeds are varied
-    /// and counted up.
+    /// [`CampaignError`] if a key is varied twice, if there are no runs, too many runs or too many combinations, if a part has no runs, or if the seed is
+    /// varied and several runs per combination count seeds up.
     pub fn new(asked: PlanSpec<'_>) -> Result<Self, CampaignError> {
         let PlanSpec { text, file, set, variations, runs, format, part, program } = asked;
         for (place, vary) in variations.iter().enumerate() {
+            // Two values for one key would override each other, and the columns would have one name.
             if variations[..place].iter().any(|other| same_key(other.key(), vary.key())) {
                 return Err(CampaignError::SameKey { key: vary.key().to_owned() });
             }
@@ -85,9 +87,11 @@ impl CampaignPlan {
         if part == Some(0) {
             return Err(CampaignError::Size("parts of 0 runs: expected at least 1".to_owned()));
         }
+        // The seeds of the runs count up from the seed of the scene, which a varied seed would contradict.
         if runs > 1 && variations.iter().any(|vary| vary.is_key("scene.seed")) {
             return Err(CampaignError::Seeds { runs });
         }
+        // Both products are checked: a plan with 2⁶⁴ runs must be refused and not wrap around.
         let all = variations.iter().try_fold(1_u64, |all, vary| all.checked_mul(vary.count() as u64));
         let combinations = all.filter(|all| *all <= MOST_COMBINATIONS).ok_or_else(|| {
             let counts: Vec<String> = variations.iter().map(|vary| vary.count().to_string()).collect();
@@ -102,72 +106,73 @@ impl CampaignPlan {
         Ok(Self { text, file, set, variations, runs, combinations, format, part, program, verdicts: false, fallback: None })
     }
 
-    /// The same campaign with a verdict on each combination, which stands in the rows of its runs.
+    /// Adds a verdict on each combination, written in the rows of its runs.
     #[must_use]
     pub fn with_verdicts(self) -> Self {
         Self { verdicts: true, ..self }
     }
 
-    /// The same campaign, in which a combination is left out whose scene is refused and would not be with these overrides on top: what refuses it is then the
-    /// value that they replace. Any other refusal is an error as ever.
+    /// Lets the campaign leave out a combination whose scene is refused, but is accepted with these overrides on top: the cause of the refusal is then the
+    /// value replaced by the overrides. Every other refusal stays an error.
     #[must_use]
     pub fn leaving_out(self, fallback: Vec<String>) -> Self {
         Self { fallback: Some(fallback), ..self }
     }
 
-    /// The file of the scene.
+    /// Returns the file of the scene.
     pub(crate) fn file(&self) -> &Path {
         &self.file
     }
 
-    /// Whether each combination is judged.
+    /// Returns `true` if each combination is judged.
     #[must_use]
     pub const fn has_verdicts(&self) -> bool {
         self.verdicts
     }
 
-    /// How many combinations of values there are; 1 if nothing is varied.
+    /// Returns the number of combinations; 1 if nothing is varied.
     #[must_use]
     pub const fn combinations(&self) -> u64 {
         self.combinations
     }
 
-    /// How many runs there are of each combination.
+    /// Returns the number of runs per combination.
     #[must_use]
     pub const fn runs_of_each(&self) -> u64 {
         self.runs
     }
 
-    /// How many runs there are in all, if no combination is left out.
+    /// Returns the number of all runs, including the runs of left out combinations.
     #[must_use]
     pub const fn runs(&self) -> u64 {
         self.combinations * self.runs
     }
 
-    /// The keys that are varied.
+    /// Returns the varied keys.
     #[must_use]
     pub fn variations(&self) -> &[Variation] {
         &self.variations
     }
 
-    /// What a combination puts into the scene, on top of the overrides of all runs: texts `KEY=VALUE`.
+    /// Returns the overrides of a combination, as texts `KEY=VALUE`. They come on top of the overrides of all runs.
     #[must_use]
     pub fn varied(&self, combination: u64) -> Vec<String> {
         self.places(combination).into_iter().zip(&self.variations).flat_map(|(place, vary)| vary.overrides(place)).collect()
     }
 
-    /// The values of a combination, for the table.
+    /// Returns the values of a combination for the table, indexed by key.
     pub(crate) fn values(&self, combination: u64) -> impl Iterator<Item = &Varied> {
         self.places(combination).into_iter().zip(&self.variations).map(|(place, vary)| &vary.values()[place])
     }
 
-    /// Which value of each key a combination has.
+    /// Returns, for each key, the index of its value in a combination.
     #[must_use]
     pub fn places(&self, combination: u64) -> Vec<usize> {
         let mut left = combination;
         let mut places: Vec<usize> = self
             .variations
             .iter()
+            // The combination is a number in a mixed base. The last key is the lowest digit, so the digits come out in reverse order.
             .rev()
             .map(|vary| {
                 let count = vary.count() as u64;
@@ -180,22 +185,23 @@ impl CampaignPlan {
         places
     }
 
-    /// The combination with these places.
+    /// Returns the combination with these indices of values, the inverse of [`CampaignPlan::places`].
     #[must_use]
     pub fn combination(&self, places: &[usize]) -> u64 {
         places.iter().zip(&self.variations).fold(0, |combination, (place, vary)| combination * vary.count() as u64 + *place as u64)
     }
 
-    /// The scene of a combination. Its seed is that of the first of its runs.
+    /// Returns the scene of a combination, with the seed of its first run.
     ///
     /// # Errors
     ///
-    /// [`CampaignError::Scene`] if the scene is refused with these values or too large, [`CampaignError::NotRun`] if its seeds leave their range.
+    /// [`CampaignError::Scene`] if the scene is refused with these values or too large, [`CampaignError::NotRun`] if the seeds of its runs leave the range of
+    /// seeds.
     pub fn scene(&self, combination: u64) -> Result<Scene, CampaignError> {
         self.scene_with(combination, &[])
     }
 
-    /// The scene of a combination with more overrides on top.
+    /// Returns the scene of a combination with further overrides on top.
     fn scene_with(&self, combination: u64, more: &[String]) -> Result<Scene, CampaignError> {
         let varied = self.varied(combination);
         let overrides: Vec<String> = self.set.iter().chain(&varied).chain(more).cloned().collect();
@@ -203,11 +209,12 @@ impl CampaignPlan {
             Ok(scene) => scene,
             Err(error) => return Err(CampaignError::Scene { error: Box::new(error), varied }),
         };
+        // The size is checked here, so that a too large scene is refused before the first run.
         if let Some(TooLarge { peer, reason }) = too_large(&scene, Model::Least, Measures::of(&scene).is_some()) {
             let error = Box::new(at_peer(&self.text, &self.file, &overrides, peer, &reason));
             return Err(CampaignError::Scene { error, varied });
         }
-        // Seeds are at most what a scene file may say, so that every run can be repeated alone.
+        // A scene file can state seeds up to this one. A larger seed could not be repeated as a single run.
         let most = i64::MAX.unsigned_abs();
         if scene.seed > most - (self.runs - 1) {
             let message = format!(
@@ -235,7 +242,7 @@ impl CampaignPlan {
         &self.set
     }
 
-    /// Whether combinations may be left out.
+    /// Returns `true` if combinations may be left out.
     pub(crate) const fn may_leave_out(&self) -> bool {
         self.fallback.is_some()
     }

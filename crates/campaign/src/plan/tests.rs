@@ -34,16 +34,16 @@ fn parts(runs: u64, events: u64, columns: usize, part: Option<u64>) -> Parts {
 
 #[test]
 fn a_part_takes_some_seconds_and_there_are_about_a_thousand_at_most() {
-    // 2·10⁸ events by 20,000 a run.
+    // 2·10⁸ events, by 20,000 events per run.
     assert_eq!(parts(100_000, 20_000, 40, None).size, 10_000);
-    // Short runs: at most 16,384. Runs of a day: one chunk, until a thousand parts are more than that.
+    // Short runs reach the bound of 16,384. Runs of a day get one chunk per part, until a thousand parts need more.
     assert_eq!(parts(1_000_000, 100, 40, None).size, 16_384);
     assert_eq!(parts(1000, u64::MAX, 40, None).size, CHUNK);
     assert_eq!(parts(1_000_000, u64::MAX, 40, None).size, 1000);
-    // A table of 4000 columns has 25 parts rather than a thousand, but none that would fill the memory.
+    // A table of 4000 columns has 25 parts rather than a thousand, but no part may fill the memory.
     assert_eq!(parts(10_000, u64::MAX, 4000, None).size, 400);
     assert_eq!(parts(1_000_000, u64::MAX, 4000, None).size, 2000);
-    // PlanSpec for, it is what was asked for.
+    // A size chosen by the user is kept.
     assert_eq!(parts(100, 1, 40, Some(7)), Parts { runs: 100, size: 7 });
     for parts in [parts(100, 1, 40, Some(7)), parts(1000, 50_000_000, 40, None), parts(8, u64::MAX, 40, None), parts(1, 1, 1, None)] {
         let ranges: Vec<u64> = (0..parts.count()).flat_map(|part| parts.range(part)).collect();
@@ -60,7 +60,7 @@ const SCENE: &str = r#"
     link = { delay = "24ms", jitter = "2ms", loss = "10%" }
 "#;
 
-/// Seeds are written into scenes that were read: that must be all that a seed in the text does.
+/// The campaign sets the seed of a scene after reading. A seed in the text must have no further effect.
 #[test]
 fn a_seed_that_is_written_is_a_seed_that_is_read() {
     for links in [
@@ -90,7 +90,7 @@ fn the_fingerprint_is_that_of_what_the_scenes_say_and_not_of_where_they_are() {
     assert_ne!(first, number(text, "a.toml", "object.mass=1,3"));
 }
 
-/// A campaign that begins takes it from the scenes that it checks; one that goes on reads those anew.
+/// A new campaign takes the fingerprint from the check; a continued campaign reads the scenes again.
 #[test]
 fn the_fingerprint_of_the_check_is_that_of_the_scenes() {
     for vary in [&[][..], &["object.mass=1..2/70"], &["object.mass=1,2,3", "link.delay=20ms,24ms", "coordination.stiffness=500..1000/13"]] {

@@ -1,4 +1,4 @@
-//! Which columns the table of a campaign has, and the peers, axes and lines that decide about them.
+//! The columns of the table, and the roster of peers, axes and lines on which the columns depend.
 
 use std::collections::BTreeSet;
 
@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use super::{Column, Kind};
 use crate::vary::Variation;
 
-/// The letters of the axes.
+/// Names of the axes, indexed by axis.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// The columns, in the order in which [`row`](super::row()) fills them.
+/// Returns the columns, in the order in which [`row`](super::row()) fills a row.
 pub(crate) fn columns(variations: &[Variation], verdicts: bool, roster: &Roster) -> Vec<Column> {
     let column = |name: String, kind: Kind, optional: bool| Column { name, kind, optional };
     let always = |name: &str, kind: Kind| column(name.to_owned(), kind, false);
@@ -33,6 +33,7 @@ pub(crate) fn columns(variations: &[Variation], verdicts: bool, roster: &Roster)
     for (place, peer) in roster.peers.iter().enumerate() {
         for (quantity, unit) in [("position", "m"), ("velocity", "m_s")] {
             for (axis, letter) in AXES.iter().enumerate().take(roster.axes) {
+                // A peer or an axis missing in some run makes the column optional.
                 let optional = place >= roster.always || axis >= roster.fewest_axes;
                 columns.push(column(format!("peers.{peer}.{quantity}_{letter}_{unit}"), Kind::Number, optional));
             }
@@ -48,7 +49,7 @@ pub(crate) fn columns(variations: &[Variation], verdicts: bool, roster: &Roster)
     columns
 }
 
-/// What links did in all.
+/// Adds the columns of the counters of all links (`of` is `links`) or of all access lines (`access`).
 fn counters(of: &str, columns: &mut Vec<Column>) {
     let causes = DropCause::ALL.into_iter().map(|cause| format!("dropped_{}", cause.name().replace('-', "_")));
     let names = ["offered", "duplicated", "delivered"].map(str::to_owned).into_iter().chain(causes);
@@ -57,24 +58,24 @@ fn counters(of: &str, columns: &mut Vec<Column>) {
     columns.push(Column { name: format!("{of}.mean_delay_s"), kind: Kind::Number, optional: true });
 }
 
-/// Everybody who takes part in any run. Runs need not have the same peers: a peer that is missing in a run has nothing in its columns.
+/// Union of the peers, axes, lines and measures of all runs. A peer absent from a run has no values in that run's row.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Roster {
-    /// Their names, in the order in which they first appear.
+    /// Names of the peers, in the order of first appearance.
     pub(crate) peers: Vec<String>,
-    /// How many of the first of them are in every run.
+    /// Number of leading `peers` present in every run.
     pub(crate) always: usize,
-    /// The most axes of a run.
+    /// Largest number of axes of a run.
     pub(crate) axes: usize,
-    /// The fewest axes of a run.
+    /// Smallest number of axes of a run.
     pub(crate) fewest_axes: usize,
-    /// Whether any run has a line that a peer sends or receives through.
+    /// Whether any run has an access line, through which a peer sends or receives.
     pub(crate) access_lines: bool,
     /// Whether the object turns in any run.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(crate) turns: bool,
-    /// The names of all measures of any run.
+    /// Names of the measures of all runs.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub(crate) measures: BTreeSet<String>,
 }
@@ -88,7 +89,8 @@ impl Roster {
         Self { always: peers.len(), peers, axes, fewest_axes: axes, access_lines, turns: scene.rotation.is_some(), measures }
     }
 
-    /// The measures in the order of their columns: which one, the place of its peer in the roster, and its name.
+    /// Returns the measures in the order of their columns: the measure, the index of its peer in `peers` (`None` for a measure of the run), and the name of the
+    /// column.
     pub(crate) fn measures(&self) -> impl Iterator<Item = (Measure, Option<usize>, String)> {
         let of = |measure: Measure| -> Vec<(Option<usize>, String)> {
             match measure.scope() {
@@ -100,10 +102,12 @@ impl Roster {
         all.filter(|(_, _, name)| self.measures.contains(name))
     }
 
-    /// Takes in what another run has.
+    /// Extends the roster by the roster of another run.
     pub(crate) fn add(&mut self, other: &Self) {
         let same = self.peers.iter().zip(&other.peers).take_while(|(one, other)| one == other).count();
+        // Only the common leading peers are certain to be in every run at the same place.
         self.always = self.always.min(other.always).min(same);
+        // A set only for the lookup. The order of `peers` stays the order of appearance.
         if same < other.peers.len() {
             let known: BTreeSet<&String> = self.peers.iter().collect();
             let new: Vec<String> = other.peers[same..].iter().filter(|name| !known.contains(name)).cloned().collect();

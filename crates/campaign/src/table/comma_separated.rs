@@ -1,4 +1,4 @@
-//! Comma-separated values.
+//! The table as comma-separated values.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write};
@@ -17,7 +17,7 @@ pub(super) fn write(to: &mut impl Write, columns: &[Column], rows: &[Row]) -> io
     to.flush()
 }
 
-/// A value as it stands in a table of text.
+/// Returns a value as a cell of text; empty for no value.
 pub(crate) fn text(value: &Value) -> String {
     match value {
         Value::Absent => String::new(),
@@ -27,7 +27,7 @@ pub(crate) fn text(value: &Value) -> String {
     }
 }
 
-/// A number with the fewest digits that read back the same.
+/// Returns a number with the fewest digits that read back as the same `f64`.
 pub(crate) fn number_text(number: f64) -> String {
     format!("{number:?}")
 }
@@ -52,9 +52,9 @@ pub(super) fn merge(to: &mut WholeFile, columns: &[Column], parts: impl Iterator
     let mut buffer = vec![0; 1 << 16];
     for part in parts {
         let OpenPart { path, mut file, .. } = part?;
-        // Each part has the header of the table: the digest of the part names the campaign.
+        // Each part begins with the header of the table, as the checked digest ties the part to this campaign. The header is copied once only.
         file.seek(SeekFrom::Start(header.len() as u64))?;
-        // Not io::copy, which does not say on which side it failed.
+        // `io::copy` does not tell a fault in reading from a fault in writing. A fault in reading must name the part.
         loop {
             let read = file.read(&mut buffer).map_err(|error| TableError::of_part(&path)(error.into()))?;
             if read == 0 {
@@ -84,7 +84,7 @@ pub(super) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> 
     Ok(())
 }
 
-/// Columns of numbers, and which runs were complete.
+/// Reads columns of numbers, and which runs came to their end. An empty cell is read as NaN.
 pub(super) fn read_columns(file: File, names: &[&str]) -> Result<RunColumns, TableError> {
     let mut reader = csv::Reader::from_reader(BufReader::new(file));
     let header = reader.headers().map_err(unread)?;

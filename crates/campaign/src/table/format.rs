@@ -1,4 +1,4 @@
-//! A table as a file in either format: its head, the figures that sum a run up, and the failure to write or read it.
+//! The two formats of a table's file, and the types shared by both: head, open parts, figures read back, errors.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -8,18 +8,18 @@ use cohaptic_files::WholeFile;
 
 use super::{Column, Row, comma_separated, parquet_file};
 
-/// As what the table is written.
+/// Format of the table's file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Format {
-    /// Apache Parquet without compression, a row group for each part.
+    /// Apache Parquet without compression, one row group per part.
     #[default]
     Parquet,
-    /// Comma-separated values with a header (RFC 4180, lines end in a line feed), numbers with the fewest digits that read back as the same `f64`.
+    /// Comma-separated values with a header (RFC 4180, lines end in a line feed). Numbers have the fewest digits that read back as the same `f64`.
     Csv,
 }
 
 impl Format {
-    /// `parquet` or `csv`, which is also how names of files end.
+    /// Returns `parquet` or `csv`, which is also the extension of the file.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -28,7 +28,7 @@ impl Format {
         }
     }
 
-    /// A table of its own with these rows.
+    /// Writes a file with these rows: a part.
     pub(crate) fn write(self, to: &mut (impl Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::write(to, head, rows),
@@ -36,7 +36,7 @@ impl Format {
         }
     }
 
-    /// Writes a file with the rows of all parts, in the order of the parts.
+    /// Writes the table with the rows of all parts, in the order of the parts.
     pub(crate) fn merge(
         self,
         file: &mut WholeFile,
@@ -49,7 +49,7 @@ impl Format {
         }
     }
 
-    /// The gist of every row of a file, in order.
+    /// Reads the gist of every row, in order.
     pub(crate) fn read_gists(self, file: File, each: Gists<'_>) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::read_gists(file, each),
@@ -57,7 +57,7 @@ impl Format {
         }
     }
 
-    /// Columns of numbers by their names, and which runs were complete.
+    /// Reads columns of numbers by their names, and which runs came to their end.
     pub(crate) fn read_columns(self, file: File, names: &[&str]) -> Result<RunColumns, TableError> {
         match self {
             Self::Parquet => parquet_file::read_columns(file, names),
@@ -66,60 +66,60 @@ impl Format {
     }
 }
 
-/// A part that was checked: its bytes are those that were written.
+/// A part whose bytes match its digest.
 #[derive(Debug)]
 pub(crate) struct OpenPart {
-    /// The name of the file, for messages.
+    /// Path of the part, for messages.
     pub(crate) path: PathBuf,
-    /// The file, at its beginning.
+    /// Open file of the part, positioned at the beginning.
     pub(crate) file: File,
-    /// How many rows the part has.
+    /// Number of rows of the part.
     pub(crate) rows: u64,
 }
 
-/// What goes into every file of a table.
+/// The content of every file of a table apart from the rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Head<'a> {
     pub(crate) columns: &'a [Column],
-    /// What the table belongs to, for formats that have room for it.
+    /// Text of the manifest, stored by formats with a place for it.
     pub(crate) about: &'a str,
-    /// The program that writes it.
+    /// Name and version of the writing program.
     pub(crate) program: &'a str,
 }
 
-/// The figures that sum a run up.
+/// The figures of a run used by the summary. `max_discrepancy` is in metres.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Gist {
     pub(crate) diverged: bool,
     pub(crate) max_discrepancy: f64,
 }
 
-/// Columns of a table, by run.
+/// Columns of a table, each indexed by run.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct RunColumns {
-    /// Whether the run came to its end without [diverging](cohaptic_harness::Summary::has_diverged).
+    /// Whether the run came to its end without [diverging](cohaptic_harness::Summary::has_diverged), indexed by run.
     pub(crate) complete: Vec<bool>,
-    /// The columns in the order in which they were asked for; no number where a run has none.
+    /// Requested columns, in the requested order; NaN for a run without a value.
     pub(crate) columns: Vec<Vec<f64>>,
 }
 
 impl RunColumns {
-    /// Empty columns.
+    /// Returns this number of empty columns.
     pub(super) fn of(columns: usize) -> Self {
         Self { complete: Vec::new(), columns: vec![Vec::new(); columns] }
     }
 }
 
-/// What the column `ending` says of a run that came to its end.
+/// Value of the column `ending` for a run without divergence which came to its end.
 pub(super) const COMPLETE: &str = "complete";
 
-/// What the column `ending` says of a run that diverged.
+/// Value of the column `ending` for a diverged run.
 pub(super) const DIVERGED: &str = "diverged";
 
-/// The names of the columns that a [`Gist`] comes from.
+/// Names of the columns of a [`Gist`].
 pub(super) const GIST: [&str; 2] = ["ending", "max_discrepancy_m"];
 
-/// Takes the gist of each row, in order.
+/// Receiver of the gists, called once per row, in order.
 pub(crate) type Gists<'a> = &'a mut dyn FnMut(Gist);
 
 /// Why a table cannot be written or read.
@@ -127,10 +127,10 @@ pub(crate) type Gists<'a> = &'a mut dyn FnMut(Gist);
 pub(crate) enum TableError {
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// The content of a file is not the content that was written.
+    /// The content of a file is not as it was written.
     #[error("{0}")]
     Content(String),
-    /// Of the parts that are put together, this one cannot be read.
+    /// A part cannot be read during the merge.
     #[error("{}: {error}", path.display())]
     Part { path: PathBuf, error: Box<Self> },
 }
@@ -141,7 +141,7 @@ impl TableError {
     }
 }
 
-/// What to say of a file with another number of rows than were written.
+/// Returns the error for a file with `found` rows in place of `expected` rows.
 pub(super) fn rows_missing(found: u64, expected: u64) -> TableError {
     TableError::Content(format!("{found} rows: expected {expected}"))
 }

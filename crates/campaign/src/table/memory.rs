@@ -1,14 +1,14 @@
-//! Figures of rows that are in memory, as they are read from a file.
+//! Figures from rows in memory, equal to the figures read from a file with these rows.
 
 use super::format::{COMPLETE, DIVERGED, GIST, Gist, RunColumns};
 use super::{Column, Row, TableError, Value};
 
-/// Returns the place of a column.
+/// Returns the index of a column.
 fn place(columns: &[Column], name: &str) -> Result<usize, TableError> {
     columns.iter().position(|column| column.name == name).ok_or_else(|| TableError::Content(format!("no column {name}")))
 }
 
-/// Returns the word in a cell of text; empty in other cells.
+/// Returns the text of a cell; empty for other types.
 fn word(row: &Row, place: usize) -> &str {
     match row.get(place) {
         Some(Value::Text(text)) => text,
@@ -16,7 +16,7 @@ fn word(row: &Row, place: usize) -> &str {
     }
 }
 
-/// Returns the number in a cell; NaN where there is none.
+/// Returns the number in a cell; NaN for other types.
 fn number(row: &Row, place: usize) -> f64 {
     match row.get(place) {
         Some(Value::Number(number)) => *number,
@@ -24,21 +24,21 @@ fn number(row: &Row, place: usize) -> f64 {
     }
 }
 
-/// Returns the gist of each row.
+/// Returns the gist of each row, in order.
 ///
 /// # Errors
 ///
-/// [`TableError::Content`] if the columns are not those of a campaign.
+/// [`TableError::Content`] if a column of the gist is missing.
 pub(crate) fn gists<'a>(columns: &[Column], rows: &'a [Row]) -> Result<impl Iterator<Item = Gist> + use<'a>, TableError> {
     let [ending, discrepancy] = [place(columns, GIST[0])?, place(columns, GIST[1])?];
     Ok(rows.iter().map(move |row| Gist { diverged: word(row, ending) == DIVERGED, max_discrepancy: number(row, discrepancy) }))
 }
 
-/// Returns columns of numbers by their names, and which runs were complete.
+/// Returns columns of numbers by their names, and which runs came to their end.
 ///
 /// # Errors
 ///
-/// [`TableError::Content`] if there is no such column.
+/// [`TableError::Content`] if a column is missing.
 pub(crate) fn run_columns(columns: &[Column], rows: &[Row], names: &[&str]) -> Result<RunColumns, TableError> {
     let ending = place(columns, GIST[0])?;
     let places = names.iter().map(|name| place(columns, name)).collect::<Result<Vec<usize>, TableError>>()?;

@@ -1,4 +1,4 @@
-//! The table of a campaign: a row for each run, columns of integers, numbers and text.
+//! The table of a campaign: one row per run, with columns of integers, numbers and text. A table is written as Parquet or as comma-separated values.
 
 mod columns;
 mod comma_separated;
@@ -16,40 +16,40 @@ pub(crate) use format::{Gist, Head, OpenPart, RunColumns, TableError};
 pub(crate) use memory::{gists, run_columns};
 pub(crate) use row::{RunId, row};
 
-/// What a column holds.
+/// Type of the values of a column.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// `i64`.
+    /// Integers, `i64`.
     Integer,
-    /// `f64`.
+    /// Numbers, `f64`.
     Number,
-    /// UTF-8.
+    /// Text, UTF-8.
     Text,
 }
 
-/// One value of a row.
+/// A value of a row.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Value {
-    /// There is none: a peer that this run does not have, a mean of nothing.
+    /// No value: a peer absent from this run, or a mean of nothing.
     Absent,
-    /// In a column of integers.
+    /// A value of an integer column.
     Integer(i64),
-    /// In a column of numbers; it may be infinite or no number in a run that diverged.
+    /// A value of a number column; may be infinite or NaN in a diverged run.
     Number(f64),
-    /// In a column of text.
+    /// A value of a text column.
     Text(Arc<str>),
 }
 
-/// A column.
+/// A column of the table.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Column {
-    /// Its name, which ends in the unit if it has one.
+    /// Name of the column. The name ends in the unit, if there is a unit.
     pub name: String,
-    /// What it holds.
+    /// Type of the values.
     pub kind: Kind,
-    /// Whether a row may have nothing here.
+    /// Whether a row may have [`Value::Absent`] here.
     pub optional: bool,
 }
 
-/// One value for each column.
+/// The values of a run, indexed by column.
 pub type Row = Vec<Value>;

@@ -1,4 +1,4 @@
-//! What a run comes to, as a row.
+//! The row of a finished run.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use super::{Roster, Row, Value};
 use crate::vary::Varied;
 use crate::verdicts::Judgement;
 
-/// Which run it is.
+/// Identity of a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RunId {
     pub(crate) run: u64,
@@ -21,7 +21,7 @@ pub(crate) struct RunId {
     pub(crate) seed: u64,
 }
 
-/// A value for each of [`columns`](super::columns()).
+/// Returns the row of a run, indexed like [`columns`](super::columns()). `judgement` is `None` for a plan without verdicts.
 pub(crate) fn row<'a>(
     place: RunId,
     varied: impl Iterator<Item = &'a Varied>,
@@ -31,12 +31,14 @@ pub(crate) fn row<'a>(
 ) -> Row {
     let mut row = vec![integer(place.run), integer(place.combination), integer(place.seed)];
     row.extend(varied.map(|varied| varied.value.clone()));
+    // Four columns for a plan with verdicts, also for a refused judgement; none otherwise.
     row.extend(judgement.into_iter().flat_map(|judgement| match judgement.verdict() {
         Some(verdict) => {
             [Value::Text(verdict.word.clone()), Value::Text(verdict.judged.clone()), Value::Number(verdict.radius), Value::Number(verdict.error)]
         }
         None => [const { Value::Absent }; 4],
     }));
+    // `ended_at_s`: the planned duration, or the instant of the early end.
     let ended = match summary.ending {
         Ending::Complete => summary.duration.as_secs_f64(),
         Ending::Diverged(at) | Ending::Interrupted(at) => seconds(at),
@@ -65,7 +67,7 @@ pub(crate) fn row<'a>(
     row.extend(roster.measures().map(|(measure, peer, _)| {
         let peer = peer.map(|place| place_of(summary, place, &roster.peers[place]));
         let value = match peer {
-            // A peer that this run does not have.
+            // The peer is absent from this run.
             Some(None) => None,
             peer => measured.get(&MeasureName { measure, peer: peer.flatten() }).copied().flatten(),
         };
@@ -74,14 +76,15 @@ pub(crate) fn row<'a>(
     row
 }
 
-/// The place of the peer of that name: nearly always that one.
+/// Returns the index of the peer `name` in the summary. Nearly always the index is `place`, its index in the roster, so `place` is tried first.
 fn place_of(summary: &Summary, place: usize, name: &str) -> Option<usize> {
     let here = summary.peers.get(place).is_some_and(|peer| peer.name == name);
     if here { Some(place) } else { summary.peers.iter().position(|peer| peer.name == name) }
 }
 
-/// The counters of links, each with how many have them.
+/// Adds the counters of the links. Each entry of `stats` comes with its number of links.
 fn counters<'a>(row: &mut Row, stats: impl Iterator<Item = (&'a LinkStats, u64)> + Clone) {
+    // The counters are sums over all links; the mean delay is weighted by the delivered packets.
     let mut total = LinkStats::default();
     stats.clone().for_each(|(stats, links)| total.add(stats, links));
     row.extend([total.offered(), total.duplicated(), total.delivered()].map(integer));
@@ -90,11 +93,13 @@ fn counters<'a>(row: &mut Row, stats: impl Iterator<Item = (&'a LinkStats, u64)>
     row.push(mean_delay(stats));
 }
 
-/// Over all packets delivered by any of the links. Each link's mean is rounded down to a nanosecond, so this one is less than two too low.
+/// Returns the mean delay \[s\] over all packets delivered by the links. The mean of each link is rounded down to a nanosecond, so the result is less than two
+/// nanoseconds too low.
 fn mean_delay<'a>(stats: impl Iterator<Item = (&'a LinkStats, u64)>) -> Value {
     let (mut nanos, mut delivered) = (0_u128, 0_u128);
     for (stats, links) in stats {
         if let Some(mean) = stats.mean_delay() {
+            // `u128`: nanoseconds times packets of all links may exceed 64 bits.
             let packets = u128::from(stats.delivered()) * u128::from(links);
             nanos += mean.as_nanos() * packets;
             delivered += packets;

@@ -1,26 +1,27 @@
-//! `LOW..HIGH/COUNT` and `LOW..HIGH/COUNT:log`.
+//! Ranges of values: `LOW..HIGH/COUNT` and `LOW..HIGH/COUNT:log`.
 
 use cohaptic_linkfile::{number_and_unit, text_of_quantity};
 
 use super::{MOST_VALUES, Varied, VaryError};
 use crate::table::Value;
 
-/// This number of values from one end to the other, both among them.
+/// A range of `count` values, including both ends.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Grid {
     low: f64,
     high: f64,
     pub(super) unit: String,
     count: usize,
-    /// Whether the ratio of neighbours is the same everywhere, and not their difference.
+    /// Whether neighbours have equal ratios rather than equal differences.
     pub(super) logarithmic: bool,
 }
 
 impl Grid {
-    /// `None` if the text does not begin with a number and two dots: it is a list then.
+    /// Reads a range. `Ok(None)`: the text does not begin with a number and two dots, and is a list. `whole`: text of the user, for errors.
     pub(super) fn parse(whole: &str, text: &str) -> Result<Option<Self>, VaryError> {
         let whole = || whole.to_owned();
         let Some((low, rest)) = text.split_once("..") else { return Ok(None) };
+        // A path such as `../a.trace` has two dots but no number before them.
         let Some((low, low_unit)) = number_and_unit(low) else { return Ok(None) };
         let Some((high, count)) = rest.rsplit_once('/') else { return Err(VaryError::NoCount { text: whole() }) };
         let (high, high_unit) = number_and_unit(high).ok_or_else(|| VaryError::End { text: whole(), end: high.trim().to_owned() })?;
@@ -39,6 +40,7 @@ impl Grid {
         if low_unit != high_unit {
             return Err(VaryError::Units { text: whole(), low: low_unit.to_owned(), high: high_unit.to_owned() });
         }
+        // The difference of two finite ends may be infinite, and then no value between them can be computed by differences.
         if low >= high || !(high - low).is_finite() {
             return Err(VaryError::Empty { text: whole(), low, high });
         }
@@ -56,12 +58,14 @@ impl Grid {
         (0..self.count).map(value).collect()
     }
 
-    /// The ends are as they are written; in between, multiplication comes before division, so that tenths are the tenths that a user would write.
+    /// Returns value `place` of the range, from 0 to `count` − 1. The ends are exact. Between the ends the multiplication comes before the division, so that
+    /// tenths are the `f64` nearest to the written tenths.
     #[expect(clippy::cast_precision_loss, reason = "at most a million values")]
     fn at(&self, place: usize) -> f64 {
         let Self { low, high, .. } = *self;
         let last = self.count - 1;
         if place == 0 || place == last {
+            // Exactly as written, without the rounding error of the interpolation.
             return if place == 0 { low } else { high };
         }
         let (place, last) = (place as f64, last as f64);
@@ -71,13 +75,15 @@ impl Grid {
         } else if (high * last).is_finite() && (low * last).is_finite() {
             between(low, high)
         } else {
+            // Near the largest `f64` the products above overflow. This form has larger rounding errors but cannot overflow.
             low + (high - low) * (place / last)
         };
+        // Rounding may go beyond an end by one bit.
         value.clamp(low, high)
     }
 }
 
-/// The same number to fifteen digits: more than that a power does not have, and 5 is not to be 4.999999999999999.
+/// Rounds to fifteen digits: a power is no more accurate, and 5 must not become 4.999999999999999.
 fn fifteen_digits(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }

@@ -1,23 +1,23 @@
-//! `NAME{KEY=VALUE,…}`: a strategy with values of its parameters, as one value of `coordination.strategy`.
+//! A strategy with settings, `NAME{KEY=VALUE,…}`, as one value of `coordination.strategy`.
 
 use super::list::split_at_commas;
 
-/// A name with settings, of which the list of values has one entry.
+/// A name with settings: one value of a list.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Group {
-    /// The value of the key itself.
+    /// Value of the key itself.
     pub(super) name: String,
-    /// Overrides `KEY=VALUE` by their dotted paths, in the order in which they are written.
+    /// Settings as overrides `KEY=VALUE` with dotted paths, in written order.
     pub(super) settings: Vec<String>,
-    /// The text without needless space.
+    /// The written value without needless space.
     pub(super) text: String,
 }
 
 impl Group {
-    /// `None` if the text is a value without settings; an error if its braces do not hold `KEY=VALUE` with commas between them.
+    /// Reads a value with settings. `Ok(None)`: the value has no settings. `Err`: the braces do not hold `KEY=VALUE` separated by commas.
     ///
-    /// A key within the braces is a parameter of that name's own table beside `key`: of `coordination.strategy` the keys of `coordination.NAME`. A dotted path is
-    /// any key of the scene.
+    /// A key without a dot is a parameter in the name's own table beside `key`: for `coordination.strategy`, a key of `coordination.NAME`. A dotted path is any
+    /// key of the scene.
     pub(super) fn parse(key: &str, text: &str) -> Result<Option<Self>, ()> {
         let Some((name, rest)) = text.split_once('{').filter(|(name, _)| !name.trim().is_empty() && !name.contains(['"', '\''])) else {
             return Ok(None);
@@ -41,7 +41,7 @@ impl Group {
     }
 }
 
-/// The dotted path of the table that a key stands in, with the dot behind it.
+/// Returns the dotted path of a key's table, including the dot at its end.
 fn table_of(key: &str) -> &str {
     key.rfind('.').map_or("", |dot| &key[..=dot])
 }
@@ -68,7 +68,7 @@ mod tests {
         for text in ["average-position", "\"a{b}\"", "{ force = 1 }", "[1, 2]", "'x'"] {
             assert_eq!(group(text), Ok(None), "{text}");
         }
-        // Empty braces set nothing.
+        // Empty braces are no settings.
         assert_eq!(group("wave{ }").unwrap().unwrap(), Group { name: "wave".to_owned(), settings: Vec::new(), text: "wave".to_owned() });
     }
 

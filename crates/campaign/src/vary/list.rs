@@ -1,4 +1,4 @@
-//! `A,B,C`.
+//! Lists of values: `A,B,C`.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use super::group::Group;
 use super::{MOST_VALUES, Varied, VaryError};
 use crate::table::{Kind, Value};
 
-/// Values one by one.
+/// A list of values with their common unit and type.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct List {
     pub(super) unit: String,
@@ -17,7 +17,7 @@ pub(super) struct List {
 }
 
 impl List {
-    /// `with_settings`: the key, if its values may have settings.
+    /// Reads a list. `with_settings`: the key, if its values may have settings. `whole`: text of the user, for errors.
     pub(super) fn parse(whole: &str, with_settings: Option<&str>, text: &str) -> Result<Self, VaryError> {
         let whole = || whole.to_owned();
         let mut texts = split_at_commas(text);
@@ -34,6 +34,7 @@ impl List {
                 (*text, *settings) = (group.text, group.settings);
             }
         }
+        // Sorted, because comparing each pair would take too long for a million values.
         let mut sorted: Vec<&String> = texts.iter().collect();
         sorted.sort_unstable();
         if let Some(value) = sorted.windows(2).find_map(|pair| (pair[0] == pair[1]).then(|| pair[0].clone())) {
@@ -45,14 +46,17 @@ impl List {
     }
 }
 
-/// Integers if all are, numbers if all are and have one unit, or else text as it is written, without the quotes around it.
+/// Returns unit, type and values of a list: integers if every value is an integer, numbers if every value is a number with the same unit, otherwise text
+/// without the enclosing quotes.
 fn typed(texts: &[String]) -> (String, Kind, Vec<Value>) {
     if let Some(integers) = texts.iter().map(|text| text.parse().ok().map(Value::Integer)).collect::<Option<Vec<Value>>>() {
         return (String::new(), Kind::Integer, integers);
     }
+    // One value without a number makes the list a list of text.
     let quantities = texts.iter().map(|text| number_and_unit(unquoted(text))).collect::<Option<Vec<(f64, &str)>>>().unwrap_or_default();
     match quantities.first() {
         Some((_, unit)) if quantities.iter().all(|(_, other)| other == unit) => {
+            // Adding 0.0 turns −0.0 into 0.0, so both have one form in the table.
             let numbers = quantities.iter().map(|(value, _)| Value::Number(value + 0.0)).collect();
             ((*unit).to_owned(), Kind::Number, numbers)
         }
@@ -65,15 +69,17 @@ fn unquoted(text: &str) -> &str {
     within('"').or_else(|| within('\'')).unwrap_or(text)
 }
 
-/// Splits at commas, but for those within brackets, braces and quotes: values may be lists, tables and texts. Space around the parts is taken away.
+/// Splits a text at commas, except within brackets, braces and quotes, because values may be lists, tables and texts. Space around the parts is removed.
 #[must_use]
 pub fn split_at_commas(text: &str) -> Vec<String> {
     let (mut parts, mut depth, mut quote) = (vec![String::new()], 0_u32, None);
     for letter in text.chars() {
         match (quote, letter) {
+            // Only the same kind of quote ends a quoted text.
             (Some(open), _) if open == letter => quote = None,
             (None, '"' | '\'') => quote = Some(letter),
             (None, '[' | '{') => depth += 1,
+            // A closing bracket too many is left to the reader of the value, which reports it.
             (None, ']' | '}') => depth = depth.saturating_sub(1),
             (None, ',') if depth == 0 => {
                 parts.push(String::new());

@@ -1,5 +1,5 @@
-//! A key of a scene and the values that it takes in a campaign, as they are written: `KEY=LOW..HIGH/COUNT`, `KEY=LOW..HIGH/COUNT:log`, `KEY=A,B,C`.
-//! Of `coordination.strategy` a value may have settings, `NAME{KEY=VALUE,…}`, which are put into the scene with it.
+//! Variations: a key of a scene and the values of the key in a campaign, written as `KEY=LOW..HIGH/COUNT`, `KEY=LOW..HIGH/COUNT:log` or `KEY=A,B,C`. A value of
+//! `coordination.strategy` may have settings, `NAME{KEY=VALUE,…}`, which are set together with the value.
 
 mod grid;
 mod group;
@@ -13,13 +13,13 @@ use crate::table::{Kind, Value, value_text};
 
 pub use list::split_at_commas;
 
-/// The key whose values may have settings.
+/// Key whose values may have settings.
 const STRATEGY: &str = "coordination.strategy";
 
-/// The most values that one key takes.
+/// Most values of one key.
 pub const MOST_VALUES: usize = 1_000_000;
 
-/// A key that is varied.
+/// A varied key with its values. The index of a value counts from 0.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Variation {
     text: String,
@@ -30,61 +30,61 @@ pub struct Variation {
     values: Vec<Varied>,
 }
 
-/// One value of a key.
+/// A value of a varied key.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Varied {
-    /// As it is written: without settings, as it is put into the scene.
+    /// The value as written. A value without settings is put into the scene in this form.
     pub(crate) text: String,
-    /// As it stands in the table.
+    /// The value in the table.
     pub(crate) value: Value,
-    /// Overrides that are put into the scene with it, by their dotted paths.
+    /// Overrides set together with the value, by dotted paths.
     pub(crate) settings: Vec<String>,
 }
 
 impl Varied {
-    /// A value without settings.
+    /// Returns a value without settings.
     pub(super) const fn plain(text: String, value: Value) -> Self {
         Self { text, value, settings: Vec::new() }
     }
 }
 
-/// Why a text does not vary a key.
+/// Why a text is no variation of a key.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum VaryError {
-    /// There is no `=`, or nothing before it.
+    /// The text has no `=`, or no key before the `=`.
     #[error(
         "no key in \"{text}\": expected KEY=LOW..HIGH/COUNT, KEY=LOW..HIGH/COUNT:log or KEY=A,B,C, such as coordination.stiffness=0..6000/13 or link.delay=8ms,24ms"
     )]
     NoKey {
-        /// The text as given.
+        /// The text of the user.
         text: String,
     },
-    /// A range does not say how many values it has, or nothing that could be a number of them.
+    /// A range has no number of values, or something else in its place.
     #[error(
         "no number of values in \"{text}\": expected a slash and a whole number of at least 2 behind the range, and :log for equal ratios, such as coordination.stiffness=0..6000/13 or coordination.stiffness=10..1000/5:log"
     )]
     NoCount {
-        /// The text as given.
+        /// The text of the user.
         text: String,
     },
-    /// A range of no values or of one.
+    /// A range of no value or of one value.
     #[error("a range of {count} in \"{text}\": expected at least 2 values, which are the two ends; for a single one, KEY=VALUE")]
     TooFew {
-        /// The text as given.
+        /// The text of the user.
         text: String,
-        /// How many values.
+        /// Number of values asked for.
         count: usize,
     },
-    /// More values than [`MOST_VALUES`].
+    /// The variation has more than [`MOST_VALUES`] values.
     #[error("too many values in \"{text}\": expected at most {MOST_VALUES}")]
     TooMany {
-        /// The text as given.
+        /// The text of the user.
         text: String,
     },
-    /// An end is no number with a unit, or not finite.
+    /// An end of the range is not finite, or is no number with a unit.
     #[error("\"{end}\" in \"{text}\" is no end of a range: expected a finite number, with a unit where the key takes one")]
     End {
-        /// The text as given.
+        /// The text of the user.
         text: String,
         /// The end.
         end: String,
@@ -92,56 +92,56 @@ pub enum VaryError {
     /// The ends have different units.
     #[error("the ends of \"{text}\" have the units \"{low}\" and \"{high}\": expected the same unit at both")]
     Units {
-        /// The text as given.
+        /// The text of the user.
         text: String,
-        /// That of the lower end.
+        /// Unit of the lower end; empty without a unit.
         low: String,
-        /// That of the upper end.
+        /// Unit of the upper end; empty without a unit.
         high: String,
     },
-    /// The lower end is not below the upper one.
+    /// The lower end is not below the upper end.
     #[error(
         "the range of \"{text}\" is empty: {} is not below {}; expected a range whose first end is below its second",
         SixDigits(*low),
         SixDigits(*high)
     )]
     Empty {
-        /// The text as given.
+        /// The text of the user.
         text: String,
-        /// The lower end.
+        /// The lower end, in its unit.
         low: f64,
-        /// The upper end.
+        /// The upper end, in its unit.
         high: f64,
     },
-    /// Equal ratios need ends above zero.
+    /// A range of equal ratios does not begin above zero.
     #[error("{} in \"{text}\" is not above zero: expected ends above zero for equal ratios (:log)", SixDigits(*low))]
     NoRatio {
-        /// The text as given.
+        /// The text of the user.
         text: String,
-        /// The lower end.
+        /// The lower end, in its unit.
         low: f64,
     },
-    /// A list has an entry with nothing in it.
+    /// A list has an empty value.
     #[error("a value of \"{text}\" is missing: expected values with commas between them, such as link.delay=8ms,24ms")]
     NoValue {
-        /// The text as given.
+        /// The text of the user.
         text: String,
     },
-    /// Braces behind the name of a strategy do not hold settings.
+    /// The braces after a strategy's name do not hold settings.
     #[error(
         "\"{value}\" in \"{text}\" is no strategy with settings: expected NAME{{KEY=VALUE,...}}, such as local-damping{{damping=58}}, with parameters of that \
          strategy or other keys of the scene by their dotted paths"
     )]
     Settings {
-        /// The text as given.
+        /// The text of the user.
         text: String,
-        /// The value.
+        /// The value with the braces.
         value: String,
     },
-    /// A list has an entry twice.
+    /// A list has a value twice.
     #[error("{value} is there twice in \"{text}\": expected different values; for more runs of each, --runs")]
     Twice {
-        /// The text as given.
+        /// The text of the user.
         text: String,
         /// The value.
         value: String,
@@ -149,13 +149,13 @@ pub enum VaryError {
 }
 
 impl Variation {
-    /// Reads what the user says. Values of a list may be anything that an override may be: numbers, quantities, text, lists and tables.
+    /// Reads a variation. Values of a list may be all that an override may be: numbers, quantities, text, lists and tables.
     ///
-    /// Nothing is known of a scene here: whether it has such a key, and takes these values, is found out when a campaign is planned.
+    /// The key and the values are not compared with a scene here. [`Campaign::open`](crate::Campaign::open) checks them.
     ///
     /// # Errors
     ///
-    /// [`VaryError`], which says what was expected.
+    /// [`VaryError`] with the expected form.
     pub fn parse(text: &str) -> Result<Self, VaryError> {
         let no_key = || VaryError::NoKey { text: text.to_owned() };
         let (key, values) = text.split_once('=').ok_or_else(no_key)?;
@@ -163,6 +163,7 @@ impl Variation {
         if key.is_empty() {
             return Err(no_key());
         }
+        // A text beginning with a number and two dots is a range. Everything else is a list, for example of paths such as `../a.trace`.
         let (unit, kind, logarithmic, values) = match Grid::parse(text, values)? {
             Some(grid) => (grid.unit.clone(), Kind::Number, grid.logarithmic, grid.values()),
             None => {
@@ -173,52 +174,53 @@ impl Variation {
         Ok(Self { text: text.trim().to_owned(), key: key.to_owned(), unit, kind, logarithmic, values })
     }
 
-    /// The text that it was read from.
+    /// Returns the text of the variation, as given to [`Variation::parse`] but without space around it.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The dotted path of the key.
+    /// Returns the dotted path of the key.
     #[must_use]
     pub fn key(&self) -> &str {
         &self.key
     }
 
-    /// How many values it takes; at least one.
+    /// Returns the number of values, at least one.
     #[must_use]
     pub const fn count(&self) -> usize {
         self.values.len()
     }
 
-    /// The key with a value as it is written, by its place: `KEY=VALUE`.
+    /// Returns key and value as written: `KEY=VALUE`. `place`: index of the value.
     ///
     /// # Panics
     ///
-    /// If there are fewer values.
+    /// If `place` is not below [`Variation::count`].
     #[must_use]
     pub fn label(&self, place: usize) -> String {
         format!("{}={}", self.key, self.values[place].text)
     }
 
-    /// The overrides that a value puts into the scene, by its place: `KEY=VALUE`, and those of its settings.
+    /// Returns the overrides of a value: `KEY=VALUE`, followed by its settings. `place`: index of the value.
     ///
     /// # Panics
     ///
-    /// If there are fewer values.
+    /// If `place` is not below [`Variation::count`].
     #[must_use]
     pub fn overrides(&self, place: usize) -> Vec<String> {
         let varied = &self.values[place];
+        // With settings, the written value is `NAME{…}`, and the key itself takes the name.
         let name = if varied.settings.is_empty() { varied.text.as_str() } else { varied.text.split('{').next().unwrap_or_default() };
         std::iter::once(format!("{}={name}", self.key)).chain(varied.settings.iter().cloned()).collect()
     }
 
-    /// Its values as they are written, in order.
+    /// Returns the values as written, in order.
     pub fn texts(&self) -> impl ExactSizeIterator<Item = &str> {
         self.values.iter().map(|varied| varied.text.as_str())
     }
 
-    /// The name of its column: the key, and the unit if all values have the same: `link.delay_ms`, `link.loss_percent`.
+    /// Returns the name of the key's column: the key, and the unit common to all values, as in `link.delay_ms` and `link.loss_percent`.
     #[must_use]
     pub fn column(&self) -> String {
         match self.unit.as_str() {
@@ -228,19 +230,19 @@ impl Variation {
         }
     }
 
-    /// The unit that all its values have; empty if they have none, or not the same.
+    /// Returns the unit common to all values; empty if the values have no unit or different units.
     #[must_use]
     pub fn unit(&self) -> &str {
         &self.unit
     }
 
-    /// Whether its values are a range of equal ratios.
+    /// Returns `true` if the values are a range of equal ratios.
     #[must_use]
     pub const fn is_logarithmic(&self) -> bool {
         self.logarithmic
     }
 
-    /// A value by its place, as a number in the unit of all; `None` if it is text, or if there are fewer.
+    /// Returns a value as a number in the common unit; `None` for a text or an index without a value.
     #[must_use]
     pub fn number(&self, place: usize) -> Option<f64> {
         match &self.values.get(place)?.value {
@@ -251,13 +253,13 @@ impl Variation {
         }
     }
 
-    /// A value by its place, as it is written; empty if there are fewer.
+    /// Returns a value as written; empty for an index without a value.
     #[must_use]
     pub fn value_text(&self, place: usize) -> &str {
         self.values.get(place).map_or("", |varied| &varied.text)
     }
 
-    /// A value by its place, as it stands in a table of text; empty if there are fewer.
+    /// Returns a value as a cell of text; empty for an index without a value.
     #[must_use]
     pub fn cell(&self, place: usize) -> String {
         self.values.get(place).map_or_else(String::new, |varied| value_text(&varied.value))
@@ -271,15 +273,16 @@ impl Variation {
         &self.values
     }
 
-    /// Whether it varies that key, however its parts are quoted.
+    /// Returns `true` if the variation is of this key, however the parts of the two paths are quoted.
     #[must_use]
     pub fn is_key(&self, key: &str) -> bool {
         same_key(&self.key, key)
     }
 }
 
-/// Whether two dotted paths are the same key.
+/// Returns `true` if two dotted paths name the same key.
 pub(crate) fn same_key(one: &str, other: &str) -> bool {
+    // `a."b"` and `a.b` are the same key in TOML.
     let parts = |key: &str| key.split('.').map(|part| part.trim().trim_matches('"').to_owned()).collect::<Vec<_>>();
     parts(one) == parts(other)
 }

@@ -11,7 +11,7 @@ fn a_range_has_both_ends_and_equal_steps() {
     assert_eq!(texts("a=0..6000/4"), ["0", "2000", "4000", "6000"]);
     assert_eq!(vary.overrides(2), ["coordination.stiffness=4000"]);
     assert_eq!((vary.kind(), &vary.values()[1].value), (Kind::Number, &Value::Number(2000.0)));
-    // Tenths are the tenths that a user would write, and no others one bit away.
+    // Tenths are exactly the `f64` nearest to the written tenths.
     assert_eq!(texts("a=0..1/11"), ["0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1"]);
     assert_eq!(texts("a=-1..1/3"), ["-1", "0", "1"]);
     assert_eq!(texts("a=-8e307..8e307/3"), ["-8e307", "0", "8e307"]);
@@ -23,7 +23,8 @@ fn a_range_with_log_has_equal_ratios() {
     assert_eq!(texts("link.delay=0.5ms..50ms/3:log"), ["0.5ms", "5ms", "50ms"]);
     let values: Vec<f64> = texts("a=2..7/6:log").iter().map(|text| text.parse().unwrap()).collect();
     for pair in values.windows(2) {
-        // (7/2)^(1/5) by repeated multiplication. Each end has 15 digits, so the ratio is wrong by 10⁻¹⁴ at most, and its fifth power by 5·10⁻¹⁴ of 3.5.
+        // Compares with (7/2)^(1/5), by repeated multiplication. Each end has 15 digits, so the ratio is wrong by at most 10⁻¹⁴, and its fifth power by 5·10⁻¹⁴
+        // of 3.5.
         assert!(((pair[1] / pair[0]).powi(5) - 3.5).abs() < 3.5 * 6e-14, "{values:?}");
     }
 }
@@ -108,7 +109,7 @@ fn a_strategy_may_have_settings() {
         let error = Variation::parse(&format!("coordination.strategy={values}")).unwrap_err().to_string();
         assert!(error.contains(part) && error.contains("expected"), "{error}");
     }
-    // Texts of other keys are what they are.
+    // Braces in values of other keys are no settings.
     assert_eq!(Variation::parse("scene.title=a{b}").unwrap().overrides(0), ["scene.title=a{b}"]);
 }
 
@@ -119,7 +120,7 @@ fn keys_are_the_same_however_they_are_quoted() {
 }
 
 proptest::proptest! {
-    /// Whatever is typed is read or refused, and a value in the table is the value in the scene.
+    /// Every text is read or refused, and the value in the table equals the value in the scene.
     #[test]
     fn no_text_breaks_it(text in "\\PC{0,30}", range in "[a.]{1,3}=[-0-9.e]{1,6}\\.\\.[-0-9.e]{1,6}(ms)?/[0-9]{1,3}(:log)?") {
         for text in [text, range] {

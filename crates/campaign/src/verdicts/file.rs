@@ -1,4 +1,4 @@
-//! Judgements as files: a journal that grows by a line for each combination that is judged, and one table of all of them.
+//! The files of judgements: the journal, with a line per judged combination in any order, and the table of all judgements.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -12,21 +12,21 @@ use crate::folder::hash;
 use crate::plan::CampaignPlan;
 use crate::table::{TableError, number_text, value_text};
 
-/// What helps where the table of judgements is not as it was written.
+/// Advice to the user about a damaged table of judgements.
 const WAY_OUT: &str = "remove it and repeat the command, which judges again";
 
-/// What a judgement says, in the order of its columns.
+/// Columns of a judgement, in order.
 const COLUMNS: [&str; 5] = ["verdict", "judged", "radius", "error_bound", "reason"];
 
-/// How many hexadecimal digits of its hash a line ends with: 128 bits.
+/// Number of hexadecimal digits of the hash at the end of a journal's line: 128 bits.
 const DIGITS: usize = 32;
 
-/// Judgements as they are made, in any order, each on a line that ends with a hash of the line and of the campaign. A last line that is not whole, as a machine leaves
-/// it that loses its power, is forgotten; other lines that are not as they were written are left out, and their combinations judged again.
+/// A journal of judgements, in the order of their making. Each line ends with a hash of the line and of the campaign. A last line without an end, left by a
+/// loss of power, is dropped. Any other damaged line is skipped, and its combination is judged again.
 #[derive(Debug)]
 pub(crate) struct Journal {
     path: PathBuf,
-    /// The hash of the campaign's manifest.
+    /// Hash of the campaign's manifest.
     campaign: String,
     file: File,
 }
@@ -34,16 +34,16 @@ pub(crate) struct Journal {
 /// Content of a journal.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
-    /// The judgements, each with its combination.
+    /// Intact judgements, each with its combination.
     pub(crate) known: Vec<(u64, Judgement)>,
-    /// How many lines are not as they were written.
+    /// Number of damaged lines.
     pub(crate) damaged: u64,
-    /// How many bytes the lines with an end have.
+    /// Length of all lines with a line feed \[bytes\].
     whole: u64,
 }
 
 impl Journal {
-    /// Reads the content of a journal; nothing if there is no journal. `campaign`: the hash of the campaign's manifest.
+    /// Reads a journal; an absent journal is empty. `campaign`: hash of the campaign's manifest. `combinations`: number of combinations of the plan.
     pub(crate) fn read(path: &Path, campaign: &str, combinations: u64) -> Result<Lines, CampaignError> {
         let bytes = match fs::read(path) {
             Ok(bytes) => bytes,
@@ -52,27 +52,30 @@ impl Journal {
         };
         let (mut lines, mut words) = (Lines::default(), Words::default());
         for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+            // Only the last line can lack a line feed. `open` cuts it off before it appends.
             let Some(line) = line.strip_suffix(b"\n") else { break };
             match record(line, campaign).filter(|(combination, _)| *combination < combinations) {
                 Some((combination, judgement)) => lines.known.push((combination, words.all(judgement))),
                 None => lines.damaged += 1,
             }
+            // Damaged lines are kept in the file, and only skipped when read.
             lines.whole += line.len() as u64 + 1;
         }
         Ok(lines)
     }
 
-    /// Opens the journal, or begins one, and gives what it holds.
+    /// Opens a journal for appending, or begins one. Also returns its content.
     pub(crate) fn open(path: PathBuf, campaign: &str, combinations: u64) -> Result<(Self, Lines), CampaignError> {
         let lines = Self::read(&path, campaign, combinations)?;
         let file = open_continued(&path, lines.whole).map_err(|error| CampaignError::File { verb: "write", path: path.clone(), error })?;
         Ok((Self { path, campaign: campaign.to_owned(), file }, lines))
     }
 
-    /// Adds a judgement. It is with the system when this returns.
+    /// Appends a judgement. The operating system has the line when the function returns.
     pub(crate) fn add(&mut self, combination: u64, judgement: &Judgement) -> Result<(), CampaignError> {
         let cells = std::iter::once(combination.to_string()).chain(cells(judgement));
         let written = line(cells).and_then(|mut line| {
+            // The hash comes before the line feed.
             line.pop();
             let digest = digest(&line, &self.campaign);
             line.push(b',');
@@ -84,17 +87,18 @@ impl Journal {
     }
 }
 
-/// The hash of a line of a campaign, without the end of the line.
+/// Returns the hash of a line, without its line feed, for this campaign.
 fn digest(line: &[u8], campaign: &str) -> String {
     let mut digest = hash(&[campaign.as_bytes(), b"\n", line].concat());
     digest.truncate(DIGITS);
     digest
 }
 
-/// A line of the journal, without its end; `None` if it is not as it was written.
+/// Reads a line of the journal, without its line feed; `None` if the line is damaged.
 fn record(line: &[u8], campaign: &str) -> Option<(u64, Judgement)> {
     let (line, found) = line.split_at_checked(line.len().checked_sub(DIGITS)?)?;
     let line = line.strip_suffix(b",")?;
+    // The hash also covers the campaign, so a line of another campaign does not count.
     if found != digest(line, campaign).as_bytes() {
         return None;
     }
@@ -107,9 +111,10 @@ fn record(line: &[u8], campaign: &str) -> Option<(u64, Judgement)> {
     Some((cells.get(0)?.parse().ok()?, judgement(cells, 1)?))
 }
 
-/// The judgement whose columns begin at that place.
+/// Reads the judgement whose columns begin at index `from`.
 fn judgement(cells: &csv::StringRecord, from: usize) -> Option<Judgement> {
     let [word, judged, radius, error, reason] = std::array::from_fn(|place| cells.get(from + place).unwrap_or_default());
+    // A refusal has a reason and no verdict.
     if word.is_empty() {
         return (!reason.is_empty()).then(|| Judgement::Refused(reason.into()));
     }
@@ -131,7 +136,7 @@ fn line(cells: impl Iterator<Item = String>) -> io::Result<Vec<u8>> {
     line.into_inner().map_err(|error| io::Error::other(error.to_string()))
 }
 
-/// Writes the table of all judgements: a row for each combination, with the values of its keys.
+/// Writes the table of all judgements: one row per combination, with the values of its keys.
 pub(crate) fn write_all(path: &Path, plan: &CampaignPlan, judgements: &[Judgement]) -> Result<(), CampaignError> {
     let written = write_whole(path, |to| -> io::Result<()> {
         let keys = plan.variations().iter().map(|vary| vary.column());
@@ -145,7 +150,7 @@ pub(crate) fn write_all(path: &Path, plan: &CampaignPlan, judgements: &[Judgemen
     written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
 }
 
-/// The judgements of a table; `None` if there is no table.
+/// Reads a table of judgements; `None` if there is no table.
 pub(crate) fn read_whole(path: &Path, plan: &CampaignPlan) -> Result<Option<Vec<Judgement>>, CampaignError> {
     let file = match File::open(path) {
         Ok(file) => file,
@@ -168,6 +173,7 @@ fn read(file: File, plan: &CampaignPlan) -> Result<Vec<Judgement>, TableError> {
         |error: csv::Error| if error.is_io_error() { TableError::Io(io::Error::other(error)) } else { TableError::Content(error.to_string()) };
     while reader.read_record(&mut cells).map_err(content)? {
         let number = judgements.len();
+        // Row n must state combination n: a lost row would shift all later judgements.
         let in_place = cells.get(0) == Some(number.to_string().as_str());
         let found = judgement(&cells, 1 + plan.variations().len()).filter(|_| in_place);
         judgements.push(words.all(found.ok_or_else(|| TableError::Content(format!("row {number} is no judgement")))?));
@@ -211,13 +217,13 @@ mod tests {
             journal.add(8, &judgements[0].1).unwrap();
             assert_eq!(Journal::read(&path, "c0ffee", 9).unwrap().known.len(), lines + 1, "{end}");
         }
-        // A journal of another campaign.
+        // A journal of another campaign has no intact line.
         fs::write(&path, &whole).unwrap();
         let other = Journal::read(&path, "decaf", 9).unwrap();
         assert_eq!((other.known, other.damaged), (Vec::new(), 3));
     }
 
-    /// A line end that is lost joins two lines, of which neither is taken then.
+    /// A lost line feed joins two lines, and neither is intact then.
     #[test]
     fn no_flipped_bit_of_a_journal_changes_a_judgement() {
         let folder = tempfile::tempdir().unwrap();

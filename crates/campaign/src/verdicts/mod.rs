@@ -1,4 +1,4 @@
-//! Judgements of combinations without running them: whether each is stable. The method of judging is not known here.
+//! Judgements: whether each combination is stable, without running it. The method of judging belongs to the caller's [`Judge`] and is not known here.
 
 mod file;
 
@@ -14,36 +14,36 @@ use crate::plan::CampaignPlan;
 
 pub(crate) use file::{Journal, Lines, read_whole, write_all};
 
-/// Judges the scene of a combination. Called from many threads.
+/// A judge of scenes, supplied by the caller. The method is called from many threads.
 pub trait Judge: Sync {
-    /// The judgement of the scene, which depends on the scene alone; `None` if the judgement was ended before its verdict was known.
+    /// Judges a scene. The judgement must depend on the scene alone. `None`: the judging was stopped before its end.
     fn judge(&self, scene: &Scene) -> Option<Judgement>;
 }
 
-/// The judgement of a combination.
+/// Judgement of a combination.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Judgement {
-    /// There is a verdict.
+    /// The combination has a verdict.
     Known(Verdict),
-    /// There is none, for this reason.
+    /// The combination cannot be judged, for this reason.
     Refused(Arc<str>),
 }
 
-/// A verdict and what it rests on.
+/// A verdict and the figures behind it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Verdict {
     /// The verdict in a word, such as `stable`.
     pub word: Arc<str>,
-    /// In a word, by what the combination was judged, such as `mean-square`.
+    /// The judged property in a word, such as `mean-square`.
     pub judged: Arc<str>,
-    /// The radius that says so.
+    /// Radius on which the verdict rests; NaN for a judge without a radius.
     pub radius: f64,
-    /// How far the true radius may be from it.
+    /// Bound on the difference between `radius` and the true radius; NaN for a judge without a radius.
     pub error: f64,
 }
 
 impl Judgement {
-    /// The verdict; `None` where there is none.
+    /// Returns the verdict; `None` for a refusal.
     #[must_use]
     pub const fn verdict(&self) -> Option<&Verdict> {
         match self {
@@ -52,7 +52,7 @@ impl Judgement {
         }
     }
 
-    /// The same judgement with a reason of one line, as a line of a journal keeps it.
+    /// Replaces line feeds in the reason, because a journal has one line per judgement.
     pub(crate) fn in_one_line(self) -> Self {
         match self {
             Self::Refused(reason) if reason.contains(['\n', '\r']) => Self::Refused(reason.replace(['\n', '\r'], " ").into()),
@@ -61,7 +61,7 @@ impl Judgement {
     }
 }
 
-/// Words that were seen: verdicts are millions, and their words few.
+/// Words seen so far, shared between judgements: a campaign has millions of verdicts with few different words.
 #[derive(Debug, Default)]
 pub(crate) struct Words(BTreeSet<Arc<str>>);
 
@@ -83,7 +83,7 @@ impl Words {
     }
 }
 
-/// What the threads share.
+/// State shared by the judging threads.
 struct Shared<'a> {
     journal: &'a mut Journal,
     judgements: Vec<Option<Judgement>>,
@@ -91,8 +91,8 @@ struct Shared<'a> {
     failed: Option<CampaignError>,
 }
 
-/// Judges these combinations, and writes each judgement into the journal as soon as it is known. Each has its place, so the number of threads changes nothing.
-/// Stops where the watch or the judge ends it; missing judgements are then `None`.
+/// Judges the combinations `missing`, and writes each judgement to the journal at once. Returns `judgements` with the new judgements added, indexed by
+/// combination; an entry stays `None` if the watch or the judge stopped the work before. The number of threads does not change the result.
 pub(crate) fn judge(
     plan: &CampaignPlan,
     judge: &dyn Judge,
@@ -107,6 +107,7 @@ pub(crate) fn judge(
     rayon::broadcast(|_| {
         while !ended.load(Ordering::Relaxed) && watch.keep_going() {
             let Some(combination) = missing.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+            // The slow part runs without the lock.
             let judged = plan.scene(*combination).map(|scene| judge.judge(&scene));
             let mut shared = lock();
             let Shared { journal, judgements, words, failed } = &mut *shared;
@@ -125,6 +126,7 @@ pub(crate) fn judge(
                     }
                     watch.judged(1);
                 }
+                // The judge gave up, so no other thread begins another combination.
                 Ok(None) => ended.store(true, Ordering::Relaxed),
                 Err(error) => {
                     failed.get_or_insert(error);

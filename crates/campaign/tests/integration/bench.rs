@@ -1,4 +1,4 @@
-//! A folder, a scene, and campaigns over it.
+//! A bench for tests: a folder, a scene, and campaigns over the scene.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,7 +8,7 @@ use cohaptic_campaign::{
 };
 use tempfile::TempDir;
 
-/// Two users for 40 ticks over links that lose and delay at random.
+/// Two users for 40 ticks, over links with random losses and delays.
 pub(crate) const SCENE: &str = r#"
 [scene]
 duration = "40ms"
@@ -40,7 +40,7 @@ jitter = "1ms"
 loss   = "20%"
 "#;
 
-/// What varies in most tests: four combinations.
+/// Variations of most tests, with four combinations.
 pub(crate) const VARY: [&str; 2] = ["coordination.stiffness=500..1500/2", "link.loss=0%,40%"];
 
 pub(crate) struct Bench {
@@ -65,7 +65,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// The names of the files in a folder, sorted.
+    /// Returns the names of the files in a folder, sorted.
     pub(crate) fn files(&self, folder: &str) -> Vec<String> {
         let entries = std::fs::read_dir(self.path(folder)).unwrap().map(Result::unwrap);
         let mut files: Vec<String> = entries.map(|entry| entry.file_name().into_string().unwrap()).collect();
@@ -73,7 +73,7 @@ impl Bench {
         files
     }
 
-    /// The names of the parts in a folder, sorted; their digests are left out.
+    /// Returns the names of the parts in a folder, sorted and without the digests.
     pub(crate) fn parts(&self, folder: &str) -> Vec<String> {
         let is_part = |name: &String| name.starts_with("part-") && name.ends_with(self.format.name());
         self.files(folder).into_iter().filter(is_part).collect()
@@ -90,34 +90,34 @@ impl Bench {
         Campaign::open(self.plan()?, &self.path(folder), &NoWatch)
     }
 
-    /// Runs it with so many threads.
+    /// Runs the campaign with this number of threads until its end or until the watch stops it.
     pub(crate) fn outcome(&self, folder: &str, threads: usize, watch: &dyn Watch) -> Result<Outcome, CampaignError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| Campaign::open(self.plan()?, &self.path(folder), watch)?.run(watch))
     }
 
-    /// Does a shard of it with this number of threads, as a worker of that name.
+    /// Does a shard with this number of threads, as a worker with this name.
     pub(crate) fn shard(&self, folder: &str, shard: Shard, worker: &str, threads: usize, watch: &dyn Watch) -> Result<ShardReport, CampaignError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| SharedCampaign::open(self.plan()?, &self.path(folder), worker, watch)?.run(shard, watch))
     }
 
-    /// Puts the shards together.
+    /// Merges the shards.
     pub(crate) fn merge(&self, folder: &str) -> Result<Report, CampaignError> {
         Ok(finished(Campaign::open_whole(self.plan()?, &self.path(folder))?.run(&NoWatch)?))
     }
 
-    /// Runs it to its end.
+    /// Runs the campaign to its end.
     pub(crate) fn finish(&self, folder: &str, threads: usize) -> Report {
         finished(self.outcome(folder, threads, &NoWatch).unwrap())
     }
 
-    /// The bytes of the table.
+    /// Returns the bytes of the table.
     pub(crate) fn table(&self, folder: &str) -> Vec<u8> {
         std::fs::read(self.path(folder).join(format!("runs.{}", self.format.name()))).unwrap()
     }
 
-    /// The refusal, with all of these parts.
+    /// Checks that the campaign is refused, with a message containing all of these parts.
     pub(crate) fn assert_refused(&self, folder: &str, parts: &[&str]) -> CampaignError {
         let error = self.open(folder).map(drop).unwrap_err();
         for part in parts {
@@ -134,7 +134,7 @@ pub(crate) fn finished(outcome: Outcome) -> Report {
     }
 }
 
-/// Ends a campaign when so many runs have been done.
+/// Stops a campaign after this number of runs.
 pub(crate) struct StopAfter(pub(crate) u64, AtomicU64);
 
 impl StopAfter {
@@ -153,7 +153,7 @@ impl Watch for StopAfter {
     }
 }
 
-/// A table of CSV: its header and rows.
+/// Reads a table of CSV: header and rows.
 pub(crate) fn comma_separated(path: &Path) -> (Vec<String>, Vec<Vec<String>>) {
     let mut reader = csv::Reader::from_path(path).unwrap();
     let header = reader.headers().unwrap().iter().map(str::to_owned).collect();

@@ -1,4 +1,4 @@
-//! Strategies side by side: combinations that a strategy refuses are left out, and the rest is the campaign that it would be without them.
+//! Comparisons of strategies: refused combinations are left out, and the other runs equal the runs of a campaign without them.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -9,7 +9,7 @@ use cohaptic_scene::Scene;
 
 use crate::bench::{Bench, StopAfter, comma_separated, finished};
 
-/// A damping of "auto" is refused where links delay by chance: in the last of four combinations.
+/// A damping of "auto" is refused on links with random delays, hence in the last of four combinations.
 const REFUSING: [&str; 2] = ["coordination.strategy=average-position,local-damping", "link.jitter=0ms,1ms"];
 
 fn bench(vary: &[&str]) -> Bench {
@@ -32,7 +32,7 @@ fn outcome(bench: &Bench, folder: &str, threads: usize, watch: &dyn Watch) -> Ou
     pool.install(|| Campaign::open(plan(bench).unwrap(), &bench.path(folder), watch)?.run(watch)).unwrap()
 }
 
-/// Runs it to its end and compares.
+/// Runs the campaign to its end, and compares.
 fn compare(bench: &Bench, folder: &str) -> Comparison {
     let mut campaign = open(bench, folder).unwrap();
     finished(campaign.run(&NoWatch).unwrap());
@@ -48,7 +48,7 @@ fn where_nothing_is_refused_it_is_the_plain_campaign_to_the_last_byte() {
         compare(&bench, "compared");
         assert!(bench.table("plain") == bench.table("compared"), "other bytes");
         assert_eq!(bench.files("plain"), bench.files("compared"));
-        // Each goes on with the other's folder.
+        // Either plan continues the campaign in the folder of the other plan.
         assert_eq!(finished(outcome(&bench, "plain", 1, &NoWatch)).computed, 0);
         assert_eq!(bench.finish("compared", 1).computed, 0);
     }
@@ -65,10 +65,10 @@ fn what_a_strategy_refuses_is_known_before_anything_runs_and_stops_nothing_else(
     drop(campaign);
     let report = finished(outcome(&bench, "out", 2, &NoWatch));
     assert_eq!(report.combinations.iter().map(|combination| combination.runs).collect::<Vec<u64>>(), [10, 10, 10, 0]);
-    // Those that run are the runs of a campaign without the strategy.
+    // The accepted runs equal the runs of a campaign without the refused strategy.
     let (_, rows) = comma_separated(&bench.path("out/runs.csv"));
     assert_eq!(rows.iter().map(|row| row[0].clone()).collect::<Vec<String>>(), (0..30).map(|run| run.to_string()).collect::<Vec<String>>());
-    // Where the first is left out, numbers of runs say so.
+    // The first combination is left out, and the numbers of the runs still count it.
     bench.vary = ["coordination.strategy=local-damping,average-position", "link.jitter=1ms"].map(str::to_owned).to_vec();
     finished(outcome(&bench, "other", 1, &NoWatch));
     let (_, other) = comma_separated(&bench.path("other/runs.csv"));
@@ -92,7 +92,7 @@ fn however_it_was_interrupted_the_table_without_the_refused_is_the_same() {
         assert_eq!(compare(&bench, "parts"), whole);
         assert!(bench.table("parts") == bench.table("whole"), "other bytes");
         assert_eq!(bench.files("parts"), bench.files("whole"));
-        // The plain campaign is another one.
+        // A plan which leaves nothing out is another campaign.
         bench.assert_refused("whole", &["another campaign", "1 of them, are left out there and not here"]);
     }
 }
@@ -103,7 +103,8 @@ fn a_table_of_either_format_is_compared_alike() {
     let parquet = compare(&bench, "parquet");
     bench.format = Format::Csv;
     assert_eq!(parquet, compare(&bench, "csv"));
-    // 0 and 1 of the baseline, 0 of the other strategy, each paired with its own: without chance all runs of a combination are equal.
+    // Combination 0 has no random delays, so its runs are equal and its interval has no width. Combination 2 is paired with combination 0, and combination 3 is
+    // refused.
     let figures = |combination: usize| parquet.cells[combination].figures[0];
     assert_eq!(figures(0).mean.unwrap().half_width, Some(0.0));
     assert!(figures(1).mean.unwrap().half_width > Some(0.0) && figures(1).difference.is_none());
@@ -116,7 +117,7 @@ fn a_fault_that_no_strategy_is_the_reason_of_is_an_error() {
     for (vary, part) in [
         (&["coordination.strategy=average-position,local-damping{damping=-5}"][..], "coordination.local-damping.damping"),
         (&["coordination.strategy=average-position,local-damping", "link.jitter=0ms,1"], "link.jitter"),
-        // Nothing is left to be run.
+        // No combination is left to run.
         (&["coordination.strategy=local-damping,local-damping{age=\"auto\"}", "link.jitter=1ms"], "damping of \"auto\""),
     ] {
         let bench = bench(vary);
@@ -126,7 +127,7 @@ fn a_fault_that_no_strategy_is_the_reason_of_is_an_error() {
     }
 }
 
-/// Gives up after that many.
+/// Stops judging after this number of verdicts.
 struct Few(AtomicU64);
 
 impl Judge for Few {
@@ -141,7 +142,7 @@ impl Judge for Few {
 fn verdicts_apart_are_kept_as_they_are_made_and_leave_the_table_alone() {
     let bench = bench(&REFUSING);
     let judge = |folder: &str, most: u64| open(&bench, folder).unwrap().judge_apart(&Few(AtomicU64::new(most)), &NoWatch).unwrap();
-    // The one that is refused needs no judge.
+    // The refused combination needs no judge.
     assert_eq!(judge("parts", 1), Err(2));
     assert_eq!(judge("parts", 2).map(|judgements| judgements.len()), Ok(4));
     let again = judge("parts", 0).unwrap();
@@ -156,7 +157,7 @@ fn verdicts_apart_are_kept_as_they_are_made_and_leave_the_table_alone() {
     assert_eq!(read("parts/stability.csv"), read("whole/stability.csv"));
 }
 
-/// Gives each scene a verdict of its own, so that two of them in each other's place are seen.
+/// Gives each scene a verdict of its own, so that two exchanged verdicts would be noticed.
 struct Numbered;
 
 impl Judge for Numbered {
@@ -166,7 +167,7 @@ impl Judge for Numbered {
     }
 }
 
-/// Rows in memory are judged, summed up and compared as the table in a folder is, whichever process made them.
+/// Rows in memory are judged, summed up and compared like the table in a folder, whatever process computed them.
 #[test]
 fn a_comparison_in_memory_is_that_of_the_folder() {
     let bench = bench(&REFUSING);

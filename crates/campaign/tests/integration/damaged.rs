@@ -1,4 +1,4 @@
-//! Parts that are not as they were written: each is named and computed again, and the table is the one of a campaign that nothing disturbed.
+//! Damaged parts: each is named and computed again, and the table equals the table of an undisturbed campaign.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use cohaptic_campaign::{Campaign, Format, NoWatch, Report, Shard, Watch};
 
 use crate::bench::{Bench, VARY, finished};
 
-/// Notes the files that are damaged.
+/// Collects the reports about damaged files.
 #[derive(Default)]
 struct Told(Mutex<Vec<(String, String)>>);
 
@@ -20,7 +20,7 @@ impl Watch for Told {
     }
 }
 
-/// Two parts of eight runs, and the table that they give.
+/// A folder with two parts of eight runs, and the table of these parts.
 struct Kept {
     bench: Bench,
     files: BTreeMap<String, Vec<u8>>,
@@ -32,7 +32,7 @@ impl Kept {
         let mut bench = Bench::new(&VARY, 4);
         (bench.part, bench.format) = (Some(8), format);
         bench.finish("whole", 1);
-        // A worker makes parts and no table.
+        // A worker makes parts but no table.
         bench.shard("out", Shard::new(1, 1).unwrap(), "a", 1, &NoWatch).unwrap();
         let files = bench.files("out").into_iter().map(|name| (name.clone(), fs::read(bench.path("out").join(name)).unwrap())).collect();
         let table = bench.table("whole");
@@ -43,7 +43,7 @@ impl Kept {
         format!("part-{number:05}.{}", self.bench.format.name())
     }
 
-    /// The folder with all parts as they were written.
+    /// Restores the folder with all parts intact.
     fn restored(&self) -> PathBuf {
         let folder = self.bench.path("out");
         fs::remove_dir_all(&folder).unwrap();
@@ -52,7 +52,7 @@ impl Kept {
         folder
     }
 
-    /// Continues the campaign after some damage, which must be seen in this part alone. Gives the words.
+    /// Continues the campaign after some damage, which must be reported for this part only. Returns the report.
     fn assert_mended(&self, damage: impl FnOnce(&Path), damaged: usize, what: &str) -> String {
         damage(&self.restored());
         let told = Told::default();
@@ -74,13 +74,13 @@ fn flip(path: &Path, bit: usize) {
     fs::write(path, bytes).unwrap();
 }
 
-/// Every bit of a short part is flipped in the test of digests; here a campaign goes on from such parts.
+/// The unit test of digests flips every bit of a short part. Here a campaign continues after some of these faults.
 #[test]
 fn a_part_with_a_flipped_bit_is_computed_again() {
     for format in [Format::Csv, Format::Parquet] {
         let kept = Kept::new(format);
         let bits = 8 * kept.files[&kept.part(1)].len();
-        // A prime step, so that all places within a byte come up.
+        // The step is odd, so all eight bit positions within a byte occur.
         for bit in (0..bits).step_by(bits / 23 * 2 + 1) {
             let fault = kept.assert_mended(|folder| flip(&folder.join(kept.part(1)), bit), 1, &format!("bit {bit} of {format:?}"));
             assert!(fault.contains("its bytes hash to") && fault.contains("Its 8 runs are computed again"), "{fault}");
@@ -112,13 +112,13 @@ fn a_part_under_the_name_of_another_and_a_shorter_one_are_computed_again() {
             kept.assert_mended(|folder| fs::write(folder.join(&second), &bytes[..length]).unwrap(), 1, what);
         }
         kept.assert_mended(|folder| fs::write(folder.join(&second), [bytes.as_slice(), b"\n"].concat()).unwrap(), 1, "a byte more");
-        // As a program left it that knew no digests.
+        // A part as left by a version of the program without digests.
         let fault = kept.assert_mended(|folder| fs::remove_file(folder.join(digest(&second))).unwrap(), 1, "no digest");
         assert!(fault.contains("it has no digest"), "{fault}");
     }
 }
 
-/// A part of the same number, length and number of runs, which says itself that it is whole.
+/// A part of another campaign, with the same number, length and number of runs, and with a digest of its own.
 #[test]
 fn a_part_of_another_campaign_is_computed_again() {
     let kept = Kept::new(Format::Csv);
@@ -146,7 +146,7 @@ fn shards_are_put_together_without_damaged_parts() {
     assert_eq!(merged(&told).computed, 8);
     assert_eq!(told.0.into_inner().unwrap()[0].0, kept.part(0));
     assert!(kept.bench.table("out") == kept.table);
-    // The worker of a shard computes such a part again too.
+    // The worker of a shard also computes a damaged part again.
     flip(&kept.restored().join(kept.part(1)), 1000);
     let told = Told::default();
     let report = kept.bench.shard("out", Shard::new(2, 2).unwrap(), "b", 1, &told).unwrap();
@@ -155,7 +155,7 @@ fn shards_are_put_together_without_damaged_parts() {
     assert!(kept.bench.table("out") == kept.table);
 }
 
-/// Damages the first part when the runs of the second are done.
+/// Damages the first part once runs of the second part are done.
 struct Damaging {
     told: Told,
     part: PathBuf,
@@ -197,7 +197,7 @@ fn only_the_verdict_of_a_damaged_line_is_judged_again() {
     let table = fs::read(bench.path("out/verdicts.csv")).unwrap();
     let journal = bench.path("out/verdicts.part.csv");
     let line_end = fs::read(&journal).unwrap().iter().position(|byte| *byte == b'\n').unwrap();
-    // Within the first line, and the table of a campaign that is not finished is not believed either.
+    // The fault lies within the first line. The table of an unfinished campaign is not trusted either.
     flip(&journal, 8 * (line_end / 2));
     flip(&bench.path("out/verdicts.csv"), 8 * (table.len() - 20));
     let told = Told::default();

@@ -1,4 +1,4 @@
-//! What is refused, before anything is written.
+//! Refusals before anything is written.
 
 use cohaptic_campaign::{CampaignError, Format, Outcome, Watch};
 
@@ -45,7 +45,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
     assert!(!bench.path("out").exists());
 }
 
-/// The first combination that is refused is the one that is named, however many threads look.
+/// The error names the first refused combination, however many threads check.
 #[test]
 fn the_first_fault_is_shown() {
     let mut bench = Bench::new(&["object.mass=1..2/40", "object.damping=0..7/8", "coordination.update=1500us..2500us/11"], 1);
@@ -70,7 +70,7 @@ fn a_folder_with_something_else_in_it_is_left_alone() {
     let error = bench.assert_refused("thesis", &["chapter.tex", "a folder of its own"]);
     assert!(!error.is_io());
     assert_eq!(bench.files("thesis"), ["chapter.tex"]);
-    // An empty one will do, also one that a campaign left which was killed at once.
+    // An empty folder is accepted, and so is a folder left by a campaign killed at its begin.
     std::fs::create_dir_all(bench.path("a/b")).unwrap();
     std::fs::write(bench.path("a/b/campaign.json.partial"), "{").unwrap();
     std::fs::write(bench.path("a/b/cohaptic.lock"), "").unwrap();
@@ -113,7 +113,7 @@ fn another_campaign_is_refused_and_it_is_said_what_differs() {
     bench.finish("out", 1);
 }
 
-/// A file that the scene names belongs to the campaign too.
+/// The content of a file named by the scene belongs to the identity of the campaign.
 #[test]
 fn a_file_that_the_scene_names_may_not_change() {
     let mut bench = Bench::new(&["peers.left.hand.file=one.csv,two.csv"], 4);
@@ -158,7 +158,7 @@ fn a_manifest_that_is_none_is_refused() {
     }
 }
 
-/// An observer of the end alone.
+/// A watch which stops at once.
 struct Never;
 
 impl Watch for Never {
@@ -176,7 +176,7 @@ fn ended_before_it_began_nothing_is_written() {
     assert!(matches!(bench.outcome("out", 2, &Never), Ok(Outcome::Interrupted { kept: 0 })));
 }
 
-/// A folder in which nothing can be written: the same as a full disk before the first byte.
+/// A folder that cannot be created gives the same error as a full disk before the first byte.
 #[test]
 fn a_folder_that_cannot_be_made_is_said() {
     let bench = Bench::new(&VARY, 4);

@@ -1,5 +1,5 @@
-//! Campaigns in folders of their own. A run of a campaign is compared with the same run alone; a table with that of a campaign that nothing disturbed, byte by
-//! byte.
+//! Tests with campaigns in temporary folders. A run of a campaign is compared with the same run alone, and a table byte by byte with the table of an
+//! undisturbed campaign.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, reason = "tests: what is written is what was computed, to the bit")]
 
 mod bench;

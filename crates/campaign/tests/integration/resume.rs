@@ -1,4 +1,4 @@
-//! Campaigns that are ended anywhere and continued give the same bytes.
+//! Campaigns stopped anywhere and continued give the same bytes.
 
 use cohaptic_campaign::{Format, Outcome};
 use proptest::prelude::*;
@@ -8,7 +8,8 @@ use crate::bench::{Bench, StopAfter, VARY};
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Ended again and again, with any number of threads, parts torn off or half written by a kill: the table is the one of a campaign that nothing disturbed.
+    /// The campaign is stopped again and again, with any number of threads, and parts are torn off or half written as by a kill. The table equals the table of
+    /// an undisturbed campaign.
     #[test]
     fn however_it_was_interrupted_the_table_is_the_same(
         stops in prop::collection::vec((0_u64..60, 1_usize..4, prop::option::of(0_usize..18), any::<bool>()), 0..5),
@@ -21,19 +22,19 @@ proptest! {
             match bench.outcome("parts", threads, &StopAfter::runs(stop)).unwrap() {
                 Outcome::Finished(report) => prop_assert_eq!(report.combinations, whole.combinations.clone()),
                 Outcome::Interrupted { kept } => {
-                    // Only the last part may have fewer runs than the others.
+                    // Only the last part may have fewer runs than the other parts.
                     let parts = bench.parts("parts").len() as u64;
                     prop_assert!(kept <= parts * part && (parts == 0 || kept > (parts - 1) * part), "{} runs in {} parts of {}", kept, parts, part);
                     prop_assert!(bench.files("parts").iter().all(|name| !name.ends_with(".partial") && !name.starts_with("runs")));
                 }
             }
-            // Killed before a part had its digest, or the part itself is lost.
+            // The process was killed before a part had its digest, or the part itself is lost.
             let parts: Vec<String> = bench.files("parts").into_iter().filter(|name| name.starts_with("part-")).collect();
             if let Some(name) = lost.and_then(|place| parts.get(place)) {
                 std::fs::remove_file(bench.path("parts").join(name)).unwrap();
             }
             if torn {
-                // What a kill leaves: a file that has not its name yet, and the file of a lock that nobody holds.
+                // A killed process leaves a partial file, and a lock file held by nobody.
                 let name = format!("parts/part-00000.{}.partial", bench.format.name());
                 std::fs::write(bench.path(&name), "PAR1 or half a row").unwrap();
                 std::fs::write(bench.path("parts/cohaptic.lock"), "").unwrap();
@@ -63,14 +64,14 @@ fn what_is_kept_is_not_computed_again() {
     let mut bench = Bench::new(&VARY, 10);
     bench.part = Some(8);
     let Outcome::Interrupted { kept } = bench.outcome("out", 1, &StopAfter::runs(17)).unwrap() else { panic!("it was to be interrupted") };
-    // One thread does the chunks of 8 one after the other, and is asked before each: after 24 runs it ends.
+    // One thread does chunks of 8 runs and asks the watch before each chunk, so the campaign stops after 24 runs.
     assert_eq!((kept, bench.parts("out").len(), bench.files("out").len()), (24, 3, 7));
     let campaign = bench.open("out").unwrap();
     assert_eq!((campaign.kept(), campaign.is_finished(), campaign.plan().runs()), (24, false, 40));
     drop(campaign);
     let report = bench.finish("out", 2);
     assert_eq!((report.runs, report.computed), (40, 16));
-    // And a finished one not at all.
+    // A finished campaign is not changed at all.
     let before = bench.path("out/runs.parquet").metadata().unwrap().modified().unwrap();
     assert!(bench.open("out").unwrap().is_finished());
     let again = bench.finish("out", 2);
@@ -78,7 +79,7 @@ fn what_is_kept_is_not_computed_again() {
     assert_eq!(bench.path("out/runs.parquet").metadata().unwrap().modified().unwrap(), before);
 }
 
-/// Killed after the table got its name and before the parts were gone.
+/// The process was killed after the table got its name and before the parts were removed.
 #[test]
 fn parts_beside_the_table_are_removed() {
     let mut bench = Bench::new(&VARY, 4);

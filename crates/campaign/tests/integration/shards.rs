@@ -1,4 +1,4 @@
-//! Shards in any split, order and number, ended anywhere and done twice, give the bytes of one process.
+//! Shards in any number and order, stopped anywhere and done twice, give the bytes of one process.
 
 use std::fs;
 
@@ -12,15 +12,15 @@ fn shard(index: u64, count: u64) -> Shard {
     Shard::new(index, count).unwrap()
 }
 
-/// What a worker does of the shards, in turn.
+/// The work of one worker on one shard.
 #[derive(Clone, Debug)]
 struct Turn {
     index: u64,
     count: u64,
     threads: usize,
-    /// After this number of runs it is ended.
+    /// Number of runs after which the worker is stopped; `None` for no stop.
     stop: Option<u64>,
-    /// Whether what a kill leaves is put there.
+    /// Whether the leftovers of a killed process are put into the folder.
     killed: bool,
 }
 
@@ -45,7 +45,7 @@ proptest! {
             let done = bench.shard("shards", shard(turn.index, turn.count), &format!("worker-{number}"), turn.threads, &watch);
             match done {
                 Ok(report) => prop_assert!(report.computed + report.left <= report.runs && (turn.stop.is_some() || report.left == 0)),
-                // Ended before anything was written.
+                // Stopped before anything was written.
                 Err(error) => prop_assert!(matches!(error, CampaignError::Stopped) && turn.stop == Some(0), "{error}"),
             }
             if turn.killed && bench.path("shards").exists() {
@@ -60,7 +60,7 @@ proptest! {
             }
         }
         let missing = bench.merge("shards");
-        // With these all is done, whatever was before.
+        // These shards complete the campaign, whatever was done before.
         let mut indices: Vec<u64> = (1..=last).collect();
         if backwards {
             indices.reverse();
@@ -78,7 +78,7 @@ proptest! {
         prop_assert_eq!(bench.files("shards"), bench.files("whole"));
     }
 
-    /// At the same time, the same shard twice among them.
+    /// Each shard is done by two workers at the same time.
     #[test]
     fn workers_at_the_same_time_do_each_other_no_harm(count in 1_u64..4, part in 1_u64..9, csv: bool) {
         let mut bench = Bench::new(&VARY, 6);
@@ -114,7 +114,7 @@ fn a_merge_says_what_is_missing_and_computes_nothing() {
         state.iter().map(|part| (part.runs, part.is_done)).collect::<Vec<_>>(),
         [false, true, false, false, true, false].map(|done| (4, done))
     );
-    // Done again it is not computed again, and a process alone does the rest.
+    // A shard done again computes nothing, and a process alone does the remaining shards.
     assert_eq!(bench.shard("out", shard(2, 3), "b", 1, &NoWatch).unwrap().computed, 0);
     assert_eq!(bench.finish("out", 1).computed, 16);
     assert_eq!(bench.shard("out", shard(1, 3), "c", 1, &NoWatch).unwrap().computed, 0);
@@ -153,7 +153,7 @@ fn a_process_alone_and_workers_do_not_work_at_the_same_time() {
     bench.merge("out").unwrap();
 }
 
-/// Judges by the stiffness alone, and counts.
+/// Judges by the stiffness alone, and counts its calls.
 struct Counting(std::sync::atomic::AtomicU64);
 
 impl Judge for Counting {
@@ -182,7 +182,7 @@ fn verdicts_are_made_where_they_are_needed_and_are_those_of_one_process() {
     whole.judge(&counting(), &NoWatch).unwrap();
     assert!(matches!(whole.run(&NoWatch), Ok(Outcome::Finished(_))));
     drop(whole);
-    // Parts of eight runs and combinations of six: part 0 has combinations 0 and 1, part 1 has 1 and 2, part 2 has 2 and 3.
+    // With parts of eight runs and six runs per combination, part 0 has combinations 0 and 1, part 1 has 1 and 2, part 2 has 2 and 3.
     for (index, expected) in [(3, 2), (1, 2), (2, 0)] {
         let mut shared = SharedCampaign::open(plan(), &bench.path("out"), &index.to_string(), &NoWatch).unwrap();
         assert!(matches!(shared.run(shard(index, 3), &NoWatch), Err(CampaignError::NotJudged)));

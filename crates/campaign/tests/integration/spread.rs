@@ -1,4 +1,4 @@
-//! A campaign that is spread has the rows of the table that one process writes.
+//! A spread campaign has the same rows as the table written by one process.
 
 use std::path::Path;
 
@@ -41,14 +41,14 @@ fn the_rows_are_those_of_one_process_whoever_has_which() {
     assert_eq!(first.columns().iter().map(|column| column.name.clone()).collect::<Vec<_>>(), names);
     let mut rows = Vec::new();
     for runs in [0..1, 1..13, 13..30] {
-        // Another process, which knows the plan and the roster alone.
+        // Another process knows the plan and the roster only.
         let other = SpreadCampaign::with_roster(plan(), &first.roster()).unwrap();
         rows.extend(other.rows(runs, &NoWatch).unwrap());
     }
     assert_eq!((rows.len(), first.runs()), (30, 30));
     for (row, expected) in rows.iter().zip(&expected) {
         for ((value, expected), name) in row.iter().zip(expected).zip(&names) {
-            // Numbers are written with the fewest digits that read back the same.
+            // Numbers are written with the fewest digits that read back as the same `f64`.
             if let Value::Number(number) = value {
                 assert_eq!(expected.parse::<f64>().unwrap().to_bits(), number.to_bits(), "{name}");
             } else {

@@ -1,4 +1,4 @@
-//! What is in a table.
+//! Contents of tables.
 
 use std::fs::File;
 use std::path::Path;
@@ -13,7 +13,7 @@ use parquet::record::Field;
 
 use crate::bench::{Bench, SCENE, VARY, comma_separated};
 
-/// The cells of a Parquet file as they would be written in CSV.
+/// Returns the cells of a Parquet file in the form of CSV.
 fn parquet(path: &Path) -> (Vec<String>, Vec<Vec<String>>) {
     let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
     let header = reader.metadata().file_metadata().schema_descr().columns().iter().map(|column| column.name().to_owned()).collect();
@@ -29,7 +29,7 @@ fn parquet(path: &Path) -> (Vec<String>, Vec<Vec<String>>) {
     (header, rows)
 }
 
-/// The row that a run alone gives, cell by cell: from the summary, without anything of the crate under test.
+/// Compares a row with a run alone, cell by cell, without using code of the tested crate.
 fn alone(cells: &[(String, String)], set: &[String], text: &str) {
     let cell = |name: &str| cells.iter().find(|(column, _)| column == name).map(|(_, cell)| cell.clone()).unwrap_or_else(|| panic!("no {name}"));
     let seed = format!("scene.seed={}", cell("seed"));
@@ -37,7 +37,7 @@ fn alone(cells: &[(String, String)], set: &[String], text: &str) {
     let scene = Scene::parse(text, Path::new(""), &overrides).unwrap();
     let Ok(summary) = Simulation::new(&scene, Model::Least).run(&mut NoObserver);
     let (ending, ended) = match summary.ending {
-        // The definition of a run that diverged, written out once more.
+        // The definition of a diverged run, repeated here.
         Ending::Complete => (if summary.max_discrepancy > 1.0 { "diverged" } else { "complete" }, summary.duration.as_secs_f64()),
         Ending::Diverged(at) => ("diverged", std::time::Duration::from_nanos(at.as_nanos()).as_secs_f64()),
         Ending::Interrupted(_) => panic!("nobody interrupts"),
@@ -100,7 +100,7 @@ fn every_run_is_the_run_alone_to_the_last_bit() {
     assert_eq!(header[header.len() - 2..], ["peers.right.energy_j", "age_p99_s"], "measures come last, in their order");
     let lost = |row: &Vec<String>| row[header.iter().position(|name| name == "links.dropped_loss").unwrap()].parse::<u64>().unwrap();
     assert!(rows.iter().any(|row| lost(row) > 0), "the network does something");
-    // The report is the table summed up.
+    // The report sums up the table.
     let discrepancy = header.iter().position(|name| name == "max_discrepancy_m").unwrap();
     for (combination, sums) in report.combinations.iter().enumerate() {
         let values: Vec<f64> = rows[combination * 5..combination * 5 + 5].iter().map(|row| row[discrepancy].parse().unwrap()).collect();
@@ -109,7 +109,7 @@ fn every_run_is_the_run_alone_to_the_last_bit() {
     }
 }
 
-/// What diverges says so, with numbers that are no numbers.
+/// A diverged run says so, and may have values that are not numbers.
 #[test]
 fn both_formats_hold_the_same_also_of_what_diverges_and_of_who_is_missing() {
     let text = SCENE
@@ -183,10 +183,10 @@ fn the_mean_delay_is_that_of_all_packets_of_all_links() {
     let (header, rows) = comma_separated(&bench.path("out/runs.csv"));
     let place = header.iter().position(|name| name == "links.mean_delay_s").unwrap();
     for (row, delay) in rows.iter().zip([3_u32, 9]) {
-        // Sent every 2 ms from 0 on, counted if it arrives by 40 ms; nothing arrives at 40 ms.
+        // A packet is sent every 2 ms from 0 on, and counts if it arrives before 40 ms. No packet arrives at exactly 40 ms.
         let arrived = |delay: u32| (0..20).map(|packet| f64::from(u8::from(packet * 2 + delay < 40))).sum::<f64>();
         let expected = (arrived(delay) * f64::from(delay) + arrived(7) * 7.0) / (arrived(delay) + arrived(7)) / 1e3;
-        // Rounded down twice, to a nanosecond.
+        // The mean is rounded down to a nanosecond twice.
         let found = row[place].parse::<f64>().unwrap();
         assert!(found <= expected + 1e-15 && expected - found < 2e-9, "{found} {expected}");
     }

@@ -1,4 +1,4 @@
-//! Verdicts that a judge brings: each combination once, kept as they are made, in the rows of its runs.
+//! Verdicts of a judge: each combination is judged once, each judgement is stored at once, and the rows of the runs contain the judgements.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -7,7 +7,7 @@ use cohaptic_scene::Scene;
 
 use crate::bench::{Bench, comma_separated, finished};
 
-/// Says a number of the scene, refuses every third stiffness, and gives up after so many.
+/// Judges by the stiffness alone, refuses stiffnesses divisible by three, and gives up after a number of judgements.
 pub(crate) struct ByStiffness(AtomicU64);
 
 impl ByStiffness {
@@ -50,7 +50,7 @@ fn each_combination_is_judged_once_however_often_it_is_stopped() {
         missing = left;
     }
     let mut campaign = open(&bench, "out");
-    // Nothing is left to be judged.
+    // No combination is left to judge.
     assert_eq!(campaign.judge(&ByStiffness::at_most(0), &NoWatch).unwrap(), 0);
     let report = finished(campaign.run(&NoWatch).unwrap());
     let mut whole = open(&bench, "whole");
@@ -70,7 +70,7 @@ fn each_combination_is_judged_once_however_often_it_is_stopped() {
         let known = ["stable".to_owned(), "by hand".to_owned(), format!("{:?}", 1.0 / stiffness), "0.1".to_owned()];
         assert_eq!(cells, if stiffness % 3.0 == 0.0 { [const { String::new() }; 4] } else { known }, "{stiffness}");
     }
-    // The quantiles are those of the rows: of three, by rank, the first, the second and the third.
+    // The quantiles are the quantiles of the rows: of three values by rank, the first, the second and the third.
     for (runs, quantiles) in rows.chunks(3).zip(&report.quantiles) {
         let mut values: Vec<f64> = runs.iter().map(|row| row[place("max_discrepancy_m")].parse().unwrap()).collect();
         values.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! The compact protocol of Apache Thrift, as far as it takes to tell where a value ends: the index at the end of a Parquet file is written in it.
+//! Reader of the compact protocol of Apache Thrift, able to find the end of a value. The index at the end of a Parquet file is written in this protocol.
 //!
 //! Source: <https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>.
 
@@ -6,18 +6,18 @@ use std::io::Read;
 
 use crate::table::TableError;
 
-/// The kind of a field that is a list.
+/// Kind of a list.
 pub(super) const LIST: u8 = 9;
-/// The kind of a field or an element that is a struct.
+/// Kind of a struct.
 pub(super) const STRUCT: u8 = 12;
-/// The kind of a field that is an `i64`.
+/// Kind of an `i64` field.
 pub(super) const I64: u8 = 6;
-/// What ends the fields of a struct.
+/// Header at the end of a struct's fields.
 pub(super) const STOP: u8 = 0;
 
-/// Structs in structs beyond these are no metadata of a table.
+/// Deepest nesting of values; deeper nesting is not from a table.
 const MOST_DEEP: u32 = 16;
-/// The longest text in it \[bytes\]: what a manifest may be long.
+/// Longest text \[bytes\]: the most that a manifest may have.
 const LONGEST: u64 = cohaptic_files::MOST_BYTES;
 
 /// Reads values one after the other, and keeps their bytes.
@@ -31,55 +31,59 @@ impl<R: Read> Compact<R> {
         Self { from, kept: Vec::new() }
     }
 
-    /// The bytes that were read since the last call.
+    /// Returns the bytes read since the last call.
     pub(super) fn take(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.kept)
     }
 
-    /// All bytes that are left, with those that are kept.
+    /// Returns the kept bytes and all further bytes.
     pub(super) fn rest(mut self) -> Result<Vec<u8>, TableError> {
         self.from.read_to_end(&mut self.kept)?;
         Ok(self.kept)
     }
 
-    /// The number and the kind of the next field of a struct, behind the field of that number; `None` at the end of the struct.
+    /// Reads the header of a struct's next field: number and kind; `None` at the end of the struct. `last`: number of the field before, 0 for the first field.
     pub(super) fn field(&mut self, last: i64) -> Result<Option<(i64, u8)>, TableError> {
         let header = self.byte()?;
         if header == STOP {
             return Ok(None);
         }
         let (step, kind) = (header >> 4, header & 15);
+        // The header holds the distance to the last number. A distance of 0 announces a full number.
         let number = if step == 0 { self.integer()? } else { last + i64::from(step) };
         Ok(Some((number, kind)))
     }
 
-    /// How many elements a list has, and their kind.
+    /// Reads the header of a list: number and kind of the elements.
     pub(super) fn list(&mut self) -> Result<(u64, u8), TableError> {
         let header = self.byte()?;
         let count = match header >> 4 {
+            // Lists of 15 or more elements have their length in a separate number.
             15 => self.varint()?,
             few => u64::from(few),
         };
         Ok((count, header & 15))
     }
 
-    /// An integer of any size but a byte's.
+    /// Reads an integer of two, four or eight bytes.
     pub(super) fn integer(&mut self) -> Result<i64, TableError> {
         let zigzag = self.varint()?;
+        // Zigzag: 0, −1, 1, −2, … are written as 0, 1, 2, 3, …
         Ok((zigzag >> 1).cast_signed() ^ -(zigzag & 1).cast_signed())
     }
 
-    /// Goes behind a value of a field.
+    /// Skips the value of a field of this kind.
     pub(super) fn skip(&mut self, kind: u8) -> Result<(), TableError> {
         self.skip_at(kind, 0)
     }
 
     fn skip_at(&mut self, kind: u8, depth: u32) -> Result<(), TableError> {
+        // A damaged file could nest without end, and the recursion would overflow the stack.
         if depth > MOST_DEEP {
             return Err(no_metadata());
         }
         match kind {
-            // Truths stand in the kind itself.
+            // The kind of a Boolean field is its value.
             1 | 2 => Ok(()),
             3 => self.byte().map(drop),
             4..=6 => self.varint().map(drop),
@@ -90,7 +94,7 @@ impl<R: Read> Compact<R> {
             }
             LIST | 10 => {
                 let (count, kind) = self.list()?;
-                // As elements truths have a byte each.
+                // Boolean elements of a list have one byte each, unlike Boolean fields.
                 let kind = if kind <= 2 { 3 } else { kind };
                 (0..count).try_for_each(|_| self.skip_at(kind, depth + 1))
             }
@@ -102,7 +106,7 @@ impl<R: Read> Compact<R> {
                 }
                 Ok(())
             }
-            // Tables of Parquet have no maps.
+            // The metadata of Parquet have no maps.
             _ => Err(no_metadata()),
         }
     }
@@ -115,15 +119,18 @@ impl<R: Read> Compact<R> {
     }
 
     fn bytes(&mut self, count: u64) -> Result<(), TableError> {
+        // A damaged length must not make the reader collect the rest of the file.
         if count > LONGEST {
             return Err(no_metadata());
         }
+        // `read_to_end` grows with the bytes present: a damaged length reserves no memory.
         let read = (&mut self.from).take(count).read_to_end(&mut self.kept)?;
         if read as u64 == count { Ok(()) } else { Err(no_metadata()) }
     }
 
     fn varint(&mut self) -> Result<u64, TableError> {
         let mut value = 0;
+        // Ten bytes hold 64 bits. A longer number is a fault.
         for shift in (0..64).step_by(7) {
             let byte = self.byte()?;
             value |= u64::from(byte & 0x7f) << shift;
@@ -135,7 +142,7 @@ impl<R: Read> Compact<R> {
     }
 }
 
-/// Puts a number behind the bytes, seven bits a byte, the last first.
+/// Appends a number in groups of seven bits, the lowest group first. The top bit of a byte announces a further byte.
 pub(super) fn put_varint(bytes: &mut Vec<u8>, mut value: u64) {
     while value >= 0x80 {
         bytes.push(value.to_le_bytes()[0] | 0x80);
@@ -144,7 +151,7 @@ pub(super) fn put_varint(bytes: &mut Vec<u8>, mut value: u64) {
     bytes.push(value.to_le_bytes()[0]);
 }
 
-/// Puts the header of a list behind the bytes.
+/// Appends the header of a list.
 pub(super) fn put_list(bytes: &mut Vec<u8>, count: u64, kind: u8) {
     match u8::try_from(count) {
         Ok(few) if few < 15 => bytes.push(few << 4 | kind),
@@ -175,7 +182,7 @@ mod tests {
         }
     }
 
-    /// An example of each kind, from the protocol's page.
+    /// Examples of each kind, from the page of the protocol.
     #[test]
     fn a_struct_is_left_at_its_end() {
         let one_of_each: [&[u8]; 11] = [

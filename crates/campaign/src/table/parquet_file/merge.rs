@@ -1,4 +1,4 @@
-//! Puts parts into one file as they are, a row group each: nothing is decoded, and no more is held than one part says of its row group.
+//! Merges the parts into one file, each as a row group. The columns are copied without decoding, and only the metadata of one part are in memory.
 
 use std::fs::File;
 use std::io::Write;
@@ -17,7 +17,7 @@ use super::{about, properties, schema};
 use crate::table::Column;
 use crate::table::format::{Head, OpenPart, TableError, rows_missing};
 
-/// The bytes are those that a file writer of the library makes of the same row groups.
+/// Writes the table. The bytes equal the bytes of the library's file writer for the same row groups.
 pub(in crate::table) fn merge(
     file: &mut WholeFile,
     head: Head<'_>,
@@ -26,12 +26,13 @@ pub(in crate::table) fn merge(
     let schema = Arc::new(SchemaDescriptor::new(schema(head.columns)?));
     let properties = properties(head);
     let mut index = IndexWriter::create(file.path(), schema.clone())?;
-    // The format has 16 bits for the place of a row group, and a file with more row groups says of none where it is.
+    // The format has 16 bits for the index of a row group. The library states no index at all in a file with more row groups.
     let has_places = i16::try_from(parts.len()).is_ok();
     let mut to = TrackedWrite::new(file);
     to.write_all(MAGIC)?;
     for (place, part) in (0..).zip(parts) {
         let OpenPart { path, file: part, rows } = part?;
+        // The digest covers the bytes and not their meaning, so columns and rows are checked here.
         let group = group(&part, head.columns, rows).map_err(TableError::of_part(&path))?;
         let place = if has_places { place } else { i32::MAX };
         let mut copied = SerializedRowGroupWriter::new(schema.clone(), properties.clone(), &mut to, place, None);
@@ -42,7 +43,7 @@ pub(in crate::table) fn merge(
     Ok(to.flush()?)
 }
 
-/// The row group of a part that is as it was written.
+/// Returns the only row group of a part, after a check of its columns and of its number of rows.
 fn group(part: &File, columns: &[Column], expected: u64) -> Result<RowGroupMetaData, TableError> {
     let reader = SerializedFileReader::new(part.try_clone()?)?;
     let metadata = reader.metadata();

@@ -1,5 +1,5 @@
-//! Apache Parquet. The file depends on the rows alone: no times, no random names. Nothing is compressed: most of a table is numbers whose last digits
-//! look random, and what repeats is stored as a dictionary anyway.
+//! The table as an Apache Parquet file. The file depends on the rows alone: no times and no random names. Nothing is compressed: the last digits of most
+//! numbers look random, and repeated values are stored in dictionaries anyway.
 
 mod compact;
 mod index;
@@ -26,7 +26,7 @@ use super::{Column, Kind, Row, Value};
 pub(super) use merge::merge;
 pub(super) use read::{read_columns, read_gists};
 
-/// Under which key a file says what it belongs to.
+/// Key of the manifest's text in the metadata of a file.
 const ABOUT: &str = "cohaptic.campaign";
 
 pub(super) fn write(to: &mut (impl Write + Send), head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
@@ -42,13 +42,13 @@ pub(super) fn write(to: &mut (impl Write + Send), head: Head<'_>, rows: &[Row]) 
     Ok(())
 }
 
-/// Of a part, and of the table that parts are put together to.
+/// Returns the properties of a file, equal for the parts and the table.
 fn properties(head: Head<'_>) -> WriterPropertiesPtr {
     let properties = WriterProperties::builder()
         .set_created_by(head.program.to_owned())
         .set_key_value_metadata(Some(vec![about(head)]))
         .set_statistics_enabled(EnabledStatistics::Chunk)
-        // The parts are put together without it.
+        // The merge copies column chunks without the offset index.
         .set_offset_index_disabled(true)
         .set_max_row_group_row_count(None)
         .build();
@@ -76,6 +76,7 @@ fn schema(columns: &[Column]) -> Result<TypePtr, ParquetError> {
 fn write_column<'a>(writer: &mut ColumnWriter<'_>, column: &Column, values: impl Iterator<Item = &'a Value>) -> Result<(), TableError> {
     let (mut integers, mut numbers, mut texts, mut levels) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for value in values {
+        // The definition level: 1 for a value, 0 for none. The library takes the values themselves without gaps.
         levels.push(i16::from(!matches!(value, Value::Absent)));
         match value {
             Value::Absent => {}

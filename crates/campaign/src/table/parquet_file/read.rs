@@ -1,4 +1,4 @@
-//! Reads columns of a table, a row group at a time.
+//! Reads columns of a table, one row group at a time.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -16,22 +16,23 @@ use parquet::schema::types::SchemaDescriptor;
 use super::index::IndexReader;
 use crate::table::format::{COMPLETE, DIVERGED, GIST, Gist, Gists, RunColumns, TableError};
 
-/// The columns of a row group.
+/// Returns the reader of a row group's columns.
 fn row_group<'a>(file: &Arc<File>, group: &'a RowGroupMetaData) -> Result<SerializedRowGroupReader<'a, File>, ParquetError> {
     let properties = Arc::new(ReaderProperties::builder().build());
     SerializedRowGroupReader::new(file.clone(), group, RowGroupPageIndex::new(0, None), properties)
 }
 
-/// The text of every row of a column in a row group, if its statistics say that there is one only: most runs are complete, and a text takes longer to read than all
-/// numbers that are summed up.
+/// Returns the text common to all rows of a column in a row group, if the statistics prove that there is only one. Most row groups have complete runs only, and
+/// then the texts need not be decoded.
 fn only_text(column: &ColumnChunkMetaData) -> Option<&[u8]> {
     let Some(Statistics::ByteArray(statistics)) = column.statistics() else { return None };
+    // Long texts are cut in the statistics. Equal cut texts prove nothing.
     let is_exact = statistics.min_is_exact() && statistics.max_is_exact();
     let (least, greatest) = (statistics.min_opt()?.data(), statistics.max_opt()?.data());
     (is_exact && least == greatest).then_some(least)
 }
 
-/// The place of a column.
+/// Returns the index of a column.
 fn place_of(schema: &SchemaDescriptor, name: &str) -> Result<usize, TableError> {
     let found = schema.columns().iter().position(|column| column.name() == name);
     found.ok_or_else(|| TableError::Content(format!("no column {name}")))
@@ -64,7 +65,7 @@ pub(in crate::table) fn read_gists(file: File, each: Gists<'_>) -> Result<(), Ta
     Ok(())
 }
 
-/// Columns of numbers, and which runs were complete.
+/// Reads columns of numbers, and which runs came to their end.
 pub(in crate::table) fn read_columns(file: File, names: &[&str]) -> Result<RunColumns, TableError> {
     let file = Arc::new(file);
     let mut index = IndexReader::open(&file)?;
@@ -88,7 +89,7 @@ pub(in crate::table) fn read_columns(file: File, names: &[&str]) -> Result<RunCo
     Ok(read)
 }
 
-/// The values of a column in one row group: no number where there is none.
+/// Returns the values of a column in one row group; NaN for no value.
 fn numbers(column: ColumnReader, rows: usize, optional: bool) -> Result<Vec<f64>, TableError> {
     let (mut integers, mut numbers, mut levels) = (Vec::new(), Vec::new(), Vec::new());
     let given = optional.then_some(&mut levels);
@@ -109,6 +110,7 @@ fn numbers(column: ColumnReader, rows: usize, optional: bool) -> Result<Vec<f64>
     if !optional {
         return Ok(numbers);
     }
+    // `numbers` has the present values only. A level above 0 marks a row with a value.
     let mut known = numbers.into_iter();
     Ok(levels.into_iter().map(|level| if level > 0 { known.next().unwrap_or(f64::NAN) } else { f64::NAN }).collect())
 }

@@ -1,4 +1,4 @@
-//! The table beside the library's own writer, which keeps the index of all row groups.
+//! Compares the table with the table of the library's own writer, which keeps the index of all row groups in memory.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -19,14 +19,14 @@ fn columns() -> Vec<Column> {
     ]
 }
 
-/// The row of a run: some diverge, and some have no mean.
+/// Returns the row of a run. Every third run diverges, and every second run has no mean.
 fn row(run: u32) -> Row {
     let ending = if run % 3 == 1 { "diverged" } else { "complete" };
     let mean = if run.is_multiple_of(2) { Value::Absent } else { Value::Number(f64::from(run).sqrt()) };
     vec![Value::Integer(i64::from(run)), Value::Text(ending.into()), Value::Number(1.0 / f64::from(run + 1)), mean]
 }
 
-/// Parts with one row, two, three, one and so on.
+/// Writes parts with one row, two, three, one and so on.
 fn parts(folder: &Path, head: Head<'_>, count: u32) -> Vec<(PathBuf, u64)> {
     let mut run = 0;
     let part = |number: u32| {
@@ -48,7 +48,7 @@ fn opened((path, rows): &(PathBuf, u64)) -> Result<OpenPart, TableError> {
     Ok(OpenPart { path: path.clone(), file: File::open(path)?, rows: *rows })
 }
 
-/// The same parts by the library alone.
+/// Writes the same parts by the library alone.
 fn by_the_library(head: Head<'_>, parts: &[(PathBuf, u64)]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut writer = SerializedFileWriter::new(&mut bytes, schema(head.columns).unwrap(), properties(head)).unwrap();
@@ -65,7 +65,7 @@ fn by_the_library(head: Head<'_>, parts: &[(PathBuf, u64)]) -> Vec<u8> {
     bytes
 }
 
-/// Lists have another header from 15 elements on, and numbers another length from 64, 8192 and so on.
+/// Lists have another header from 15 elements on, and numbers have another length from 64, 8192 and so on.
 #[test]
 fn the_bytes_are_those_of_the_library_and_nothing_else_stays_in_the_folder() {
     let folder = tempfile::tempdir().unwrap();
@@ -79,7 +79,7 @@ fn the_bytes_are_those_of_the_library_and_nothing_else_stays_in_the_folder() {
     }
 }
 
-/// From 32,768 row groups on none says its place, for which the format has 16 bits.
+/// From 32,768 row groups on, no row group states its index, for which the format has 16 bits.
 #[test]
 fn they_are_so_with_more_row_groups_than_have_a_place() {
     let folder = tempfile::tempdir().unwrap();
@@ -117,7 +117,7 @@ fn a_row_group_at_a_time_says_what_the_library_reads() {
     assert_eq!(read.columns.iter().map(|column| column[9].to_bits()).collect::<Vec<_>>(), [3.0_f64, 9.0].map(f64::to_bits));
 }
 
-/// What a table ends with is cut off, or says something else.
+/// The end of the table is cut off, or has other bytes.
 #[test]
 fn a_table_that_is_not_as_it_was_written_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,17 +140,17 @@ fn a_table_that_is_not_as_it_was_written_is_refused() {
         read_gists(File::open(&table).unwrap(), &mut |_| rows += 1).map(|()| rows)
     };
     assert_eq!(read(&whole).unwrap(), 6);
-    // Shorter than an end, without its last byte, of another format, longer than the file, and with other fields in front.
+    // Shorter than an end, without the last byte, of another format, with an index longer than the file, and with another first field.
     for bytes in [vec![], whole[..7].to_vec(), whole[..whole.len() - 1].to_vec(), with(end + 7, b'E'), with(end + 3, 0x7f), with(begin, 0x25)] {
         assert!(matches!(read(&bytes), Err(TableError::Content(_))), "{}", bytes.len());
     }
 }
 
-/// In which environment variable a process of this test is told how many parts it is to put together.
+/// Environment variable with the number of parts for a child process of this test.
 #[cfg(target_os = "linux")]
 const PARTS: &str = "COHAPTIC_TEST_PARTS";
 
-/// The most memory that a merge takes \[kB\], in a process of its own: this test, called again.
+/// Returns the peak memory of a merge \[kB\]. The merge runs in a process of its own: this test, called again.
 #[cfg(target_os = "linux")]
 fn peak(parts: usize) -> u64 {
     let mut command = std::process::Command::new(std::env::current_exe().unwrap());
@@ -161,7 +161,7 @@ fn peak(parts: usize) -> u64 {
     peak.unwrap_or_else(|| panic!("{said}"))
 }
 
-/// An index that is held takes a kilobyte a column of a part: 60 MB here.
+/// An index in memory would take a kilobyte per column and part: 60 MB here.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_more_memory_is_taken_by_more_parts() {
@@ -183,7 +183,7 @@ fn no_more_memory_is_taken_by_more_parts() {
     read_gists(File::open(&table).unwrap(), &mut |_| rows += 1).unwrap();
     assert_eq!(rows, parts.len());
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
-    // On a line of its own, whatever stands there.
+    // The line begins with a line feed, because the test harness may have printed a part of a line.
     let peak = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
     writeln!(io::stdout(), "\n{peak}").unwrap();
 }
