@@ -1,4 +1,4 @@
-//! Whether a scene does what its `[expect]` says.
+//! Checks a scene against its `[expect]`.
 
 use std::cell::RefCell;
 
@@ -11,42 +11,42 @@ use serde::Serialize;
 
 use crate::{Quick, quick_verdict};
 
-/// What came out of a check.
+/// Result of a check.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Answered {
-    /// A line for each expectation that does not hold, or why the scene could not be checked; empty if all hold.
+    /// Lines about failed expectations, or the reason why the scene could not be checked; empty if all expectations hold.
     pub failures: Vec<String>,
-    /// What came out of each expectation; empty if the scene could not be checked.
+    /// Results of the expectations; empty if the scene could not be checked.
     pub expectations: Vec<OutcomeDocument>,
-    /// What was told in another way than it could be with more time.
+    /// Notes on results found in a less exact way to save time.
     pub notes: Vec<String>,
 }
 
-/// One expectation and what came out.
+/// An expectation and its result.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OutcomeDocument {
-    /// The section of `[expect]`.
+    /// Section of `[expect]`.
     pub expectation: &'static str,
-    /// The quantity that is compared, in words.
+    /// Compared quantity, in words.
     pub name: String,
-    /// The unit of the numbers; empty for ratios.
+    /// Unit of the numbers; empty for ratios.
     pub unit: &'static str,
-    /// The least value that is expected.
+    /// Least expected value; `None` without a lower bound.
     pub low: Option<f64>,
-    /// The greatest value that is expected.
+    /// Greatest expected value; `None` without an upper bound.
     pub high: Option<f64>,
-    /// What came out, if it is a number.
+    /// Found value, if the result is a number.
     pub measured: Option<f64>,
-    /// Whether that is as expected.
+    /// Whether the result is as expected.
     pub passed: bool,
-    /// The expectation in words.
+    /// The expectation, in words.
     pub expected: String,
-    /// What came out, in words.
+    /// The result, in words.
     pub found: String,
 }
 
 impl OutcomeDocument {
-    /// That of a result.
+    /// Returns the document of a result.
     #[must_use]
     pub fn new(outcome: &Outcome) -> Self {
         let Outcome { key, name, unit, low, high, measured, passed, expected, found, .. } = outcome.clone();
@@ -54,7 +54,7 @@ impl OutcomeDocument {
     }
 }
 
-/// Checks a scene. Whether it is stable is told by the analysis if that is a matter of seconds, and by a simulation otherwise. The watch may end it.
+/// Checks a scene. Stability is told by analysis if the analysis takes seconds only, otherwise by a simulation. The watch may stop the check.
 #[must_use]
 pub fn check(scene: &Scene, model: Model, watch: &dyn Watch) -> Answered {
     let notes = RefCell::new(Vec::new());
@@ -64,11 +64,11 @@ pub fn check(scene: &Scene, model: Model, watch: &dyn Watch) -> Answered {
     Answered { failures, expectations, notes: notes.into_inner() }
 }
 
-/// How long the second moment of a scene may take, by the estimate \[s\]; what takes longer is left to a simulation.
+/// Most time for the analysis, by its estimate \[s\].
 const QUICK: f64 = 10.0;
 
-/// Whether a scene is as stable as it is expected to be, by analysis. One that is not linear, that changes on its way, or whose chance has no second
-/// moment that can be followed in seconds, is left to a simulation; of the last it is noted.
+/// Tells by analysis whether a scene is as stable as expected. A scene without a [quick verdict](quick_verdict()) is left to a simulation; `note` is called if
+/// the reason is a second moment which cannot be followed in time.
 fn judged(scene: &Scene, stable: bool, watch: &dyn Watch, note: impl FnOnce(String)) -> Judged {
     let judgement = match quick_verdict(scene, QUICK, watch) {
         Quick::Known(judgement) => judgement,

@@ -1,6 +1,7 @@
-//! How a document is made.
+//! The macro of JSON documents.
 
-/// A JSON document, or a part of one: keys and values, in this order. Attributes are those of serde; a part that may be absent is a flattened `Option`.
+/// Makes a JSON document, or a part of a document: keys and values, in this order. Attributes are passed to serde; a part that may be absent is a flattened
+/// `Option`.
 #[macro_export]
 macro_rules! document {
     ($($(#[$attribute:meta])* $key:ident: $value:expr),* $(,)?) => {{

@@ -1,4 +1,4 @@
-//! The parts of a scene that are modelled.
+//! The JSON document about the modelled parts of a scene.
 
 use cohaptic_harness::explain::Explanation;
 use cohaptic_scene::Scene;
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::document;
 
-/// The parts that a scene makes the program model, the parts left out, and the cost of a run.
+/// Returns the modelled parts of a scene, the parts left out, and the cost of a run.
 pub fn explanation(scene: &Scene, explanation: &Explanation) -> impl Serialize {
     let Explanation { models, left_out, dimensions, cost } = explanation;
     document! {

@@ -1,16 +1,15 @@
-//! What runs, checks, explanations, verdicts, campaigns, comparisons and links answer, as values, as JSON documents, in words and as pictures.
+//! The answers of the commands: results of runs, checks, verdicts, campaigns and other work as values, as JSON documents, as text for people and as pictures.
 //!
-//! Use this crate if your program answers as `cohaptic --json` does: the command line and the Python package have their documents from here.
+//! Use this crate if your program answers as `cohaptic --json` does: the command line and the Python package take their documents from this crate.
 //!
-//! [`run()`] is a run, [`explanation()`] the model of a scene, [`check()`] a scene and its expectations, where [`quick_verdict()`] tells first whether the
-//! scene is stable. [`methods()`] lists the methods that a scene can choose between, and [`measure()`] says what each costs and how wrong it is.
+//! [`run()`] is the document of a run, [`explanation()`] of the model of a scene. [`check()`] checks the expectations of a scene, and [`quick_verdict()`] tells
+//! by analysis whether a scene is stable. [`methods()`] lists the methods selectable in a scene, and [`measure()`] measures the cost and the error of each.
 //! [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
-//! The commands that have a module of their own have their answer in its function `document`, and the text for people in its function `words`: [`campaign`],
-//! [`compare`], [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`].
-//! [`shards`] has those of work that several processes share.
+//! The other commands have a module each, with a function `document` for the JSON document and a function `words` for the text: [`campaign`], [`compare`],
+//! [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`]. [`shards`] has the answers about work shared by several processes.
 //!
-//! Nothing here reads a clock or prints: [`measure()`] is given a clock.
+//! The crate reads no clock and prints nothing: [`measure()`] takes the clock as an argument.
 //!
 //! ```
 //! use cohaptic_answers::run;

@@ -1,8 +1,8 @@
-//! What a verdict leaves out, in words.
+//! Notes about the simplifications behind a verdict.
 
 use cohaptic_stability::Judgement;
 
-/// The simplifications of the analysis and of the mean square, each once. Where there are both figures, a note says which of them it is about.
+/// Returns the simplifications of the analysis and of the mean square, each once. With both figures, each note names the figure it is about.
 #[must_use]
 pub fn notes(judgement: &Judgement) -> Vec<String> {
     let Some(mean_square) = &judgement.mean_square else {

@@ -1,4 +1,4 @@
-//! Parts of documents.
+//! Parts shared by several documents: peers, links, access lines and measures.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 
 use crate::document;
 
-/// A number in a scene of one axis, a list with more.
+/// Components of a vector: a number in a scene with one axis, a list in a scene with more axes.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Components {
@@ -20,7 +20,7 @@ enum Components {
     More(Vec<f64>),
 }
 
-/// A peer at the end of a run.
+/// Returns the document of a peer at the end of a run.
 pub fn peer(peer: &PeerSummary) -> impl Serialize {
     document! {
         name: peer.name.as_str(),
@@ -42,22 +42,22 @@ impl Components {
     }
 }
 
-/// The largest angle between two copies; nothing where the object does not turn.
+/// Returns the largest angle between two copies \[rad\]; `None` if the object does not turn.
 pub fn rotation(summary: &Summary) -> Option<impl Serialize + use<>> {
     summary.max_rotation_discrepancy.map(|angle| document! { max_rotation_discrepancy_rad: angle })
 }
 
-/// More links than these are not listed one by one.
+/// Most links listed one by one.
 pub(crate) const MOST_LINKS: u64 = 1000;
 
-/// Each link between two peers at the end of a run, if they are listed.
+/// Returns the document of each link between two peers at the end of a run; `None` if the scene has more than 1000 links.
 pub fn peer_links(scene: &Scene, summary: &Summary) -> Option<Vec<impl Serialize + use<>>> {
     let name = |peer: usize| scene.peers[peer].name.clone();
     let links = || summary.links.iter().map(|link| self::link(name(link.from), name(link.to), &link.stats));
     (summary.links.len() <= MOST_LINKS).then(|| links().collect())
 }
 
-/// What all links between peers did together.
+/// Returns the sums of the counters over all links between peers.
 pub fn link_totals(summary: &Summary) -> impl Serialize + use<> {
     document! {
         links: summary.links.len(),
@@ -66,7 +66,7 @@ pub fn link_totals(summary: &Summary) -> impl Serialize + use<> {
     }
 }
 
-/// How the links between peers differ.
+/// Returns the quantiles, over the links between peers, of the delivered fraction and of the mean delay.
 pub fn link_quantiles(summary: &Summary) -> impl Serialize + use<> {
     let of = |quantiles: Option<LinkQuantiles>| {
         quantiles.map(|LinkQuantiles { min, p01, p50, p99, max }| document! { min: min, p01: p01, p50: p50, p99: p99, max: max })
@@ -74,7 +74,7 @@ pub fn link_quantiles(summary: &Summary) -> impl Serialize + use<> {
     document! { delivered_fraction: of(summary.links.delivered_fraction()), mean_delay_s: of(summary.links.mean_delay()) }
 }
 
-/// A link with its ends.
+/// Returns the document of a link with the names of its ends.
 pub fn link(from: String, to: String, stats: &LinkStats) -> impl Serialize + use<> {
     document! {
         from: from,
@@ -84,7 +84,7 @@ pub fn link(from: String, to: String, stats: &LinkStats) -> impl Serialize + use
     }
 }
 
-/// An access line at the end of a run.
+/// Returns the document of an access line at the end of a run.
 pub fn access_line(scene: &Scene, line: &AccessSummary) -> impl Serialize + use<> {
     document! {
         peer: scene.peers[line.peer].name.clone(),
@@ -94,7 +94,7 @@ pub fn access_line(scene: &Scene, line: &AccessSummary) -> impl Serialize + use<
     }
 }
 
-/// What a link or an access line did.
+/// Returns the counters of a link or an access line.
 fn counters(stats: &LinkStats) -> impl Serialize + use<> {
     document! {
         offered: stats.offered(),
@@ -108,13 +108,13 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
     }
 }
 
-/// The measures of a run by their names; `None` if nothing is measured.
+/// Returns the measures of a run by name; `None` if the scene has no measures.
 pub fn measures_of(scene: &Scene, measured: &[MeasuredValue]) -> Option<impl Serialize + use<>> {
     let named: Map<String, Value> = measured.iter().map(|measured| (measured.name.text(scene), Value::from(measured.value))).collect();
     (!named.is_empty()).then(|| document! { measures: named })
 }
 
-/// Things of one kind that were judged: how many there are, and the share of them that is stable.
+/// Returns the number of judged items (cells, values) of one kind of verdict, and the share of stable items among these.
 pub(crate) fn judged(kind: VerdictKind, count: usize, stable_fraction: f64) -> impl Serialize {
     document! { judged: kind.word(), count: count, stable_fraction: stable_fraction }
 }

@@ -1,32 +1,34 @@
-//! Whether a scene is stable, by analysis where that is a matter of seconds and leaves nothing out.
+//! Tells whether a scene is stable, by analysis, if the analysis takes seconds only and leaves nothing out.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{AnalysisError, Judgement, Limits, Method, NOMINAL, QUICK_UNKNOWNS, UNLOADED, Watch, has_chance, judge_watched};
 
-/// How many operations, as the analysis estimates them, this program does in a second and on one thread: measured on a shared core of a server, 0.5
-/// billion of a mean square with bursts on six links, 1.7 of an admittance, 5 of the eigenvalues of 400 rows. It tells seconds from hours, and nothing
-/// finer.
+/// Operations per second of this program on one thread, in the units of the analysis's estimate. Measured on a shared core of a server: 0.5 billion for a mean
+/// square with bursts on six links, 1.7 for an admittance, 5 for the eigenvalues of 400 rows. The number tells seconds from hours, and nothing finer.
 pub const OPERATIONS_A_SECOND: f64 = 1e9;
 
-/// What the analysis says.
+/// Result of the analysis.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Quick {
-    /// Its judgement, which leaves nothing out.
+    /// The judgement, which leaves nothing out.
     Known(Box<Judgement>),
-    /// None that holds for the scene as it is, which is left to a simulation. With the reason where the chance of the links has a second moment that cannot be
-    /// followed in that time.
+    /// The analysis has no answer for the whole scene, so a simulation must decide. The text is the reason, if the second moment of the random links cannot be
+    /// followed in the allowed time.
     Simulate(Option<String>),
-    /// The watch ended it.
+    /// The watch stopped the analysis.
     Stopped,
 }
 
-/// Whether a scene is stable, by analysis, if that takes at most `seconds` by the estimate. One that is not linear, that changes on its way, or whose chance has
-/// no second moment that can be followed in that time, is left to a simulation, as is an object that turns and does more than small motions near rest.
+/// Tells by analysis whether a scene is stable, if the estimated time is at most `seconds`.
+///
+/// Left to a simulation are: a scene which is not linear, a scene with a timeline, a scene whose random links have no second moment computable in that time,
+/// and an object with more than small turns about rest.
 #[must_use]
 pub fn quick_verdict(scene: &Scene, seconds: f64, watch: &dyn Watch) -> Quick {
     if !scene.timeline.is_empty() || !scene.turns_about_rest() {
         return Quick::Simulate(None);
     }
+    // The limits refuse a long analysis before it begins, by its estimate.
     let limits = Limits { unknowns: QUICK_UNKNOWNS, operations: seconds * OPERATIONS_A_SECOND, watch };
     let judgement = match judge_watched(scene, Method::Reduced, &limits) {
         Ok(judgement) => judgement,
@@ -34,7 +36,7 @@ pub fn quick_verdict(scene: &Scene, seconds: f64, watch: &dyn Watch) -> Quick {
         Err(_) => return Quick::Simulate(None),
     };
     let refused = judgement.analysis.notes.iter().find_map(|note| note.strip_prefix(NOMINAL)).map(str::to_owned);
-    // Without a second moment, whatever was replaced by something nominal is better simulated as it is.
+    // Without a second moment the analysis is nominal. A simulation then runs what the analysis would leave out.
     let is_left_out = judgement.analysis.notes.iter().any(|note| note != UNLOADED);
     let nominal = judgement.mean_square.is_none() && (has_chance(scene) || is_left_out);
     if judgement.analysis.combines_contacts() || nominal { Quick::Simulate(refused) } else { Quick::Known(Box::new(judgement)) }

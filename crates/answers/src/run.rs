@@ -1,4 +1,4 @@
-//! A run.
+//! The JSON document of a run.
 
 use cohaptic_harness::Summary;
 use cohaptic_harness::measures::MeasuredValue;
@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::document;
 use crate::parts::{access_line, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 
-/// What a run comes to. `wall_s`: how long it took \[s\], if that is said.
+/// Returns the document of a run. `wall_s`: wall time of the run \[s\]; `None` leaves the keys of the speed out.
 pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s: Option<f64>) -> impl Serialize {
     let duration_s = summary.duration.as_secs_f64();
     document! {

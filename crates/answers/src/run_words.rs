@@ -1,4 +1,4 @@
-//! A run in words.
+//! The text about a run.
 
 use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::record::Bands;
@@ -10,7 +10,7 @@ use cohaptic_wan::{DropCause, LinkStats};
 use crate::parts::MOST_LINKS;
 use crate::{length, text_plot};
 
-/// A run in words, for people. `wall_s`: the time that it took \[s\]. `positions`: the positions that are drawn, if they are.
+/// Returns the text about a run. `wall_s`: wall time of the run \[s\]. `positions`: positions to draw as a text plot, if wanted.
 #[must_use]
 pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s: f64, positions: Option<&Bands>) -> String {
     let mut text = String::new();
@@ -45,7 +45,7 @@ pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], w
     text
 }
 
-/// The summary for people names this many peers at most.
+/// Most peers named in the text.
 const MOST_PEERS: usize = 8;
 
 /// Returns how a run [diverged](Summary::has_diverged), in words; `None` if the run did not diverge.
@@ -63,7 +63,7 @@ pub fn angle_text(radians: f64) -> String {
     format!("{radians:.4} rad ({:.2}°)", radians.to_degrees())
 }
 
-/// How the links of a large mesh differ.
+/// Returns lines about the differences between the links of a large mesh.
 fn over_links(summary: &Summary) -> Vec<String> {
     let words = |what: &str, unit: &str, factor: f64, quantiles: Option<LinkQuantiles>| {
         quantiles.map(|LinkQuantiles { min, p01, p50, p99, max }| {
@@ -75,13 +75,14 @@ fn over_links(summary: &Summary) -> Vec<String> {
     delivered.into_iter().chain(words("mean delay", " ms", 1e3, summary.links.mean_delay())).collect()
 }
 
-/// What became of all packets, end to end.
+/// Returns the counts of all packets from sender to receiver, in words.
 #[must_use]
 pub fn packets(summary: &Summary) -> String {
     let total = summary.links.total();
-    // A packet enters at the uplink of its sender, or at the link, and leaves at the downlink of its receiver, or at the link.
+    // A packet is first counted by the uplink of its sender, or by the link if the sender has no uplink; last by the downlink of its receiver, or by the link.
     let through = |uplink: bool, count: fn(&LinkStats) -> u64| -> u64 {
         let lines = || summary.access_lines.iter().filter(move |line| line.uplink == uplink);
+        // The usual scene has no access lines, and then the totals suffice.
         if lines().next().is_none() {
             return count(&total);
         }
@@ -116,10 +117,10 @@ pub fn packets(summary: &Summary) -> String {
     parts.join(", ")
 }
 
-/// The text for people has this many measures at most; the document has all.
+/// Most measures in the text. The document has all.
 const MOST_MEASURES: usize = 40;
 
-/// A line for each measure: its name and its value, aligned.
+/// Returns a line per measure, with aligned names and values.
 #[must_use]
 pub fn measured_lines(scene: &Scene, measured: &[MeasuredValue]) -> Vec<String> {
     let named: Vec<(String, &MeasuredValue)> = measured.iter().take(MOST_MEASURES).map(|measured| (measured.name.text(scene), measured)).collect();

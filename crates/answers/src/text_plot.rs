@@ -1,24 +1,25 @@
-//! Curves over time as text, with the dots of Unicode's braille patterns: two dots wide and four high in each character.
+//! Curves over time as text, in braille patterns of Unicode: each character has two columns and four rows of dots.
 
 use cohaptic_harness::record::{Bands, SANE_POSITION};
 
 const WIDTH: usize = 72;
 const HEIGHT: usize = 12;
 
-/// Draws curves of positions into one frame, with the ends of both axes, and says if values far beyond were cut off. `scale` turns values into `unit`.
+/// Draws curves of positions into one frame with labelled ends of the axes, and notes if far values were cut off. `scale` converts metres to `unit`.
 pub(crate) fn text_plot(bands: &Bands, scale: f64, unit: &str) -> String {
     let (range, cut) = bands.range(SANE_POSITION);
     let mut dots = [[0_u8; WIDTH]; HEIGHT];
     for curve in 0..bands.curves() {
         let mut last: Option<usize> = None;
         for (t, low, high) in bands.curve(curve) {
+            // A value beyond the frame interrupts the curve.
             if !range.contains(&low) || !range.contains(&high) {
                 last = None;
                 continue;
             }
             let column = place(t / bands.seconds(), 2 * WIDTH);
             let row = |value: f64| 4 * HEIGHT - 1 - place((value - range.start) / (range.end - range.start), 4 * HEIGHT);
-            // A column is filled from where the curve was, so that steep parts hang together.
+            // A column is filled from the last row of the curve, so that steep parts stay connected.
             let (mut top, mut bottom) = (row(high), row(low));
             if let Some(last) = last {
                 top = top.min(last);
@@ -49,12 +50,12 @@ pub(crate) fn text_plot(bands: &Bands, scale: f64, unit: &str) -> String {
     text
 }
 
-/// A number at the axis, nine characters wide.
+/// Returns a label of an axis, nine characters wide.
 fn label(value: f64) -> String {
     if value.abs() < 1e4 { format!("{value:9.3}") } else { format!("{value:9.2e}") }
 }
 
-/// The bit of each dot, by row and column, in a braille pattern.
+/// Bits of the dots in a braille pattern, indexed by row and column.
 pub(crate) const BRAILLE: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "a share of a small number of dots")]

@@ -1,4 +1,4 @@
-//! Words that several answers share.
+//! Words shared by several answers.
 
 use cohaptic_units::print::Counted;
 
@@ -8,8 +8,8 @@ pub fn length(metres: f64) -> String {
     if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }
 }
 
-/// Returns what the verdicts of a number of combinations, cells or values leave out, because their second moment cannot be followed; `None` if there are none.
-/// `one` and `several` follow the number: "cell is", "cells are".
+/// Returns the note about `count` nominal verdicts, which leave random parts out because their second moment cannot be followed; `None` if `count` is 0. `one`
+/// and `several` follow the number: "cell is", "cells are".
 #[must_use]
 pub fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
     (count > 0).then(|| {
@@ -21,13 +21,13 @@ pub fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
     })
 }
 
-/// `1 cell is`, `2 cells are`.
+/// Returns a count with its noun and verb: `1 cell is`, `2 cells are`.
 #[must_use]
 pub fn are(number: usize, one: &str) -> String {
     format!("{} {}", Counted(number, one), if number == 1 { "is" } else { "are" })
 }
 
-/// A figure with `digits` digits behind the point; in powers of ten where these would be most of it, or not enough: from 10⁶ on and below 10⁻⁴.
+/// Returns a figure with `digits` digits after the decimal point. Values from 10⁶ on and below 10⁻⁴ are written with an exponent.
 #[must_use]
 pub fn figure(value: f64, digits: usize) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());

@@ -1,4 +1,4 @@
-//! An admittance as a JSON document.
+//! The JSON document of admittances.
 
 use cohaptic_stability::Estimate;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::Curve;
 use crate::document;
 
-/// The answer of `cohaptic admittance --json`. `interrupted`: whether points at the end of the frequencies are missing because the user asked for the end.
+/// Returns the answer of `cohaptic admittance --json`. `interrupted`: whether the user stopped the computation, so that the last frequencies are missing.
 pub fn document(peer: &str, curves: &[Curve], files: &[String], interrupted: bool) -> impl Serialize {
     let named = curves.iter().skip(1).map(|curve| {
         document! {
@@ -21,7 +21,7 @@ pub fn document(peer: &str, curves: &[Curve], files: &[String], interrupted: boo
         peer: peer,
         #[serde(flatten)]
         scene: curves.first().map(of_curve),
-        // Those of `--curve`.
+        // The curves of `--curve`.
         curves: named.collect::<Vec<_>>(),
         files: files,
         interrupted: interrupted,
@@ -29,7 +29,7 @@ pub fn document(peer: &str, curves: &[Curve], files: &[String], interrupted: boo
 }
 
 fn of_curve(curve: &Curve) -> impl Serialize + use<> {
-    // A number that was extrapolated, and about how far it may be off.
+    // An extrapolated number with its approximate error.
     let limit = |Estimate { value, error }: Estimate| document! { value: value, error: error };
     let radius = curve.admittance.radius();
     let points = curve.response.points.iter().map(|point| {
@@ -46,7 +46,7 @@ fn of_curve(curve: &Curve) -> impl Serialize + use<> {
         stiffness: limit(curve.fit.stiffness),
         object_mass_kg: curve.mass,
         points: points.collect::<Vec<_>>(),
-        // The growth of the second moment in a frame, where links leave something to chance and it can be followed.
+        // Growth of the second moment per frame, if links have random parts and the second moment can be followed.
         #[serde(flatten)]
         moment: moment.map(|moment| document! {
             mean_square: document! { verdict: moment.verdict().word(), radius: moment.radius.value, error_bound: moment.radius.error },

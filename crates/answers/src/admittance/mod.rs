@@ -1,4 +1,4 @@
-//! What admittances answer: the document, the words and the table of curves.
+//! The answers about admittances: document, words and table of the curves.
 
 mod document;
 mod words;
@@ -10,39 +10,39 @@ use crate::{AdmittanceWords, admittance_words};
 pub use document::document;
 pub use words::words;
 
-/// The admittance in one scene.
+/// The admittance of a scene or of a variant.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// In the legend; of the scene as it stands "as it stands".
+    /// Name in the legend; "as it stands" for the scene as it stands.
     pub name: String,
-    /// What differs from the scene as it stands.
+    /// Overrides which make the variant out of the scene.
     pub overrides: Vec<String>,
-    /// The title of the scene.
+    /// Title of the scene.
     pub title: String,
     /// The admittance.
     pub admittance: Admittance,
-    /// Its values at the frequencies that were asked for.
+    /// Values of the admittance at the requested frequencies.
     pub response: FrequencyResponse,
-    /// What a slow hand feels.
+    /// Stiffness, viscosity and inertia felt by a slow hand.
     pub fit: LowFrequencyFit,
-    /// Where links leave something to chance: the second moment of the scene, or why it cannot be followed.
+    /// Second moment of a scene with random links, or the reason why the second moment cannot be followed; `None` if the links have no random parts.
     pub chance: Option<Result<MeanSquare, AnalysisError>>,
-    /// What the whole object alone would be felt as: see [`Admittance::object_mass`].
+    /// Inertia of the whole object alone: see [`Admittance::object_mass`].
     pub mass: f64,
 }
 
 impl Curve {
-    /// Returns the words: the motion over the push, what the whole object alone is, and the units of both.
+    /// Returns the names and units of the admittance.
     fn words(&self) -> AdmittanceWords {
         admittance_words(&self.admittance)
     }
 
-    /// Returns what the whole object alone would be at each frequency \[dB\].
+    /// Returns the magnitude of the admittance of the whole object alone at a frequency \[dB\].
     fn ideal_db(&self, hz: f64) -> f64 {
         20.0 * ideal(self.mass, hz).norm().log10()
     }
 
-    /// Returns what the numbers leave out.
+    /// Returns notes on simplifications behind the numbers.
     fn notes(&self) -> Vec<String> {
         let mut notes = self.admittance.notes().to_vec();
         if let Some(chance) = &self.chance {
@@ -54,7 +54,7 @@ impl Curve {
         notes
     }
 
-    /// Returns what the numbers must not be taken for, if there is a reason to.
+    /// Returns a warning if the scene has no steady state or might have none; `None` for a stable scene.
     fn warning(&self) -> Option<&'static str> {
         match self.admittance.verdict() {
             Verdict::Stable => match &self.chance {
@@ -73,7 +73,7 @@ impl Curve {
     }
 }
 
-/// Returns `admittance.csv`: one row a curve and frequency. Numbers have the fewest digits that read back the same.
+/// Returns `admittance.csv`: one row per curve and frequency. Numbers have the fewest digits that read back as the same `f64`.
 #[must_use]
 pub fn csv(curves: &[Curve]) -> String {
     let mut text = "curve,hz,magnitude_db,phase_deg,ideal_db\n".to_owned();

@@ -1,4 +1,4 @@
-//! An admittance in words.
+//! The text about admittances.
 
 use std::fmt::Write as _;
 
@@ -7,12 +7,12 @@ use cohaptic_stability::{Estimate, Verdict};
 use super::Curve;
 use crate::{AdmittanceWords, figure};
 
-/// All curves in words, each with its table.
+/// Returns the text about all curves, each with its table.
 #[must_use]
 pub fn words(peer: &str, curves: &[Curve]) -> String {
     let mut text = String::new();
     for (number, curve) in curves.iter().enumerate() {
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = if number == 0 { writeln!(text, "{}", curve.title) } else { writeln!(text, "\nWith {}", curve.name) };
         if let Some(warning) = curve.warning() {
             let _ = writeln!(text, "  WARNING: {warning}");
@@ -44,7 +44,7 @@ fn table(text: &mut String, curve: &Curve) {
     }
 }
 
-/// Five significant digits, without zeros at the end of decimals.
+/// Returns a frequency with five significant digits, without trailing zeros.
 fn significant(hz: f64) -> String {
     if !(1e-4..1e6).contains(&hz) {
         return format!("{hz:.4e}");
@@ -55,12 +55,12 @@ fn significant(hz: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Of a spring, a viscosity and an inertia.
+/// Returns the units of a spring, a viscosity and an inertia.
 fn units(curve: &Curve) -> [&'static str; 3] {
     if curve.admittance.axes()[0].is_turn() { ["N·m/rad", "N·m·s/rad", "kg·m²"] } else { ["N/m", "N·s/m", "kg"] }
 }
 
-/// What a slow hand feels: a spring only where something ties the object to ground.
+/// Adds the lines about the feeling of a slow hand. The spring is listed only if the object is tied to the ground.
 fn felt(text: &mut String, curve: &Curve) {
     let fit = curve.fit;
     let [spring, viscosity, inertia] = units(curve);
@@ -79,7 +79,7 @@ fn limit(Estimate { value, error }: Estimate, unit: &str) -> String {
     if value.is_finite() && error.is_finite() { format!("{} +- {error:.1e} {unit}", figure(value, 6)) } else { "no definite size".to_owned() }
 }
 
-/// A verdict as it is printed: one that people must not overlook in capitals.
+/// Returns a verdict for people: in capitals unless stable.
 fn shown(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Stable => "stable",

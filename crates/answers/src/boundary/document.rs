@@ -1,4 +1,4 @@
-//! A boundary as a JSON document.
+//! The JSON document of a boundary.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use super::Searched;
 use crate::document;
 use crate::parts::judged;
 
-/// The answer of `cohaptic stability boundary --json`.
+/// Returns the answer of `cohaptic stability boundary --json`. `files`: paths of the written files.
 pub fn document(searched: &Searched<'_>, files: &[String]) -> impl Serialize {
     let found = searched.found;
     let crossings = found.crossings.iter();
@@ -16,7 +16,7 @@ pub fn document(searched: &Searched<'_>, files: &[String]) -> impl Serialize {
         unit: searched.range.unit.as_str(),
         low: searched.range.low,
         high: searched.range.high,
-        // By which radius the scene is judged.
+        // The radius by which the scene is judged.
         criterion: searched.family.criterion().word(),
         // The verdict at the lower end.
         first: found.first.word(),
@@ -27,11 +27,11 @@ pub fn document(searched: &Searched<'_>, files: &[String]) -> impl Serialize {
         finest: found.finest,
         coarsest: found.coarsest,
         settled: found.is_settled(),
-        // How many of the values looked at are nominal.
+        // Number of nominal values among the sampled values.
         nominal: found.nominal(),
-        // The values looked at by the question that their verdicts answer.
+        // Counts of the sampled values, by the question answered by their verdicts.
         verdicts: searched.kinds().present().map(|(kind, count)| judged(kind, count, searched.stable_fraction(kind))).collect::<Vec<_>>(),
-        // Random parts of the links that nominal values leave out; empty where there are none.
+        // Random parts of the links left out by nominal values; empty without nominal values.
         left_out: if found.nominal() > 0 { searched.family.left_out() } else { &[] },
         notes: searched.notes(),
         files: files,

@@ -1,4 +1,4 @@
-//! What searches along a key answer: the document, the words and the tables of a boundary.
+//! The answers of a search along a key: document, words and tables of a boundary of stability.
 
 mod document;
 mod tables;
@@ -11,33 +11,33 @@ pub use document::document;
 pub use tables::{crossings_csv, samples_csv};
 pub use words::words;
 
-/// A key of a scene that was searched for crossings.
+/// A key of a scene, searched for crossings.
 #[derive(Clone, Copy, Debug)]
 pub struct Searched<'a> {
-    /// The title of the scene.
+    /// Title of the scene.
     pub title: &'a str,
-    /// The key, and from where to where it was searched.
+    /// The key and the searched range.
     pub range: &'a KeyRange,
-    /// How closely it was searched.
+    /// Tolerance and limits of the search.
     pub options: BoundaryOptions,
     /// The scene with the key left open.
     pub family: &'a Family,
-    /// The crossings, and all values that were looked at.
+    /// The crossings and all sampled values.
     pub found: &'a Boundary,
 }
 
 impl Searched<'_> {
-    /// Returns what the radii leave out.
+    /// Returns notes on simplifications behind the radii.
     fn notes(&self) -> Vec<String> {
         nominal(self.found.nominal(), ["of the values looked at is", "of the values looked at are"]).into_iter().collect()
     }
 
-    /// Returns the numbers of values looked at, by the question that their verdicts answer.
+    /// Returns the numbers of sampled values, by the question answered by their verdicts.
     fn kinds(&self) -> Kinds {
         Kinds::of(self.family.criterion(), self.found.known.iter().map(|(_, cell)| cell.is_nominal))
     }
 
-    /// Returns the share of stable values among those of a kind.
+    /// Returns the share of stable values among the sampled values of a kind.
     #[expect(clippy::cast_precision_loss, reason = "far fewer values than 2^52")]
     fn stable_fraction(&self, kind: VerdictKind) -> f64 {
         let criterion = self.family.criterion();

@@ -1,11 +1,11 @@
-//! The tables of a boundary. Numbers have the fewest digits that read back the same.
+//! The tables of a boundary. Numbers have the fewest digits that read back as the same `f64`.
 
 use cohaptic_stability::{Cell, Criterion};
 use cohaptic_units::print::csv_field;
 
 use super::Searched;
 
-/// Returns `boundary.csv`: a row for each crossing.
+/// Returns `boundary.csv`: one row per crossing.
 #[must_use]
 pub fn crossings_csv(Searched { range, found, .. }: &Searched<'_>) -> String {
     let mut text = format!("{},from,to\n", csv_field(&range.key));
@@ -15,7 +15,7 @@ pub fn crossings_csv(Searched { range, found, .. }: &Searched<'_>) -> String {
     text
 }
 
-/// Returns `samples.csv`: a row for each value that was looked at.
+/// Returns `samples.csv`: one row per sampled value.
 #[must_use]
 pub fn samples_csv(Searched { range, family, found, .. }: &Searched<'_>) -> String {
     let is_mean_square = family.criterion() == Criterion::MeanSquare;

@@ -1,4 +1,4 @@
-//! A boundary in words.
+//! The text about a boundary.
 
 use cohaptic_stability::{VerdictKind, nominal_head};
 use cohaptic_units::print::Counted;
@@ -6,7 +6,7 @@ use cohaptic_units::print::Counted;
 use super::Searched;
 use crate::crossing_in_words;
 
-/// A boundary in words, for people. `is_ended`: whether the user asked for the end before the search had settled.
+/// Returns the text about a boundary. `is_ended`: whether the user stopped the search.
 #[must_use]
 pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
     let found = searched.found;
@@ -14,7 +14,7 @@ pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
     let mut text = format!("{}\n\n", searched.title);
     let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     let kinds = searched.kinds();
-    // Of several kinds, the verdict at the lower end has that of its own value.
+    // If the values are of several kinds, the first line has the kind of the value at the lower end.
     let lowest = found.known.iter().min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, cell)| searched.family.criterion().kind(cell.is_nominal));
     let kind = kinds.only().or(lowest).unwrap_or(VerdictKind::Certain);
     if kinds.present().any(|(kind, _)| kind == VerdictKind::Nominal) {
@@ -29,6 +29,7 @@ pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
         line(format!("no crossing up to {}", range.text(range.high)));
     }
     for stretch in &found.marginal {
+        // A stretch of one value is a touch: the radius reaches 1 there and turns back, as far as the analysis can tell.
         if stretch.low < stretch.high {
             line(format!("cannot be told from 1 from {} to {}", range.text(stretch.low), range.text(stretch.high)));
         } else {
@@ -44,6 +45,7 @@ pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
         searched.options.tolerance
     ));
     if !found.is_settled() {
+        // With the limit of samples reached, a request of the user did not shorten the search.
         line(if found.samples < searched.options.most && is_ended {
             "NOT SETTLED: it was ended before it had looked as closely as it should; what lies between two values is open".to_owned()
         } else {

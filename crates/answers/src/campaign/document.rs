@@ -1,4 +1,4 @@
-//! A campaign as a JSON document.
+//! The JSON document of a finished campaign.
 
 use cohaptic_campaign::Judgement;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{Finished, Written};
 use crate::document;
 
-/// The answer of `cohaptic campaign --json`. `written`: the time that the campaign took and its files, if they are said.
+/// Returns the answer of `cohaptic campaign --json`. `written`: the time of the campaign and its files; `None` leaves these keys out.
 pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serialize {
     let report = &finished.report;
     let combinations = report.combinations.iter().enumerate().map(|(number, combination)| {
@@ -17,7 +17,7 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
             mean_discrepancy_m: combination.mean_discrepancy,
             largest_discrepancy_m: combination.largest_discrepancy,
             worst_run: combination.worst_run,
-            // Nothing unless verdicts are asked for.
+            // Absent without verdicts.
             #[serde(flatten)]
             judgement: report.judgements.get(number).map(of_judgement),
         }
@@ -32,7 +32,7 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
             runs_per_s: finished.runs_per_s(written.wall_s),
             out: written.out.as_str(),
             file: written.files.first(),
-            // The table, verdicts, pictures.
+            // The table of runs, the verdicts and the pictures.
             files: written.files.as_slice(),
         }),
         diverged: report.diverged(),
@@ -41,7 +41,7 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
     }
 }
 
-/// All but the reason is `null` where there is no verdict.
+/// Returns the document of a judgement. Without a verdict, all keys but the reason are `null`.
 fn of_judgement(judgement: &Judgement) -> impl Serialize {
     let (verdict, reason) = match judgement {
         Judgement::Known(verdict) => (Some(verdict), None),

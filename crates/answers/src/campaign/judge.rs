@@ -1,4 +1,4 @@
-//! Verdicts on combinations: each is judged as `cohaptic stability point` judges it.
+//! Judges the combinations of a campaign by analysis, as `cohaptic stability point` judges a scene.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,7 +10,7 @@ use cohaptic_stability::{AnalysisError, Limits, Method, VerdictKind, Watch, judg
 
 use crate::nominal;
 
-/// Judges by analysis, until the watch ends it.
+/// Judge of combinations by analysis. The watch may stop the analysis.
 #[derive(Clone, Copy)]
 pub struct ByAnalysis<'a>(pub &'a dyn Watch);
 
@@ -20,17 +20,19 @@ impl fmt::Debug for ByAnalysis<'_> {
     }
 }
 
-/// Why a scene that changes on its way has no verdict.
+/// Reason for a scene with a timeline to have no verdict.
 const TIMELINE: &str = "its timeline changes it on its way; simulate it instead, or take the timeline away";
 
-/// The most reasons that notes tell apart.
+/// Most reasons listed in the notes.
 const MOST_REASONS: usize = 5;
 
 impl Judge for ByAnalysis<'_> {
     fn judge(&self, scene: &Scene) -> Option<Judgement> {
+        // The analysis is of one fixed scene, and a timeline makes several scenes out of one.
         if !scene.timeline.is_empty() {
             return Some(Judgement::Refused(TIMELINE.into()));
         }
+        // No limit on the number of unknowns: a campaign judges each combination once, and can be stopped and continued.
         let limits = Limits { watch: self.0, ..Limits::of_unknowns(usize::MAX) };
         let judgement = match judge_watched(scene, Method::Reduced, &limits) {
             Ok(judgement) => judgement,
@@ -40,7 +42,7 @@ impl Judge for ByAnalysis<'_> {
         let kind = judgement.kind();
         let radius = match (&judgement.mean_square, kind) {
             (Some(mean_square), _) => mean_square.radius,
-            // As in a map, so that it can be compared with mean-square radii.
+            // The square of the spectral radius, as in a map, is comparable with mean-square radii.
             (None, VerdictKind::Nominal) => judgement.analysis.radius.over(2),
             (None, VerdictKind::Certain | VerdictKind::MeanSquare) => judgement.analysis.radius,
         };
@@ -49,23 +51,24 @@ impl Judge for ByAnalysis<'_> {
     }
 }
 
-/// Whether the verdict leaves out what links leave to chance.
+/// Returns `true` if the verdict leaves random parts of the links out.
 pub(super) fn is_nominal(judgement: &Judgement) -> bool {
     kind(judgement) == Some(VerdictKind::Nominal)
 }
 
-/// Whether the radius is that of the scene with nothing left to chance because nothing is.
+/// Returns `true` if the radius is a spectral radius, because the links of the scene have no random part.
 pub(super) fn is_spectral(judgement: &Judgement) -> bool {
     kind(judgement) == Some(VerdictKind::Certain)
 }
 
-/// The question that the verdict answers, from the word that its file has.
+/// Returns the question answered by the verdict, found by the word in the verdict.
 fn kind(judgement: &Judgement) -> Option<VerdictKind> {
     let verdict = judgement.verdict()?;
+    // The judgement may come from a file, which stores the kind as a word.
     VerdictKind::ALL.into_iter().find(|kind| kind.word() == &*verdict.judged)
 }
 
-/// What the verdicts leave out, and how many combinations have none, by reason.
+/// Returns notes on the simplifications of the verdicts, and on the number of combinations without a verdict, by reason.
 #[must_use]
 pub fn notes(report: &Report) -> Vec<String> {
     let count = report.judgements.iter().filter(|judgement| is_nominal(judgement)).count();

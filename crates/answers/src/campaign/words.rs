@@ -1,4 +1,4 @@
-//! A campaign in words.
+//! The text about a finished campaign.
 
 use std::fmt::Write as _;
 
@@ -8,16 +8,16 @@ use cohaptic_units::print::Counted;
 use super::Finished;
 use crate::length;
 
-/// The number of combinations that are named; all are in the table.
+/// Most combinations listed in the text. The table of runs has all.
 const MOST_COMBINATIONS: usize = 20;
 
-/// A campaign in words, for people. `wall_s`: the time that it took \[s\].
+/// Returns the text about a campaign. `wall_s`: wall time of this call \[s\].
 #[must_use]
 pub fn words(finished: &Finished, wall_s: f64) -> String {
     let Finished { plan, title, report, notes } = finished;
     let (combinations, each) = (plan.combinations(), plan.runs_of_each());
     let mut text = format!("{title}\n");
-    // Writing to a string does not fail.
+    // Writing to a string cannot fail.
     let mut line = |line: &str| {
         let _ = writeln!(text, "{line}");
     };
@@ -34,6 +34,7 @@ pub fn words(finished: &Finished, wall_s: f64) -> String {
             let others = if report.diverged() > 0 { " of the others" } else { "" };
             line(&format!("  {} diverged; the largest discrepancy{others} is {}, in run {run}", report.diverged(), length(*largest)));
         }
+        // `worst` is `None` only if no run came to its end.
         Some(_) | None => line(&format!("  all {} diverged", report.runs)),
     }
     if !plan.variations().is_empty() || !report.judgements.is_empty() {
@@ -47,7 +48,7 @@ pub fn words(finished: &Finished, wall_s: f64) -> String {
     text
 }
 
-/// A row for each combination, with its values and what became of its runs.
+/// Returns the rows of a text table with aligned columns: a head, then a row per combination with its values and figures.
 fn table(finished: &Finished) -> Vec<String> {
     let keys: Vec<String> = finished.plan.variations().iter().map(|vary| vary.key().to_owned()).collect();
     let judgements = &finished.report.judgements;
@@ -61,12 +62,13 @@ fn table(finished: &Finished) -> Vec<String> {
         let figures = [combination.diverged.to_string(), metres(combination.mean_discrepancy), metres(combination.largest_discrepancy)];
         rows.push(values.chain(judgements.get(number).into_iter().flat_map(judged)).chain(figures).collect());
     }
+    // Characters and not bytes, because keys and names may be in any script.
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
     rows.iter().map(|row| row.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}")).collect()).collect()
 }
 
-/// The cells of a verdict.
+/// Returns the cells of a judgement: verdict, kind and radius, or dashes.
 fn judged(judgement: &Judgement) -> [String; 3] {
     match judgement.verdict() {
         Some(verdict) => [verdict.word.to_string(), verdict.judged.to_string(), format!("{:.6}", verdict.radius)],

@@ -1,4 +1,4 @@
-//! A comparison as a JSON document.
+//! The JSON document of a comparison.
 
 use cohaptic_campaign::{Cell, Estimate, Figures, Judgement, MeasuredColumn};
 use serde::Serialize;
@@ -7,7 +7,7 @@ use super::Finished;
 use crate::campaign::Written;
 use crate::document;
 
-/// The answer of `cohaptic compare --json`. `written`: the time that the comparison took and its files, if they are said.
+/// Returns the answer of `cohaptic compare --json`. `written`: the time of the comparison and its files; `None` leaves these keys out.
 pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serialize {
     let Finished { report, comparison, .. } = finished;
     let strategy = &finished.plan.variations()[0];
@@ -20,10 +20,10 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
         document! {
             strategy: comparison.strategies[strategy].as_str(),
             vary: finished.keys().iter().zip(finished.places(other)).map(|(key, place)| key.label(place)).collect::<Vec<_>>(),
-            // Why the strategy does not run; `null` if it does.
+            // The reason why the strategy refuses the scene; `null` if the strategy runs.
             refused: cell.refused.as_deref(),
             runs: cell.diverged.map_or(0, |share| share.of),
-            // `null` where nothing ran.
+            // `null` if nothing was run.
             diverged: cell.diverged.map(|share| document! { count: share.count, share: share.value(), low: share.low, high: share.high }),
             #[serde(flatten)]
             judgement: finished.judgement(strategy, other).map(of_judgement),
@@ -38,7 +38,7 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
         written: written.map(|written| document! {
             wall_s: written.wall_s,
             out: written.out.as_str(),
-            // The table of runs, verdicts, the table of figures, the page.
+            // The table of runs, the verdicts, the table of figures and the page.
             files: written.files.as_slice(),
         }),
         strategies: strategies.collect::<Vec<_>>(),
@@ -47,7 +47,7 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
     }
 }
 
-/// Words are `null` where there is no verdict, the radius where it has none.
+/// Returns the document of a judgement. All keys are `null` without a verdict; the radius is `null` for a verdict without a radius.
 fn of_judgement(judgement: &Judgement) -> impl Serialize {
     let verdict = judgement.verdict();
     document! {
@@ -69,7 +69,7 @@ fn measures_of<'a>(finished: &'a Finished, cell: &'a Cell) -> Vec<impl Serialize
     finished.comparison.measures.iter().zip(&cell.figures).map(of).collect()
 }
 
-/// The ends are `null` without an interval.
+/// Returns a mean with the ends of its interval. The ends are `null` without an interval.
 fn mean_and_ends(estimate: Estimate) -> impl Serialize {
     let known = estimate.half_width.is_some();
     document! { value: estimate.mean, low: known.then(|| estimate.low()), high: known.then(|| estimate.high()) }

@@ -1,24 +1,24 @@
-//! Measures as they are shown: a title, a unit of a convenient size, and numbers with as many digits as their intervals allow.
+//! Formats measures: title, unit of a convenient size, and numbers with as many digits as their intervals allow.
 
 use cohaptic_campaign::{Comparison, Estimate, MeasuredColumn, Share};
 
-/// How a measure is shown.
+/// Form of a measure in texts and pictures.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Shown {
-    /// Its name without the unit: `discrepancy p95`.
+    /// Name of the measure without its unit: `discrepancy p95`.
     pub(super) title: String,
-    /// The unit that it is shown in; empty if it has none.
+    /// Displayed unit; empty without a unit.
     pub(super) unit: String,
-    /// How many of that unit are one of the table.
+    /// Factor from the unit of the table to the displayed unit.
     pub(super) factor: f64,
 }
 
 impl Shown {
-    /// A measure by its place among those of a comparison.
+    /// Chooses the form of a measure. `place`: index of the measure in the comparison.
     pub(super) fn of(comparison: &Comparison, place: usize) -> Self {
         let measure = &comparison.measures[place];
         let means = comparison.cells.iter().filter_map(|cell| cell.figures.get(place)?.mean);
-        // What diverges slowly is not to make micrometres of the rest: the middle decides.
+        // The median decides, so that a few large means do not choose the unit of all others.
         let mut sizes: Vec<f64> = means.map(|estimate| estimate.mean.abs()).filter(|size| *size > 0.0).collect();
         sizes.sort_by(f64::total_cmp);
         let size = sizes.get(sizes.len() / 2).copied().unwrap_or(1.0);
@@ -26,23 +26,24 @@ impl Shown {
         Self { title: title(measure), unit, factor }
     }
 
-    /// Title and unit: `discrepancy p95 [mm]`.
+    /// Returns title and unit: `discrepancy p95 [mm]`.
     pub(super) fn head(&self) -> String {
         if self.unit.is_empty() { self.title.clone() } else { format!("{} [{}]", self.title, self.unit) }
     }
 
-    /// A mean with its interval.
+    /// Returns a mean with its interval in the displayed unit.
     pub(super) fn estimate(&self, estimate: &Estimate) -> String {
         interval(estimate.mean * self.factor, estimate.half_width.map(|half| half * self.factor))
     }
 }
 
-/// The name of a measure in words: without its unit, and of a peer with the peer behind it.
+/// Returns the name of a measure in words: without its unit, and followed by the peer for a measure of a peer.
 fn title(measure: &MeasuredColumn) -> String {
     let (name, peer) = match measure.name.strip_prefix("peers.").and_then(|rest| rest.rsplit_once('.')) {
         Some((peer, name)) => (name, Some(peer)),
         None => (measure.name.as_str(), None),
     };
+    // Names of measures end in the unit, in lower case and with underscores.
     let suffix = match measure.unit.as_str() {
         "1/s" => "_per_s".to_owned(),
         "bit/s" => "_bits_per_s".to_owned(),
@@ -52,7 +53,7 @@ fn title(measure: &MeasuredColumn) -> String {
     peer.map_or_else(|| words.clone(), |peer| format!("{words} of {peer}"))
 }
 
-/// The unit for values of that size.
+/// Returns the displayed unit and its factor for values of this size.
 fn scaled(unit: &str, size: f64) -> (String, f64) {
     match unit {
         "m" if size < 1.0 => ("mm".to_owned(), 1e3),
@@ -63,10 +64,13 @@ fn scaled(unit: &str, size: f64) -> (String, f64) {
     }
 }
 
-/// A number and half the width of its interval with two digits, both with as many decimals; without an interval of any width four digits.
+/// Returns a mean and the half width of its interval. The half width has two digits, and both numbers have the same number of decimals. Without a half width
+/// above 0 the mean has four digits.
 pub(super) fn interval(mean: f64, half: Option<f64>) -> String {
+    // An interval of no width has no digits to round to.
     let certain = half.filter(|half| *half > 0.0);
     let size = mean.abs().max(half.unwrap_or(0.0));
+    // Numbers of ordinary size have no exponent.
     let exponent = if (1e-3..1e6).contains(&size) || size == 0.0 || !size.is_finite() { 0 } else { power(size) };
     let unit = libm::exp10(f64::from(exponent));
     let (mean, certain) = (mean / unit, certain.map(|half| half / unit));
@@ -85,7 +89,7 @@ pub(super) fn interval(mean: f64, half: Option<f64>) -> String {
     }
 }
 
-/// A number without the sign of a zero, and with a minus that is as wide as a plus.
+/// Removes the sign of a zero, and writes a minus as wide as a plus.
 fn signed(text: String) -> String {
     match text.strip_prefix('-') {
         Some(rest) if rest.chars().all(|letter| matches!(letter, '0' | '.')) => rest.to_owned(),
@@ -94,13 +98,13 @@ fn signed(text: String) -> String {
     }
 }
 
-/// The power of ten of the first digit; 0 of zero.
+/// Returns the power of ten of the first digit; 0 for zero and for numbers that are not finite.
 #[expect(clippy::cast_possible_truncation, reason = "between -324 and 308")]
 fn power(size: f64) -> i32 {
     if size > 0.0 && size.is_finite() { libm::floor(libm::log10(size)) as i32 } else { 0 }
 }
 
-/// How many of how many, with the interval in percent: `3 of 20 (5.2 to 36 %)`.
+/// Returns a share with its interval in percent: `3 of 20 (5.2 to 36 %)`.
 pub(super) fn share(share: &Share) -> String {
     let percent = |value: f64| {
         let percent = 100.0 * value;

@@ -1,4 +1,4 @@
-//! Whether a combination is stable: by analysis where that takes less than a second, else by two runs, of which one begins with a small disturbance.
+//! Judges the combinations of a comparison: by analysis if the analysis is quick, otherwise by two runs, one of which begins with a small disturbance.
 
 use std::fmt;
 
@@ -10,15 +10,15 @@ use cohaptic_stability::Watch;
 
 use crate::{Quick, quick_verdict};
 
-/// Two runs judge where the analysis takes longer than this, by its estimate \[s\].
+/// Most time for the analysis, by its estimate \[s\]. Two runs judge instead if the analysis would take longer.
 const QUICK: f64 = 0.25;
 
-/// The word for a verdict by two runs.
+/// Word for the kind of a verdict by two runs.
 pub(super) const TWO_RUNS: &str = "two-runs";
-/// The verdict of two runs that leave it open within the duration of the scene.
+/// Verdict of two runs without a decision within the duration of the scene.
 pub(super) const UNDECIDED: &str = "undecided";
 
-/// Judges by analysis or by two runs, until the watch ends it.
+/// Judge of combinations by analysis or by two runs. The watch may stop the judging.
 #[derive(Clone, Copy)]
 pub struct ByAnalysisOrRuns<'a>(pub &'a dyn Watch);
 
@@ -36,13 +36,14 @@ impl Judge for ByAnalysisOrRuns<'_> {
                 let judged = judgement.kind().word().into();
                 Some(Judgement::Known(Verdict { word: judgement.verdict.word().into(), judged, radius: radius.value, error: radius.error }))
             }
+            // The reason of the quick verdict is not kept: the word `two-runs` tells that the analysis did not decide.
             Quick::Simulate(_) => by_runs(scene, self.0),
             Quick::Stopped => None,
         }
     }
 }
 
-/// The verdict of two runs with the first seed, which have no radius.
+/// Judges by two runs with the first seed. Such a verdict has no radius.
 fn by_runs(scene: &Scene, watch: &dyn Watch) -> Option<Judgement> {
     let word = match stability(scene, Model::Least, || !watch.stops()) {
         Stability::Stable => cohaptic_stability::Verdict::Stable.word(),

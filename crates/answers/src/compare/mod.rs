@@ -1,4 +1,4 @@
-//! What comparisons of strategies answer: the document, the words, the table of figures and the page of one that is finished, and verdicts on its combinations.
+//! The answers of a comparison of strategies: document, words, table, page, and the judge of its combinations.
 
 mod document;
 mod figures;
@@ -15,39 +15,39 @@ pub use page::{PageSource, html};
 pub use rows_file::csv;
 pub use words::words;
 
-/// A comparison that is finished.
+/// A finished comparison.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// The plan, whose first key has the strategies as its values.
+    /// The plan. The values of its first key are the strategies.
     pub plan: CampaignPlan,
-    /// The title of the scene of the first combination that is run.
+    /// Title of the scene of the first run combination.
     pub title: String,
     /// Figures of all combinations.
     pub report: Report,
-    /// The strategies side by side.
+    /// The compared figures.
     pub comparison: Comparison,
-    /// The judgement of each combination.
+    /// Judgements, indexed by combination.
     pub stability: Vec<Judgement>,
 }
 
 impl Finished {
-    /// Returns the keys that vary beside the strategy.
+    /// Returns the varied keys other than the strategy.
     fn keys(&self) -> &[Variation] {
         &self.plan.variations()[1..]
     }
 
-    /// Returns which value of each of [`Finished::keys`] a combination of them has.
+    /// Returns the index of the value of each of [`Finished::keys`] in a combination of these keys.
     fn places(&self, other: usize) -> Vec<usize> {
-        // Of the baseline, whose combinations come first.
+        // The combinations of the baseline come first, so combination `other` of the plan has the same other values.
         self.plan.places(other as u64).split_off(1)
     }
 
-    /// Returns the values of a combination of the other keys, as they are written.
+    /// Returns the values of a combination of the other keys, as written.
     fn values(&self, other: usize) -> Vec<String> {
         self.keys().iter().zip(self.places(other)).map(|(key, place)| key.value_text(place).to_owned()).collect()
     }
 
-    /// Returns the judgement of a strategy at a combination of the other keys.
+    /// Returns the judgement of a strategy at a combination of the other keys; `None` if there is no such combination.
     fn judgement(&self, strategy: usize, other: usize) -> Option<&Judgement> {
         self.stability.get(strategy * self.comparison.others() + other)
     }

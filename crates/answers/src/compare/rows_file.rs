@@ -1,14 +1,14 @@
-//! `compare.csv`: a row for each combination and measure.
+//! The table `compare.csv`: one row per combination and measure.
 
 use cohaptic_campaign::{Estimate, Judgement};
 use cohaptic_units::print::csv_field;
 
 use super::Finished;
 
-/// The columns behind those of the keys.
+/// Columns after the columns of the keys.
 const COLUMNS: &str = "refused,runs,diverged,verdict,judged,measure,count,mean,low,high,pairs,difference,difference_low,difference_high";
 
-/// The table. Numbers have the fewest digits that read back the same, and a cell is empty where there is no number. A combination that is refused has one row.
+/// Returns the table. Numbers have the fewest digits that read back as the same `f64`; a cell without a number is empty. A refused combination has one row.
 #[must_use]
 pub fn csv(finished: &Finished) -> String {
     let comparison = &finished.comparison;
@@ -18,6 +18,7 @@ pub fn csv(finished: &Finished) -> String {
         let (strategy, other) = (combination / comparison.others(), combination % comparison.others());
         let values = finished.keys().iter().zip(finished.places(other)).map(|(key, place)| csv_field(&key.cell(place)) + ",");
         let head = format!("{combination},{},{}", csv_field(&comparison.strategies[strategy]), values.collect::<String>());
+        // The row of a refusal has the reason in its first cell after the keys, and all other cells empty.
         if let Some(reason) = &cell.refused {
             text.push_str(&format!("{head}{}{}\n", csv_field(reason), ",".repeat(COLUMNS.matches(',').count())));
             continue;
@@ -33,7 +34,7 @@ pub fn csv(finished: &Finished) -> String {
     text
 }
 
-/// How many values, their mean, and both ends of its interval.
+/// Returns the cells of an estimate: number of values, mean, and both ends of the interval.
 fn estimate_cells(estimate: Option<&Estimate>) -> String {
     let Some(estimate) = estimate else { return "0,,,".to_owned() };
     let ends = if estimate.half_width.is_some() { format!("{:?},{:?}", estimate.low(), estimate.high()) } else { ",".to_owned() };

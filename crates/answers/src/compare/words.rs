@@ -1,4 +1,4 @@
-//! A comparison in words, for a terminal.
+//! The text about a comparison, for a terminal.
 
 use std::cmp::Ordering;
 
@@ -8,13 +8,13 @@ use cohaptic_units::print::Counted;
 use super::Finished;
 use super::figures::{self, Shown};
 
-/// With more rows than this a measure is summed up by strategy; compare.csv and compare.html have all.
+/// Most rows of a measure in the text. A larger comparison is summed up per strategy; compare.csv and compare.html have all rows.
 const MOST_ROWS: usize = 24;
 
-/// What stands where there is no number.
+/// Cell without a number.
 const NOTHING: &str = "-";
 
-/// A comparison in words, for people. `wall_s`: the time that it took \[s\].
+/// Returns the text about a comparison. `wall_s`: wall time of this call \[s\].
 #[must_use]
 pub fn words(finished: &Finished, wall_s: f64) -> String {
     let comparison = &finished.comparison;
@@ -46,7 +46,7 @@ pub fn words(finished: &Finished, wall_s: f64) -> String {
     lines.join("\n") + "\n"
 }
 
-/// How many runs there are, and what the numbers mean.
+/// Returns the lines about the number of runs and the meaning of the numbers.
 fn head(finished: &Finished, wall_s: f64) -> Vec<String> {
     let Finished { plan, report, comparison, .. } = finished;
     let keys: Vec<&str> = finished.keys().iter().map(cohaptic_campaign::Variation::key).collect();
@@ -62,7 +62,7 @@ fn head(finished: &Finished, wall_s: f64) -> Vec<String> {
     lines
 }
 
-/// A row for each strategy: its number, how many runs diverged, and at how many combinations it is stable.
+/// Returns one row per strategy: its number, its diverged runs, and the number of stable combinations.
 fn strategies(finished: &Finished) -> Vec<Vec<String>> {
     let comparison = &finished.comparison;
     let mut rows = vec![["", "strategy", "diverged", "stable", "refused"].map(str::to_owned).to_vec()];
@@ -82,7 +82,7 @@ fn strategies(finished: &Finished) -> Vec<Vec<String>> {
     rows
 }
 
-/// What all combinations of a strategy come to.
+/// Sums over all combinations of a strategy.
 #[derive(Default)]
 pub(super) struct Sum {
     pub(super) runs: u64,
@@ -109,12 +109,12 @@ impl Sum {
     }
 }
 
-/// A verdict and what it rests on: `stable (mean-square)`.
+/// Returns a verdict and its kind: `stable (mean-square)`; a dash without a verdict.
 pub(super) fn verdict(judgement: &Judgement) -> String {
     judgement.verdict().map_or_else(|| NOTHING.to_owned(), |verdict| format!("{} ({})", verdict.word, verdict.judged))
 }
 
-/// The reasons for which combinations are refused, in order, and how many are.
+/// Returns the reasons of refusals in order of appearance, each with its number of combinations.
 pub(super) fn refusals(finished: &Finished) -> Vec<(String, usize)> {
     let comparison = &finished.comparison;
     let mut counts: Vec<(String, usize)> = Vec::new();
@@ -129,7 +129,7 @@ pub(super) fn refusals(finished: &Finished) -> Vec<(String, usize)> {
     counts
 }
 
-/// A row for each combination of the other keys and each strategy.
+/// Returns one row per combination of the other keys and strategy.
 fn rows(finished: &Finished, measure: usize, shown: &Shown) -> Vec<Vec<String>> {
     let comparison = &finished.comparison;
     let heads = finished.keys().iter().map(|key| key.key().to_owned());
@@ -138,13 +138,14 @@ fn rows(finished: &Finished, measure: usize, shown: &Shown) -> Vec<Vec<String>> 
         for (strategy, name) in comparison.strategies.iter().enumerate() {
             let figures = comparison.cell(strategy, other).figures[measure];
             let of_each = finished.plan.runs_of_each();
+            // Strategies of equal other values stand below each other, to be compared by eye.
             rows.push(finished.values(other).into_iter().chain([name.clone()]).chain(cells(&figures, shown, of_each)).collect());
         }
     }
     rows
 }
 
-/// Mean, difference, and on which side that is.
+/// Returns the cells of a measure: mean, difference to the baseline, and side of the difference.
 pub(super) fn cells(figures: &Figures, shown: &Shown, of_each: u64) -> [String; 3] {
     let text = |estimate: Option<cohaptic_campaign::Estimate>| {
         estimate.map_or_else(
@@ -159,16 +160,17 @@ pub(super) fn cells(figures: &Figures, shown: &Shown, of_each: u64) -> [String; 
     [text(figures.mean), difference, side(figures).to_owned()]
 }
 
-/// The word for a difference whose whole interval is on one side of zero; empty of others.
+/// Returns the word for a difference whose whole interval is on one side of zero; empty for other differences.
 pub(super) fn side(figures: &Figures) -> &'static str {
     match figures.difference.map(|difference| difference.side()) {
         Some(Ordering::Less) => "lower",
         Some(Ordering::Greater) => "higher",
+        // The interval contains zero, or there is no interval.
         Some(Ordering::Equal) | None => "",
     }
 }
 
-/// At how many combinations each strategy is lower and higher than the baseline: a row for each measure, a column for each strategy by its number.
+/// Returns the numbers of combinations with a lower and a higher value than the baseline: one row per measure, one column per strategy.
 fn overview(finished: &Finished) -> Vec<Vec<String>> {
     let comparison = &finished.comparison;
     let numbers = (2..=comparison.strategies.len()).map(|number| number.to_string());
@@ -183,14 +185,14 @@ fn overview(finished: &Finished) -> Vec<Vec<String>> {
     rows
 }
 
-/// At how many combinations a strategy is lower than the baseline, and at how many higher.
+/// Returns the numbers of combinations in which a strategy is lower and higher than the baseline.
 pub(super) fn sides(finished: &Finished, measure: usize, strategy: usize) -> [usize; 2] {
     let comparison = &finished.comparison;
     let count = |word: &str| (0..comparison.others()).filter(|other| side(&comparison.cell(strategy, *other).figures[measure]) == word).count();
     ["lower", "higher"].map(count)
 }
 
-/// Rows with cells below each other: names at the left of their columns, what begins with a digit or a sign at the right.
+/// Aligns the cells of rows: columns of names at the left, columns of numbers at the right.
 fn table(rows: Vec<Vec<String>>) -> Vec<String> {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);

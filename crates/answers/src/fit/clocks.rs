@@ -1,4 +1,4 @@
-//! The clocks of the two ends: offset, steps and drift, which are taken off before a link is fitted.
+//! Corrects the clocks of the two ends before the fit: offset, steps and drift.
 
 use cohaptic_measure::fit::{Measurements, Skew, Step};
 use serde::Serialize;
@@ -6,33 +6,37 @@ use serde::Serialize;
 use super::words::milliseconds;
 use super::{Corrections, FitFailure};
 
-/// A mean delay beyond this \[s\] is more likely the offset of two clocks.
+/// Largest plausible mean delay \[s\]. A longer mean delay is more likely an offset between two clocks.
 const QUESTIONED_S: f64 = 60.0;
 
-/// What was done to the clocks.
+/// Corrections applied to the clocks.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(super) struct Clocks {
-    /// Time that was added to every delay \[s\].
+    /// Time added to every delay \[s\]; `None` if nothing was added.
     #[serde(skip_serializing_if = "Option::is_none")]
     added_s: Option<f64>,
-    /// Instants at which the least delay changed and stayed so.
+    /// Instants of a lasting change of the least delay.
     steps: Vec<Step>,
-    /// The packets that were fitted.
+    /// The fitted packets.
     fitted: Fitted,
     #[serde(skip)]
     all: usize,
 }
 
-/// The packets between two steps.
+/// Consecutive packets between two steps.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Fitted {
-    /// Number of the first one, from 0.
+    /// Index of the first packet, from 0.
     first: usize,
     packets: usize,
 }
 
-/// Measurements that one clock could have made, what was done to get them, and the drift that was looked for. If both ends have one clock, a change of the
-/// least delay and a long delay are those of the link.
+/// Corrects the measurements so that both ends could share one clock. Returns the corrected measurements, the applied corrections, and the estimated drift if
+/// requested. With `has_one_clock`, steps and long delays are left as properties of the link.
+///
+/// # Errors
+///
+/// [`FitFailure::Measurements`] if a correction is impossible, [`FitFailure::LongDelays`] if the mean delay suggests an uncorrected offset.
 pub(super) fn settled(
     asked: &Corrections,
     measurements: &Measurements,
@@ -42,7 +46,9 @@ pub(super) fn settled(
     let mut added_s = asked.offset_s;
     let shifted = added_s.map(|by| measurements.shifted(by)).transpose().map_err(|error| refused(&error))?;
     let measurements = shifted.as_ref().unwrap_or(measurements);
+    // With one clock a change of the least delay is a change of the path, and belongs to the link.
     let steps = if has_one_clock { Vec::new() } else { measurements.steps() };
+    // Between two steps the offset is constant, so only the longest such part is fitted.
     let longest = measurements.longest_part(&steps);
     let fitted = Fitted { first: longest.start, packets: longest.len() };
     let part = measurements.part(longest);
@@ -52,6 +58,7 @@ pub(super) fn settled(
     } else {
         (part, None)
     };
+    // The offset is chosen after the drift is removed, because the drift changes the least delay.
     if let (Some(least), Some(found)) = (asked.least, settled.least_s()) {
         let by = least.as_secs_f64() - found;
         settled = settled.shifted(by).map_err(|error| refused(&error))?;
@@ -64,7 +71,7 @@ pub(super) fn settled(
     Ok((settled, clocks, skew))
 }
 
-/// Lines that say what was done.
+/// Returns the lines of text about the corrections.
 pub(super) fn describe(clocks: &Clocks, skew: Option<&Skew>) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(added) = clocks.added_s {

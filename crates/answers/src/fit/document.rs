@@ -1,11 +1,11 @@
-//! A fitted link as a JSON document.
+//! The JSON document of a fitted link.
 
 use serde::Serialize;
 
 use super::Answered;
 use crate::document;
 
-/// The answer of `cohaptic fit --json`.
+/// Returns the answer of `cohaptic fit --json`.
 pub fn document(answered: &Answered) -> impl Serialize {
     document! {
         #[serde(flatten)]

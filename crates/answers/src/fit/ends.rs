@@ -1,17 +1,17 @@
-//! Counts of the captures of both ends.
+//! Counts of the frames in the captures of both ends.
 
 use cohaptic_measure::fit::Measurements;
 use cohaptic_measure::fit::captures::{Contents, Matched};
 use cohaptic_units::print::Counted;
 use serde::Serialize;
 
-/// Packets of a pair of captures that are not fitted, and counts of all frames.
+/// Numbers of unfitted packets in a pair of captures, and counts of all frames.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(super) struct Ends {
     unmatched_sent: usize,
     unmatched_arrived: usize,
     ambiguous: usize,
-    /// Packets of the sender before and after the time in which both captures ran.
+    /// Numbers of the sender's packets before and after the time covered by both captures.
     left_out: [usize; 2],
     sender: Contents,
     receiver: Contents,
@@ -37,6 +37,7 @@ impl Ends {
                 Counted(after, "packet")
             ));
         }
+        // Fragments are not joined, so a datagram cut by the path has no match at the receiver.
         if self.receiver.kinds.keys().any(|kind| kind.starts_with("fragments")) {
             lines.push("fragments are not joined: a datagram that the path cut counts as lost".to_owned());
         }

@@ -1,4 +1,4 @@
-//! What an estimate of a link answers: measurements of any kind, their clocks, the link, as a document and in words.
+//! The answers of the estimate of a link: reading measurements, correcting the clocks, fitting the link, and its document and words.
 
 mod clocks;
 mod document;
@@ -23,24 +23,24 @@ pub use words::words;
 /// Corrections of the clocks of the two ends.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Corrections {
-    /// Time that is added to the clock of the receiver, and so to every delay \[s\].
+    /// Time added to the clock of the receiver, and so to every delay \[s\].
     pub offset_s: Option<f64>,
-    /// The least delay, where it is known: one time is added to every delay, so that the least of them is this one.
+    /// Known least delay: one common time is added to every delay, so that the smallest delay becomes this delay.
     pub least: Option<Duration>,
-    /// Whether the linear drift of one clock against the other is removed, where it is significant.
+    /// Whether a significant linear drift between the two clocks is removed.
     pub skew: bool,
 }
 
-/// A link that was estimated.
+/// An estimated link.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Answered {
-    /// The link and its goodness.
+    /// The link and its goodness of fit.
     pub fitted: Fitted,
     /// The link as keys of a scene.
     pub scene: String,
-    /// The content of the file of delays that the link names; `None` if a law fits.
+    /// Content of the file of delays named by the link; `None` if a law fits.
     pub delays: Option<String>,
-    /// The packets that were fitted.
+    /// The fitted packets.
     measurements: Measurements,
     clocks: Clocks,
     skew: Option<Skew>,
@@ -50,33 +50,33 @@ pub struct Answered {
 /// Why no link is estimated.
 #[derive(Debug, thiserror::Error)]
 pub enum FitFailure {
-    /// The corrections cannot be made.
+    /// The clocks cannot be corrected as requested.
     #[error("{0}")]
     Measurements(String),
-    /// The delays are so long that the two clocks are more likely apart, and no time is added to them.
+    /// The mean delay is so long that two clocks with an offset are the likely cause, and no correction was requested.
     #[error("the mean delay is {mean_s:.6} s: are the two clocks apart?")]
     LongDelays {
-        /// The mean delay \[s\].
+        /// Mean delay \[s\].
         mean_s: f64,
     },
-    /// The measurements have no link.
+    /// No link can be fitted to the measurements.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// A scene would refuse the link.
+    /// A scene refuses the link.
     #[error(transparent)]
     Scene(Box<SceneError>),
-    /// A scene would have another link.
+    /// A scene reads the link with other moments of the delay.
     #[error("{0}")]
     Unheld(String),
 }
 
 impl Source {
-    /// Estimates the link, and reads it as a scene reads it. `file` is the name of the file with the link. `delays_file` is that of the file of delays beside
-    /// it, which the link names where no law fits. Neither of the files need exist.
+    /// Estimates the link, and reads it back as a scene does. `file`: name of the file with the link. `delays_file`: name of the file of delays beside the
+    /// link, named by the link if no law fits. Neither file needs to exist.
     ///
     /// # Errors
     ///
-    /// [`FitFailure`] if the measurements have no link, or none that a scene can hold.
+    /// [`FitFailure`] if no link can be fitted, or if a scene cannot hold the link.
     pub fn fit(&self, corrections: &Corrections, file: &Path, delays_file: &str) -> Result<Answered, FitFailure> {
         let (measurements, clocks, skew) = clocks::settled(corrections, &self.measurements, self.has_one_clock)?;
         let fitted = fit::fit(&measurements)?;

@@ -1,4 +1,4 @@
-//! Measurements as they are read: a table of delays, a log of fates, or the captures of both ends.
+//! Reads measurements of a link: a table of delays, a log of fates, or the captures of both ends.
 
 use std::io::{self, Read};
 
@@ -9,53 +9,55 @@ use cohaptic_wan::FateRow;
 
 use super::ends::Ends;
 
-/// Measurements, and where they are from.
+/// Measurements with their origin.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Source {
     pub(super) measurements: Measurements,
-    /// Counts of a pair of captures.
+    /// Counts of a pair of captures; `None` for other sources.
     pub(super) matched: Option<Ends>,
-    /// `true` if both ends have one clock, as in a log of fates.
+    /// Whether both ends share one clock, as in a log of fates.
     pub(super) has_one_clock: bool,
 }
 
 /// Why measurements cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
-    /// The system cannot read them.
+    /// The operating system cannot read the file.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// A line is no text.
+    /// A line is not UTF-8.
     #[error("line {line}: not UTF-8: expected a text file")]
     NotText {
-        /// The number of the line, from 1.
+        /// Number of the line, from 1.
         line: u64,
     },
-    /// The capture of one end alone.
+    /// The file is the capture of one end only.
     #[error("found the capture of one end: expected two, since a delay is the time from the one to the other")]
     OneEnd,
-    /// The content is no table and no log.
+    /// The content is neither a table nor a log.
     #[error("{0}")]
     Content(String),
 }
 
-/// The first bytes of a file, which show of which kind it is.
+/// Number of leading bytes which show the kind of a file.
 const HEAD: u64 = 256;
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 impl Source {
-    /// Reads a table of delays or a log of fates. A log is read line by line, a table as a whole: `as_table` gets the rest of the reader before, to limit its
-    /// length.
+    /// Reads a table of delays or a log of fates. A log is read line by line, a table as a whole. Before a table is read, `as_table` gets the rest of the
+    /// reader, and can limit the length.
     ///
     /// # Errors
     ///
-    /// [`SourceError`] if it cannot be read or is neither; and for a capture, which is that of one end alone.
+    /// [`SourceError`] if the file cannot be read or is neither a table nor a log; [`SourceError::OneEnd`] for a capture.
     pub fn read<R: Read>(mut from: R, as_table: impl FnOnce(R) -> io::Result<R>) -> Result<Self, SourceError> {
         let mut bytes = Vec::new();
         from.by_ref().take(HEAD).read_to_end(&mut bytes)?;
+        // A capture is found by its magic number before it fails as a text.
         if captures::is_capture(&bytes) {
             return Err(SourceError::OneEnd);
         }
+        // Some editors begin a text with a byte order mark.
         if bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes).starts_with(FateRow::HEADER.as_bytes()) {
             let log = fates::read(bytes.chain(from)).map_err(|error| match error {
                 ReadError::Io(error) => SourceError::Io(error),
@@ -66,6 +68,7 @@ impl Source {
         }
         as_table(from)?.read_to_end(&mut bytes)?;
         let text = String::from_utf8(bytes).map_err(|error| {
+            // The bytes before the fault are valid, so their line feeds give the number of the faulty line.
             let right = &error.as_bytes()[..error.utf8_error().valid_up_to()];
             SourceError::NotText { line: right.iter().filter(|byte| **byte == b'\n').count() as u64 + 1 }
         })?;
@@ -73,17 +76,17 @@ impl Source {
         Ok(Self { measurements, matched: None, has_one_clock: false })
     }
 
-    /// Reads the captures of both ends. `port`: only datagrams to that UDP port count.
+    /// Reads the captures of both ends. `port`: only datagrams to this UDP port count.
     ///
     /// # Errors
     ///
-    /// Those of [`captures::between`].
+    /// The errors of [`captures::between`].
     pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Result<Self, CaptureError> {
         let (measurements, ends) = Ends::of(captures::between(sender, receiver, port)?);
         Ok(Self { measurements, matched: Some(ends), has_one_clock: false })
     }
 
-    /// Measurements of two clocks.
+    /// Takes measurements made with two clocks.
     #[must_use]
     pub const fn of(measurements: Measurements) -> Self {
         Self { measurements, matched: None, has_one_clock: false }

@@ -1,4 +1,4 @@
-//! A fitted link in words.
+//! The text about a fitted link.
 
 use std::time::Duration;
 
@@ -8,14 +8,14 @@ use cohaptic_units::print::{Counted, Span};
 use super::ends::Ends;
 use super::{Answered, clocks};
 
-/// A fitted link in words, for people: the link, what was read, and how good each law is.
+/// Returns the text about a fitted link: the link, the read packets, and the goodness of each law.
 #[must_use]
 pub fn words(answered: &Answered) -> String {
     let goodness = &answered.fitted.goodness;
     let mut text = format!("{}\n", answered.scene);
     let mut line = |line: String| text.push_str(&format!("{line}\n"));
     let instants = answered.measurements.instants();
-    // The spacing is that of bursts where most gaps are zero.
+    // If most gaps are zero, the packets come in bursts, and the spacing is the spacing of the bursts.
     let are_bursts = 2 * instants <= goodness.packets;
     let (bursts, burst) = if are_bursts { (format!(" in {}", Counted(instants, "burst")), " burst") } else { (String::new(), "") };
     let spaced = if goodness.evenly_spaced { "evenly" } else { "unevenly" };
@@ -38,6 +38,7 @@ pub fn words(answered: &Answered) -> String {
         step(goodness.resolution_s)
     ));
     line(format!("\n  {:<12}{:>14}{:>14}{:>14}{:>16}{:>12}{:>12}", "law", "mean", "sd", "floor", "AIC - best", "Kolmogorov", "p-value"));
+    // Criteria of information only compare laws, so their distance from the best law is shown.
     let best = goodness.laws.iter().map(|law| law.aic).fold(f64::INFINITY, f64::min);
     for law in &goodness.laws {
         let floor = law.floor_s.map_or_else(|| "-".to_owned(), milliseconds);
@@ -65,6 +66,7 @@ pub fn words(answered: &Answered) -> String {
         }
     }
     line(format!("\n  {:<60}{:>12}{:>14}", "loss", "mean", "BIC - best"));
+    // The chosen model of loss comes first.
     let best = goodness.losses.first().map_or(0.0, |loss| loss.bic);
     for loss in &goodness.losses {
         line(format!("  {:<60}{:>10.5} %{:>14.1}", model(loss), loss.mean_loss * 100.0, loss.bic - best));
@@ -81,7 +83,7 @@ fn model(loss: &LossFit) -> String {
     }
 }
 
-/// A step of a clock: a round number, which a nanosecond may miss.
+/// Returns the resolution of a clock as a span. The resolution is a round number of seconds, which `f64` may miss by a nanosecond.
 fn step(seconds: f64) -> Span {
     Span(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
 }

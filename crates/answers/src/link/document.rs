@@ -1,20 +1,20 @@
-//! The figures of a link as a JSON document.
+//! The JSON document of a link's figures.
 
 use serde::Serialize;
 
 use super::{MOST_MEASURED, Measured};
 use crate::document;
 
-/// The speed of the emulator over a link, and the files that were written.
+/// Speed of the emulator, and the written files.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Written {
-    /// Packets that the emulator took in a second of the wall clock.
+    /// Packets per second of wall time.
     pub packets_per_s: f64,
-    /// The paths of the files: the log of fates, the capture.
+    /// Paths of the files: the log of fates, the capture.
     pub files: Vec<String>,
 }
 
-/// The answer of `cohaptic link --json`. `written`: the speed of the emulator and the files, if they are said.
+/// Returns the answer of `cohaptic link --json`. `written`: speed and files; `None` leaves these keys out.
 pub fn document(measured: &Measured, written: Option<&Written>) -> impl Serialize {
     document! {
         asked: document! {

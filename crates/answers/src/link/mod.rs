@@ -1,4 +1,4 @@
-//! What a steady stream over one link answers: the figures that the link was asked for and those that it achieved, as a document and in words.
+//! The answers about a steady stream over one link: requested and achieved figures of the link, as a document and in words.
 
 mod document;
 mod words;
@@ -12,10 +12,10 @@ use cohaptic_wan::PacketRecord;
 pub use document::{Written, document};
 pub use words::words;
 
-/// The most packets that figures are of. Each takes 127 bytes while figures are worked out: half a gigabyte of these.
+/// Most packets in the figures. Each packet takes 127 bytes during the computation, half a gigabyte in all.
 pub const MOST_MEASURED: u64 = 4_000_000;
 
-/// Measures a link from the records of its packets, one by one. Records beyond [`MOST_MEASURED`] packets are counted only.
+/// Measures a link from the records of its packets. Packets beyond [`MOST_MEASURED`] are only counted.
 #[derive(Clone, Debug)]
 pub struct Meter {
     accumulator: Accumulator,
@@ -25,21 +25,21 @@ pub struct Meter {
 /// The figures of a link.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Measured {
-    /// The link as it was said, in words of tc-netem or in keys of a scene.
+    /// The link as written by the user, in words of tc-netem or in keys of a scene.
     pub said: String,
-    /// The figures that the link was asked for.
+    /// Figures requested of the link.
     pub asked: Asked,
-    /// The figures that the link achieved.
+    /// Figures achieved by the link.
     pub achieved: Achieved,
-    /// The figures that both have, with their distance.
+    /// Figures both requested and achieved, with their distance.
     pub figures: Vec<Figure>,
-    /// Packets that were sent.
+    /// Number of sent packets.
     pub sent: u64,
-    /// Packets that were to be sent; more than were sent if the stream was interrupted.
+    /// Number of packets to send; larger than `sent` if the stream was interrupted.
     pub wanted: u64,
 }
 
-/// Returns why a stream cannot be sent over a link, in words; `None` if it can: half of all time is left for delays.
+/// Returns the reason, in words, why a stream is too long; `None` if the stream can be sent. Half of the range of instants is reserved for delays.
 #[must_use]
 pub fn too_long(stream: &SteadyStream) -> Option<&'static str> {
     let is_too_long = stream.sent(stream.packets).as_nanos() > u64::MAX / 2;
@@ -53,16 +53,17 @@ impl Default for Meter {
 }
 
 impl Meter {
-    /// Takes a record. Records come in the order in which things happen.
+    /// Adds a record. Records must come in the order of their instants.
     pub fn record(&mut self, record: &PacketRecord) {
-        // The only refusal is that of a record out of order.
+        // The only refused record is one out of order, which the emulator never makes.
         let _ = self.accumulator.record(record);
+        // The accumulator has the same limit inside; the comparison needs it from here.
         if record.sequence < MOST_MEASURED {
             self.comparison.record(record);
         }
     }
 
-    /// Returns the figures. `said`: the link in words or keys. `sent`, `wanted`: packets that were sent, and that were to be sent.
+    /// Returns the figures. `said`: the link in words or keys. `sent`, `wanted`: numbers of sent packets and of packets to send.
     #[must_use]
     pub fn finish(self, said: String, asked: Asked, [sent, wanted]: [u64; 2]) -> Measured {
         let figures = self.comparison.figures(&asked);
@@ -71,7 +72,7 @@ impl Meter {
 }
 
 impl Measured {
-    /// Whether fewer packets were sent than were to be sent.
+    /// Returns `true` if fewer packets were sent than planned.
     #[must_use]
     pub const fn is_interrupted(&self) -> bool {
         self.sent < self.wanted

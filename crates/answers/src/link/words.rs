@@ -1,4 +1,4 @@
-//! What a link was asked for and what it achieved, as a table.
+//! The table of a link's requested and achieved figures.
 
 use std::fmt::Write as _;
 
@@ -7,11 +7,11 @@ use cohaptic_units::print::Counted;
 
 use super::{MOST_MEASURED, Measured};
 
-/// The figures of a link in words, for people. `packets_per_s`: packets that the emulator took in a second of the wall clock.
+/// Returns the text about a link. `packets_per_s`: packets handled by the emulator per second of wall time.
 #[must_use]
 pub fn words(measured: &Measured, packets_per_s: f64) -> String {
     let mut text = format!("{}\n", measured.said);
-    // Writing to a string does not fail.
+    // Writing to a string cannot fail.
     let mut line = |line: String| {
         let _ = writeln!(text, "{}", line.trim_end());
     };
@@ -52,10 +52,10 @@ fn row(figure: &Figure) -> String {
     format!("  {:<24}{asked:>18}{achieved:>18}{error:>14}{mark}", label(name))
 }
 
-/// A name, what was asked, what was achieved, and the standard error of that.
+/// A figure: name, requested value, achieved value, and standard error of the achieved value.
 type Other = (&'static str, Option<f64>, Option<f64>, Option<f64>);
 
-/// The mark where nothing was compared.
+/// Returns the figures shown even if they were not compared.
 fn others(measured: &Measured) -> [Other; 8] {
     let Measured { asked, achieved, .. } = measured;
     let (delay, loss) = (achieved.delay.as_ref(), &achieved.loss);
@@ -88,7 +88,7 @@ fn label(name: &str) -> String {
     .to_owned()
 }
 
-/// A figure in the unit that its name says.
+/// Returns a value in the unit named by the end of the figure's name; a dash for `None`.
 fn shown(name: &str, value: Option<f64>) -> String {
     let Some(value) = value else { return "-".to_owned() };
     match name {

@@ -1,4 +1,4 @@
-//! Maps as a JSON document.
+//! The JSON document of maps.
 
 use cohaptic_stability::Criterion;
 use serde::Serialize;
@@ -7,7 +7,7 @@ use super::{Filled, Speed, VariantMap};
 use crate::document;
 use crate::parts::judged;
 
-/// The answer of `cohaptic stability map --json`.
+/// Returns the answer of `cohaptic stability map --json`. `files`: paths of the written files.
 pub fn document(filled: &Filled<'_>, speed: Speed, files: &[String]) -> impl Serialize {
     let Filled { title, axes: [x, y], maps } = *filled;
     let first = maps.first();
@@ -35,7 +35,7 @@ pub fn document(filled: &Filled<'_>, speed: Speed, files: &[String]) -> impl Ser
         radii: first.map(radii),
         #[serde(flatten)]
         shares: first.map(shares),
-        // The maps beside the first.
+        // The maps of the variants.
         curves: curves.collect::<Vec<_>>(),
         wall_s: speed.wall_s,
         cells_per_s: speed.cells_per_s(),
@@ -45,7 +45,7 @@ pub fn document(filled: &Filled<'_>, speed: Speed, files: &[String]) -> impl Ser
     }
 }
 
-/// The radii of a map, under the name of its criterion; a row for each value of y.
+/// Returns the radii of a map under the name of its criterion, with one row per value of y.
 fn radii(map: &VariantMap) -> impl Serialize {
     let is_mean_square = map.criterion == Criterion::MeanSquare;
     document! {
@@ -55,20 +55,20 @@ fn radii(map: &VariantMap) -> impl Serialize {
         #[serde(flatten)]
         mean_square: is_mean_square.then(|| document! {
             mean_square_radius: map.map.radius.as_slice(),
-            // Which cells leave out what their links leave to chance.
+            // Cells which leave random parts of the links out.
             nominal: map.map.nominal.as_slice(),
         }),
         nominal_cells: map.nominal_cells(),
     }
 }
 
-/// The shares of stable cells: of all, and of those whose verdicts answer the same question.
+/// Returns the shares of stable cells: among all cells, and among the cells of each kind of verdict.
 fn shares(map: &VariantMap) -> impl Serialize + use<> {
     let kinds = map.kinds().present().map(|(kind, count)| judged(kind, count, map.stable_fraction_of(kind)));
     document! {
         stable_fraction: map.stable_fraction(),
         verdicts: kinds.collect::<Vec<_>>(),
-        // Random parts of the links that nominal cells leave out; empty where there are none.
+        // Random parts of the links left out by nominal cells; empty without nominal cells.
         left_out: if map.nominal_cells() > 0 { map.left_out.clone() } else { Vec::new() },
     }
 }

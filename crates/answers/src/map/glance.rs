@@ -1,17 +1,17 @@
-//! A map as text, with the dots of Unicode's braille patterns: a dot where the scene is stable.
+//! A map as text, in braille patterns of Unicode: a dot marks a stable point.
 
 use crate::text_plot::BRAILLE;
 
 const WIDTH: usize = 60;
 const HEIGHT: usize = 15;
 
-/// One axis of the picture: what it is called, and its values from left or from below.
+/// An axis: its label, and its values from left to right or from bottom to top.
 pub(super) struct Axis<'a> {
     pub(super) label: &'a str,
     pub(super) values: &'a [f64],
 }
 
-/// Draws the region; each dot shows the cell in which it lies.
+/// Draws the stable region. Each dot shows the cell at the place of the dot.
 pub(super) fn draw(x: &Axis<'_>, y: &Axis<'_>, stable: impl Fn(usize, usize) -> bool) -> String {
     let (columns, rows) = (2 * WIDTH, 4 * HEIGHT);
     let mut text = format!("  {}\n", y.label);
@@ -27,6 +27,7 @@ pub(super) fn draw(x: &Axis<'_>, y: &Axis<'_>, stable: impl Fn(usize, usize) -> 
             let mut dots = 0;
             for (row, pair) in BRAILLE.iter().enumerate() {
                 for (half, bit) in pair.iter().enumerate() {
+                    // Dots count from the top, cells from the bottom.
                     let from_top = 4 * line + row;
                     let cell_x = (2 * column + half) * x.values.len() / columns;
                     let cell_y = (rows - 1 - from_top) * y.values.len() / rows;
@@ -44,7 +45,7 @@ pub(super) fn draw(x: &Axis<'_>, y: &Axis<'_>, stable: impl Fn(usize, usize) -> 
     text
 }
 
-/// With few digits: the ends of an axis.
+/// Returns the label of an end of an axis, with few digits.
 fn number(value: f64) -> String {
     let shown = format!("{value}");
     if shown.len() <= 9 { shown } else { format!("{value:.3e}") }
@@ -58,14 +59,14 @@ mod tests {
     fn a_dot_shows_the_cell_in_which_it_lies() {
         let values = [0.0, 1.0];
         let axis = |label| Axis { label, values: &values };
-        // Stable at the lower left only.
+        // Only the lower left cell is stable.
         let text = draw(&axis("x"), &axis("y"), |x, y| x == 0 && y == 0);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), HEIGHT + 3);
         assert_eq!(lines[1], "         1 |");
         let full: String = "\u{28ff}".repeat(WIDTH / 2);
         assert_eq!(lines[HEIGHT], format!("         0 |{full}"));
-        // 30 of 60 rows of dots are below the middle: the line in the middle is half full.
+        // Below the middle are 30 of 60 rows of dots, so the middle line is half full.
         assert_eq!(lines[1 + HEIGHT / 2], format!("           |{}", "\u{28e4}".repeat(WIDTH / 2)));
     }
 }

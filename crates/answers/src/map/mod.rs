@@ -1,4 +1,4 @@
-//! What maps answer: the document, the words and the tables of maps over two keys.
+//! The answers about maps over two keys: document, words and tables.
 
 mod document;
 mod glance;
@@ -14,39 +14,39 @@ pub use words::words;
 /// Maps of one scene over the same keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Filled<'a> {
-    /// The title of the scene.
+    /// Title of the scene.
     pub title: &'a str,
     /// The keys along x and y.
     pub axes: [&'a KeyRange; 2],
-    /// The map of the scene as it stands, and those of its variants.
+    /// The map of the scene as it stands, followed by the maps of its variants.
     pub maps: &'a [VariantMap],
 }
 
 /// The map of a variant of a scene.
 #[derive(Clone, Debug)]
 pub struct VariantMap {
-    /// Its name in the legend.
+    /// Name of the variant in the legend.
     pub name: String,
-    /// What differs from the scene as it stands.
+    /// Overrides which make the variant out of the scene.
     pub overrides: Vec<String>,
-    /// The radii.
+    /// The radii, indexed by row and column, with the values of both keys.
     pub map: Map,
-    /// By which radius it judges.
+    /// Radius by which the map is judged.
     pub criterion: Criterion,
-    /// Random parts of the links that its nominal cells leave out, in words.
+    /// Random parts of the links left out by nominal cells, in words.
     pub left_out: Vec<&'static str>,
-    /// Of every cell, row after row.
+    /// Verdicts, indexed by row and column.
     pub verdicts: Vec<Vec<Verdict>>,
-    /// Its table, if it was written.
+    /// Path of the written table, if any.
     pub file: Option<String>,
 }
 
-/// How fast the maps were filled.
+/// Speed of the computation of the maps.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Speed {
-    /// The time that it took \[s\].
+    /// Wall time \[s\].
     pub wall_s: f64,
-    /// Cells computed now.
+    /// Number of cells computed by this call.
     pub cells: usize,
 }
 
@@ -57,7 +57,7 @@ impl Speed {
 }
 
 impl Filled<'_> {
-    /// Returns what the radii of the maps leave out.
+    /// Returns notes on simplifications behind the radii of the maps.
     fn notes(&self) -> Vec<String> {
         let cells: usize = self.maps.iter().map(VariantMap::nominal_cells).sum();
         nominal(cells, ["cell is", "cells are"]).into_iter().collect()
@@ -65,24 +65,24 @@ impl Filled<'_> {
 }
 
 impl VariantMap {
-    /// How many of its cells leave out what their links leave to chance.
+    /// Returns the number of nominal cells, which leave random parts of the links out.
     fn nominal_cells(&self) -> usize {
         self.map.nominal.iter().flatten().filter(|nominal| **nominal).count()
     }
 
-    /// Returns the numbers of its cells, by the question that their verdicts answer.
+    /// Returns the numbers of cells, by the question answered by their verdicts.
     fn kinds(&self) -> Kinds {
         Kinds::of(self.criterion, self.map.nominal.iter().flatten().copied())
     }
 
-    /// Returns the share of the cells of a kind that is stable.
+    /// Returns the share of stable cells among the cells of a kind.
     fn stable_fraction_of(&self, kind: VerdictKind) -> f64 {
         let all = self.verdicts.iter().flatten().zip(self.map.nominal.iter().flatten());
         let of_kind: Vec<Verdict> = all.filter(|(_, nominal)| self.criterion.kind(**nominal) == kind).map(|(verdict, _)| *verdict).collect();
         share(of_kind.iter().filter(|verdict| **verdict == Verdict::Stable).count(), of_kind.len())
     }
 
-    /// What share of its cells is stable.
+    /// Returns the share of stable cells among all cells.
     fn stable_fraction(&self) -> f64 {
         let cells = || self.verdicts.iter().flatten();
         share(cells().filter(|verdict| **verdict == Verdict::Stable).count(), cells().count())
@@ -94,7 +94,7 @@ fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole.max(1) as f64
 }
 
-/// Returns `map.csv`: one row a cell, x running fastest.
+/// Returns `map.csv`: one row per cell; x varies fastest.
 #[must_use]
 pub fn csv([x, y]: [&KeyRange; 2], VariantMap { map, criterion, verdicts, .. }: &VariantMap) -> String {
     let keys = format!("{},{}", csv_field(&x.key), csv_field(&y.key));

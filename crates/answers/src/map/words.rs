@@ -1,4 +1,4 @@
-//! Maps in words, with small pictures.
+//! The text about maps, with small pictures.
 
 use std::fmt::Write as _;
 
@@ -8,16 +8,16 @@ use cohaptic_units::print::Counted;
 use super::{Filled, Speed, VariantMap, glance};
 use crate::{are, figure, label};
 
-/// More pictures than this do not fit on a screen.
+/// Most pictures in the text, as many as fit on a screen.
 const MOST_PICTURES: usize = 4;
 
-/// Maps in words, for people. `pictures`: whether small pictures of them stand in the text.
+/// Returns the text about maps. `pictures`: whether the text contains small pictures of the maps.
 #[must_use]
 pub fn words(filled: &Filled<'_>, speed: Speed, pictures: bool) -> String {
     let Filled { title, axes, maps } = *filled;
     let mut text = format!("{title}\n");
     for (number, map) in maps.iter().enumerate() {
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = match maps.len() {
             1 => writeln!(text),
             _ => writeln!(text, "\n{}", map.name),
@@ -36,7 +36,7 @@ pub fn words(filled: &Filled<'_>, speed: Speed, pictures: bool) -> String {
     text
 }
 
-/// The share of stable cells, a line for each question that verdicts answer: a share over cells of several kinds would answer none.
+/// Returns a line with the share of stable cells per kind of verdict. A share over cells of several kinds would answer no question.
 fn headline(axes: [&KeyRange; 2], map: &VariantMap) -> String {
     let is_mixed = map.kinds().only().is_none();
     let line = |(kind, count): (VerdictKind, usize)| {
@@ -51,11 +51,12 @@ const fn verb(count: usize) -> &'static str {
     if count == 1 { "is" } else { "are" }
 }
 
-/// The least radius of the cells of a kind, and where it is.
+/// Returns the least radius of the cells of a kind, and its place; empty if no radius is finite.
 fn least([x_range, y_range]: [&KeyRange; 2], VariantMap { map, criterion, .. }: &VariantMap, kind: VerdictKind) -> String {
     let rows = map.y.iter().zip(map.radius.iter().zip(&map.nominal));
     let cells =
         rows.flat_map(|(y, (row, nominal))| map.x.iter().zip(row.iter().zip(nominal)).map(move |(x, (radius, nominal))| (*radius, *x, *y, *nominal)));
+    // The radii of an overflow are not finite and have no least.
     let of_kind = cells.filter(|(radius, _, _, nominal)| radius.is_finite() && criterion.kind(*nominal) == kind);
     let least = of_kind.min_by(|one, other| one.0.total_cmp(&other.0));
     least.map_or_else(String::new, |(radius, x, y, _)| {

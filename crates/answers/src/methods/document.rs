@@ -1,4 +1,4 @@
-//! The explanation of a scene with measured costs, as JSON.
+//! The JSON document of an explanation with measured costs.
 
 use cohaptic_harness::explain::Explanation;
 use cohaptic_scene::Scene;
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Measured, MeasuredMethod};
 use crate::{document, explanation};
 
-/// The explanation of a scene, with what was measured if anything was.
+/// Returns the explanation of a scene, extended by the measured costs and errors if there are any.
 pub fn explanation_with_costs<'a>(scene: &'a Scene, found: &'a Explanation, measured: Option<&'a Measured>) -> impl Serialize + 'a {
     document! {
         #[serde(flatten)] explanation: explanation(scene, found),

@@ -1,4 +1,4 @@
-//! The list of methods.
+//! Lists the methods of a scene, without running them.
 
 use std::time::Duration;
 
@@ -11,14 +11,14 @@ use cohaptic_units::{Instant, print::Span};
 
 use super::{Kind, Method, Run, Work};
 
-/// An engine of runs: its name, the option that chooses it, and whether packets are watched. The last one is the reference.
+/// Engines of runs: name, option, model, and whether packets are watched. The last engine is the reference.
 const ENGINES: [(&str, &str, Model, bool); 3] = [
     ("least that the scene needs", "", Model::Least, false),
     ("the same with packets watched", "--out DIR", Model::Least, true),
     ("everything the program has", "--general", Model::General, false),
 ];
 
-/// The integrators, with their steps a tick. The exact one comes first and is the reference.
+/// Integrators: name, word, and steps per tick. The exact integrator comes first and is the reference.
 const INTEGRATORS: [(&str, &str, u32); 6] = [
     ("exact propagator", "exact", 1),
     ("semi-implicit Euler, 1 step a tick", "semi-implicit-euler", 1),
@@ -28,26 +28,26 @@ const INTEGRATORS: [(&str, &str, u32); 6] = [
     ("RK4, 4 steps a tick", "rk4", 4),
 ];
 
-/// Meanings of the words of netem. The exact meaning comes first.
+/// Profiles of netem: name and word. The exact profile comes first.
 const PROFILES: [(&str, &str); 2] = [("exact laws", "exact"), ("tables and generator of Linux 6.6", "kernel-6.6")];
 
-/// The methods of analysis. The last one, which shares least with the others, is the reference.
+/// Methods of analysis. The last method shares the least code with the others, and is the reference.
 const ANALYSES: [(&str, AnalysisMethod); 3] = [
     ("equal peers together", AnalysisMethod::Reduced),
     ("roots of a determinant", AnalysisMethod::Determinant),
     ("whole state pushed through the simulation", AnalysisMethod::Full),
 ];
 
-/// Ticks along three axes, and packets, of the part of a scene that a run simulates: up to a tenth of a second of the slowest engine.
+/// Number of events in the simulated part of a scene (ticks along three axes, and packets): up to a tenth of a second of the slowest engine.
 const EVENTS: f64 = 6e5;
-/// A run with an event for each tick and each packet is not measured if it has more of them, each link of its set-up counted twice: some seconds.
+/// Most events of a measured run which has an event per tick and packet, with each link's set-up counted as two events: some seconds.
 const MOST_EVENTS: f64 = 2e6;
-/// The shortest span simulated.
+/// Shortest simulated span.
 const SHORTEST: Duration = Duration::from_millis(20);
 
-/// Returns the methods that the scene could choose, kind by kind.
+/// Returns the methods selectable in the scene, kind by kind.
 ///
-/// `variant` reads the scene once more with overrides such as `link.netem-profile=exact`, or says in words why the scene refuses them.
+/// `variant` reads the scene again with overrides such as `link.netem-profile=exact`, or returns the reason, in words, why the scene refuses the overrides.
 pub fn methods(scene: &Scene, explanation: &Explanation, variant: &dyn Fn(&[&str]) -> Result<Scene, String>) -> Vec<Method> {
     let span = span(scene, explanation);
     #[expect(clippy::cast_precision_loss, reason = "a number of links is far below 2^53")]
@@ -61,7 +61,7 @@ pub fn methods(scene: &Scene, explanation: &Explanation, variant: &dyn Fn(&[&str
     methods
 }
 
-/// Returns how much of the scene is simulated. It follows from the scene alone, so that errors are the same on every machine.
+/// Returns the simulated span. The span depends on the scene alone, so that the errors are the same on every machine.
 fn span(scene: &Scene, explanation: &Explanation) -> Duration {
     let millis = (1e3 * EVENTS / events_a_second(explanation)).clamp(0.0, 1e12);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0 and at most 1e12")]
@@ -69,7 +69,7 @@ fn span(scene: &Scene, explanation: &Explanation) -> Duration {
     scene.duration.min(span.max(SHORTEST))
 }
 
-/// Returns the ticks along three axes, and the packets, of a simulated second.
+/// Returns the number of events (ticks along three axes, and packets) per simulated second.
 fn events_a_second(explanation: &Explanation) -> f64 {
     3.0 * explanation.cost.peer_ticks_per_s + explanation.cost.packets_per_s
 }
@@ -77,7 +77,7 @@ fn events_a_second(explanation: &Explanation) -> f64 {
 struct List<'a> {
     scene: &'a Scene,
     span: Duration,
-    /// The events of a run that has one for each tick and each packet.
+    /// Number of events of a run which has an event per tick and packet.
     events: f64,
     variant: &'a dyn Fn(&[&str]) -> Result<Scene, String>,
 }
@@ -135,7 +135,7 @@ impl List<'_> {
         };
         let mut methods: Vec<Method> = INTEGRATORS.into_iter().map(method).collect();
         if !methods.iter().any(|method| method.chosen) {
-            // The number of steps of the scene is not in the list.
+            // The scene's own number of steps is not in the list.
             let work = self.run(self.scene.clone(), Model::Least, false);
             let name = "as the scene has".to_owned();
             methods.push(Method { kind: Kind::Integrator, name, option: String::new(), chosen: true, is_reference: false, work });
@@ -143,19 +143,20 @@ impl List<'_> {
         methods
     }
 
-    /// Only links that are written in words of netem offer a choice; others have their exact law.
+    /// Only links written in words of netem have a choice. All other links follow their exact laws.
     fn samplings(&self) -> Vec<Method> {
         let variants = PROFILES.map(|(name, word)| {
             let key = format!("link.netem-profile={word}");
             ((self.variant)(&[&key]), name, key)
         });
+        // A scene whose links are not in words of netem refuses the override.
         if variants.iter().any(|(scene, ..)| scene.is_err()) {
             return Vec::new();
         }
         let method = |(scene, name, key): (Result<Scene, String>, &str, String)| {
             let chosen = scene.as_ref().is_ok_and(|scene| scene.links == self.scene.links);
             let work = scene.and_then(|scene| self.run(scene, Model::Least, false));
-            // The two draw other random numbers, so that positions differ by chance: there is no error against any of them.
+            // The two profiles draw different random numbers, so positions differ by chance, and neither is a reference.
             Method { kind: Kind::Sampling, name: name.to_owned(), option: format!("--set {key}"), chosen, is_reference: false, work }
         };
         variants.into_iter().map(method).collect()
@@ -173,9 +174,9 @@ impl List<'_> {
         ANALYSES.into_iter().map(method).collect()
     }
 
-    /// Returns a run of the beginning of that scene; in words why the peers are too many to be simulated.
+    /// Returns a run of the beginning of a scene, or the reason, in words, why the run is too large.
     fn run(&self, mut scene: Scene, model: Model, watches_packets: bool) -> Result<Work, String> {
-        // Positions are compared at ticks, so every run is watched once.
+        // Every run is watched once, because positions are compared at ticks.
         if let Some(refused) = cohaptic_harness::too_large(&scene, model, true) {
             return Err(refused.reason);
         }
@@ -183,6 +184,7 @@ impl List<'_> {
             return Err(format!("too long to be measured here: {:.1e} events even in {}", self.events, Span(self.span)));
         }
         scene.duration = self.span;
+        // Changes after the span never happen in the run.
         scene.timeline.retain(|change| change.at - Instant::ZERO <= self.span);
         scene.expect = None;
         Ok(Work::Run(Run { scene: Box::new(scene), model, watches_packets, compared_axes: self.scene.axes.count() }))

@@ -1,4 +1,4 @@
-//! The measurement of methods: what each costs and how wrong it is.
+//! Measures the cost and the error of methods.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -9,26 +9,26 @@ use super::runs::{Trajectory, unwatched};
 use super::{Kind, Method, Work};
 use crate::quick_verdict::OPERATIONS_A_SECOND;
 
-/// Time spent on the cost of one method, at least one round of it.
+/// Time spent on the cost of one method; at least one round is run.
 const BUDGET: Duration = Duration::from_millis(50);
-/// The most rounds of one method, whose median is steady.
+/// Most rounds of one method. The median of 31 rounds is steady.
 const MOST_ROUNDS: usize = 31;
-/// After this time the methods that are left are listed without figures: in scenes of thousands of peers one run takes seconds.
+/// Time after which further methods get no figures: in scenes of thousands of peers one run takes seconds.
 const MOST_TIME: Duration = Duration::from_secs(6);
-/// An analysis that takes more operations than this, by its own estimate, is not measured: about a second.
+/// Most operations of a measured analysis, by its own estimate: about a second.
 const MOST_OPERATIONS: f64 = OPERATIONS_A_SECOND;
 
-/// Sees how far a measurement is, and may end it.
+/// Observer of a measurement, which can also stop the measurement.
 pub trait MeasurementWatch: Sync {
-    /// This method is measured next.
+    /// Called before a method is measured.
     fn begins(&self, _method: &Method) {}
 
-    /// Returns `true` if the method that began last takes too long to wait for. Called often.
+    /// Returns `true` if the current method takes too long. Called often.
     fn is_late(&self) -> bool {
         false
     }
 
-    /// Returns `true` if the measurement is to be given up. Called often.
+    /// Returns `true` if the measurement must stop. Called often.
     fn stops(&self) -> bool {
         false
     }
@@ -37,11 +37,11 @@ pub trait MeasurementWatch: Sync {
 /// Methods with their measured costs and errors.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Measured {
-    /// The simulated time of the runs.
+    /// Simulated span of the runs.
     pub span: Duration,
     /// The methods, kind by kind.
     pub methods: Vec<MeasuredMethod>,
-    /// `true` if the watch ended the measurement. Kinds are missing then.
+    /// Whether the watch stopped the measurement. Some kinds are missing then.
     pub interrupted: bool,
 }
 
@@ -52,28 +52,29 @@ pub struct MeasuredMethod {
     pub kind: Kind,
     /// Name of the method, unique within its kind.
     pub name: String,
-    /// The words that choose it on the command line; empty for the default.
+    /// Option which selects the method on the command line; empty for the default.
     pub option: String,
-    /// `true` if the scene as it stands is computed by this method.
+    /// Whether the scene as it stands uses this method.
     pub chosen: bool,
-    /// Processor time for one [`Kind::cost_of`] \[ms\]: measured, the median of some rounds. `None` if the method does not apply, and then the note says why.
+    /// Processor time per [`Kind::cost_of`] \[ms\], the median of some rounds. `None` if the method does not apply; the note then gives the reason.
     pub cost_ms: Option<f64>,
-    /// The largest difference from the reference in [`Kind::error_unit`]: computed, the same every time. `None` if there is no such number, and then the note
-    /// says why.
+    /// Largest difference from the reference, in [`Kind::error_unit`]. The error is computed, and the same every time. `None` if there is no such number; the
+    /// note then gives the reason.
     pub error: Option<f64>,
-    /// The name of the method that the error is against; `None` if there is no error.
+    /// Name of the method used as the reference; `None` without an error.
     pub reference: Option<String>,
-    /// Remark for the reader; empty if there is none.
+    /// Remark for the reader; may be empty.
     pub note: String,
 }
 
-/// Measures the methods, kind by kind. `clock` tells the processor time used so far.
+/// Measures the methods, kind by kind. `clock` returns the processor time used so far.
 pub fn measure(methods: &[Method], clock: &dyn Fn() -> Duration, watch: &dyn MeasurementWatch) -> Measured {
     let span = methods.iter().find_map(|method| match &method.work {
         Ok(Work::Run(run)) => Some(run.span()),
         Ok(Work::Analysis { .. }) | Err(_) => None,
     });
     let mut measured = Measured { span: span.unwrap_or_default(), methods: Vec::new(), interrupted: false };
+    // Measured once for all kinds: `MOST_TIME` bounds the runs of the whole list.
     let begin = clock();
     for kind in Kind::ALL {
         let of_kind: Vec<&Method> = methods.iter().filter(|method| method.kind == kind).collect();
@@ -86,19 +87,19 @@ pub fn measure(methods: &[Method], clock: &dyn Fn() -> Duration, watch: &dyn Mea
     measured
 }
 
-/// The result of a method, which others are compared with.
+/// Result of a method, compared with the result of the reference.
 enum Outcome {
     Trajectory(Trajectory),
     Radius(Radius),
 }
 
-/// Returns the rows of one kind; `None` if the watch ended the measurement.
+/// Returns the rows of one kind; `None` if the watch stopped the measurement.
 fn of_one_kind(methods: &[&Method], begin: Duration, clock: &dyn Fn() -> Duration, watch: &dyn MeasurementWatch) -> Option<Vec<MeasuredMethod>> {
     let mut outcomes = Vec::new();
     for method in methods {
         watch.begins(method);
         outcomes.push(match &method.work {
-            // Analyses have a limit of their own.
+            // The limit does not apply to analyses, which have a limit of their own.
             Ok(Work::Run(_)) if clock().saturating_sub(begin) > MOST_TIME => Err("not measured: the methods before took too long".to_owned()),
             Ok(work) => outcome(work, watch)?,
             Err(why) => Err(why.clone()),
@@ -107,7 +108,7 @@ fn of_one_kind(methods: &[&Method], begin: Duration, clock: &dyn Fn() -> Duratio
     let costs = costs(methods, &outcomes, clock, watch)?;
     let is_had = |place: &usize| outcomes[*place].is_ok();
     let named = (0..methods.len()).find(|place| methods[*place].is_reference).filter(is_had);
-    // Where the reference does not apply, the first method of the kind that does takes its place. Kinds without a reference have no error.
+    // If the reference does not apply, the first applicable method of the kind becomes the reference. A kind without a reference has no errors.
     let reference = named.or_else(|| methods.iter().any(|method| method.is_reference).then(|| (0..methods.len()).find(is_had)).flatten());
     let row = |(place, method): (usize, &&Method)| {
         let (error, note) = match (&outcomes[place], reference.map(|place| &outcomes[place])) {
@@ -130,7 +131,7 @@ fn of_one_kind(methods: &[&Method], begin: Duration, clock: &dyn Fn() -> Duratio
     Some(methods.iter().enumerate().map(row).collect())
 }
 
-/// Does the work of a method once and keeps what comes of it, or why nothing does; `None` if the watch ended it.
+/// Does the work of a method once. Returns its result, or the reason for having no result; `None` if the watch stopped the measurement.
 fn outcome(work: &Work, watch: &dyn MeasurementWatch) -> Option<Result<Outcome, String>> {
     match work {
         Work::Run(run) => Trajectory::of(run, &|| watch.stops()).map(|trajectory| Ok(Outcome::Trajectory(trajectory))),
@@ -150,7 +151,7 @@ fn outcome(work: &Work, watch: &dyn MeasurementWatch) -> Option<Result<Outcome, 
     }
 }
 
-/// Returns the error of an outcome, and a note on it.
+/// Returns the error of a result, and a note about the error.
 fn error(own: &Outcome, reference: &Outcome, turns: bool) -> (Option<f64>, String) {
     match (own, reference) {
         (Outcome::Trajectory(own), Outcome::Trajectory(reference)) => match own.difference(reference) {
@@ -167,9 +168,10 @@ fn error(own: &Outcome, reference: &Outcome, turns: bool) -> (Option<f64>, Strin
     }
 }
 
-/// Returns the cost of each method \[ms\]; `None` for methods without an outcome, and for all if the watch ended the measurement.
+/// Returns the cost of each method \[ms\]; `None` for a method without a result. The outer `None` means that the watch stopped the measurement.
 ///
-/// Methods take turns, so that a disturbance of the machine hits all of them. The first time, which fills caches, was that of the outcome.
+/// The methods take turns, so that a disturbance of the machine affects all of them. The caches are warm, because each method has already run once for its
+/// result.
 fn costs(
     methods: &[&Method],
     outcomes: &[Result<Outcome, String>],
@@ -189,6 +191,7 @@ fn costs(
     }
     let cost = |(method, mut times): (&&Method, Vec<Duration>)| {
         times.sort();
+        // An odd number of rounds is not guaranteed, so the upper of two middle rounds counts.
         let median = times.get(times.len() / 2)?.as_secs_f64();
         let units = match &method.work {
             Ok(Work::Run(run)) => run.span().as_secs_f64(),
@@ -199,24 +202,24 @@ fn costs(
     Some(methods.iter().zip(times).map(cost).collect())
 }
 
-/// Does the work of a method once, as a user has it done; `None` if the watch ended it.
+/// Does the work of a method once, as a user would; `None` if the watch stopped the measurement.
 fn once(work: &Work, watch: &dyn MeasurementWatch) -> Option<()> {
     match work {
         Work::Run(run) => drop(std::hint::black_box(unwatched(run, &|| watch.stops())?)),
         Work::Analysis { scene, method } => {
             let limited = Limited { watch, expected: Mutex::new(0.0), is_first: false };
-            // Its outcome was had before, so an error is the end that the watch asked for.
+            // The same analysis has succeeded before, so an error now means that the watch stopped it.
             drop(std::hint::black_box(analyse_watched(scene, *method, &limited).ok()?));
         }
     }
     if watch.stops() { None } else { Some(()) }
 }
 
-/// Ends an analysis that is too long by its estimate, and any if the watch asks for it.
+/// A watch of an analysis, which stops an analysis with a too large estimate, and every analysis if the measurement must stop.
 struct Limited<'a> {
     watch: &'a dyn MeasurementWatch,
     expected: Mutex<f64>,
-    /// `true` for the first analysis of a method, which alone may be late.
+    /// Whether this is the first analysis of a method. Later analyses are never late, because the first was not.
     is_first: bool,
 }
 

@@ -1,7 +1,7 @@
-//! The methods that a scene can choose between, each with its cost and its error on this scene.
+//! The methods selectable in a scene, with the cost and the error of each on this scene.
 //!
-//! A [`Method`] is data: its kind, the words that choose it on the command line, and the work that shows what it costs. [`methods`] lists them, and [`measure`]
-//! does the work. Methods of one [`Kind`] do the same work, so that their costs and errors can be compared. No clock is read here: [`measure`] is given one.
+//! A [`Method`] is data: its kind, its option on the command line, and the work which shows its cost. [`methods`] lists the methods, and [`measure`] does the
+//! work. The methods of one [`Kind`] do the same work, so their costs and errors are comparable. [`measure`] takes the clock as an argument.
 
 mod document;
 mod list;
@@ -25,7 +25,7 @@ use cohaptic_scene::Scene;
 /// Purpose of a method.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Kind {
-    /// Engine of runs. All engines have the same answer, to the bit.
+    /// Engine of runs. All engines have the same results, to the last bit.
     Engine,
     /// Number of simulated axes.
     Axes,
@@ -33,15 +33,15 @@ pub enum Kind {
     Integrator,
     /// Source of random delays and losses.
     Sampling,
-    /// Analysis that decides on stability.
+    /// Analysis of stability.
     Analysis,
 }
 
 impl Kind {
-    /// Every kind, in the order in which they are shown.
+    /// All kinds, in the order of display.
     pub const ALL: [Self; 5] = [Self::Engine, Self::Axes, Self::Integrator, Self::Sampling, Self::Analysis];
 
-    /// The word in JSON.
+    /// Returns the word in JSON documents.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -53,7 +53,7 @@ impl Kind {
         }
     }
 
-    /// The heading for people.
+    /// Returns the heading for people.
     #[must_use]
     pub const fn heading(self) -> &'static str {
         match self {
@@ -65,7 +65,7 @@ impl Kind {
         }
     }
 
-    /// The unit of the cost, with what it is for.
+    /// Returns the unit of the cost, with the unit of work.
     #[must_use]
     pub const fn cost_unit(self) -> &'static str {
         match self {
@@ -74,7 +74,7 @@ impl Kind {
         }
     }
 
-    /// Unit of work that the cost is for.
+    /// Returns the unit of work of the cost.
     #[must_use]
     pub const fn cost_of(self) -> &'static str {
         match self {
@@ -83,7 +83,7 @@ impl Kind {
         }
     }
 
-    /// Quantity that the error is of.
+    /// Returns the quantity of the error.
     #[must_use]
     pub const fn error_of(self) -> &'static str {
         match self {
@@ -92,7 +92,7 @@ impl Kind {
         }
     }
 
-    /// The unit of the error.
+    /// Returns the unit of the error.
     #[must_use]
     pub const fn error_unit(self) -> &'static str {
         match self {
@@ -102,31 +102,31 @@ impl Kind {
     }
 }
 
-/// A method that the scene could choose.
+/// A method selectable in the scene.
 #[derive(Clone, Debug)]
 pub struct Method {
     /// Purpose of the method.
     pub kind: Kind,
     /// Name of the method, unique within its kind.
     pub name: String,
-    /// The words that choose it on the command line; empty for the default.
+    /// Option which selects the method on the command line; empty for the default.
     pub option: String,
-    /// `true` if the scene as it stands is computed by this method.
+    /// Whether the scene as it stands uses this method.
     pub chosen: bool,
-    /// `true` for the reference of its kind, which the errors of the other methods are against.
+    /// Whether the errors of the methods of this kind are measured against this method.
     pub(crate) is_reference: bool,
-    /// The work that shows its cost and its error, or why it does not apply to the scene.
+    /// Work which shows the cost and the error, or the reason why the method does not apply to the scene.
     pub(crate) work: Result<Work, String>,
 }
 
 impl Method {
-    /// Returns whether the object turns in the run of the method.
+    /// Returns `true` if the object turns in the run of the method.
     fn turns(&self) -> bool {
         matches!(&self.work, Ok(Work::Run(run)) if run.scene.rotation.is_some())
     }
 }
 
-/// Work that shows the cost and the error of a method.
+/// Work which shows the cost and the error of a method.
 #[derive(Clone, Debug)]
 pub(crate) enum Work {
     Run(Run),
@@ -136,12 +136,12 @@ pub(crate) enum Work {
 /// A run of a scene, or of its beginning.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
-    /// The scene, no longer than the span that is simulated.
+    /// The scene, with the simulated span as its duration.
     pub(crate) scene: Box<Scene>,
     pub(crate) model: Model,
-    /// `true` if packets are watched, for which a run has events.
+    /// Whether packets are watched, which makes the run use events.
     pub(crate) watches_packets: bool,
-    /// The axes whose positions are compared: those of the scene as it stands.
+    /// Number of compared axes: the axes of the scene as it stands.
     pub(crate) compared_axes: usize,
 }
 

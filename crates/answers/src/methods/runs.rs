@@ -1,4 +1,4 @@
-//! Runs that show where copies are, and runs that show nothing but how long they take.
+//! Runs of methods: watched runs, which give the positions of the copies, and unwatched runs, whose time is measured.
 
 use std::convert::Infallible;
 
@@ -7,18 +7,18 @@ use cohaptic_units::{Instant, print::Span};
 
 use super::Run;
 
-/// Positions of the copies in one run.
+/// Positions of the copies in the runs of one method.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Trajectory {
-    /// Positions along the compared axes \[m\]: in the order of the ticks, then those at the end, then those at the end of a run of which no tick is watched,
-    /// which may take another way.
+    /// Positions along the compared axes \[m\]: tick by tick, then at the end of the same run, then at the end of an unwatched run, which may use another
+    /// engine.
     positions: Vec<f64>,
-    /// The instant at which the run diverged, if it did.
+    /// Instant of divergence; `None` if no run diverged.
     diverged: Option<Instant>,
 }
 
 impl Trajectory {
-    /// Runs twice, watched and not; `None` if `stops` ended a run.
+    /// Runs twice, watched and unwatched; `None` if `stops` ended a run.
     pub(crate) fn of(run: &Run, stops: &dyn Fn() -> bool) -> Option<Self> {
         let mut watched = Watching { positions: Some(Vec::new()), ..Watching::new(run, stops) };
         let summaries = [watched.finish(run)?, unwatched(run, stops)?];
@@ -33,10 +33,11 @@ impl Trajectory {
         Some(Self { positions, diverged })
     }
 
-    /// Returns the largest difference from another trajectory \[m\], or why there is none.
+    /// Returns the largest difference of the positions \[m\], or the reason for having none.
     pub(crate) fn difference(&self, other: &Self) -> Result<f64, String> {
         for (trajectory, whose) in [(self, "the run diverges"), (other, "the run of the reference diverges")] {
             if let Some(at) = trajectory.diverged
+                // Two runs which diverge at the same instant can still be compared up to there.
                 && self.diverged != other.diverged
             {
                 return Err(format!("{whose} at {}", Span(at - Instant::ZERO)));
@@ -45,7 +46,7 @@ impl Trajectory {
         if self.positions.len() != other.positions.len() {
             return Err("the runs have other numbers of ticks".to_owned());
         }
-        // Equal bits are no difference, so that a NaN is equal to itself alone.
+        // Equal bits count as no difference, so that a NaN equals itself.
         let apart = |(one, other): (&f64, &f64)| if one.to_bits() == other.to_bits() { 0.0 } else { (one - other).abs() };
         let largest = self
             .positions
@@ -57,7 +58,7 @@ impl Trajectory {
     }
 }
 
-/// Runs and keeps nothing but the summary; `None` if `stops` ended the run.
+/// Runs without watching ticks; `None` if `stops` ended the run.
 pub(crate) fn unwatched(run: &Run, stops: &dyn Fn() -> bool) -> Option<Summary> {
     Watching::new(run, stops).finish(run)
 }
@@ -100,7 +101,7 @@ impl Observer for Watching<'_> {
     }
 
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), Infallible> {
-        // Looking at a packet is part of the work, and its result is used nowhere.
+        // Receiving a packet is part of the measured work, and `black_box` keeps the compiler from removing it.
         std::hint::black_box(row);
         Ok(())
     }

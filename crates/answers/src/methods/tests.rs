@@ -9,7 +9,7 @@ use cohaptic_scene::Scene;
 
 use super::*;
 
-/// Two peers hold one object; the first one pushes it. No force depends on where the copies are apart.
+/// Two peers hold one object, and the first peer pushes it. No force depends on the distance between the copies.
 const PUSHED: &str = r#"
     scene        = { duration = "1s", count = 2 }
     object       = { mass = 0.45 }
@@ -21,7 +21,7 @@ const PUSHED: &str = r#"
     hand = { force = 1.5 }
 "#;
 
-/// The scene of docs/stability.md, whose radius is printed there, with a hand that moves it.
+/// The scene of docs/stability.md, whose radius is printed there, with a hand to move the object.
 const THREE: &str = r#"
     scene        = { duration = "2s", count = 3 }
     object       = { mass = 0.45 }
@@ -52,7 +52,7 @@ fn listed(text: &str, keys: &[&str]) -> Vec<Method> {
     methods(&scene, &explain(&scene), &variant)
 }
 
-/// Measures by a clock that goes a millisecond further whenever it is looked at, so that each round takes one.
+/// Measures with a clock which advances by a millisecond per reading, so that each round takes one millisecond.
 fn measured(text: &str, keys: &[&str]) -> Measured {
     let ticks = Cell::new(0);
     let clock = || {
@@ -82,20 +82,21 @@ fn all_engines_and_numbers_of_axes_have_the_same_answer_to_the_bit() {
         &["link.rate=1Mbit", "scene.axes=2", "peers.peer1.hand.force=[1.5, 1.0]"],
         &["peer.clock={ drift = \"20ppm\" }", "peer.contact={ push = \"+x\" }"],
     ] {
-        // Analyses of clocks that drift take seconds, and are tested below.
+        // Analyses of drifting clocks take seconds, and are tested below.
         let runs: Vec<Method> = listed(THREE, keys).into_iter().filter(|method| method.kind != Kind::Analysis).collect();
         let measured = measure(&runs, &|| Duration::ZERO, &Unwatched);
         assert_eq!(measured.errors(Kind::Engine), [Some(0.0); 3], "{keys:?}");
         assert_eq!(measured.span, Duration::from_secs(2));
-        // With more axes samples are longer, and a line takes more time to send them.
+        // With more axes the samples are longer, and a line needs more time to send them.
         if !keys.contains(&"link.rate=1Mbit") {
             assert_eq!(measured.errors(Kind::Axes), [Some(0.0); 2], "{keys:?}");
         }
     }
 }
 
-/// The mass M = 0.1 kg + 0.45 kg/2 of a device and its copy, which has its share of the object, under a constant force F moves by F·t²/2M. Semi-implicit Euler with steps of h is ahead by F·h·t/2M: after n steps
-/// it is at (F/M)·h²·n(n+1)/2. The spring between the two is relaxed after a second and moves the copy by less than a hundredth of that.
+/// The mass M = 0.1 kg + 0.45 kg/2 (a device, and the copy with its share of the object) moves under a constant force F by F·t²/2M. Semi-implicit Euler with
+/// steps of h is ahead by F·h·t/2M: after n steps the position is (F/M)·h²·n(n+1)/2. The spring between device and copy is relaxed after a second, and moves
+/// the copy by less than a hundredth of that.
 #[test]
 fn the_error_of_semi_implicit_euler_is_that_of_theory_and_in_proportion_to_the_step() {
     let measured = measured(PUSHED, &[]);
@@ -106,7 +107,7 @@ fn the_error_of_semi_implicit_euler_is_that_of_theory_and_in_proportion_to_the_s
         let theory = 1.5 * (1e-3 / steps) * 1.0 / (2.0 * 0.325);
         assert!((error / theory - 1.0).abs() < 0.01, "{steps} steps: {error} and not {theory}");
     }
-    // Runge and Kutta's method is exact for a constant force, and nearly so for one that is held for a millisecond.
+    // The method of Runge and Kutta is exact for a constant force, and nearly exact for a force held for a millisecond.
     assert!(rk4 < 1e-9, "{rk4}");
     let reference = |method: &&MeasuredMethod| method.reference.as_deref() == Some("exact propagator");
     assert!(measured.of(Kind::Integrator).iter().all(reference));
@@ -132,14 +133,14 @@ fn the_methods_of_analysis_agree_within_their_errors() {
     let errors = measured.errors(Kind::Analysis);
     let [Some(reduced), Some(determinant), Some(full)] = errors[..] else { panic!("{errors:?}") };
     assert_eq!(full.to_bits(), 0.0_f64.to_bits());
-    // docs/stability.md: the methods agree to 1e-10, and this radius.
+    // Source: docs/stability.md, where the methods agree to 1e-10 on this radius.
     assert!(reduced < 1e-10 && determinant < 1e-10, "{errors:?}");
     let analyses = measured.of(Kind::Analysis);
     assert!(analyses.iter().all(|method| method.note.starts_with("radius 0.89648813856")), "{analyses:?}");
     assert_eq!(analyses.iter().map(|method| method.chosen).collect::<Vec<_>>(), [true, false, false]);
 }
 
-/// Finds every analysis late as soon as it is asked.
+/// A watch which calls every analysis late at once.
 struct Impatient;
 
 impl MeasurementWatch for Impatient {
@@ -148,7 +149,7 @@ impl MeasurementWatch for Impatient {
     }
 }
 
-/// A frame of clocks that drift is 400 s long and has 50,000 samples.
+/// A frame of drifting clocks is 400 s long and has 50,000 samples.
 #[test]
 fn analyses_that_are_late_are_listed_without_figures() {
     let methods = listed(THREE, &["peer.clock={ drift = \"20ppm\" }"]);
@@ -160,7 +161,7 @@ fn analyses_that_are_late_are_listed_without_figures() {
     assert_eq!(measured.errors(Kind::Engine), [Some(0.0); 3]);
 }
 
-/// A round takes 1 ms of two simulated seconds.
+/// A round takes 1 ms for two simulated seconds.
 #[test]
 fn the_cost_is_the_time_of_a_round_by_the_clock_that_was_given() {
     let measured = measured(THREE, &[]);
@@ -208,18 +209,18 @@ fn what_is_simulated_follows_from_the_scene_alone_and_is_no_longer_than_the_scen
             })
             .collect();
         assert!(spans.windows(2).all(|pair| pair[0] == pair[1]));
-        // 600,000 ticks along three axes, and packets: of three peers 9,000 and 750 a second; of a hundred 300,000 and 1,237,500.
+        // 600,000 events: three peers make 9,000 ticks along three axes and 750 packets per second; a hundred peers make 300,000 and 1,237,500.
         assert!((spans[0].as_secs_f64() / span_s - 1.0).abs() < 0.05, "{count} peers: {spans:?}");
     }
 }
 
 #[test]
 fn methods_that_take_too_long_are_listed_without_figures() {
-    // A thousand peers send 124,875,000 packets a second, which are 2,497,500 in 20 ms.
+    // A thousand peers send 124,875,000 packets per second, hence 2,497,500 in 20 ms.
     let crowd = listed(THREE, &["scene.count=1000"]);
     let refused = |method: &&Method| method.kind == Kind::Engine && method.work.as_ref().is_err_and(|why| why.starts_with("too long"));
     assert_eq!(crowd.iter().filter(refused).count(), 2);
-    // A clock by which each look takes four seconds, so that the runs of the second method would begin after eight.
+    // With a clock of four seconds per reading, the runs of the second method would begin after eight seconds.
     let ticks = Cell::new(0);
     let clock = || {
         ticks.set(ticks.get() + 4);
@@ -238,7 +239,7 @@ fn of_an_object_that_turns_the_row_says_that_turns_are_not_compared() {
     assert!(measured.of(Kind::Engine).iter().all(|method| method.error == Some(0.0) && method.note.contains("turns are not compared")));
 }
 
-/// A watch that ends the measurement when `most` methods have begun.
+/// A watch which stops the measurement after `most` methods have begun.
 struct Until {
     begun: AtomicUsize,
     most: usize,

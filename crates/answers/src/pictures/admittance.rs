@@ -1,33 +1,33 @@
-//! A Bode plot.
+//! The Bode plot of admittances.
 
 use cohaptic_picture::{Axis, Line, Look, Marker, Panel, Picture};
 use cohaptic_stability::{Admittance, AdmittanceError, FrequencyResponse, PushedAxis, Verdict, ideal};
 
-/// An admittance with what its legend calls it, at frequencies.
+/// An admittance, its name in the legend, and its values.
 #[derive(Clone, Copy, Debug)]
 pub struct AdmittanceCurve<'a> {
-    /// In the legend.
+    /// Name in the legend.
     pub name: &'a str,
-    /// Of which peer, along which axes.
+    /// Admittance of a peer, along or about its axes.
     pub admittance: &'a Admittance,
-    /// At the frequencies that were asked for.
+    /// Values at the requested frequencies.
     pub response: &'a FrequencyResponse,
 }
 
-/// The words about an admittance.
+/// Names and units of the quantities of an admittance.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct AdmittanceWords {
-    /// The motion over the push: `velocity over force`.
+    /// Motion over push, such as `velocity over force`.
     pub what: String,
-    /// The unit of that.
+    /// Unit of motion over push.
     pub over: &'static str,
-    /// What the whole object alone is.
+    /// Name of the object alone, the reference curve.
     pub free: &'static str,
-    /// The unit of its inertia.
+    /// Unit of the inertia of the object alone.
     pub inertia: &'static str,
 }
 
-/// In words: the motion over the push, what the whole object alone is, and the units of both.
+/// Returns the names and units of an admittance, which depend on whether push and motion are along or about an axis.
 pub(crate) fn admittance_words(admittance: &Admittance) -> AdmittanceWords {
     let [push, seen] = admittance.axes();
     let along = |axis: PushedAxis| format!(" {} {}", if axis.is_turn() { "about" } else { "along" }, axis.word().trim_start_matches('r'));
@@ -43,21 +43,21 @@ pub(crate) fn admittance_words(admittance: &Admittance) -> AdmittanceWords {
     AdmittanceWords { what: format!("{seen_name}{velocity} over {push_name}{force}"), over, free, inertia }
 }
 
-/// A response with its name.
+/// A curve with its name.
 struct Response {
     name: String,
     look: Look,
-    /// Frequency \[Hz\] and magnitude \[dB\].
+    /// Points: frequency \[Hz\] and magnitude \[dB\].
     magnitudes: Vec<(f64, f64)>,
-    /// Frequency \[Hz\] and phase \[degrees\].
+    /// Points: frequency \[Hz\] and phase \[degrees\].
     phases: Vec<(f64, f64)>,
 }
 
-/// The plot of curves in scenes of which the first has that title.
+/// Draws the curves. `title`: title of the first scene. `peer`: name of the pushed peer.
 ///
 /// # Errors
 ///
-/// [`AdmittanceError`] if no frequency is one of the curve.
+/// [`AdmittanceError`] if a frequency of a curve is not above 0, or is above half the rate of the peer's ticks.
 pub fn admittance_picture(title: &str, peer: &str, curves: &[AdmittanceCurve<'_>]) -> Result<Picture, AdmittanceError> {
     let mut responses = masses(curves);
     for (number, curve) in curves.iter().enumerate() {
@@ -79,15 +79,15 @@ pub fn admittance_picture(title: &str, peer: &str, curves: &[AdmittanceCurve<'_>
 impl Response {
     fn line(&self, points: &[(f64, f64)]) -> Line {
         let line = Line::new(points.iter().copied(), self.look).named(self.name.as_str());
-        // One frequency alone is a point.
+        // A line with one point is invisible without a mark.
         if points.len() == 1 { line.marked(Marker::Disc) } else { line }
     }
 }
 
-/// Between two points of a line a frequency is this much higher at most: a resonance is round then, and a phase can be followed through its jumps.
+/// Largest ratio of neighbouring frequencies of a drawn line: a resonance is then drawn round, and a phase can be followed through its jumps.
 const FINEST: f64 = 1.02;
 
-/// The frequencies that were asked for, rising, with enough between them that no two are far apart.
+/// Returns the requested frequencies in rising order, filled up so that neighbours differ at most by the ratio [`FINEST`].
 fn filled(curve: &AdmittanceCurve<'_>) -> Vec<f64> {
     let mut asked: Vec<f64> = curve.response.points.iter().map(|point| point.hz).collect();
     asked.sort_by(f64::total_cmp);
@@ -99,6 +99,7 @@ fn filled(curve: &AdmittanceCurve<'_>) -> Vec<f64> {
 }
 
 fn responded(number: usize, curve: &AdmittanceCurve<'_>) -> Result<Response, AdmittanceError> {
+    // Computed again, because the curve has values only at the requested frequencies.
     let response = curve.admittance.response(&filled(curve))?;
     let hz = || response.points.iter().map(|point| point.hz);
     Ok(Response {
@@ -109,7 +110,7 @@ fn responded(number: usize, curve: &AdmittanceCurve<'_>) -> Result<Response, Adm
     })
 }
 
-/// The name, and the verdict where it is no good one: such a curve is nothing that could be measured.
+/// Returns the name of a curve, with the verdict unless the scene is stable: the curve of an unstable scene cannot be measured.
 fn named(curve: &AdmittanceCurve<'_>) -> String {
     match curve.admittance.verdict() {
         Verdict::Stable => curve.name.to_owned(),
@@ -117,10 +118,10 @@ fn named(curve: &AdmittanceCurve<'_>) -> String {
     }
 }
 
-/// The objects of all curves, as free masses: each mass once.
+/// Returns the curves of the objects alone, one per mass.
 fn masses(curves: &[AdmittanceCurve<'_>]) -> Vec<Response> {
     let mut masses: Vec<Response> = Vec::new();
-    // No number of decibels stands for nothing.
+    // A mass without a finite value has no curve.
     for curve in curves.iter().filter(|curve| curve.admittance.object_mass().is_finite()) {
         let mass = curve.admittance.object_mass();
         let AdmittanceWords { free, inertia, .. } = admittance_words(curve.admittance);
@@ -128,11 +129,11 @@ fn masses(curves: &[AdmittanceCurve<'_>]) -> Vec<Response> {
         if masses.iter().any(|mass| mass.name == name) {
             continue;
         }
-        // Straight over a logarithmic frequency.
+        // On a logarithmic axis of frequency the curve is a straight line, so two points suffice.
         let ends = extent(curve.response.points.iter().map(|point| point.hz))
             .map_or(Vec::new(), |(low, high)| if low < high { vec![low, high] } else { vec![low] });
         let magnitudes = ends.iter().map(|hz| (*hz, 20.0 * ideal(mass, *hz).norm().log10())).collect();
-        // One is grey, as all that curves are compared with; more have the looks after those of the curves.
+        // The first reference is grey. Further references have the looks after the looks of the curves.
         let look = if masses.is_empty() { Look::reference() } else { Look::of(curves.len() + masses.len() - 1).thin() };
         masses.push(Response { name, look, magnitudes, phases: ends.into_iter().map(|hz| (hz, -90.0 * mass.signum())).collect() });
     }

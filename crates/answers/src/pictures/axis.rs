@@ -1,9 +1,9 @@
-//! What an axis says of a key: its name and symbol as in the paper, and its unit.
+//! Names, symbols and units of keys along an axis, as in the paper.
 
 use cohaptic_picture::Axis;
 use cohaptic_stability::KeyRange;
 
-/// The key with the unit that its range has, or else that of the key itself: `coordination.stiffness [N/m]`, `link.delay [ms]`.
+/// Returns the key with the unit of its range, or else with the unit of the key: `coordination.stiffness [N/m]`, `link.delay [ms]`.
 pub(crate) fn label(range: &KeyRange) -> String {
     match shown_unit(&range.key, &range.unit) {
         Some(unit) => format!("{} [{unit}]", range.key),
@@ -11,20 +11,20 @@ pub(crate) fn label(range: &KeyRange) -> String {
     }
 }
 
-/// The axis of a picture over a key: `Coordination stiffness K_T [N/m]`. A key that has no symbol in the paper keeps its own name.
+/// Returns the axis of a picture over a key: `Coordination stiffness K_T [N/m]`. A key without a symbol in the paper keeps its own name.
 #[must_use]
 pub fn axis_of(range: &KeyRange) -> Axis {
     axis_of_key(&range.key, &range.unit)
 }
 
-/// The same of a key whose values have that unit, which may be empty.
+/// Like [`axis_of`], for a key whose values have the given unit, which may be empty.
 pub(crate) fn axis_of_key(key: &str, unit: &str) -> Axis {
     let named = NAMES.iter().find(|(known, _, _)| *known == key.trim());
     let axis = named.map_or_else(|| Axis::new(key), |(_, name, symbol)| Axis::new(*name).symbol(symbol));
     axis.unit(shown_unit(key, unit).unwrap_or_default())
 }
 
-/// Keys, their names, and their symbols in Rakhsha & Constantinescu 2015; N is how many users there are, T_d the delay one way.
+/// Keys, names, and symbols of Rakhsha & Constantinescu 2015. N is the number of users, T_d the delay one way.
 const NAMES: [(&str, &str, &str); 10] = [
     ("coordination.stiffness", "Coordination stiffness", "K_T"),
     ("coordination.damping", "Coordination damping", "B_T"),
@@ -42,7 +42,7 @@ fn shown_unit<'a>(key: &str, given: &'a str) -> Option<&'a str> {
     Some(given).filter(|unit| !unit.is_empty()).or_else(|| unit(key))
 }
 
-/// The unit of the plain numbers of a key; `None` where they have none.
+/// Returns the unit of a key's plain numbers; `None` for a key without a unit.
 fn unit(key: &str) -> Option<&'static str> {
     let mut words = key.rsplit('.').map(|word| word.trim().trim_matches('"'));
     match words.next().unwrap_or_default() {
@@ -61,7 +61,7 @@ mod tests {
 
     use super::*;
 
-    /// Symbols are those of the table in docs/model.md, which takes them from the paper.
+    /// Source of the symbols: the table in docs/model.md, taken from the paper.
     #[test]
     fn an_axis_has_the_name_symbol_and_unit_of_the_paper() {
         let of = |range: &str| axis_of(&KeyRange::parse(range).unwrap());

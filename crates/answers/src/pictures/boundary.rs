@@ -1,4 +1,4 @@
-//! The radius along a key, with the crossings marked.
+//! The picture of a boundary: the radius along a key, with marked crossings.
 
 use cohaptic_picture::{Axis, Line, Look, Marker, Panel};
 use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange, Kinds, nominal_head};
@@ -6,11 +6,11 @@ use cohaptic_units::print::six_digits;
 
 use super::axis::axis_of;
 
-/// The picture of a boundary along that key, judged by that criterion. `left_out`: the random parts of the links that nominal values leave out, in words.
+/// Draws a boundary along a key. `left_out`: the random parts of the links left out by nominal values, in words.
 #[must_use]
 pub fn boundary_picture(title: &str, range: &KeyRange, criterion: Criterion, left_out: &[&str], found: &Boundary) -> cohaptic_picture::Picture {
     let samples: Vec<(f64, f64)> = found.known.iter().map(|(value, cell)| (*value, cell.radius.value)).collect();
-    // `samples.csv` has all digits.
+    // Six digits suffice in a legend; `samples.csv` has all digits.
     let named = |crossing: &Crossing| crossing_in_words(range, &Crossing { value: six_digits(crossing.value), ..*crossing });
     let crossings: Vec<(f64, String)> = found.crossings.iter().map(|crossing| (crossing.value, named(crossing))).collect();
     let kinds = Kinds::of(criterion, found.known.iter().map(|(_, cell)| cell.is_nominal));
@@ -18,7 +18,7 @@ pub fn boundary_picture(title: &str, range: &KeyRange, criterion: Criterion, lef
     let picture = Picture {
         title,
         axis: axis_of(range),
-        // Marks tell nominal values from others; of one kind alone the curve has its name.
+        // With values of several kinds, marks show the nominal values. With one kind only, the name of the curve tells the kind.
         radius: kinds.only().unwrap_or_else(|| criterion.kind(false)).radius_name(),
         nominal: (&nominal, &nominal_head(left_out)),
         range: (range.low, range.high),
@@ -28,38 +28,39 @@ pub fn boundary_picture(title: &str, range: &KeyRange, criterion: Criterion, lef
     picture.drawn()
 }
 
-/// What changes at a crossing: `unstable from link.delay=54ms (before: stable)`.
+/// Returns the change at a crossing: `unstable from link.delay=54ms (before: stable)`.
 pub(crate) fn crossing_in_words(range: &KeyRange, crossing: &Crossing) -> String {
     format!("{} from {} (before: {})", crossing.to.word(), range.text(crossing.value), crossing.from.word())
 }
 
-/// The content of the picture.
+/// Content of the picture.
 struct Picture<'a> {
     title: &'a str,
-    /// The axis of the key.
+    /// Axis of the key.
     axis: Axis,
-    /// The name of the radius: spectral radius, or mean-square radius.
+    /// Name of the radius, such as spectral radius or mean-square radius.
     radius: &'a str,
-    /// Nominal values of the key, each with its radius, and their name in the legend.
+    /// Nominal values of the key with their radii, and their name in the legend.
     nominal: (&'a [(f64, f64)], &'a str),
-    /// From where to where the key was searched.
+    /// Lower and upper end of the searched range.
     range: (f64, f64),
-    /// Values of the key, rising, and the radius at each.
+    /// Values of the key in rising order, each with its radius.
     samples: &'a [(f64, f64)],
-    /// Where the verdict changes, and in words to what.
+    /// Values of the key at crossings, each with its description.
     crossings: &'a [(f64, String)],
 }
 
-/// A radius above this is cut off: how far beyond 1 it is says nothing about where it crosses.
+/// Largest radius in a picture. Larger radii are cut off, because their size tells nothing about the place of a crossing.
 const HIGHEST: f64 = 2.0;
 
-/// The legend names this many crossings at most.
+/// Most crossings named in the legend.
 const MOST_NAMED: usize = 20;
 
 impl Picture<'_> {
-    /// The picture, of no size yet.
+    /// Draws the picture, without a size.
     fn drawn(&self) -> cohaptic_picture::Picture {
         let finite = || self.samples.iter().map(|(_, radius)| *radius).filter(|radius| radius.is_finite());
+        // NaN stands for an overflow, whose radius is beyond the picture in any case.
         let cut = self.samples.iter().any(|(_, radius)| radius.is_nan() || *radius > HIGHEST);
         let (low, high) = finite().fold((1.0_f64, 1.0_f64), |(low, high), radius| (low.min(radius), high.max(radius)));
         let high = high.min(HIGHEST);

@@ -1,24 +1,24 @@
-//! A map: the outline of the region of each variant, and the region of the first one shaded.
+//! The picture of maps: the outline of each variant's stable region, and the region of the first variant shaded.
 
 use cohaptic_picture::{Axis as Shown, Fill, Line, Look, Panel, Region};
 use cohaptic_stability::{Criterion, KeyRange, Kinds, Map, Polyline, nominal_head};
 
 use super::axis::axis_of;
 
-/// A map with what its legend calls it.
+/// A map with its name in the legend.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedMap<'a> {
-    /// In the legend.
+    /// Name in the legend.
     pub name: &'a str,
-    /// All of it.
+    /// The map.
     pub map: &'a Map,
-    /// By which radius it judges.
+    /// Radius by which the map is judged.
     pub criterion: Criterion,
-    /// Random parts of the links that its nominal cells leave out, in words.
+    /// Random parts of the links left out by nominal cells, in words.
     pub left_out: &'a [&'a str],
 }
 
-/// The picture of maps over the same keys; `None` of no map.
+/// Draws maps over the same two keys; `None` for an empty list.
 #[must_use]
 pub fn map_picture(title: &str, [x, y]: [&KeyRange; 2], maps: &[NamedMap<'_>]) -> Option<cohaptic_picture::Picture> {
     let first = maps.first()?;
@@ -38,29 +38,29 @@ pub fn map_picture(title: &str, [x, y]: [&KeyRange; 2], maps: &[NamedMap<'_>]) -
     Some(picture.drawn())
 }
 
-/// What a map shows.
+/// Content of the picture.
 struct Picture<'a> {
     title: &'a str,
-    /// What the region of the first variant is: stable, by which criterion.
+    /// Meaning of the shaded region: stable, with the criterion.
     stable: &'a str,
     x: Axis<'a>,
     y: Axis<'a>,
     outlines: Vec<Outline>,
-    /// The stable region of the first variant: anticlockwise around stable cells, clockwise around others.
+    /// Outlines of the stable region of the first variant: anticlockwise around stable cells, clockwise around unstable cells.
     regions: Vec<Polyline>,
-    /// Which cells of the first variant are nominal, row by row.
+    /// Nominal cells of the first variant, indexed by row and column.
     nominal: &'a [Vec<bool>],
-    /// The name of these cells in the legend.
+    /// Name of the nominal cells in the legend.
     hatched: &'a str,
 }
 
-/// One axis: what it says, and the values at which there are cells, rising.
+/// An axis with the values of the cells, in rising order.
 struct Axis<'a> {
     shown: Shown,
     values: &'a [f64],
 }
 
-/// Where the region of a variant ends.
+/// Outline of the stable region of a variant.
 struct Outline {
     name: String,
     /// Lines along which the radius is 1.
@@ -68,7 +68,7 @@ struct Outline {
 }
 
 impl Picture<'_> {
-    /// The picture, of no size yet.
+    /// Draws the picture, without a size.
     fn drawn(&self) -> cohaptic_picture::Picture {
         let first = self.outlines.first().map_or("", |outline| &outline.name);
         let regions = self.regions.iter().map(|region| region.points.clone());
@@ -91,14 +91,14 @@ impl Picture<'_> {
 }
 
 impl Axis<'_> {
-    /// The axis from its first to its last value.
+    /// Returns the axis from the first to the last value.
     fn between_values(&self) -> Shown {
         let (first, last) = (self.values.first().copied().unwrap_or_default(), self.values.last().copied().unwrap_or_default());
         self.shown.clone().range(first, last)
     }
 }
 
-/// The points of a line; those of a closed one come back to the first.
+/// Returns the points of a line; a closed line ends with its first point again.
 fn closed(line: &Polyline) -> Vec<(f64, f64)> {
     let again = line.points.first().filter(|_| line.closed);
     line.points.iter().chain(again).copied().collect()

@@ -1,4 +1,4 @@
-//! Pictures of analyses: maps, boundaries and admittances, of no size yet. Those of runs are in `cohaptic-harness`, which has their rows.
+//! Pictures of analyses without a size: maps, boundaries and admittances. The pictures of runs are in `cohaptic-harness`, where their rows are made.
 
 mod admittance;
 mod axis;

@@ -1,4 +1,4 @@
-//! A verdict as a JSON document.
+//! The JSON document of a verdict.
 
 use cohaptic_proofs::{Links, SceneWorstCase};
 use cohaptic_scene::Scene;
@@ -9,8 +9,8 @@ use super::speed::{Bounded, per_second, time_constant};
 use super::worst_mode;
 use crate::{document, notes};
 
-/// The answer of `cohaptic stability point --json`.
-/// `every`, `contacts`: the documents of the proofs for every number of peers and for contacts that switch, if they were asked for.
+/// Returns the answer of `cohaptic stability point --json`. `every`, `contacts`: documents of the proofs for every number of peers and for switching contacts,
+/// if requested.
 pub fn document(
     scene: &Scene,
     judgement: &Judgement,
@@ -23,7 +23,7 @@ pub fn document(
     let constant = time_constant(analysis);
     let modes = analysis.modes.iter().map(|mode| {
         document! {
-            // Of an object that turns, the components of its motion; absent otherwise.
+            // The components of the motion of an object that turns; absent otherwise.
             #[serde(flatten)]
             motion: (!mode.motion.is_empty()).then(|| document! { motion: mode.motion.clone() }),
             contacts: mode.contacts.as_str(),
@@ -35,9 +35,9 @@ pub fn document(
     });
     document! {
         title: scene.title.as_str(),
-        // In the mean square where links leave something to chance.
+        // In the mean square if the links have random parts.
         verdict: verdict.word(),
-        // The question that the verdict answers; of a nominal one, the random parts of the links that it leaves out.
+        // The question answered by the verdict, and the random parts of the links left out by a nominal verdict.
         judged: judgement.kind().word(),
         left_out: left_out.as_slice(),
         spectral_radius: analysis.radius.value,
@@ -48,12 +48,12 @@ pub fn document(
         dimension: analysis.dimension,
         method: analysis.method.word(),
         frame_s: analysis.frame.as_secs_f64(),
-        // Both `null` where the bounds of the radius leave more than a percent of them open.
+        // Both are `null` if the bounds of the radius leave more than one percent of the number open.
         per_second: per_second(analysis).known(),
         time_constant_s: constant.and_then(|constant| constant.known()).filter(|seconds| *seconds != 0.0),
-        // The least and the most that the bounds of the radius allow.
+        // The least and the greatest time constant within the bounds of the radius.
         time_constant_bounds_s: constant.map(|Bounded { low, high, .. }| [low, high]),
-        // Of the mode of contact with the largest radius.
+        // The parts of the mode of contact with the largest radius.
         parts: worst_mode(analysis).map(|mode| parts(scene, mode)).into_iter().flatten().collect::<Vec<_>>(),
         modes: modes.collect::<Vec<_>>(),
         #[serde(flatten)]
@@ -70,7 +70,7 @@ fn parts(scene: &Scene, mode: &ContactMode) -> Vec<impl Serialize + use<>> {
     let parts = mode.parts.iter().map(|part| {
         document! {
             kind: part.kind.word(),
-            // The first peer that it is about; absent where it is about all peers.
+            // The first peer of the part; absent for a part about all peers.
             #[serde(flatten)]
             peer: part.kind.peer().map(|peer| document! { peer: scene.peers[peer].name.clone() }),
             dimension: part.size,
@@ -82,23 +82,23 @@ fn parts(scene: &Scene, mode: &ContactMode) -> Vec<impl Serialize + use<>> {
     parts.collect()
 }
 
-/// The part of the worst case.
+/// Returns the part of the document about the worst case.
 fn worst_case(worst: &SceneWorstCase) -> impl Serialize {
     let part = worst.worst();
     document! {
         verdict: worst.verdict().word(),
         lower: worst.lower,
         upper: worst.upper,
-        // Whether the bounds are more than 1 % apart.
+        // `true` if the bounds are more than 1 % apart.
         open: worst.is_open(),
-        // The rate that quadratic certificates prove.
+        // The rate proved by quadratic certificates.
         certificate: worst.certificate,
         links: match worst.links {
             Links::Together => "together",
             Links::Each => "each",
         },
         step_s: worst.step.as_secs_f64(),
-        // The pattern that attains the lower bound.
+        // The pattern which attains the lower bound.
         sequence: part.sequence.as_str(),
         period: part.period,
         dimension: part.dimension,

@@ -1,4 +1,4 @@
-//! A verdict in words.
+//! The text about a verdict.
 
 use cohaptic_proofs::{SceneWorstCase, WorstVerdict};
 use cohaptic_scene::Scene;
@@ -8,10 +8,10 @@ use cohaptic_units::print::Span;
 use super::{speed, worst_mode};
 use crate::{figure, notes};
 
-/// The modes of contact that are listed at most; the worst is always among them.
+/// Most listed modes of contact. The worst mode is always listed.
 const MOST_MODES: usize = 16;
 
-/// A verdict in words, for people.
+/// Returns the text about a verdict. `worst`: the worst case over the network, if requested.
 #[must_use]
 pub fn words(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> String {
     let Judgement { verdict, analysis, mean_square, left_out } = judgement;
@@ -55,7 +55,7 @@ pub fn words(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase
         line(String::new());
         notes.iter().for_each(|note| line(format!("note: {note}")));
     }
-    // Lines that are empty but for the indentation.
+    // Empty lines lose their indentation.
     text.replace("\n  \n", "\n\n")
 }
 
@@ -76,7 +76,7 @@ fn sentence(verdict: Verdict, mean_square: bool) -> &'static str {
     }
 }
 
-/// The worst case by itself.
+/// Returns the text about the worst case alone.
 #[must_use]
 pub fn worst_in_words(worst: &SceneWorstCase) -> String {
     let mut text = String::new();
@@ -84,7 +84,7 @@ pub fn worst_in_words(worst: &SceneWorstCase) -> String {
     text.trim_end().to_owned()
 }
 
-/// The worst case, with the pattern that makes it.
+/// Adds the lines about the worst case, with the pattern of the lower bound. `said`: notes already in the text.
 fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(String)) {
     let verdict = match worst.verdict() {
         WorstVerdict::Stable => "stable whatever the network does within these bounds",
@@ -117,6 +117,7 @@ fn modes(analysis: &Analysis, line: &mut impl FnMut(String)) {
         (true, true) => "motions that do not mix, each with its combinations of contacts, the worst first".to_owned(),
     });
     let mut sorted: Vec<&ContactMode> = analysis.modes.iter().collect();
+    // The worst mode comes first, so it is listed even if the list is cut.
     sorted.sort_by(|one, other| other.radius.value.total_cmp(&one.radius.value));
     for mode in sorted.iter().take(MOST_MODES) {
         let away = if mode.motion.is_empty() || analysis.combines_contacts() { "away from the walls" } else { "" };

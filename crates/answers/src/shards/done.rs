@@ -1,4 +1,4 @@
-//! A shard that is done, as a JSON document and in words.
+//! JSON document and text of a finished shard.
 
 use cohaptic_campaign::Shard;
 use cohaptic_units::print::Counted;
@@ -7,26 +7,26 @@ use serde::Serialize;
 use super::Names;
 use crate::document;
 
-/// A shard that is done.
+/// A finished shard.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Done {
     /// The shard.
     pub shard: Shard,
-    /// The folder, as it was named.
+    /// Path of the folder as given by the user.
     pub folder: String,
-    /// What the work is cut into, and what a piece of it is made of.
+    /// Names of the pieces and units.
     pub names: Names,
-    /// Pieces of the shard.
+    /// Number of pieces of the shard.
     pub pieces: u64,
-    /// Units in all pieces of the shard.
+    /// Number of units in all pieces of the shard.
     pub units: u64,
-    /// How many units were computed this time.
+    /// Number of units computed by this call.
     pub computed: u64,
-    /// The time of this call \[s\].
+    /// Wall time of this call \[s\].
     pub wall_s: f64,
 }
 
-/// The answer of `--shard` with `--json`.
+/// Returns the answer of `--shard` with `--json`.
 pub fn done_document(done: &Done) -> impl Serialize {
     document! {
         shard: done.shard.to_string(),
@@ -40,7 +40,7 @@ pub fn done_document(done: &Done) -> impl Serialize {
     }
 }
 
-/// A shard that is done, in words.
+/// Returns the text about a finished shard.
 #[must_use]
 pub fn done_words(done: &Done) -> String {
     let Done { shard, folder, names, pieces, units, computed, wall_s } = done;

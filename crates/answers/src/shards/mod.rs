@@ -1,4 +1,4 @@
-//! What shared work answers, each of whose processes does a shard of it: the document and the words of a shard that is done, and of the status of all.
+//! The answers about work shared by several processes: document and words of a finished shard, and of the status of all shards.
 
 mod done;
 mod status;
@@ -8,20 +8,20 @@ pub use done::{Done, done_document, done_words};
 pub use status::{Status, status_document, status_words};
 pub use worker::Worker;
 
-/// What the work is cut into, such as parts, and what these are made of, such as runs.
+/// Names of the pieces and units of the work: parts and runs of a campaign, for example.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Names {
-    /// A piece, such as `part`.
+    /// Name of a piece in the singular, such as `part`.
     pub piece: &'static str,
-    /// A unit, such as `run`.
+    /// Name of a unit in the singular, such as `run`.
     pub unit: &'static str,
 }
 
-/// A piece of the work.
+/// State of a piece of the work.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Piece {
-    /// Units in it.
+    /// Number of units in the piece.
     pub units: u64,
-    /// Whether they are done.
+    /// Whether the units are done.
     pub is_done: bool,
 }

@@ -1,4 +1,4 @@
-//! The status of shared work, as a JSON document and in words.
+//! JSON document and text of the status of shared work.
 
 use std::fmt::Write as _;
 
@@ -9,16 +9,16 @@ use super::worker::State;
 use super::{Names, Piece, Worker};
 use crate::{document, figure};
 
-/// Work that several processes share, and those that do it.
+/// Shared work and its workers.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Status<'a> {
-    /// The folder, as it was named.
+    /// Path of the folder as given by the user.
     pub folder: String,
-    /// What the work is cut into.
+    /// Names of the pieces and units.
     pub names: Names,
-    /// The pieces of the work, in order.
+    /// States of the pieces, indexed by piece.
     pub pieces: &'a [Piece],
-    /// The workers that ever were in the folder, in the order of their shards.
+    /// Present and past workers of the folder, in the order of their shards.
     pub workers: Vec<Worker>,
 }
 
@@ -27,23 +27,23 @@ impl Status<'_> {
         self.workers.iter().filter(|worker| worker.state == State::Working)
     }
 
-    /// Returns the units of a worker's shard that are not done.
+    /// Returns the number of unfinished units in a worker's shard.
     fn left(&self, worker: &Worker) -> u64 {
         (0..).zip(self.pieces).filter(|(place, piece)| !piece.is_done && worker.shard.has(*place)).map(|(_, piece)| piece.units).sum()
     }
 
-    /// Returns when a worker will be done \[s\]; `None` if it did nothing yet.
+    /// Returns the time until a worker is done \[s\]; `None` if the worker has not finished a piece yet.
     #[expect(clippy::cast_precision_loss, reason = "fewer units than 2^52")]
     fn ends_in(&self, worker: &Worker) -> Option<f64> {
         worker.units_per_s().map(|speed| self.left(worker) as f64 / speed)
     }
 
-    /// Returns when a worker that is at work will be done \[s\].
+    /// Returns the time until a worker at work is done \[s\]; `None` for other workers.
     fn worker_ends_in(&self, worker: &Worker) -> Option<f64> {
         self.ends_in(worker).filter(|_| worker.state == State::Working)
     }
 
-    /// Returns the numbers of pieces, and of units in them: of all, and of those that are done.
+    /// Returns two pairs of numbers of pieces and units: of the whole work, and of its finished pieces.
     fn counts(&self) -> [(u64, u64); 2] {
         let of = |is_meant: &dyn Fn(&Piece) -> bool| {
             let meant: Vec<&Piece> = self.pieces.iter().filter(|piece| is_meant(piece)).collect();
@@ -52,20 +52,21 @@ impl Status<'_> {
         [of(&|_| true), of(&|piece| piece.is_done)]
     }
 
-    /// Returns the pieces that are not done and no worker does.
+    /// Returns the unfinished pieces without a worker at work.
     fn unassigned(&self) -> Vec<u64> {
         let undone = |place: &u64, piece: &Piece| !piece.is_done && !self.at_work().any(|worker| worker.shard.has(*place));
         (0..).zip(self.pieces).filter(|(place, piece)| undone(place, piece)).map(|(place, _)| place).collect()
     }
 
-    /// Returns when all will be done \[s\]; `None` if anybody's end is not known, or if pieces are no worker's.
+    /// Returns the time until all work is done \[s\]; `None` if the speed of a worker is unknown, or if pieces have no worker.
     fn end(&self) -> Option<f64> {
         let ends = self.at_work().map(|worker| self.ends_in(worker)).collect::<Option<Vec<f64>>>();
+        // The slowest worker decides. Pieces without a worker would never be done.
         ends.filter(|_| self.unassigned().is_empty()).map(|ends| ends.into_iter().fold(0.0, f64::max))
     }
 }
 
-/// The answer of `--status` with `--json`.
+/// Returns the answer of `--status` with `--json`.
 pub fn status_document(status: &Status<'_>) -> impl Serialize {
     let [all, done] = status.counts();
     document! {
@@ -92,10 +93,10 @@ pub fn status_document(status: &Status<'_>) -> impl Serialize {
     }
 }
 
-/// More workers are counted and not named.
+/// Most workers listed in the text. Further workers are only counted.
 const MOST_WORKERS: usize = 100;
 
-/// The status of shared work in words.
+/// Returns the text about the status of shared work.
 #[must_use]
 pub fn status_words(status: &Status<'_>) -> String {
     let Status { folder, names: Names { piece, unit }, workers, .. } = status;
@@ -112,7 +113,7 @@ pub fn status_words(status: &Status<'_>) -> String {
     if !workers.is_empty() {
         for row in rows {
             let cells: String = row.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}")).collect();
-            // Writing to a string does not fail.
+            // Writing to a string cannot fail.
             let _ = writeln!(text, "{cells}");
         }
     }
@@ -120,6 +121,7 @@ pub fn status_words(status: &Status<'_>) -> String {
         let _ = writeln!(text, "  ... and {more} more");
     }
     if !unassigned.is_empty() {
+        // The largest number of shards among the workers is most likely the split in use.
         let missing = Missing { piece, count: all.0, pieces: unassigned };
         let _ = writeln!(text, "no worker does these: {}", missing.words(workers.iter().map(|worker| worker.shard.count()).max()));
     } else if done.0 == all.0 {
@@ -130,7 +132,7 @@ pub fn status_words(status: &Status<'_>) -> String {
     text
 }
 
-/// A span in words.
+/// Returns a time in words.
 fn span(seconds: f64) -> String {
     match seconds {
         ..120.0 => format!("{seconds:.0} s"),

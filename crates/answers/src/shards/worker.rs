@@ -1,30 +1,30 @@
-//! Workers, by what their logs say.
+//! Workers, read from their logs.
 
 use cohaptic_campaign::Shard;
 
-/// A worker, by its log and its lease.
+/// A worker, known by its log and its lease.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Worker {
-    /// The shard that it does.
+    /// Shard of the worker.
     pub shard: Shard,
     pub(super) process: u32,
     pub(super) host: String,
     pub(super) state: State,
-    /// How many pieces it did, and of how many units they are.
+    /// Number of finished pieces, and in `units` the number of units in these pieces.
     pub(super) pieces: u64,
     pub(super) units: u64,
-    /// When it did the last of them, or ended \[s after it began\].
+    /// Time from the worker's begin to its last finished piece, or to its end \[s\].
     seconds: f64,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum State {
-    /// It renews its lease.
+    /// The worker renews its lease.
     Working,
     Done,
     Interrupted,
     Failed,
-    /// It neither ended nor lives.
+    /// The worker has neither written an end nor renewed its lease.
     Killed,
 }
 
@@ -46,11 +46,13 @@ impl Worker {
         (self.units > 0 && self.seconds > 0.0).then(|| self.units as f64 / self.seconds)
     }
 
-    /// Reads the log of a worker; `None` if it is not even begun. `lives`: whether the worker renews its lease.
+    /// Reads the log of a worker; `None` if its first line is not whole. `lives`: whether the worker renews its lease.
     #[must_use]
     pub fn read(text: &str, lives: bool) -> Option<Self> {
+        // A line without a line feed is torn, or still being written, and is left out.
         let mut lines = text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n'));
         let [_, shard, _, process, _, host] = *lines.next()?.split(' ').collect::<Vec<_>>() else { return None };
+        // A log which states no end belongs to a worker at work or to a killed worker.
         let state = if lives { State::Working } else { State::Killed };
         let mut worker =
             Self { shard: shard.parse().ok()?, process: process.parse().ok()?, host: host.to_owned(), state, pieces: 0, units: 0, seconds: 0.0 };
@@ -65,6 +67,7 @@ impl Worker {
                 ["end", "done", _] => worker.state = State::Done,
                 ["end", "interrupted", _] => worker.state = State::Interrupted,
                 ["end", "failed", _] => worker.state = State::Failed,
+                // Unknown lines, such as lines of later versions, are skipped.
                 _ => continue,
             }
             worker.seconds = seconds;

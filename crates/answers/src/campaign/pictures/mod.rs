@@ -1,4 +1,4 @@
-//! The pictures of a campaign: quantiles of the discrepancy, which runs diverged, and verdicts, over the keys that are varied.
+//! The pictures of a campaign over its varied keys: quantiles of the discrepancy, shares of diverged runs, and verdicts.
 
 mod arranged;
 mod panels;
@@ -13,16 +13,16 @@ pub(crate) use arranged::Along;
 use arranged::{Arranged, Keys};
 use scale::Scale;
 
-/// Pictures, and the notes about them.
+/// Pictures and notes on missing pictures.
 #[derive(Clone, Debug, Default)]
 pub struct Drawn {
-    /// The pictures by the names of their files.
+    /// Pictures, each with the name of its file.
     pub pictures: Vec<(&'static str, Picture)>,
-    /// Why a picture is not drawn.
+    /// Reasons for missing pictures, in words.
     pub notes: Vec<String>,
 }
 
-/// What all pictures of a campaign have in common.
+/// Content shared by all pictures of a campaign.
 struct Sheet<'a> {
     title: &'a str,
     plan: &'a CampaignPlan,
@@ -31,7 +31,7 @@ struct Sheet<'a> {
     size: Size,
 }
 
-/// Draws `discrepancy.svg`, and `verdicts.svg` where there are verdicts; nothing if no key has several values.
+/// Draws `discrepancy.svg`, and `verdicts.svg` for a campaign with verdicts. Draws nothing if no key has several values.
 #[must_use]
 pub fn pictures(finished: &Finished, size: Size) -> Drawn {
     let Finished { title, plan, report, .. } = finished;
@@ -42,6 +42,7 @@ pub fn pictures(finished: &Finished, size: Size) -> Drawn {
     };
     let sheet = Sheet { title, plan, report, arranged, size };
     let mut drawn = Drawn::default();
+    // The report leaves the quantiles out beyond a limit of memory.
     if report.quantiles.is_empty() {
         drawn.notes.push(format!(
             "no picture of the discrepancy is drawn: its quantiles would take too much memory; they are computed of at most {MOST_RUNS_OF_QUANTILES} runs of each \
@@ -57,7 +58,7 @@ pub fn pictures(finished: &Finished, size: Size) -> Drawn {
 }
 
 impl Sheet<'_> {
-    /// The quantiles of the discrepancy, and below them which share of the runs diverged, if any did.
+    /// Draws the quantiles of the discrepancy, and below these the shares of diverged runs if any run diverged.
     fn discrepancy(&self) -> Picture {
         let (each, diverged) = (self.plan.runs_of_each(), self.report.diverged());
         let scale = Scale::of(&self.report.quantiles);
@@ -74,12 +75,12 @@ impl Sheet<'_> {
         picture.panels(panels("", &|facet| self.quantiles(facet, &scale))).panels(shares)
     }
 
-    /// The picture without panels.
+    /// Returns an empty picture with a layout suited to the panels.
     fn picture(&self) -> Picture {
         let is_grid = matches!(self.arranged.keys, Keys::Grid(..));
         let columns = match self.arranged.facets() {
             1 => 1,
-            // Colour bars take room.
+            // Heat maps have colour bars, which need room beside each panel.
             _ if is_grid && self.size.is_narrow() => 1,
             2..=4 => 2,
             _ if is_grid => 2,
@@ -88,7 +89,7 @@ impl Sheet<'_> {
         let picture = Picture::new(self.title).size(self.size).columns(columns);
         match &self.arranged.keys {
             Keys::Names(along) => {
-                // A few rows are not far from each other, and the names of many have room.
+                // The height grows with the number of rows, so that a few rows stay close and many rows have room for their names.
                 let aspect = 0.06 * f64::from(u32::try_from((1 + along.values.len()) * columns).unwrap_or(u32::MAX));
                 picture.aspect(aspect).note(format!("The rows are the values of {}.", self.plan.variations()[along.key].key()))
             }
@@ -105,7 +106,7 @@ impl Sheet<'_> {
         }
     }
 
-    /// Which share of the runs diverged.
+    /// Returns the panel with the shares of diverged runs. `facet`: index of the panel.
     fn shares(&self, facet: usize) -> Panel {
         match &self.arranged.keys {
             Keys::Names(along) => panels::shares_by_name(self, along, facet),
@@ -114,7 +115,7 @@ impl Sheet<'_> {
         }
     }
 
-    /// The combination at these places along the axes, in a panel.
+    /// Returns the combination at these indices along the axes, in panel `facet`.
     fn combination(&self, facet: usize, at: &[usize]) -> usize {
         self.arranged.combination(self.plan, facet, at)
     }
@@ -123,12 +124,12 @@ impl Sheet<'_> {
         self.report.quantiles.get(combination).copied().flatten()
     }
 
-    /// Which share of the runs of a combination diverged.
+    /// Returns the share of diverged runs of a combination, from 0 to 1; NaN for a combination without a report.
     fn share(&self, combination: usize) -> f64 {
         #[expect(clippy::cast_precision_loss, reason = "fewer runs than 2^52")]
         self.report.combinations.get(combination).map_or(f64::NAN, |combination| combination.diverged as f64 / combination.runs.max(1) as f64)
     }
 }
 
-/// What the axis of shares says.
+/// Name of the axis of shares.
 const SHARE: &str = "Share of runs that diverged";

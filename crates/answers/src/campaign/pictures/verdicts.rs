@@ -1,4 +1,4 @@
-//! The verdicts of a campaign: the radius over one key, regions over two.
+//! The picture of a campaign's verdicts: the radius over one key, stable and unstable regions over two keys.
 
 use cohaptic_campaign::Judgement;
 use cohaptic_picture::{Axis, Fill, Line, Look, Marker, Panel, Picture};
@@ -9,22 +9,23 @@ use super::arranged::{Along, Keys};
 use super::panels::{marked, with_cells};
 use crate::campaign::judge::{is_nominal, is_spectral};
 
-/// A radius above this is cut off: how far beyond 1 it is says nothing about where it crosses.
+/// Largest radius in a picture. Larger radii are cut off, because their size tells nothing about the place of a crossing.
 const HIGHEST: f64 = 2.0;
-/// What the legend says of radii that leave out what links leave to chance.
+/// Legend of radii without the random parts of the links.
 const NOMINAL: &str = "nominal: nothing is left to chance";
 
-/// The radii of a campaign, all by one criterion: as in a map, a scene that leaves nothing to chance has the square of its spectral radius beside mean-square radii.
+/// The radii of a campaign, converted to one criterion. As in a map, a scene without random links counts with the square of its spectral radius among
+/// mean-square radii.
 struct Radii {
     criterion: Criterion,
-    /// The name of the radius: a nominal one where every verdict is nominal.
+    /// Name of the radius; the name of a nominal radius if every verdict is nominal.
     name: &'static str,
-    /// From where to where the axis reaches.
+    /// Lower and upper end of the axis.
     range: (f64, f64),
     is_cut: bool,
 }
 
-/// The picture, of no size yet.
+/// Draws the picture, without a size.
 pub(super) fn picture(sheet: &Sheet<'_>) -> Picture {
     let radii = Radii::of(&sheet.report.judgements);
     let panel = |facet: usize| {
@@ -50,18 +51,21 @@ impl Radii {
         let name = kinds.only().unwrap_or_else(|| criterion.kind(false)).radius_name();
         let mut radii = Self { criterion, name, range: (1.0, 1.0), is_cut: false };
         for radius in judgements.iter().filter_map(|judgement| radii.radius(judgement)).collect::<Vec<f64>>() {
+            // A radius of NaN stands for an overflow, which is also not drawn.
             radii.is_cut |= radius.is_nan() || radius > HIGHEST;
             if radius.is_finite() {
                 radii.range = (radii.range.0.min(radius), radii.range.1.max(radius.min(HIGHEST)));
             }
         }
+        // The range always contains 1, because it begins as 1 to 1.
         let margin = (0.05 * (radii.range.1 - radii.range.0)).max(1e-3);
         radii.range = ((radii.range.0 - margin).max(0.0), radii.range.1 + margin);
         radii
     }
 
-    /// The radius by the criterion of the picture; `None` where there is no verdict.
+    /// Returns the radius by the criterion of the picture; `None` without a verdict.
     fn radius(&self, judgement: &Judgement) -> Option<f64> {
+        // The mean-square radius of a scene without random parts is the square of its spectral radius.
         let squared = self.criterion == Criterion::MeanSquare && is_spectral(judgement);
         judgement.verdict().map(|verdict| if squared { verdict.radius * verdict.radius } else { verdict.radius })
     }
@@ -71,7 +75,7 @@ impl Radii {
         Axis::new(format!("{}{rest}", first.to_uppercase())).range(self.range.0, self.range.1)
     }
 
-    /// Each value of a key, its radius, and whether that is nominal.
+    /// Returns, for each value of a key: the value, its radius (NaN without a verdict), and whether the verdict is nominal.
     fn points(&self, sheet: &Sheet<'_>, along: &Along, facet: usize) -> Vec<(f64, f64, bool)> {
         let point = |(at, value): (usize, &f64)| {
             let judgement = sheet.report.judgements.get(sheet.combination(facet, &[at]));
@@ -81,7 +85,7 @@ impl Radii {
         along.values.iter().enumerate().map(point).collect()
     }
 
-    /// The radius over a key of numbers.
+    /// Draws the radius over a key of numbers.
     fn line(&self, sheet: &Sheet<'_>, along: &Along, facet: usize) -> Panel {
         let points = self.points(sheet, along, facet);
         let radius = Line::new(points.iter().map(|(x, radius, _)| (*x, *radius)), Look::of(0));
@@ -89,7 +93,7 @@ impl Radii {
         with_nominal(panel, points.iter().filter(|point| point.2).map(|(x, radius, _)| (*x, *radius)).collect())
     }
 
-    /// A mark for each name.
+    /// Draws the radius as a mark per name.
     fn by_name(&self, sheet: &Sheet<'_>, along: &Along, facet: usize) -> Panel {
         let points = self.points(sheet, along, facet);
         let of = |nominal: bool| points.iter().filter(move |point| point.2 == nominal).map(|(y, radius, _)| (*radius, *y)).collect::<Vec<_>>();
@@ -98,17 +102,17 @@ impl Radii {
     }
 }
 
-/// With the points that are nominal marked, if there are any.
+/// Marks the nominal points, if there are any.
 fn with_nominal(panel: Panel, points: Vec<(f64, f64)>) -> Panel {
     if points.is_empty() { panel } else { panel.with(Line::new(points, Look::of(1)).marks_only(Marker::Diamond).named(NOMINAL)) }
 }
 
-/// Where the combinations of two keys are stable, and where not.
+/// Draws the stable and unstable regions over two keys, and the cells without a clear verdict.
 fn regions(sheet: &Sheet<'_>, along: (&Along, &Along), facet: usize, criterion: Criterion) -> Panel {
     let judgement = |column: usize, row: usize| sheet.report.judgements.get(sheet.combination(facet, &[column, row]));
     let word = |column: usize, row: usize| judgement(column, row).and_then(Judgement::verdict).map(|verdict| &*verdict.word);
     let is = |verdict: Verdict| move |column: usize, row: usize| word(column, row) == Some(verdict.word());
-    // Among mean-square radii a certain scene has the square of its spectral radius, which is its mean-square radius.
+    // In the mean square, a scene without random links counts with the square of its spectral radius, which is its mean-square radius.
     let verdicts = sheet.report.judgements.iter().filter(|judgement| judgement.verdict().is_some());
     let kinds = Kinds::of(criterion, verdicts.map(is_nominal));
     let panel = Panel::new(along.0.axis(), along.1.axis());
@@ -117,5 +121,6 @@ fn regions(sheet: &Sheet<'_>, along: (&Along, &Along), facet: usize, criterion: 
     let unknown = |column: usize, row: usize| is(Verdict::Marginal)(column, row) || is(Verdict::Overflow)(column, row);
     let panel = with_cells(panel, along, Fill::Grey, "cannot be told", unknown);
     let panel = with_cells(panel, along, Fill::BackHatch, "no verdict", |column, row| word(column, row).is_none());
+    // This hatching comes last, because it lies over the colour of the verdict.
     with_cells(panel, along, Fill::Hatch, NOMINAL, |column, row| judgement(column, row).is_some_and(is_nominal))
 }

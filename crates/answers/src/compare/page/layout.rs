@@ -1,37 +1,38 @@
-//! Which key lies along the pictures, and which have a panel for each of their values.
+//! Arranges the keys of a comparison: one key along the pictures, and keys with one panel per value.
 
 use cohaptic_campaign::Variation;
 
 use crate::campaign::Along;
 
-/// The most panels that a key is drawn in.
+/// Most panels of a picture.
 const MOST_PANELS: usize = 16;
 
-/// The keys that vary beside the strategy, arranged in pictures.
+/// The varied keys other than the strategy, arranged in pictures.
 pub(super) struct Layout {
-    /// The first key of numbers; `None` if there is none.
+    /// The first key of numbers, along x; `None` if there is none.
     pub(super) x: Option<Along>,
-    /// The other keys with several values: their places, and how many values each has.
+    /// Further keys with several values: index of the key, and number of values.
     facets: Vec<(usize, usize)>,
-    /// How many values each key has.
+    /// Number of values of each key.
     counts: Vec<usize>,
 }
 
 impl Layout {
     pub(super) fn of(keys: &[Variation]) -> Self {
         let counts: Vec<usize> = keys.iter().map(Variation::count).collect();
+        // A key with one value needs neither an axis nor panels.
         let x = keys.iter().enumerate().filter(|(_, key)| key.count() > 1).find_map(|(place, key)| Along::of_numbers(place, key));
         let along = x.as_ref().map(|along| along.key);
         let facets = counts.iter().copied().enumerate().filter(|(place, count)| *count > 1 && Some(*place) != along).collect();
         Self { x, facets, counts }
     }
 
-    /// How many panels a picture has.
+    /// Returns the number of panels of a picture.
     pub(super) fn panels(&self) -> usize {
         self.facets.iter().map(|(_, count)| count).product()
     }
 
-    /// Why nothing is drawn; `None` if it is.
+    /// Returns the reason, in words, why pictures are not drawn; `None` if they are drawn.
     pub(super) fn undrawn(&self, keys: &[Variation]) -> Option<String> {
         let names: Vec<&str> = self.facets.iter().map(|(key, _)| keys[*key].key()).collect();
         (self.panels() > MOST_PANELS).then(|| {
@@ -43,18 +44,18 @@ impl Layout {
         })
     }
 
-    /// The values that a panel is of, as `KEY=VALUE`; empty if there is one alone.
+    /// Returns the title of a panel, its values as `KEY=VALUE`; empty for a single panel.
     pub(super) fn title(&self, keys: &[Variation], panel: usize) -> String {
         let places = self.places(panel, None);
         self.facets.iter().map(|(key, _)| keys[*key].label(places[*key])).collect::<Vec<String>>().join(", ")
     }
 
-    /// The combination of the keys in a panel, at a place along x.
+    /// Returns the combination of the keys in a panel, at index `at` along x.
     pub(super) fn other(&self, panel: usize, at: Option<usize>) -> usize {
         self.places(panel, at).into_iter().zip(&self.counts).fold(0, |other, (place, count)| other * count + place)
     }
 
-    /// The key of the panels along the other axis of a map, if there is one such key alone and it is of numbers.
+    /// Returns the key along y of a map: the only key with panels, if its values are numbers.
     pub(super) fn y(&self, keys: &[Variation]) -> Option<Along> {
         match (&self.x, self.facets.as_slice()) {
             (Some(_), [(key, _)]) => Along::of_numbers(*key, &keys[*key]),
@@ -90,7 +91,7 @@ mod tests {
         let layout = Layout::of(&keys);
         assert_eq!((layout.x.as_ref().map(|along| along.key), layout.panels(), layout.undrawn(&keys)), (Some(1), 4, None));
         assert_eq!(layout.title(&keys, 1), "peer.contact=none, link.loss=0.5");
-        // Along x values rise: 8 ms is second in the command. Of grasp and 0.5: 6 + 2 + 1.
+        // Values rise along x: 8 ms is the second value in the command. With grasp and 0.5 the combination is 6 + 2 + 1.
         assert_eq!(layout.other(3, Some(0)), 9);
         assert!(layout.y(&keys).is_none());
     }

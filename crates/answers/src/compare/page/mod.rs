@@ -1,4 +1,4 @@
-//! `compare.html`: strategies side by side on one page.
+//! The page `compare.html` with all figures of a comparison.
 
 mod layout;
 mod panels;
@@ -15,20 +15,20 @@ use layout::Layout;
 use panels::Sheet;
 use scale::Scale;
 
-/// What the page says about where its numbers come from.
+/// Origin of the numbers, shown on the page.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PageSource<'a> {
-    /// What each strategy does, and its parameters with their values in the scene, in words.
+    /// For each strategy: its description, and its parameters with their values in the scene, in words.
     pub strategies: Vec<(&'static str, String)>,
-    /// The command that makes the page.
+    /// Command which makes the page.
     pub command: String,
-    /// The command of the campaign whose table of runs is that of the comparison.
+    /// Command of the campaign with the same table of runs.
     pub campaign: String,
-    /// The text of the scene.
+    /// Text of the scene.
     pub scene: &'a str,
 }
 
-/// The page. It depends on the scene, the runs and the strategies alone.
+/// Returns the page. Its bytes depend on the scene, the runs and the strategies alone.
 #[must_use]
 pub fn html(finished: &Finished, source: &PageSource<'_>) -> String {
     let sheet = Sheet { finished, layout: Layout::of(finished.keys()) };
@@ -54,11 +54,11 @@ pub fn html(finished: &Finished, source: &PageSource<'_>) -> String {
     page.html()
 }
 
-/// What stands above the table of differences.
+/// Text above the table of differences.
 const DIFFERENCES: &str = "At how many combinations of the other keys a measure is lower (▼) and higher (▲) than with the first strategy, where the whole interval of the paired difference is \
     on that side of zero. Lower is better for discrepancy, force, settling and energy.";
 
-/// What the numbers rest on.
+/// Notes about the origin of the numbers.
 const NOTES: [&str; 6] = [
     "A run counts as diverged where a number is not finite any more, and where two copies are more than 1 m apart at some instant. No mean has it.",
     "A mean is that of the other runs, if they have the measure: a strategy whose hardest runs diverge is judged by the easier ones, so look at the diverged runs first.",
@@ -68,7 +68,7 @@ const NOTES: [&str; 6] = [
     "A verdict is that of the analysis where it takes less than a second and leaves nothing out (spectral-radius, mean-square), else of two runs, one of them with a small disturbance (two-runs).",
 ];
 
-/// How many runs there are, in words.
+/// Returns the number of runs, in words.
 fn sum(finished: &Finished) -> String {
     let keys: Vec<&str> = finished.keys().iter().map(cohaptic_campaign::Variation::key).collect();
     let (runs, each) = (finished.report.runs, finished.plan.runs_of_each());
@@ -80,7 +80,7 @@ fn sum(finished: &Finished) -> String {
     format!("{}, {each} of each strategy{over}, with the same seeds for all.", Counted(runs, "run"))
 }
 
-/// Verdicts as a picture, and which runs diverged.
+/// Returns the section of stability: verdicts as a picture, and diverged runs.
 fn stability(sheet: &Sheet<'_>) -> Html {
     let drawn = sheet.layout.undrawn(sheet.finished.keys()).is_none();
     let picture = sheet.stability().filter(|_| drawn).map_or_else(Html::default, |picture| figure("stability", &picture, ""));
@@ -94,7 +94,7 @@ fn stability(sheet: &Sheet<'_>) -> Html {
     picture.and(Html::details("Verdicts and diverged runs", tables::stability(sheet.finished))).and(diverged)
 }
 
-/// A section for each measure, or one picture of all where one panel each is enough.
+/// Returns the section of measures: one section per measure, or common pictures of all measures if each measure needs one panel only.
 fn measures(sheet: &Sheet<'_>) -> Html {
     let Finished { comparison, .. } = sheet.finished;
     let scales: Vec<Scale> = (0..comparison.measures.len()).map(|measure| Scale::of(comparison, measure)).collect();
@@ -127,7 +127,7 @@ fn measures(sheet: &Sheet<'_>) -> Html {
     content
 }
 
-/// Below a picture whose axis ends before the largest values.
+/// Caption of a picture whose axis ends before the largest values.
 const CUT: &str = "What lies far beyond the other means is cut off.";
 
 fn figure(name: &str, picture: &Picture, caption: &str) -> Html {

@@ -1,4 +1,5 @@
-//! The panels: a line and a band for each strategy, or below each other where no key of numbers varies; shares of runs that diverged; where each strategy is stable.
+//! The panels of a comparison: a line and a band per strategy over a key of numbers, or a row per strategy without such a key; shares of diverged runs; stable
+//! regions.
 
 use cohaptic_campaign::Judgement;
 use cohaptic_picture::{Axis, Band, Fill, Line, Look, Marker, Panel, Picture, Region};
@@ -9,15 +10,15 @@ use super::scale::Scale;
 use crate::campaign::Along;
 use crate::compare::{Finished, judge};
 
-/// With no more values along x than this, each is marked.
+/// Most values along x whose points are marked.
 const MOST_MARKED: usize = 24;
-/// How far the bar of an interval reaches to both sides of the middle of its row.
+/// Half height of the bar of an interval, in rows.
 const HALF_BAR: f64 = 0.16;
 
-/// The most panels of a picture of all measures: its legend is not to be far from them.
+/// Most panels of one picture of all measures, so that the legend stays close to the panels.
 const PANELS: usize = 6;
 
-/// The number of panels beside each other.
+/// Returns the number of panels side by side.
 const fn columns_of(panels: usize) -> usize {
     match panels {
         1 => 1,
@@ -26,14 +27,14 @@ const fn columns_of(panels: usize) -> usize {
     }
 }
 
-/// A picture without a title: that stands in the page.
+/// Returns a picture without a title, because the page has the title.
 fn picture(panels: Vec<Panel>) -> Picture {
     let columns = columns_of(panels.len());
     let aspect = if columns == 1 { 0.45 } else { 0.75 };
     Picture::new("").columns(columns).aspect(aspect).panels(panels)
 }
 
-/// What all pictures of a page have in common.
+/// Content shared by all pictures of a page.
 pub(super) struct Sheet<'a> {
     pub(super) finished: &'a Finished,
     pub(super) layout: Layout,
@@ -44,7 +45,7 @@ impl Sheet<'_> {
         self.finished.comparison.strategies.iter().map(String::as_str).enumerate()
     }
 
-    /// Pictures of all measures, a panel each, where no key has panels.
+    /// Draws all measures, one panel each, for a comparison without further panels.
     pub(super) fn all(&self, scales: &[Scale]) -> Vec<Picture> {
         let shares = self.any_diverged().then(|| self.diverged_panel(0));
         let panels: Vec<Panel> =
@@ -52,29 +53,29 @@ impl Sheet<'_> {
         panels.chunks(PANELS).map(|panels| self.arranged(picture(panels.to_vec()), panels.len())).collect()
     }
 
-    /// With one axis of x, or with rows of strategies.
+    /// Shares the axis of x between the panels, or gives each strategy a row.
     fn arranged(&self, picture: Picture, panels: usize) -> Picture {
         if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture.shared_y(), panels) }
     }
 
-    /// The picture of one measure, a panel for each value of the other keys.
+    /// Draws one measure, with one panel per value of the keys with panels.
     pub(super) fn measure(&self, measure: usize, scale: &Scale) -> Picture {
         let panels = (0..self.layout.panels()).map(|panel| self.titled(self.measure_panel(measure, scale, panel), panel));
         self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
     }
 
-    /// Shares of runs that diverged, a panel for each value of the other keys.
+    /// Draws the shares of diverged runs, with one panel per value of the keys with panels.
     pub(super) fn diverged(&self) -> Picture {
         let panels = (0..self.layout.panels()).map(|panel| self.titled(self.diverged_panel(panel), panel));
         self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
     }
 
-    /// Whether any run diverged.
+    /// Returns `true` if any run diverged.
     pub(super) fn any_diverged(&self) -> bool {
         self.finished.comparison.cells.iter().any(|cell| cell.diverged.is_some_and(|share| share.count > 0))
     }
 
-    /// Rows need no more height than their names.
+    /// Sets the height of a picture to the height of its rows.
     fn with_rows(&self, picture: Picture, panels: usize) -> Picture {
         let rows = (1 + self.finished.comparison.strategies.len()) * columns_of(panels);
         picture.aspect(0.05 * from_place(rows))
@@ -101,7 +102,7 @@ impl Sheet<'_> {
         self.panel(Axis::new("diverged").range(0.0, 1.0), value)
     }
 
-    /// Values with their intervals: over x, or in a row for each strategy.
+    /// Draws values with their intervals: over x, or as one row per strategy.
     fn panel(&self, axis: Axis, value: impl Fn(usize, Option<usize>) -> Option<(f64, f64, f64)>) -> Panel {
         match &self.layout.x {
             Some(x) => self.over(x, axis, |strategy, at| value(strategy, Some(at))),
@@ -121,11 +122,11 @@ impl Sheet<'_> {
             let line = Line::new(means, Look::of(strategy)).named(name);
             if x.values.len() <= MOST_MARKED { line.marked(Marker::of(strategy)) } else { line }
         });
-        // The baseline lies over the others: its line is the widest, and theirs have gaps through which it is seen.
+        // The baseline lies above the other lines. Its line is the widest, and the other lines have gaps which leave it visible.
         Panel::new(x.axis(), axis).with_all(bands).with_all(lines)
     }
 
-    /// The first strategy is the uppermost.
+    /// Draws one row per strategy, with the first strategy uppermost.
     fn rows(&self, axis: Axis, value: impl Fn(usize) -> Option<(f64, f64, f64)>) -> Panel {
         let count = self.finished.comparison.strategies.len();
         let rows: Vec<(usize, f64)> = (0..count).rev().enumerate().map(|(row, strategy)| (strategy, from_place(row))).collect();
@@ -133,6 +134,7 @@ impl Sheet<'_> {
         let mut panel = Panel::new(axis, Axis::new("").categories(names));
         for (strategy, y) in rows {
             let Some((mean, low, high)) = value(strategy) else { continue };
+            // A mean of one run has no interval, and its bar would have no width.
             if low < high {
                 let bar = vec![(low, y - HALF_BAR), (high, y - HALF_BAR), (high, y + HALF_BAR), (low, y + HALF_BAR)];
                 panel = panel.with(Region::new([bar], Fill::Deep(strategy)));
@@ -142,7 +144,7 @@ impl Sheet<'_> {
         panel
     }
 
-    /// Where each strategy is stable: over two keys of numbers a panel for each strategy, over one a row. `None` without a key of numbers.
+    /// Draws the stable regions: over two keys of numbers one panel per strategy, over one key one row per strategy. `None` without a key of numbers.
     pub(super) fn stability(&self) -> Option<Picture> {
         let x = self.layout.x.as_ref()?;
         if let Some(y) = self.layout.y(self.finished.keys()) {
@@ -156,6 +158,7 @@ impl Sheet<'_> {
         let names: Vec<&str> = self.finished.comparison.strategies.iter().rev().map(String::as_str).collect();
         let rows: Vec<f64> = (0..=count).map(|row| from_place(row) - 0.5).collect();
         let panel = |panel: usize| {
+            // Rows count from below, and the first strategy is uppermost.
             let at = |column: usize, row: usize| (count - 1 - row, self.layout.other(panel, Some(column)));
             let axes = Panel::new(x.axis(), Axis::new("").categories(names.iter().copied()));
             self.titled(self.areas(axes, (&x.edges(), &rows), at), panel)
@@ -164,7 +167,7 @@ impl Sheet<'_> {
         Some(self.with_rows(picture((0..panels).map(panel).collect()).shared_y(), panels).shared_x())
     }
 
-    /// The verdicts of cells as areas.
+    /// Draws the verdicts of cells as areas.
     fn areas(&self, panel: Panel, (columns, rows): (&[f64], &[f64]), at: impl Fn(usize, usize) -> (usize, usize)) -> Panel {
         let word = |column: usize, row: usize| {
             let (strategy, other) = at(column, row);
@@ -175,11 +178,13 @@ impl Sheet<'_> {
         let place_of = |word: Option<&str>| match word {
             Some(word) if word == stable => 0,
             Some(word) if word == unstable => 1,
+            // Marginal, overflow and undecided.
             Some(_) => 2,
             None => 3,
         };
         areas.into_iter().enumerate().fold(panel, |panel, (place, (fill, name))| {
             let shown = |column: usize, row: usize| place_of(word(column, row)) == place;
+            // An empty area would still appear in the legend. There is one cell fewer than edges.
             let any = (1..columns.len()).any(|column| (1..rows.len()).any(|row| shown(column - 1, row - 1)));
             if any { panel.with(Region::between(columns, rows, fill, shown).named(name)) } else { panel }
         })

@@ -7,7 +7,7 @@ use crate::compare::Finished;
 use crate::compare::figures::{self, Shown};
 use crate::compare::words::{self, Sum};
 
-/// The strategies: what each does, its parameters, and what became of all its runs.
+/// Returns the table of strategies: description, parameters, and counts of diverged, stable and refused combinations.
 pub(super) fn strategies(finished: &Finished, words: &[(&'static str, String)]) -> Html {
     let comparison = &finished.comparison;
     let head =
@@ -29,10 +29,10 @@ pub(super) fn strategies(finished: &Finished, words: &[(&'static str, String)]) 
     Html::table(&table)
 }
 
-/// What stands where there is no number.
+/// Cell without a number.
 const NOTHING: &str = "–";
 
-/// At how many combinations each strategy is lower and higher than the baseline.
+/// Returns the table of differences: numbers of combinations in which each strategy is lower and higher than the baseline.
 pub(super) fn overview(finished: &Finished) -> Html {
     let comparison = &finished.comparison;
     let head = comparison.strategies.iter().skip(1).fold(Table::new().column("measure"), |table, name| table.number(name.as_str()));
@@ -56,7 +56,7 @@ fn up(words: &str) -> Html {
     Html::mark(Mark::Partly, &format!("▲ {words}"))
 }
 
-/// A row for each combination of the other keys, a column for each strategy.
+/// Returns a table with one row per combination of the other keys and one column per strategy.
 fn by_strategy(finished: &Finished, cell: impl Fn(usize, usize) -> Html) -> Html {
     let comparison = &finished.comparison;
     let keys = finished.keys().iter().map(Variation::key);
@@ -71,7 +71,7 @@ fn by_strategy(finished: &Finished, cell: impl Fn(usize, usize) -> Html) -> Html
     Html::table(&table)
 }
 
-/// The verdict and the diverged runs of each combination.
+/// Returns the table of verdicts and diverged runs.
 pub(super) fn stability(finished: &Finished) -> Html {
     by_strategy(finished, |strategy, other| {
         let cell = finished.comparison.cell(strategy, other);
@@ -84,7 +84,7 @@ pub(super) fn stability(finished: &Finished) -> Html {
     })
 }
 
-/// The means of a measure, and below each its difference to the baseline.
+/// Returns the table of a measure: means, and below each mean its difference to the baseline.
 pub(super) fn measure(finished: &Finished, measure: usize, shown: &Shown) -> Html {
     let of_each = finished.plan.runs_of_each();
     by_strategy(finished, |strategy, other| {
@@ -99,7 +99,7 @@ pub(super) fn measure(finished: &Finished, measure: usize, shown: &Shown) -> Htm
     })
 }
 
-/// A difference with a mark of the side of zero that its whole interval lies on.
+/// Marks a difference whose whole interval lies on one side of zero.
 fn marked(figures: &Figures, words: &str) -> Html {
     match words::side(figures) {
         "lower" => down(words),
