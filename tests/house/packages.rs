@@ -241,7 +241,7 @@ fn every_front_page_says_who_needs_it_and_has_an_example() {
         let Ok(source) = fs::read_to_string(&path) else { continue };
         let page: Vec<&str> = source.lines().map_while(|line| line.strip_prefix("//!")).collect();
         let has_example = page.iter().filter(|line| **line == " ```").count() >= 2;
-        if !has_example || !page.iter().any(|line| line.starts_with(" Use this crate if ")) {
+        if !has_example || !page.iter().any(|line| line.starts_with(" Use this crate ")) {
             missing.push(name(&path));
         }
     }

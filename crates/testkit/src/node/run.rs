@@ -27,7 +27,7 @@ use crate::wire::Wire;
 ///
 /// Between the steps the test looks at the nodes, changes them, and breaks the links between them. At one instant packets arrive first, in the order of the
 /// [network](cohaptic_wan::Network); then the timers go off that are due, in the order of the nodes; then packets arrive that are sent at this instant over links without
-/// delay. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`] asked for is written.
+/// delay. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`](super::Nodes::artefacts) asked for is written.
 pub struct NodeRun {
     pub(super) names: Arc<Names>,
     /// `None`: crashed, or being asked.
@@ -214,7 +214,7 @@ impl NodeRun {
     ///
     /// # Panics
     ///
-    /// As [`NodeRun::step`]; if there is no end before the [time limit](Nodes::time_limit).
+    /// As [`NodeRun::step`]; if there is no end before the [time limit](super::Nodes::time_limit).
     #[expect(clippy::panic, reason = "a test that waits for ever; says the way out")]
     pub fn run_until_idle(&mut self) -> Instant {
         while self.step() {
@@ -233,7 +233,7 @@ impl NodeRun {
     ///
     /// # Panics
     ///
-    /// As [`NodeRun::step`]; if it is so still when nothing will happen any more, or at the [time limit](Nodes::time_limit).
+    /// As [`NodeRun::step`]; if it is so still when nothing will happen any more, or at the [time limit](super::Nodes::time_limit).
     #[expect(clippy::panic, reason = "a test that waits for what never comes; says the way out")]
     pub fn run_while(&mut self, mut is_so: impl FnMut(&Self) -> bool) -> Instant {
         while is_so(self) {
@@ -255,7 +255,7 @@ impl NodeRun {
     ///
     /// # Panics
     ///
-    /// If it is not [recorded](Nodes::recorded).
+    /// If it is not [recorded](super::Nodes::recorded).
     #[must_use]
     pub fn record(&self) -> Record {
         assert!(self.wire.recording().traces, "nothing was recorded; `Nodes::recorded` asks for it");
