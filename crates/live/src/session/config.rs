@@ -1,4 +1,4 @@
-//! What a session is told when it is made.
+//! Configuration of a session, and the errors that keep a session from beginning or going on.
 
 use std::io;
 use std::net::SocketAddr;
@@ -12,32 +12,33 @@ use cohaptic_scene::SceneContent;
 
 use crate::{AdmissionConfigError, SessionKey};
 
-/// How a session runs. What runs is the scene's business.
+/// Configuration of a session: its socket, its pace and its record. Peers, links and duration come from the scene.
 #[derive(Clone, Debug)]
 pub struct SessionConfig {
-    /// Where the peers of kind `udp` send to; not used in a scene that has none.
+    /// Local address of the socket to which peers of kind `udp` send. Not used in a scene without such peers.
     pub listen: SocketAddr,
-    /// Whether `listen` may be an address that other machines reach though there is no key.
+    /// Whether a session without a key may listen at an address that other machines can reach.
     pub allow_remote: bool,
-    /// With a key every datagram must carry a tag made with it.
+    /// Session key. If set, every datagram must carry a tag made with the key. `None`: datagrams carry no tags.
     pub key: Option<SessionKey>,
-    /// How to wait for deadlines.
+    /// Way of waiting for deadlines: sleeping or spinning.
     pub pacing: Pacing,
-    /// What to ask of the system.
+    /// Requests to the system for the thread of the session, such as priority and processor.
     pub wishes: Wishes,
-    /// How late things may be.
+    /// Largest lateness of ticks and releases with which the session still counts as valid.
     pub tolerance: Tolerance,
-    /// Where to record; `None`: nowhere.
+    /// Folder of the record. `None`: nothing is recorded.
     pub out: Option<PathBuf>,
-    /// Which files are recorded.
+    /// Extent of the record. Not used without `out`.
     pub recorded: Recorded,
-    /// The keys and files of the scene, from [`cohaptic_scene::scene_content`], which the record keeps: a replay with another scene says what differs.
-    /// Without them it says only that something does.
+    /// Keys and files of the scene, from [`cohaptic_scene::scene_content`], kept in the record. A replay with another scene names the keys and files that
+    /// differ. With empty content, a replay can only say that the scenes differ.
     pub content: SceneContent,
 }
 
 impl SessionConfig {
-    /// Sleeping, with the usual wishes, a tolerance of a millisecond, no key and no record.
+    /// Returns a configuration that sleeps until deadlines, asks the system for the default wishes, tolerates a lateness of 1 ms, and has no key and no
+    /// record.
     #[must_use]
     pub fn new(listen: SocketAddr) -> Self {
         Self {
@@ -54,38 +55,38 @@ impl SessionConfig {
     }
 }
 
-/// Which files of a session are recorded.
+/// Files that a session records.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Recorded {
-    /// Every motion and every packet too.
+    /// All files: `inputs.csv`, motions, packets and lateness.
     #[default]
     All,
-    /// `inputs.csv` alone, from which all others can be made again.
+    /// `inputs.csv` alone. A replay of this file computes motions and packets again; the lateness of the session is lost.
     Inputs,
 }
 
-/// Why a session cannot begin, or had to end.
+/// Reason why a session cannot begin or had to end.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// Strangers could join.
+    /// The session would listen without a key at an address that other machines reach, and [`SessionConfig::allow_remote`] is not set.
     #[error(
         "anybody who reaches {address} could take part: expected an address of this computer such as 127.0.0.1:7400, or a session key (--key-file), or \
          --allow-remote if everybody there may"
     )]
     NotLoopback {
-        /// The address.
+        /// Address in [`SessionConfig::listen`].
         address: SocketAddr,
     },
-    /// The socket.
+    /// The socket cannot be bound.
     #[error(transparent)]
     Bind(#[from] BindError),
-    /// The admission of peers in other programs.
+    /// The admission control cannot be made from the scene, or the system has no random bytes.
     #[error("nobody can be let in: {0}")]
     AdmissionControl(#[from] AdmissionConfigError),
-    /// The record.
+    /// The record cannot be created or written.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// The system does not let the loop wait or receive.
+    /// The system does not let the loop wait, or refuses to receive.
     #[error("the session had to end: {0}")]
     System(#[from] io::Error),
 }

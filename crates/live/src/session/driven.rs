@@ -1,4 +1,4 @@
-//! A session in the loop of [`cohaptic_realtime::drive()`].
+//! Implementation of [`cohaptic_realtime::Driven`] for a session: the steps that the loop of [`cohaptic_realtime::drive()`] calls.
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
@@ -13,10 +13,10 @@ impl Driven for Session {
     type Clock = MonotonicClock;
     type Error = SessionError;
 
-    /// A tick reads the devices of its peers, which must not happen before its time. A flood of forged datagrams makes one reading as long as a tick may be
-    /// late, so that none begins shortly before a tick.
+    /// `None`, for two reasons. A tick reads the devices of its peers, and must not read them before its time. A flood of forged datagrams can make one
+    /// reading take as long as a tick may be late, so no reading may begin shortly before a tick.
     const AHEAD: Option<Duration> = None;
-    /// A rest would make ticks late.
+    /// `false`: a rest between two readings would make ticks late.
     const RESTS: bool = false;
 
     fn clock(&self) -> &MonotonicClock {
@@ -27,18 +27,19 @@ impl Driven for Session {
         self.outside.as_ref().and_then(Outside::readable)
     }
 
-    /// Reads one batch of datagrams. Each sample counts at the instant at which the kernel saw it.
+    /// Reads one batch of datagrams and hands each admitted sample to the scene, at the instant at which the kernel received the datagram.
     fn receive(&mut self, now: Instant) -> Result<Received, SessionError> {
         let Self { outside, live, watch, clock, is_stopped, .. } = self;
         watch.woken = now;
         let Some(outside) = outside else { return Ok(Received { count: 0, until: now }) };
         let count = outside.receive(clock, |at, peer, sample| {
             if !*is_stopped {
-                // A sample that the scene refuses is counted there.
+                // `handle_sample` fails only if the record cannot be written. A sample that the scene refuses is counted by the scene. Once the record has
+                // failed, the rest of the batch is dropped: the run is over.
                 *is_stopped = live.handle_sample(at, peer, sample, watch).is_err();
             }
         })?;
-        // Time passes to now also if more datagrams wait than one batch: a tick does not wait for a flood.
+        // Logical time passes to `now` even if more datagrams wait than one batch holds: otherwise a flood would delay ticks.
         Ok(Received { count, until: now })
     }
 
@@ -46,7 +47,7 @@ impl Driven for Session {
         self.live.poll_timeout()
     }
 
-    /// Lets the next deadline pass, if it is due: one at a time, so that samples that came before the next one are read before it.
+    /// Handles the next deadline, if due. Handles one deadline per call, so that samples received before the following deadline are read first.
     fn handle_timeout(&mut self, now: Instant) -> bool {
         if let Some(due) = self.live.poll_timeout().filter(|due| *due <= now && !self.is_stopped) {
             let passed = self.live.handle_timeout(due, &mut self.watch);
@@ -55,12 +56,13 @@ impl Driven for Session {
         false
     }
 
-    /// Sends on what the network has delivered.
+    /// Queues and sends the samples that the network has delivered to peers in other programs. Returns the number of samples that had a receiver.
     fn send(&mut self) -> u64 {
         let Self { outside, live, watch, clock, is_stopped, .. } = self;
         let Some(outside) = outside else { return 0 };
         let mut count = 0;
         while let Some(transmit) = live.poll_transmit() {
+            // `queue` returns `None` if nobody holds the seat of the receiver: the sample is then dropped and counted by the admission.
             if let Some(release) = outside.queue(clock, &transmit) {
                 *is_stopped |= watch.released(release).is_err();
                 count += 1;

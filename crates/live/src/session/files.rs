@@ -1,4 +1,5 @@
-//! `releases.csv`, when each datagram to another program was due and how late it was sent, and `lateness.csv`, the histograms of a session.
+//! Two files of the record: `releases.csv` has a row for each datagram sent to another program, with its deadline and its lateness. `lateness.csv` has the
+//! histograms of the lateness of ticks and releases.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -9,21 +10,22 @@ use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 
-/// A datagram that was sent to a peer in another program.
+/// One sample sent to a peer in another program.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Release {
-    /// The receiver.
+    /// Receiver, as index of a peer in the scene.
     pub(crate) to: usize,
-    /// When the network had delivered it: when it was due.
+    /// Instant at which the emulated network delivered the sample, in logical time: the deadline of sending.
     pub(crate) due: Instant,
-    /// From then until it was handed to the system.
+    /// Time from `due` to the instant at which the sample was sealed and queued for the kernel.
     pub(crate) late: Duration,
 }
 
-/// Columns `peer,due,late_us`, in the order of sending. It left at `due + late_us`.
+/// Writer of `releases.csv`, with columns `peer,due,late_us` and rows in the order of sending. A datagram left at `due + late_us`.
 #[derive(Debug)]
 pub(super) struct Releases {
     file: RecordFile,
+    /// Names of the peers, indexed by peer.
     names: Vec<String>,
 }
 
@@ -45,7 +47,7 @@ impl Releases {
     }
 }
 
-/// Columns `of,late_us,count`: the number of ticks, or releases, of a lateness, to three digits.
+/// Writes `lateness.csv`, with columns `of,late_us,count`: number of ticks or releases per lateness. Latenesses are rounded to three digits by the histogram.
 pub(super) fn write_lateness(folder: &Path, ticks: &Lateness, releases: &Lateness) -> Result<PathBuf, RecordError> {
     let mut file = RecordFile::create(folder.join("lateness.csv"))?;
     file.write(b"of,late_us,count\n")?;

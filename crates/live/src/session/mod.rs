@@ -1,7 +1,9 @@
-//! The session itself: a [`LiveScene`] driven by the wall clock, with a socket behind its [`AdmissionControl`](crate::AdmissionControl).
+//! The session: a [`LiveScene`] driven by the wall clock, and the socket to other programs, whose datagrams pass an
+//! [`AdmissionControl`](crate::AdmissionControl).
 //!
-//! One thread does everything that has to be on time. It sleeps until something is due or a datagram comes in that may be for another program, and tells the
-//! scene the logical instant of either: that at which it was due, or that at which the kernel saw it. Files, live control and the terminal have threads of their own.
+//! One thread does all work that has a deadline. The thread sleeps until a deadline is due, or until a datagram arrives that may have to be sent on to another
+//! program. The scene gets a logical instant with each event: the deadline itself, or the instant at which the kernel received the datagram. Files, live
+//! control and the terminal have threads of their own.
 
 mod config;
 mod driven;
@@ -31,68 +33,73 @@ pub use config::{Recorded, SessionConfig, SessionError};
 pub use motion::{EndedPacket, Motion};
 pub use status::{LinkStatus, PeerStatus, Report, SocketCounts, Status};
 
-/// The conductor of a session: looks on while it runs, changes links, and ends it. Called on the thread that has to be on time: calls must neither wait nor take long.
+/// Conductor of a session: observes the session, changes links, and ends the session. The session calls the conductor on the thread that has deadlines, so the
+/// methods must neither wait nor take long.
 pub trait Conductor {
-    /// Whether to go on. Asked at least 50 times a second.
+    /// Returns whether the session goes on. Called about 50 times a second.
     fn keep_going(&mut self) -> bool;
 
-    /// The next change of a link, if somebody wants one.
+    /// Returns the next change of a link, or `None` if no change is pending. Called until `None`, about 50 times a second.
     fn next_change(&mut self) -> Option<LinkChange>;
 
-    /// The session as it stands, about 20 times a second, if [`Conductor::wants_status`].
+    /// Takes a snapshot of the session. Called about 17 times a second and once at the end, if [`Conductor::wants_status`].
     fn show(&mut self, status: Status);
 
-    /// Whether anybody looks on. The answer must stay.
+    /// Returns whether [`Conductor::show`] is to be called. The answer must not change during the session.
     fn wants_status(&self) -> bool {
         true
     }
 
-    /// What moves, about 50 times a second, and at the end, if [`Conductor::wants_motion`].
+    /// Takes the motion of peers and packets. Called about 50 times a second and once at the end, if [`Conductor::wants_motion`].
     fn show_motion(&mut self, _motion: Motion) {}
 
-    /// Whether anybody looks on so closely. The answer must stay.
+    /// Returns whether [`Conductor::show_motion`] is to be called. The answer must not change during the session.
     fn wants_motion(&self) -> bool {
         false
     }
 }
 
-/// A link from now on.
+/// Change of one directed link, effective from the instant at which the session takes the change.
 #[derive(Clone, Debug)]
 pub struct LinkChange {
-    /// The sender's place in the scene.
+    /// Sender, as index of a peer in the scene.
     pub from: usize,
-    /// The receiver's place in the scene.
+    /// Receiver, as index of a peer in the scene.
     pub to: usize,
-    /// All its keys.
+    /// All keys of the link after the change, for the record.
     pub keys: LinkKeys,
-    /// The model that they make.
+    /// Model of the link made from `keys`.
     pub model: LinkModel,
 }
 
-/// A session that is ready to begin: its socket is open and its files are made.
+/// Session that is ready to begin: the socket is bound and the files of the record are created.
 #[derive(Debug)]
 pub struct Session {
     live: LiveScene,
+    /// Socket and admission. `None` in a scene without peers in other programs.
     outside: Option<Outside>,
     watch: Watch,
     config: SessionConfig,
+    /// Number of peers of the scene.
     peers: usize,
-    /// The clock of the run, which begins with the run.
+    /// Clock of the run. Restarted when the run begins.
     clock: MonotonicClock,
-    /// Whether the record can no longer be written.
+    /// Whether writing the record has failed.
     is_stopped: bool,
 }
 
-/// So often the conductor is asked, and shown the session.
+/// Time between two calls of [`Session::look`].
 const LOOK: Duration = Duration::from_millis(20);
+/// Number of looks per status. Making a status reads all links, so a status is made less often than a look.
 const SHOW_EVERY: u32 = 3;
 
 impl Session {
-    /// Opens what the session needs. `devices` gives the device of each peer of kind `falcon`, by its place; `None` is one that is never there.
+    /// Binds the socket, creates the files of the record, and makes the scene. `devices` returns the device of a peer of kind `falcon`, given the index of the
+    /// peer. A peer for which `devices` returns `None` counts as absent throughout.
     ///
     /// # Errors
     ///
-    /// [`SessionError`] if the socket cannot be had or may not be, or a file cannot be made.
+    /// [`SessionError`] if the socket cannot be bound or would be open to strangers, if the admission control cannot be made, or if a file cannot be created.
     ///
     /// # Panics
     ///
@@ -105,25 +112,27 @@ impl Session {
         Ok(Self { live, outside, watch, config, peers, clock, is_stopped: false })
     }
 
-    /// Where the session listens; `None` in a scene without peers in other programs.
+    /// Returns the local address of the socket. `None` in a scene without peers in other programs.
     #[must_use]
     pub fn address(&self) -> Option<std::net::SocketAddr> {
         self.outside.as_ref().map(Outside::address)
     }
 
-    /// Runs the session on the calling thread until the scene ends, diverges, or the conductor ends it. Time begins with this call.
+    /// Runs the session on the calling thread until the scene ends or diverges, or until the conductor ends the session. Time begins with this call.
     ///
-    /// The thread asks the system for what the configuration wishes, and keeps what it is granted: give it one of its own.
+    /// The calling thread asks the system for the configured wishes, and keeps the granted ones after the run. Give the session a thread of its own.
     ///
     /// # Errors
     ///
-    /// [`SessionError`] if the system does not let it go on, or the record cannot be written. What was recorded until then is kept as far as it can be.
+    /// [`SessionError`] if the system does not let the loop wait or receive, or if the record cannot be written. Rows recorded before the error are kept as
+    /// far as possible.
     pub fn run(mut self, conductor: &mut impl Conductor) -> Result<Report, SessionError> {
         let prepared = prepare_thread(&self.config.wishes);
         self.clock = MonotonicClock::start();
         let driven = self.conduct(conductor);
         let behind = self.clock.now().saturating_duration_since(self.live.open());
         let summary = self.live.summary();
+        // The record is finished before `driven` is looked at: after an error of the loop, the rows recorded so far are kept.
         let files = match self.watch.take_recording() {
             Some(recording) => recording.finish(&summary, &self.watch.ticks, &self.watch.releases)?,
             None => Vec::new(),
@@ -144,6 +153,7 @@ impl Session {
         })
     }
 
+    /// Drives the session to its end, and then shows the final state to the conductor.
     fn conduct(&mut self, conductor: &mut impl Conductor) -> Result<(), SessionError> {
         self.watch.is_shown = conductor.wants_status();
         self.watch.ended = conductor.wants_motion().then(Default::default);
@@ -155,7 +165,7 @@ impl Session {
             if session.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         if self.is_stopped {
-            // The record cannot be written: its end says why.
+            // The writer of the record has failed. `Recording::finish` returns the writer's error.
             return Ok(());
         }
         if conductor.wants_status() {
@@ -167,10 +177,13 @@ impl Session {
         Ok(())
     }
 
+    /// Remembers that the writer of the record has failed.
     fn note(&mut self, outcome: Result<(), Stopped>) {
         self.is_stopped |= outcome.is_err();
     }
 
+    /// Applies the changes that the conductor wants, ends the scene if the conductor says so, and shows the state: the motion at each look, the status if
+    /// `show`.
     fn look(&mut self, conductor: &mut impl Conductor, now: Instant, show: bool) -> Result<(), Stopped> {
         while let Some(LinkChange { from, to, keys, model }) = conductor.next_change() {
             self.live.set_link(now, (from, to), &keys, &model, &mut self.watch)?;
@@ -188,6 +201,7 @@ impl Session {
         Ok(())
     }
 
+    /// Judges ticks and releases together against the tolerance.
     fn validity(&self) -> cohaptic_realtime::Validity {
         let mut all = self.watch.ticks.clone();
         all.merge(&self.watch.releases);
@@ -210,6 +224,7 @@ impl Session {
     fn status(&self) -> Status {
         let places = 0..self.peers;
         let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
+        // `links` is a square matrix in rows, as in `Watch`: the row is the sender, the column the receiver.
         let link = |(from, to): (usize, usize)| {
             let carried = &self.watch.links[from * self.peers + to];
             let stats = self.live.link_stats(from, to)?;

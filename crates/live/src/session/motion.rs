@@ -1,4 +1,4 @@
-//! What moves in a session, often enough for a screen: the peers, and some of the packets between them.
+//! Motion of a session for a display: states of the peers, and a selection of the packets between the peers.
 
 use std::time::Duration;
 
@@ -7,36 +7,36 @@ use cohaptic_wan::Fate;
 
 use super::status::PeerStatus;
 
-/// Everything that moves, at one moment.
+/// States of all peers at one instant, and packets that ended since the previous instant.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Since the session began, in logical time.
+    /// Logical time since the beginning of the session.
     pub elapsed: Duration,
-    /// Each peer, in the order of the scene.
+    /// Peers in the order of the scene.
     pub peers: Vec<PeerStatus>,
-    /// Packets that have ended since the last time: of each link one in 16, and all that were lost, up to 64 together.
+    /// Packets that ended since the previous [`Motion`]: every 16th packet of each link and every lost packet, at most 64 packets in total.
     pub packets: Vec<EndedPacket>,
 }
 
-/// A packet that has arrived, or never will.
+/// Packet that was delivered or lost.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct EndedPacket {
-    /// The sender's place in the scene.
+    /// Sender, as index of a peer in the scene.
     pub from: usize,
-    /// The receiver's place in the scene.
+    /// Receiver, as index of a peer in the scene.
     pub to: usize,
-    /// From its sending to its end.
+    /// Time from the offer of the packet to the link until its delivery or loss.
     pub after: Duration,
-    /// Whether it was lost.
+    /// Whether the packet was lost.
     pub is_lost: bool,
 }
 
-/// Of this number of packets one is shown: at 125 Hz eight a second.
+/// Delivered packets per shown packet. At 125 Hz, eight packets a second are shown for each link.
 const ONE_IN: u64 = 16;
-/// No more packets are shown at once.
+/// Largest number of packets in one [`Motion`]. Bounds the memory and the work if a link loses everything.
 const MOST: usize = 64;
 
-/// Collects packets to be shown.
+/// Packets to be shown with the next [`Motion`].
 #[derive(Debug, Default)]
 pub(super) struct EndedPackets(Vec<EndedPacket>);
 
@@ -45,6 +45,7 @@ impl EndedPackets {
         let is_lost = match row.fate {
             Fate::Delivered(_) => false,
             Fate::Dropped(_) => true,
+            // Not final: packet and copy each get a later row.
             Fate::Duplicated => return,
         };
         if self.0.len() < MOST && (is_lost || row.sequence.is_multiple_of(ONE_IN)) {

@@ -1,4 +1,5 @@
-//! Peers in other programs: the socket and the admission behind it.
+//! Connection to peers in other programs: the UDP socket, and the admission that decides about received datagrams. Samples go in and out here; this module
+//! knows nothing of the scene's physics.
 
 use std::net::SocketAddr;
 use std::os::fd::BorrowedFd;
@@ -16,30 +17,32 @@ use super::{SessionConfig, SessionError};
 use crate::handshake::HANDSHAKE_LEN;
 use crate::{Admission, AdmissionConfig, AdmissionControl, AdmissionStats, Limits, MAX_DATAGRAM, Place, Seat, SystemEntropy};
 
-/// The way to peers in other programs.
+/// Socket and admission of a session, with the buffers of both directions.
 #[derive(Debug)]
 pub(super) struct Outside {
     socket: UdpEndpoint,
     buffers: ReceiveBuffers,
     admission: AdmissionControl,
-    /// Whether a sample may have to be sent on to another program at once.
+    /// Whether the scene has more than one peer in another program. A received sample may then have to be sent on to another program at once.
     passes_on: bool,
-    /// Whether more waited than was read at once.
+    /// Whether the last reading filled a whole batch, so that more datagrams may wait in the kernel.
     is_more: bool,
+    /// Buffer in which each outgoing datagram is made before the socket copies the datagram into its queue.
     sealed: [u8; MAX_DATAGRAM],
-    /// Answers to hellos, with where to: at most a batch.
+    /// Welcomes to be sent with the next [`Outside::flush`], with the address of each receiver. At most as many as a batch has datagrams.
     replies: Vec<(SocketAddr, [u8; HANDSHAKE_LEN])>,
 }
 
-/// Nobody at a desk moves a copy farther or faster than this; what says so is no motion but a fault, and would throw every other copy out of the room.
+/// Largest position \[m\] and velocity [m/s] that are admitted. A hand at a desk stays well below both; a larger number comes from a fault, and would throw
+/// every other copy far away through the coordination.
 const LIMITS: Limits = Limits { position: 10.0, velocity: 100.0 };
-/// A sample that is too long is refused by the admission, and counted there.
+/// Longest datagram that the socket hands on \[byte\]. Longer than [`MAX_DATAGRAM`], so that the admission sees and counts oversized datagrams.
 const LARGEST: usize = 2048;
-/// Datagrams of a few peers at 125 Hz: a second of a thousand of them.
+/// Receive buffer of the socket \[byte\]: room for about a thousand datagrams, which is more than a few peers at 125 Hz send in a second.
 const RECEIVE_BUFFER: usize = 1 << 20;
 
 impl Outside {
-    /// `None` in a scene without peers in other programs.
+    /// Binds the socket and makes the admission. Returns `None` in a scene without peers in other programs.
     pub(super) fn open(scene: &Scene, config: &SessionConfig) -> Result<Option<Self>, SessionError> {
         let seats: Vec<(Seat, Duration)> = scene
             .peers
@@ -50,7 +53,7 @@ impl Outside {
                 Some((Seat { place: Place(place), name: peer.name.clone(), tick: peer.clock.tick }, silence.after))
             })
             .collect();
-        // A seat is free to be taken again once every peer counts as silent that was not heard for so long.
+        // One time for all seats, the longest of the peers' silences: a seat can be taken again only when the scene, too, counts its peer as silent.
         let Some(stale_after) = seats.iter().map(|(_, after)| *after).max() else { return Ok(None) };
         let address = config.listen;
         if !address.ip().to_canonical().is_loopback() && config.key.is_none() && !config.allow_remote {
@@ -66,7 +69,7 @@ impl Outside {
             ..AdmissionConfig::new(scene.seed, scene.axes.count(), peers, scene.coordination.update, seats)
         };
         let admission = AdmissionControl::new(admission.with_key(config.key.clone()), &mut SystemEntropy)?;
-        // Single datagrams: put together, a batch of a flood would be 64 times as long, and a tick would wait for it.
+        // The kernel must not join datagrams: a batch of a flood could then hold 64 times as many datagrams, and a tick would wait for the whole batch.
         let endpoint = udp::EndpointConfig { receive_buffer: RECEIVE_BUFFER, largest: LARGEST, joined: false, ..udp::EndpointConfig::default() };
         let socket = UdpEndpoint::bind(address, endpoint)?;
         let (buffers, sealed, replies) = (ReceiveBuffers::new(), [0; MAX_DATAGRAM], Vec::new());
@@ -77,17 +80,18 @@ impl Outside {
         self.socket.local_address()
     }
 
-    /// What to wake up for before something is due. A sample that is only for peers here waits for their next tick: it counts from when the kernel saw it.
+    /// Returns the socket if a datagram must wake the loop before the next deadline. With one peer outside, samples are for simulated peers only, and can wait
+    /// in the kernel until the next tick: each counts from the instant at which the kernel received the datagram.
     pub(super) fn readable(&self) -> Option<BorrowedFd<'_>> {
         (self.passes_on || self.is_more).then(|| std::os::fd::AsFd::as_fd(&self.socket))
     }
 
-    /// Hands on the samples that have come in and may, with the instant at which the kernel saw them. Hellos are answered with the next [`Outside::flush`].
-    /// Returns the number of datagrams.
+    /// Reads one batch of datagrams. Calls `take` for each admitted sample, with the instant at which the kernel received the datagram and the index of the
+    /// sending peer. Welcomes are sent with the next [`Outside::flush`]. Returns the number of datagrams read.
     pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<usize> {
         let Self { socket, buffers, admission, is_more, replies, .. } = self;
-        // One batch: more than come in between two ticks of a session in order. The rest waits in the kernel until the next look, which is after the next
-        // tick if that is due, so that a flood cannot keep the loop from its ticks.
+        // One batch is more than arrives between two ticks of an orderly session. Further datagrams stay in the kernel until the next reading, which comes
+        // after the next tick if the tick is due: a flood cannot keep the loop from its ticks.
         let count = socket.receive(buffers, clock, |datagram| match admission.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
             Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),
             Admission::Reply { to, bytes } => replies.push((to, bytes)),
@@ -97,8 +101,9 @@ impl Outside {
         Ok(count)
     }
 
-    /// Makes a datagram ready for the program that has the seat; `None` if nobody has it.
+    /// Seals a sample for the program at the seat of its receiver, and queues the datagram. Returns `None` if no program is present at the seat.
     pub(super) fn queue(&mut self, clock: &MonotonicClock, transmit: &Transmit) -> Option<Release> {
+        // Peers of a scene are counted in `u32`, so the conversion does not fail for a receiver in the scene.
         let place = Place(u32::try_from(transmit.to).ok()?);
         let now = clock.now();
         let (to, len) = self.admission.seal(now, place, &transmit.datagram, &mut self.sealed)?;
@@ -106,8 +111,8 @@ impl Outside {
         Some(Release { to: transmit.to, due: transmit.at, late: now.saturating_duration_since(transmit.at) })
     }
 
-    /// Sends samples, and then answers to hellos. A flood of hellos must not delay samples: an answer for which the kernel has no room is dropped and counted,
-    /// and its peer says hello again.
+    /// Sends the queued samples, and then the welcomes. In this order a flood of hellos cannot delay samples. A welcome for which the kernel has no room is
+    /// dropped and counted, and the peer repeats its hello.
     pub(super) fn flush(&mut self) {
         self.socket.flush();
         for (to, bytes) in self.replies.drain(..) {

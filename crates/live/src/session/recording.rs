@@ -1,7 +1,7 @@
-//! Writing records without making the 1 kHz loop wait for a disk.
+//! Record of a session, written by a thread of its own, so that the thread with the deadlines never waits for a disk.
 //!
-//! The loop puts rows of fixed size into a queue that was allocated at the start; a thread of its own takes them out and writes them. If the disk falls so
-//! far behind that the queue is full, the loop waits: nothing is lost, and the wait shows in the lateness.
+//! The loop puts rows of fixed size into a bounded queue; the writer takes the rows out and writes them to the files. If the disk falls so far behind that the
+//! queue is full, the loop waits: no row is lost, and the wait shows in the lateness.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -17,18 +17,23 @@ use super::Recorded;
 use super::files::{Release, Releases, write_lateness};
 use super::rows::{InputCopy, TickCopy};
 
-/// How many rows may wait: of three peers, ten seconds.
+/// Capacity of the queue \[rows\]: about ten seconds of a session of three peers.
 const ROWS: usize = 65_536;
 
-/// Records a live session into a folder: the files of `cohaptic run --out`, what came from outside, and how late everything was.
+/// Record of a live session in a folder: the files of `cohaptic run --out`, the inputs from outside, and the lateness of ticks and releases.
 #[derive(Debug)]
 pub(crate) struct Recording {
+    /// Folder of the files, needed for `lateness.csv` at the end.
     folder: PathBuf,
+    /// Sending end of the queue. Dropping this end tells the writer to finish.
     rows: SyncSender<Row>,
+    /// Thread of the writer, which returns the files once the queue is closed and empty.
     writer: JoinHandle<Result<Files, RecordError>>,
+    /// Whether other files than `inputs.csv` are written. Rows for other files are not even queued otherwise.
     has_others: bool,
 }
 
+/// One row in the queue, with copies of all borrowed numbers.
 #[derive(Debug)]
 enum Row {
     Tick(TickCopy),
@@ -37,20 +42,20 @@ enum Row {
     Release(Release),
 }
 
-/// The files that grow while the session lasts.
+/// Files that grow while the session lasts.
 #[derive(Debug)]
 struct Files {
     inputs: InputRecorder,
-    /// Those that can be made again from the inputs, and how late everything was.
+    /// Files other than `inputs.csv`: the record that a replay can compute again, and the releases. `None` with [`Recorded::Inputs`].
     others: Option<(Recorder, Releases)>,
 }
 
-/// The writer could not write; [`Recording::finish`] says why.
+/// Marks that the writer has ended because a file could not be written. [`Recording::finish`] returns the error.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Stopped;
 
 impl Recording {
-    /// Begins to record.
+    /// Creates the files and starts the writer.
     pub(crate) fn create(folder: &Path, scene: &Scene, content: SceneContent, recorded: Recorded) -> Result<Self, RecordError> {
         let others = match recorded {
             Recorded::All => Some((Recorder::create(folder, scene)?, Releases::create(folder, scene)?)),
@@ -64,8 +69,10 @@ impl Recording {
         Ok(Self { folder: folder.to_path_buf(), rows, writer, has_others })
     }
 
-    /// Writes the rest and gives every file its name; gives the files.
+    /// Writes the rows that are still queued, then the summary and the lateness, and gives every file its final name. Returns the paths of the files, or the
+    /// first error of the writer.
     pub(crate) fn finish(self, summary: &Summary, ticks: &Lateness, releases: &Lateness) -> Result<Vec<PathBuf>, RecordError> {
+        // The writer ends when the queue is closed and empty, so that the queue must be closed before the thread is joined.
         drop(self.rows);
         let files = self.writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
         let Some((recorder, sent)) = files.others else { return Ok(vec![files.inputs.finish()?]) };
@@ -92,13 +99,15 @@ impl Recording {
         if self.has_others { self.put(Row::Release(release)) } else { Ok(()) }
     }
 
+    /// Queues a row. Waits while the queue is full.
     fn put(&self, row: Row) -> Result<(), Stopped> {
-        // The writer takes rows until it cannot write.
+        // The receiving end is dropped only if the writer has failed: while `self` lives, the queue is open and the writer goes on.
         self.rows.send(row).map_err(|_| Stopped)
     }
 }
 
 impl Files {
+    /// Writes rows until the queue is closed and empty, or until a file cannot be written. `axes`: number of axes of the scene.
     fn write(mut self, rows: &Receiver<Row>, axes: usize) -> Result<Self, RecordError> {
         for row in rows {
             match (row, &mut self.others) {
@@ -106,6 +115,7 @@ impl Files {
                 (Row::Tick(row), Some((recorder, _))) => recorder.on_tick(&row.borrowed(axes))?,
                 (Row::Packet(row), Some((recorder, _))) => recorder.on_packet(&row)?,
                 (Row::Release(row), Some((_, releases))) => releases.write(&row)?,
+                // Such rows are not queued without `others`.
                 (Row::Tick(_) | Row::Packet(_) | Row::Release(_), None) => {}
             }
         }

@@ -1,4 +1,5 @@
-//! Rows of a session with numbers of their own, so that another thread can write them.
+//! Owned copies of the rows that observers get borrowed, so that another thread can write the rows. All copies have a fixed size, except for changes of a
+//! link.
 
 use cohaptic_harness::live::{Input, InputRow};
 use cohaptic_harness::{StateRow, TickRow, TurnRow};
@@ -7,10 +8,10 @@ use cohaptic_peer::wire::MAX_LEN;
 use cohaptic_scene::LinkKeys;
 use cohaptic_units::Instant;
 
-/// Position and velocity, the axes that the scene does not have at zero.
+/// Position \[m\] and velocity [m/s], in this order. Axes that the scene does not have are zero.
 type Numbers = [[f64; 3]; 2];
 
-/// A [`TickRow`].
+/// Owned copy of a [`TickRow`].
 #[derive(Debug)]
 pub(super) struct TickCopy {
     at: Instant,
@@ -18,15 +19,17 @@ pub(super) struct TickCopy {
     device: Numbers,
     object: Numbers,
     target: Numbers,
+    /// Coupling force and coordination force \[N\], in this order.
     forces: Numbers,
     turn: Option<TurnCopy>,
 }
 
-/// A [`TurnRow`].
+/// Owned copy of a [`TurnRow`].
 #[derive(Debug)]
 struct TurnCopy {
     object: Attitude,
     device: Option<Attitude>,
+    /// Coupling torque and coordination torque \[N·m\], in this order.
     torques: [[f64; 3]; 2],
 }
 
@@ -47,6 +50,7 @@ impl TickCopy {
         }
     }
 
+    /// Returns the row as the recorders take it. `axes`: number of axes of the scene, at most 3.
     pub(super) fn borrowed(&self, axes: usize) -> TickRow<'_> {
         TickRow {
             at: self.at,
@@ -66,7 +70,7 @@ impl TickCopy {
     }
 }
 
-/// An [`InputRow`].
+/// Owned copy of an [`InputRow`].
 #[derive(Debug)]
 pub(super) struct InputCopy {
     at: Instant,
@@ -84,7 +88,7 @@ enum What {
         peer: usize,
         state: Option<Numbers>,
     },
-    /// The only one that allocates: somebody moved a slider.
+    /// Boxed, because keys are large and a link changes only when somebody changes the link by hand. No other input allocates.
     Link {
         from: usize,
         to: usize,
@@ -97,6 +101,7 @@ impl InputCopy {
     pub(super) fn of(row: &InputRow<'_>) -> Self {
         let what = match row.what {
             Input::Sample { peer, datagram } => {
+                // A sample that the scene has taken is never longer than `MAX_LEN`; `min` keeps the slice in range.
                 let (mut bytes, len) = ([0; MAX_LEN], datagram.len().min(MAX_LEN));
                 bytes[..len].copy_from_slice(&datagram[..len]);
                 What::Sample { peer, bytes, len }
@@ -108,6 +113,7 @@ impl InputCopy {
         Self { at: row.at, what }
     }
 
+    /// Returns the row as the recorder takes it. `axes`: number of axes of the scene, at most 3.
     pub(super) fn borrowed(&self, axes: usize) -> InputRow<'_> {
         let what = match &self.what {
             What::Sample { peer, bytes, len } => Input::Sample { peer: *peer, datagram: &bytes[..*len] },
@@ -123,10 +129,12 @@ fn state(row: StateRow<'_>) -> Numbers {
     [padded(row.position), padded(row.velocity)]
 }
 
+/// Returns the first `axes` components of position and velocity.
 fn row(numbers: &Numbers, axes: usize) -> StateRow<'_> {
     StateRow { position: &numbers[0][..axes], velocity: &numbers[1][..axes] }
 }
 
+/// Returns `values` with zeros for missing axes.
 fn padded(values: &[f64]) -> [f64; 3] {
     std::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0))
 }

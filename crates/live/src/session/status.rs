@@ -1,4 +1,4 @@
-//! A session as it stands, and as it ended.
+//! Snapshots of a running session, and the report of a session that has ended.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -13,87 +13,87 @@ use cohaptic_wan::LinkStats;
 
 use crate::AdmissionStats;
 
-/// A session at one moment, for onlookers.
+/// Snapshot of a running session, for display.
 #[derive(Clone, Debug)]
 pub struct Status {
-    /// Since it began, in logical time.
+    /// Logical time since the beginning of the session.
     pub elapsed: Duration,
-    /// How late ticks were so far.
+    /// Lateness of the ticks so far.
     pub ticks: LatenessSummary,
-    /// How late datagrams to other programs were so far.
+    /// Lateness so far of datagrams to other programs.
     pub releases: LatenessSummary,
-    /// Whether it counts so far.
+    /// Verdict on the session so far: whether ticks and releases were in time.
     pub validity: Validity,
-    /// Each peer, in the order of the scene.
+    /// Peers in the order of the scene.
     pub peers: Vec<PeerStatus>,
-    /// Each directed link, by sender, then receiver.
+    /// Directed links, ordered by sender, then by receiver.
     pub links: Vec<LinkStatus>,
-    /// The counts of the admission; `None` in a scene without peers in other programs.
+    /// Counts of the admission. `None` in a scene without peers in other programs.
     pub admission: Option<AdmissionStats>,
-    /// The measures of the scene so far; empty if it asks for none.
+    /// Measures of the scene so far. Empty if the scene asks for no measures.
     pub measures: Vec<MeasuredValue>,
 }
 
-/// A peer at one moment.
+/// Snapshot of one peer.
 #[derive(Clone, Copy, Debug)]
 pub struct PeerStatus {
-    /// Whether it is there, and where.
+    /// Presence, position and velocity of the peer.
     pub state: PeerState,
-    /// FC, which its hand feels \[N\]; zero beyond the axes of the scene, and for a peer in another program.
+    /// Coupling force FC, which the hand of the peer feels \[N\]. Zero on axes that the scene does not have, and for a peer in another program.
     pub force: [f64; 3],
-    /// What came in from it; `None` for one that is simulated here.
+    /// Counts of the samples and readings received from the peer. `None` for a simulated peer.
     pub seat: Option<SeatStats>,
 }
 
-/// A link at one moment.
+/// Snapshot of one directed link.
 #[derive(Clone, Debug)]
 pub struct LinkStatus {
-    /// The sender's place in the scene.
+    /// Sender, as index of a peer in the scene.
     pub from: usize,
-    /// The receiver's place in the scene.
+    /// Receiver, as index of a peer in the scene.
     pub to: usize,
-    /// Its counters.
+    /// Counters of the link.
     pub stats: LinkStats,
-    /// Bytes that it has delivered.
+    /// Bytes delivered by the link.
     pub delivered_bytes: u64,
-    /// The delays of the latest packets that it delivered, in no order.
+    /// Delays of the packets delivered last, in no particular order.
     pub recent: Vec<Duration>,
 }
 
-/// What a session came to.
+/// Report of a session that has ended.
 #[derive(Debug)]
 pub struct Report {
-    /// What the scene came to, in logical time.
+    /// Result of the scene, in logical time.
     pub summary: Summary,
-    /// The measures of the scene; empty if it asks for none.
+    /// Measures of the scene. Empty if the scene asks for no measures.
     pub measures: Vec<MeasuredValue>,
-    /// How late ticks were.
+    /// Lateness of the ticks.
     pub ticks: LatenessSummary,
-    /// How many ticks were later than the tolerance.
+    /// Number of ticks that were later than the tolerance.
     pub late_ticks: u64,
-    /// How late datagrams to other programs were sent.
+    /// Lateness of datagrams to other programs.
     pub releases: LatenessSummary,
-    /// Whether the session counts.
+    /// Verdict on the session: whether ticks and releases were in time.
     pub validity: Validity,
-    /// By how much the clock on the wall was ahead of logical time when the last thing happened.
+    /// Time by which the wall clock was ahead of logical time at the end of the run.
     pub behind: Duration,
-    /// What came in at each peer that is remote; `None` for one that is simulated here.
+    /// Counts of the samples and readings received, indexed by peer. `None` for a simulated peer.
     pub seats: Vec<Option<SeatStats>>,
-    /// The counts of the admission, and of the socket before it.
+    /// Counts of the admission and of its socket. `None` in a scene without peers in other programs.
     pub admission: Option<(AdmissionStats, SocketCounts)>,
-    /// What the system granted and refused.
+    /// Wishes that the system granted and refused.
     pub prepared: Prepared,
-    /// The files of the record.
+    /// Paths of the files of the record. Empty if nothing was recorded.
     pub files: Vec<PathBuf>,
 }
 
-/// What the socket of a session did.
+/// Counts of the socket of a session.
 #[derive(Clone, Copy, Debug)]
 pub struct SocketCounts {
-    /// Where it listened.
+    /// Local address of the socket.
     pub address: SocketAddr,
-    /// What it took and sent.
+    /// Counts of received and sent datagrams.
     pub counts: EndpointCounts,
-    /// What the kernel dropped because nobody read in time; `None` if the system does not tell.
+    /// Datagrams that the kernel dropped because the receive buffer was full. `None` if the system does not tell.
     pub kernel_drops: Option<u64>,
 }

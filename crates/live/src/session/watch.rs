@@ -1,4 +1,4 @@
-//! The figures of a session while it runs.
+//! Figures of a running session: the observer of the scene, which also feeds the record.
 
 use std::time::Duration;
 
@@ -14,36 +14,43 @@ use super::files::Release;
 use super::motion::EndedPackets;
 use super::recording::{Recording, Stopped};
 
-/// Sees every tick and packet: how late ticks were, what links have carried of late, and the record if there is one.
+/// Observer of a session. Keeps the lateness of ticks and releases, the traffic of the links and the measures, and hands rows to the record if there is a
+/// record.
 #[derive(Debug)]
 pub(super) struct Watch {
     recording: Option<Recording>,
+    /// Number of peers of the scene.
     peers: usize,
-    /// When the loop woke up for what happens now.
+    /// Instant at which the loop woke up for the present event. The lateness of a tick is counted up to this instant.
     pub(super) woken: Instant,
+    /// Instant of the latest tick, to count peers that tick together as one tick.
     last_tick: Option<Instant>,
     pub(super) ticks: Lateness,
     pub(super) releases: Lateness,
+    /// Traffic of the directed links: the entry `from * peers + to`, for every pair of peers. Pairs without a link stay empty.
     pub(super) links: Vec<Carried>,
-    /// Whether anybody looks at what links have carried: of 100 peers it is a quarter of a tick.
+    /// Whether the conductor wants a status. Otherwise `links` is not kept up, because this takes time for each delivered packet.
     pub(super) is_shown: bool,
-    /// Packets for those who look closely.
+    /// Packets for the next [`Motion`](super::Motion). `None` if the conductor wants no motion.
     pub(super) ended: Option<EndedPackets>,
-    /// The force that each device renders.
+    /// Coupling force at the latest tick \[N\], indexed by peer.
     pub(super) forces: Vec<[f64; 3]>,
     measures: Option<Measures>,
 }
 
-/// What a link has delivered: all bytes, and the delays of the latest packets.
+/// Traffic of one link: the sum of delivered bytes, and a ring of the delays of the packets delivered last.
 #[derive(Clone, Debug)]
 pub(super) struct Carried {
     pub(super) bytes: u64,
+    /// Ring of delays. Only the first `filled` entries are valid.
     recent: [Duration; RECENT],
+    /// Index in `recent` of the next delay, below `RECENT`.
     next: usize,
+    /// Number of valid delays, at most `RECENT`.
     filled: usize,
 }
 
-/// The number of delays that are remembered: at 125 Hz those of a second.
+/// Number of delays in the ring: one second of packets at 125 Hz.
 const RECENT: usize = 125;
 
 impl Carried {
@@ -54,7 +61,7 @@ impl Carried {
         self.filled = (self.filled + 1).min(RECENT);
     }
 
-    /// The delays of the latest packets, in no order.
+    /// Returns the delays of the packets delivered last, in no particular order.
     pub(super) fn recent(&self) -> &[Duration] {
         &self.recent[..self.filled]
     }
@@ -79,11 +86,12 @@ impl Watch {
         }
     }
 
-    /// The measures after that much of the scene; none if it asks for none.
+    /// Returns the measures at the logical time `elapsed`. Empty if the scene asks for no measures.
     pub(super) fn measured(&self, elapsed: Duration) -> Vec<MeasuredValue> {
         self.measures.as_ref().map(|measures| measures.values(elapsed)).unwrap_or_default()
     }
 
+    /// Counts a datagram that was queued for another program, and hands its row to the record.
     pub(super) fn released(&mut self, release: Release) -> Result<(), Stopped> {
         self.releases.record(release.late);
         self.recording.as_ref().map_or(Ok(()), |recording| recording.release(release))
@@ -122,12 +130,14 @@ impl Observer for Watch {
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Stopped> {
-        // Peers that tick at the same instant are one tick of the loop.
+        // Peers that tick at the same instant are one tick of the loop. The scene handles their ticks one after another, so the previous instant is enough to
+        // compare with.
         if self.last_tick != Some(row.at) {
             self.last_tick = Some(row.at);
             self.ticks.record(self.woken.saturating_duration_since(row.at));
         }
         self.forces[row.peer] = std::array::from_fn(|axis| row.coupling_force.get(axis).copied().unwrap_or(0.0));
+        // The measures cannot fail: their error type has no value.
         let Ok(()) = self.measures.on_tick(row);
         self.recording.as_ref().map_or(Ok(()), |recording| recording.tick(row))
     }
@@ -158,6 +168,7 @@ impl Observer for Watch {
         {
             self.links[row.path.from.index() * self.peers + row.path.to.index()].deliver(row.size.get(), at.saturating_duration_since(row.offered));
         }
+        // Lost packets, too, are shown in a motion.
         if let Some(ended) = &mut self.ended {
             ended.see(row);
         }
