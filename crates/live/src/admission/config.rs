@@ -1,4 +1,4 @@
-//! The parameters of an admission control.
+//! Configuration of an [`AdmissionControl`](super::AdmissionControl), and the errors of a configuration.
 
 use core::fmt;
 use core::time::Duration;
@@ -8,7 +8,7 @@ use cohaptic_units::print::Counted;
 
 use crate::{EntropyError, SessionKey};
 
-/// The place of a peer among the peers of the scene, from 0: the sender of its samples.
+/// Index of a peer among all peers of the scene, from 0. Samples carry this index as their sender.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct Place(pub u32);
 
@@ -18,68 +18,72 @@ impl fmt::Display for Place {
     }
 }
 
-/// A peer of the scene that is another program.
+/// Peer of the scene that is another program.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Seat {
-    /// Where it stands among the peers.
+    /// Index of the peer in the scene.
     pub place: Place,
-    /// Its name in the scene.
+    /// Name of the peer in the scene.
     pub name: String,
-    /// Tc of this peer, which a welcome tells.
+    /// Control tick Tc of the peer, above zero and below 584 years. A welcome carries this tick.
     pub tick: Duration,
 }
 
-/// How far and how fast a copy can be without being refused. A sample can be finite and still throw every other copy out of the room.
+/// Largest position and velocity of an admitted sample. Without limits, a sample can be finite and still throw every other copy far away through the
+/// coordination.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Limits {
-    /// The largest coordinate, either way \[m\].
+    /// Largest absolute value of a coordinate \[m\], above zero.
     pub position: f64,
-    /// The largest velocity along an axis, either way [m/s].
+    /// Largest absolute value of the velocity along an axis [m/s], above zero.
     pub velocity: f64,
 }
 
-/// The parameters of an admission control.
+/// Configuration of an [`AdmissionControl`](super::AdmissionControl).
 #[derive(Clone, Debug)]
 pub struct AdmissionConfig {
-    /// Only peers of one session understand each other; the seed of the scene.
+    /// Number of the session, which is the seed of the scene. Datagrams with another number are refused.
     pub session: u64,
-    /// How many axes the scene has, 1 to 3.
+    /// Number of axes of the scene, 1 to 3.
     pub axes: usize,
-    /// What samples carry beyond the state.
+    /// Kind of the samples: data that samples carry beyond position and velocity.
     pub kind: SampleKind,
-    /// How many peers the scene has, simulated ones among them.
+    /// Number of peers of the scene, simulated peers included. Every seat has a place below this number.
     pub peers: u32,
-    /// Tn, which a welcome tells.
+    /// Period of sending Tn, above zero and below 584 years. A welcome carries this period.
     pub update: Duration,
-    /// The peers that are other programs, in any order.
+    /// Peers that are other programs, in any order, each at a place of its own.
     pub seats: Vec<Seat>,
-    /// With a key only its holders can join. Without one every program can that reaches the socket.
+    /// Session key. With a key only programs that hold the key can join. `None`: every program that reaches the socket can join.
     pub key: Option<SessionKey>,
-    /// After how long a peer that is not heard counts as gone: nothing is sent to it any more, and its seat can be taken.
+    /// Time without an admitted sample after which a peer counts as gone, above zero and below 584 years. Nothing is sent to a peer that is gone, and its seat
+    /// can be taken.
     pub stale_after: Duration,
-    /// `None`: any finite sample is let in.
+    /// Limits of position and velocity. `None`: every finite sample is admitted.
     pub limits: Option<Limits>,
 }
 
 impl AdmissionConfig {
-    /// With samples of states, without a key and limits, and with a second until a silent peer counts as gone.
+    /// Returns a configuration for samples of states, without a key, without limits, and with one second until a silent peer counts as gone.
     #[must_use]
     pub const fn new(session: u64, axes: usize, peers: u32, update: Duration, seats: Vec<Seat>) -> Self {
         Self { session, axes, kind: SampleKind::State, peers, update, seats, key: None, stale_after: Duration::from_secs(1), limits: None }
     }
 
-    /// With that key, or none.
+    /// Returns the configuration with the session key `key`, or without a key if `None`.
     #[must_use]
     pub fn with_key(self, key: Option<SessionKey>) -> Self {
         Self { key, ..self }
     }
 
+    /// Returns the first fault of the configuration.
     pub(super) fn check(&self) -> Result<(), AdmissionConfigError> {
         if !(1..=3).contains(&self.axes) {
             return Err(AdmissionConfigError::Axes { found: self.axes });
         }
         let ticks = self.seats.iter().map(|seat| (seat.tick, "tick"));
         for (span, name) in ticks.chain([(self.update, "update"), (self.stale_after, "stale_after")]) {
+            // A welcome carries spans as nanoseconds in 64 bits.
             if span.is_zero() || u64::try_from(span.as_nanos()).is_err() {
                 return Err(AdmissionConfigError::Span { name, found: span });
             }
@@ -101,44 +105,44 @@ impl AdmissionConfig {
     }
 }
 
-/// Why an admission control cannot be made.
+/// Reason why an admission control cannot be made.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum AdmissionConfigError {
-    /// A sample has 1 to 3 axes.
+    /// The number of axes is not 1 to 3.
     #[error("{}; a sample has 1 to 3", Counted(*found, "axis"))]
     Axes {
-        /// What was asked for.
+        /// Configured number of axes.
         found: usize,
     },
-    /// A span is zero or longer than nanoseconds can be counted.
+    /// A span is zero, or too long for nanoseconds in 64 bits.
     #[error("{name} is {found:?}; expected more than nothing and less than 584 years")]
     Span {
-        /// Which one.
+        /// Name of the span: `tick`, `update` or `stale_after`.
         name: &'static str,
-        /// What was asked for.
+        /// Configured span.
         found: Duration,
     },
-    /// A limit is not above zero.
+    /// A limit is zero, negative or not a number.
     #[error("limits of {} m and {} m/s; expected numbers above zero", found.position, found.velocity)]
     Limits {
-        /// What was asked for.
+        /// Configured limits.
         found: Limits,
     },
-    /// A seat is none of the scene's peers.
+    /// The place of a seat is not below the number of peers.
     #[error("a seat at place {place}, but the scene has {peers} peers, counted from 0")]
     Beyond {
-        /// The place.
+        /// Place of the seat.
         place: Place,
-        /// How many peers there are.
+        /// Number of peers of the scene.
         peers: u32,
     },
-    /// Two seats are the same peer.
+    /// Two seats have the same place.
     #[error("two seats at place {place}")]
     Twice {
-        /// The place.
+        /// Place of both seats.
         place: Place,
     },
-    /// There are no random bytes to make nonces of.
+    /// The system has no random bytes for the secret of the nonces.
     #[error(transparent)]
     Entropy(#[from] EntropyError),
 }

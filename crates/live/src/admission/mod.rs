@@ -1,4 +1,4 @@
-//! Admission to a live session: which datagrams from outside reach the scene, and how those to the outside are made.
+//! Admission to a live session: decides which datagrams from outside reach the scene, and makes the datagrams to peers outside.
 //!
 //! ```text
 //!                      ┌── Sample: goes on to the scene's links
@@ -6,19 +6,19 @@
 //!                      └── Refused: counted by cause, and nothing else has changed
 //! ```
 //!
-//! Without a key the first sample for a seat joins, and the seat belongs to its address until it has been silent for a while. With a key a peer says
-//! hello, is answered by a nonce of the server, and joins with the first sample that is sealed under keys made of both nonces. The session remembers
-//! nothing of those that asked:
+//! Without a key the first sample for a seat joins, and the seat belongs to the address of that sample until no sample has been admitted for a while. With a
+//! key a peer says hello, gets a nonce of the server in a welcome, and joins with the first sample that is sealed under keys derived from the nonces of both
+//! sides. The session keeps no state for peers that have only said hello:
 //!
-//! - The server's nonce is a keyed hash of the seat, of how often the seat was taken, and of the address that asked. The client's nonce comes with
-//!   every sealed sample. So the session can make the keys again when a sample needs them.
-//! - When a seat is taken, every nonce given out for it before is void. A recording of an earlier joining, or one that is sent from another address,
+//! - The server's nonce is a keyed hash of the place, of the number of joinings at the seat so far, and of the address that asked. The client's nonce comes
+//!   with every sealed sample. So the session can derive the keys again when a sample needs the keys.
+//! - When a seat is taken, every earlier server nonce for the seat becomes void. A sample recorded in an earlier joining, or sent from another address, then
 //!   has a wrong tag.
-//! - A hello changes nothing, and each hello with a right tag is answered: a limit on answers is what a flood of recorded hellos would use up. A host
-//!   that repeats recorded ones gets answers that it cannot use. `docs/live-protocol.md` has the argument, attacker by attacker.
+//! - A hello changes nothing, and each hello with a right tag is answered. A limit on the number of answers would be used up by a flood of recorded hellos. A
+//!   host that repeats recorded hellos gets welcomes that the host cannot use. `docs/live-protocol.md` has the argument, attacker by attacker.
 //!
-//! Memory is that of the seats. The numbers of a seat never go back for those inside: an admitted sample has the number of the joining in its upper 24
-//! bits and the number that the peer gave it in the lower 40, so a peer that joins again and counts from 0 is newer than it was.
+//! Memory is bounded by the number of seats. Inside the session the sequence numbers of a seat never go back: an admitted sample has the number of the joining
+//! in its upper 24 bits and the peer's own number in the lower 40 bits. A peer that joins again and counts from 0 is therefore newer than before.
 
 mod config;
 mod refusal;
@@ -41,38 +41,40 @@ pub use seats::{SeatStatus, WINDOW};
 
 use seats::{Occupant, SeatState};
 
-/// The numbers that a peer may give its samples are below this.
+/// Upper bound (exclusive) of the sequence numbers that a peer may give its samples: 2⁴⁰.
 pub const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;
 
+/// Bits of an admitted sequence number that hold the peer's own number.
 const SEQUENCE_BITS: u32 = 40;
+/// Largest number of joinings at a seat: the numbers from 0 fill the upper bits of an admitted sequence number.
 const JOININGS_END: u64 = 1 << (64 - SEQUENCE_BITS);
-/// Where the number of a sample stands in its bytes.
+/// Bytes of a sample that hold its sequence number, in little-endian order.
 const SEQUENCE_AT: core::ops::Range<usize> = 24..32;
 
-/// What became of a datagram.
+/// Decision about a received datagram.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Admission {
-    /// A sample for the scene.
+    /// The datagram was a sample, to be handed to the scene.
     Sample {
-        /// The sender.
+        /// Sender of the sample.
         place: Place,
-        /// Whether it took the seat: for the first time, or again.
+        /// Whether the sample took the seat, for the first time or again.
         joined: bool,
-        /// The sample, without its seal, and with its number made unique within the session.
+        /// The sample without its seal. Its sequence number is unique within the session.
         sample: Admitted,
     },
-    /// An answer to be sent.
+    /// The datagram was a hello, to be answered by a welcome.
     Reply {
-        /// Where to.
+        /// Receiver of the welcome: the address that sent the hello.
         to: SocketAddr,
-        /// What.
+        /// The welcome.
         bytes: [u8; HANDSHAKE_LEN],
     },
-    /// Nothing: it was counted.
+    /// The datagram was refused and counted by cause.
     Refused(Refusal),
 }
 
-/// The bytes of a sample that was let in.
+/// Bytes of an admitted sample.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Admitted {
     buffer: [u8; wire::MAX_LEN],
@@ -80,18 +82,18 @@ pub struct Admitted {
 }
 
 impl Admitted {
-    /// The datagram, in the format of [`wire`].
+    /// Returns the sample, in the format of [`wire`].
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.buffer[..self.len]
     }
 }
 
-/// Decides about every datagram of a session. See the [module](self).
+/// Decides about every received datagram of a session, and seals every sent sample. See the [module](self).
 ///
-/// The driver hands in whatever its socket receives, with [`AdmissionControl::handle_datagram`], does what the answer says, and asks [`AdmissionControl::seal`] for the bytes
-/// of what goes out. There are no deadlines to keep: what has become old is noticed when it matters. Time must not go back; if it does, nothing
-/// becomes old in between.
+/// The driver hands each received datagram to [`AdmissionControl::handle_datagram`], carries out the decision, and asks [`AdmissionControl::seal`] for the
+/// bytes of each sample to a peer outside. There are no deadlines: whether a peer is silent is computed from the instant of the call that needs to know. If
+/// time goes back, no peer becomes silent in between.
 #[derive(Debug)]
 pub struct AdmissionControl {
     session: u64,
@@ -102,13 +104,14 @@ pub struct AdmissionControl {
     key: Option<SessionKey>,
     stale_after: Duration,
     limits: Option<Limits>,
-    /// What the nonces are made with, drawn anew for each session, so that no two sessions give the same ones.
+    /// Secret key of the hash that makes server nonces. Drawn anew for each session, so that no two sessions give the same nonces.
     secret: Secret,
-    /// By place.
+    /// Seats, sorted by place, so that a place is found by binary search.
     seats: Vec<SeatState>,
     stats: AdmissionStats,
 }
 
+/// Key of the server nonces. Overwritten when dropped, and never printed.
 struct Secret(Zeroizing<[u8; 32]>);
 
 impl core::fmt::Debug for Secret {
@@ -117,21 +120,21 @@ impl core::fmt::Debug for Secret {
     }
 }
 
-/// Under which keys a sample came.
+/// Keys under which a sample was sealed.
 enum Under {
-    /// Those of the present joining, or of none where there is no key.
+    /// Keys of the present joining, or no keys in a session without a key.
     Present,
-    /// New ones, made for this address. Where they lie they stay, so that no copies of them are left behind.
+    /// Newly derived keys, for the address that sent the sample. Boxed, so that the box moves and not the keys: moved keys would leave copies in memory.
     New(Box<JoiningKeys>),
 }
 
 impl AdmissionControl {
-    /// An admission control with all its seats free. 32 bytes are drawn from `entropy`, now and never again: with the same ones it does the same to the same
-    /// datagrams.
+    /// Returns an admission control whose seats are all free. Draws 32 bytes from `entropy`, in this call only. With the same bytes, the same datagrams at the
+    /// same instants get the same decisions.
     ///
     /// # Errors
     ///
-    /// [`AdmissionConfigError`] if the configuration makes no sense or there are no random bytes.
+    /// [`AdmissionConfigError`] if a number of the configuration is out of its range, two seats have the same place, or `entropy` has no random bytes.
     pub fn new(config: AdmissionConfig, entropy: &mut impl Entropy) -> Result<Self, AdmissionConfigError> {
         config.check()?;
         let mut secret = Zeroizing::new([0; 32]);
@@ -143,10 +146,10 @@ impl AdmissionControl {
         Ok(Self { session, axes, kind, peers, update, key, stale_after, limits, secret, seats, stats: AdmissionStats::default() })
     }
 
-    /// Decides about a datagram that was received from `from`.
+    /// Decides about a datagram that was received from the address `from` at the instant `now`.
     ///
-    /// Never panics, whatever the bytes are, and needs no memory for it. Give it a buffer longer than [`MAX_DATAGRAM`]: what does not fit a shorter one
-    /// would be cut, and pass.
+    /// Never panics, whatever the bytes are. Memory does not grow with the number of datagrams. Receive into a buffer longer than [`MAX_DATAGRAM`]: a shorter
+    /// buffer would cut an oversized datagram to a length that may be admitted.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) -> Admission {
         self.stats.handled += 1;
         let admission = self.decide(now, from, datagram);
@@ -161,10 +164,11 @@ impl AdmissionControl {
         admission.unwrap_or_else(Admission::Refused)
     }
 
-    /// Makes a sample of another peer ready for the one in that seat: writes it, sealed if there is a key, and gives its address and the length.
+    /// Makes the datagram that carries `sample` to the peer at `place`: writes the sample to `out`, sealed if the session has a key. Returns the address of
+    /// the peer and the length of the datagram.
     ///
-    /// `None` if nobody has the seat, if its holder was not heard for [`AdmissionConfig::stale_after`], if `place` is no seat, or if `sample` is longer than
-    /// a sample. So a false address cannot have another program flooded for longer than that.
+    /// Returns `None` if the seat was never taken, if no sample of its holder was admitted for [`AdmissionConfig::stale_after`], if `place` is no seat, or if
+    /// `sample` is longer than [`wire::MAX_LEN`]. So a false address can direct samples to an uninvolved program no longer than `stale_after`.
     pub fn seal(&mut self, now: Instant, place: Place, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<(SocketAddr, usize)> {
         let ready = self.make_ready(now, place, sample, out);
         match ready {
@@ -174,27 +178,29 @@ impl AdmissionControl {
         ready
     }
 
-    /// The counts so far.
+    /// Returns the counts so far.
     #[must_use]
     pub const fn stats(&self) -> &AdmissionStats {
         &self.stats
     }
 
-    /// Every seat, by place: its holder and since when that was not heard.
+    /// Returns the status of every seat at the instant `now`, sorted by place.
     pub fn seats(&self, now: Instant) -> impl Iterator<Item = SeatStatus<'_>> {
         self.seats.iter().map(move |seat| seat.status(now, self.stale_after))
     }
 
-    /// The seat at that place; `None` if that peer is no other program.
+    /// Returns the status of the seat at `place`, or `None` if the peer at that place is not another program.
     #[must_use]
     pub fn seat(&self, now: Instant, place: Place) -> Option<SeatStatus<'_>> {
         self.find(place).map(|index| self.seats[index].status(now, self.stale_after))
     }
 
+    /// Returns the index in `seats` of the seat at `place`.
     fn find(&self, place: Place) -> Option<usize> {
         self.seats.binary_search_by_key(&place, SeatState::place).ok()
     }
 
+    /// Tells hellos from samples by their first bytes. The length is checked before any byte is read.
     fn decide(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
         if datagram.len() > MAX_DATAGRAM {
             return Err(Refusal::Oversized);
@@ -202,7 +208,8 @@ impl AdmissionControl {
         if datagram.starts_with(&HELLO_MAGIC) { self.handle_hello(from, datagram) } else { self.handle_sample(now, from, datagram) }
     }
 
-    /// Answers a hello. Neither the time nor earlier hellos decide whether it is answered: then no hello of an attacker can take the answer from another one.
+    /// Answers a hello. The decision depends neither on the time nor on earlier hellos: otherwise the hellos of an attacker could keep another peer from its
+    /// welcome.
     fn handle_hello(&self, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
         let unchecked = Hello::decode(datagram).map_err(Refusal::of_hello)?;
         let Some(key) = &self.key else { return Err(Refusal::Keyless) };
@@ -211,6 +218,7 @@ impl AdmissionControl {
             return Err(Refusal::ForeignSession);
         }
         let index = self.find(place).ok_or(Refusal::UnknownSeat)?;
+        // The tag is checked last, because the hash costs more than all other checks.
         unchecked.verify(key).map_err(Refusal::of_hello)?;
         let server_nonce = self.server_nonce(index, from);
         let tick = self.seats[index].tick();
@@ -221,9 +229,11 @@ impl AdmissionControl {
         Ok(Admission::Reply { to: from, bytes: welcome.encode(key) })
     }
 
+    /// Decides about a sample. Format, session and seat are checked before the tag, because the hash costs more. State changes only after all checks, in
+    /// `take_or_keep`.
     fn handle_sample(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
         let plain_len = self.kind.datagram_len(self.axes);
-        // The seal is taken off by length alone; what the bytes are worth is decided below.
+        // Whether a seal is present follows from the length alone. Whether the seal is right is decided in `unseal`.
         let sealed = (datagram.len() == plain_len + SEAL_LEN).then(|| Sealed::split(datagram)).flatten();
         let plain = sealed.map_or(datagram, |sealed| sealed.sample);
         let (sample, _) = Sample::<3>::decode_as(plain, self.kind, self.axes).map_err(Refusal::of_sample)?;
@@ -237,7 +247,7 @@ impl AdmissionControl {
             (Some(_), None) => return Err(Refusal::Unsealed),
             (Some(key), Some(sealed)) => self.unseal(key, index, from, sealed)?,
         };
-        // From here on it is known to be what its sender wrote, if there is a key.
+        // From here on, in a session with a key, the sample is known to be unchanged since a holder of the key made the seal.
         if sample.sequence >= SEQUENCE_END {
             return Err(Refusal::SequenceRange);
         }
@@ -251,10 +261,12 @@ impl AdmissionControl {
         let seat = &self.seats[index];
         let mut buffer = [0; wire::MAX_LEN];
         buffer[..plain.len()].copy_from_slice(plain);
+        // A decoded sample has a full header, so that bytes 24 to 31 are within `plain`, and `plain` is at most `MAX_LEN` long.
         buffer[SEQUENCE_AT].copy_from_slice(&seat.number_inside(sample.sequence).to_le_bytes());
         Ok(Admission::Sample { place: seat.place(), joined, sample: Admitted { buffer, len: plain.len() } })
     }
 
+    /// Checks the seal of a sample, first under the keys of the present joining, then under keys derived for a new joining from `from`.
     fn unseal(&self, key: &SessionKey, index: usize, from: SocketAddr, sealed: Sealed<'_>) -> Result<Under, Refusal> {
         let seat = &self.seats[index];
         if let Some(Occupant { address, keys: Some(keys), .. }) = seat.occupant()
@@ -264,15 +276,17 @@ impl AdmissionControl {
         {
             return Ok(Under::Present);
         }
+        // Not sealed under the present keys: a program that joins, or a forgery. `of_sample` returns keys only if the tag fits.
         let keys = JoiningKeys::of_sample(key, self.session, seat.place(), sealed, &self.server_nonce(index, from));
         let otherwise = if seat.occupant().is_some() { Refusal::Forged } else { Refusal::NotJoined };
         keys.map(|keys| Under::New(Box::new(keys))).ok_or(otherwise)
     }
 
-    /// The nonce for a program that asks for that seat from that address, until the seat is taken the next time.
+    /// Returns the server nonce for a program that asks for the seat from the address `from`. Changes when the seat is taken.
     fn server_nonce(&self, index: usize, from: SocketAddr) -> Nonce {
         let seat = &self.seats[index];
-        // An IPv4 address reads the same where a socket of IPv6 shows it mapped. Scope and flow label are of this machine alone.
+        // A socket of IPv6 shows an IPv4 address in mapped form; both forms must give the same nonce. Scope and flow label are left out, because both have a
+        // meaning on this machine only.
         let ip = match from {
             SocketAddr::V4(v4) => v4.ip().to_ipv6_mapped(),
             SocketAddr::V6(v6) => *v6.ip(),
@@ -280,6 +294,7 @@ impl AdmissionControl {
         nonce_of(&self.secret.0, &[&seat.place().0.to_le_bytes(), &seat.joinings().to_le_bytes(), &ip.octets(), &from.port().to_le_bytes()])
     }
 
+    /// Writes a sample for the peer at `place`. See [`AdmissionControl::seal`], which also counts.
     fn make_ready(&self, now: Instant, place: Place, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<(SocketAddr, usize)> {
         let occupant = self.seats[self.find(place)?].present(now, self.stale_after)?;
         let len = match &occupant.keys {

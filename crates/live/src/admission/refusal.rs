@@ -1,4 +1,4 @@
-//! Why a datagram was not let in, and how often what happened.
+//! Causes of refusal, and the counts of the admission.
 
 use core::fmt;
 
@@ -6,55 +6,55 @@ use cohaptic_peer::wire::DecodeError;
 
 use crate::handshake::HandshakeError;
 
-/// Why the session did not let a datagram in. Nothing but a counter has changed.
+/// Cause for which the session refused a datagram. A refused datagram changes nothing but a counter.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Refusal {
-    /// Shorter than the header of a sample.
+    /// The datagram is no hello, and shorter than the header of a sample.
     TooShort,
-    /// Longer than [`MAX_DATAGRAM`](crate::MAX_DATAGRAM).
+    /// The datagram is longer than [`MAX_DATAGRAM`](crate::MAX_DATAGRAM).
     Oversized,
-    /// Neither a sample nor a hello.
+    /// The datagram is neither a sample nor a hello.
     Magic,
-    /// Of another version.
+    /// The datagram has another version of the protocol, or its sample is of another kind.
     Version,
-    /// With another number of axes.
+    /// The sample has another number of axes than the scene.
     Axes,
-    /// With an attitude where the object does not turn, or without one where it does.
+    /// The sample has an attitude although the object does not turn, or has no attitude although the object turns.
     Motion,
-    /// Of a length that does not fit what it is.
+    /// The length of the datagram does not fit its type.
     Length,
-    /// A byte that must be zero is not.
+    /// A byte that must be zero is not zero.
     Reserved,
     /// A position or a velocity is infinite or not a number.
     NotFinite,
-    /// The quaternion of its attitude does not have the norm 1.
+    /// The quaternion of the attitude does not have the norm 1.
     NotUnit,
     /// A position or a velocity is beyond the [`Limits`](super::Limits) of the session.
     OutOfRange,
-    /// The number of the sample is 2⁴⁰ or more.
+    /// The sequence number of the sample is 2⁴⁰ or more.
     SequenceRange,
-    /// Of another session.
+    /// The datagram belongs to another session.
     ForeignSession,
-    /// From a place that is no seat of the session.
+    /// The place in the datagram is no seat of the session.
     UnknownSeat,
-    /// For a seat whose holder is another program that was heard lately.
+    /// The seat belongs to another program, of which a sample was admitted less than `stale_after` ago.
     SeatTaken,
-    /// A hello, or a sealed sample, in a session without a key.
+    /// A hello, or a sealed sample, was sent to a session without a key.
     Keyless,
-    /// A sample without a seal, in a session with a key.
+    /// A sample without a seal was sent to a session with a key.
     Unsealed,
-    /// Its tag is wrong: made with another key, for another joining or another address, the other way round, or changed.
+    /// The tag is wrong: made with another key, for another joining, for another address or for the other direction, or the datagram was changed.
     Forged,
-    /// As [`Refusal::Forged`], for a seat that nobody has taken yet.
+    /// The tag is wrong as in [`Refusal::Forged`], and the seat has not been taken yet.
     NotJoined,
-    /// Its number was let in before, or is too old to tell.
+    /// The sequence number was admitted before, or is too old to tell.
     Replayed,
-    /// The seat was taken 2²⁴ times: its numbers are used up.
+    /// The seat was taken 2²⁴ times, so that its numbers of joinings are used up.
     JoiningsUsedUp,
 }
 
 impl Refusal {
-    /// Every cause, in the order of its counters.
+    /// All causes, in the order of their counters.
     pub const ALL: [Self; 21] = [
         Self::TooShort,
         Self::Oversized,
@@ -79,7 +79,7 @@ impl Refusal {
         Self::JoiningsUsedUp,
     ];
 
-    /// Its name in documents and tables.
+    /// Returns the name of the cause in documents and tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -107,6 +107,7 @@ impl Refusal {
         }
     }
 
+    /// Returns the cause for a sample that cannot be decoded.
     pub(super) const fn of_sample(error: DecodeError) -> Self {
         match error {
             DecodeError::TooShort { .. } => Self::TooShort,
@@ -117,11 +118,12 @@ impl Refusal {
             DecodeError::Length { .. } => Self::Length,
             DecodeError::NotFinite { .. } => Self::NotFinite,
             DecodeError::NotUnit => Self::NotUnit,
-            // What a later version of the decoder may find wrong is a byte that this one does not know.
+            // The decoder may check more reserved bytes in a later version. Such a byte is counted here, too.
             DecodeError::Reserved => Self::Reserved,
         }
     }
 
+    /// Returns the cause for a hello that cannot be decoded or has a wrong tag.
     pub(super) const fn of_hello(error: HandshakeError) -> Self {
         match error {
             HandshakeError::Magic => Self::Magic,
@@ -139,38 +141,39 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// The counts of the admission. Every datagram that was handed in is admitted, welcomed or refused: the three add up to [`AdmissionStats::handled`].
+/// Counts of the admission. Every datagram handed in is admitted, welcomed or refused: these three counts add up to [`AdmissionStats::handled`].
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct AdmissionStats {
-    /// Datagrams that were handed in.
+    /// Datagrams handed in.
     pub handled: u64,
-    /// Samples that were let in.
+    /// Samples admitted.
     pub admitted: u64,
-    /// Hellos that were answered.
+    /// Hellos answered.
     pub welcomed: u64,
-    /// How many of the admitted samples took a seat.
+    /// Admitted samples that took a seat.
     pub joinings: u64,
-    /// Samples that were made ready for a peer.
+    /// Samples made ready for a peer outside.
     pub sent: u64,
-    /// Samples for seats that nobody has, or that have not been heard lately.
+    /// Samples not sent: the receiver's seat was never taken, its holder is gone, the receiver has no seat, or the sample is too long.
     pub nobody_there: u64,
+    /// Refused datagrams, indexed by cause: `Refusal as usize`.
     refused: [u64; Refusal::ALL.len()],
 }
 
 impl AdmissionStats {
-    /// How many datagrams were refused for that cause.
+    /// Returns the number of datagrams refused for `cause`.
     #[must_use]
     pub const fn refused(&self, cause: Refusal) -> u64 {
         self.refused[cause as usize]
     }
 
-    /// How many datagrams were refused.
+    /// Returns the number of datagrams refused for any cause.
     #[must_use]
     pub fn refused_in_all(&self) -> u64 {
         self.refused.iter().sum()
     }
 
-    /// Every cause with its count, zeros among them.
+    /// Returns every cause with its count, causes that never occurred included.
     pub fn refusals(&self) -> impl Iterator<Item = (Refusal, u64)> + '_ {
         Refusal::ALL.into_iter().map(|cause| (cause, self.refused(cause)))
     }

@@ -1,4 +1,4 @@
-//! One seat: its holder, which numbers were seen, and whether it can be taken.
+//! One seat of a session: its holder, the sequence numbers seen from the holder, and the rule by which another program can take the seat.
 
 use core::time::Duration;
 use std::net::SocketAddr;
@@ -8,41 +8,47 @@ use cohaptic_units::Instant;
 use super::{JOININGS_END, Place, Refusal, SEQUENCE_BITS, Seat, Under};
 use crate::seal::JoiningKeys;
 
-/// What a seat is like at an instant.
+/// Status of a seat at an instant.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SeatStatus<'a> {
-    /// Its place.
+    /// Index of the peer in the scene.
     pub place: Place,
-    /// The name of the peer in the scene.
+    /// Name of the peer in the scene.
     pub name: &'a str,
-    /// Where the peer was heard from last; `None` if it never was.
+    /// Address of the holder. `None` if the seat was never taken.
     pub address: Option<SocketAddr>,
-    /// When a sample of it was let in last; `None` if none ever was.
+    /// Instant of the latest admitted sample of the holder. `None` if the seat was never taken.
     pub heard: Option<Instant>,
-    /// Whether that is less than `stale_after` ago.
+    /// Whether the latest sample was admitted less than `stale_after` ago.
     pub present: bool,
-    /// How often the seat was taken.
+    /// Number of times that the seat was taken.
     pub joinings: u64,
-    /// How many samples were let in.
+    /// Number of samples admitted, in all joinings together.
     pub admitted: u64,
 }
 
-/// A seat and its holder.
+/// A seat, its holder and its counts.
 #[derive(Debug)]
 pub(super) struct SeatState {
     seat: Seat,
+    /// Holder of the seat, also if the holder is gone. `None` if the seat was never taken.
     occupant: Option<Occupant>,
+    /// Number of times that the seat was taken, at most `JOININGS_END`.
     joinings: u64,
+    /// Samples admitted, in all joinings together.
     admitted: u64,
 }
 
-/// The holder of a seat, present or gone.
+/// Holder of a seat, present or gone.
 #[derive(Debug)]
 pub(super) struct Occupant {
+    /// Address to which samples are sent: the sender of the sample that took the seat.
     pub(super) address: SocketAddr,
-    /// `None` in a session without a key.
+    /// Keys of the joining. `None` in a session without a key. Boxed, so that the keys are not copied when the occupant moves.
     pub(super) keys: Option<Box<JoiningKeys>>,
+    /// Instant of the latest admitted sample.
     heard: Instant,
+    /// Sequence numbers seen in the present joining.
     window: Window,
 }
 
@@ -67,7 +73,7 @@ impl SeatState {
         self.occupant.as_ref()
     }
 
-    /// The holder of the seat, if heard lately.
+    /// Returns the holder of the seat, if a sample of the holder was admitted less than `stale_after` ago.
     pub(super) fn present(&self, now: Instant, stale_after: Duration) -> Option<&Occupant> {
         self.occupant.as_ref().filter(|occupant| since(occupant.heard, now) < stale_after)
     }
@@ -85,18 +91,20 @@ impl SeatState {
         }
     }
 
-    /// Takes in a sample that is good in itself. Whether it took the seat.
+    /// Admits a sample whose format, limits and tag are right. Returns whether the sample took the seat, or the refusal if the seat belongs to another
+    /// program, the sequence number is a repetition, or the joinings are used up.
     pub(super) fn take_or_keep(&mut self, now: Instant, stale_after: Duration, from: SocketAddr, number: u64, under: Under) -> Result<bool, Refusal> {
         let present = self.present(now, stale_after).is_some();
         let same_address = self.occupant.as_ref().is_some_and(|occupant| occupant.address == from);
         let keys = match under {
-            // With a key, a joining lasts until the next one, however long the peer is silent. Without, it ends with the silence.
+            // With a key, a joining lasts until the next joining, however long the peer is silent: `unseal` has checked the address and the keys. Without a
+            // key, a joining ends with the silence.
             Under::Present if self.occupant.as_ref().is_some_and(|occupant| occupant.keys.is_some()) => return self.keep(now, number),
             Under::Present if present && same_address => return self.keep(now, number),
             Under::Present => None,
             Under::New(keys) => Some(keys),
         };
-        // New keys from the address of the holder: the same program has begun anew. Anybody else waits until he has gone.
+        // New keys from the address of the holder mean that the same program has begun anew. A program at another address waits until the holder has gone.
         if present && !same_address {
             return Err(Refusal::SeatTaken);
         }
@@ -109,6 +117,7 @@ impl SeatState {
         Ok(true)
     }
 
+    /// Admits a sample of the present joining, unless its number was seen before or is too old to tell.
     fn keep(&mut self, now: Instant, number: u64) -> Result<bool, Refusal> {
         let Some(occupant) = &mut self.occupant else { return Err(Refusal::NotJoined) };
         if !occupant.window.accept(number) {
@@ -119,38 +128,40 @@ impl SeatState {
         Ok(false)
     }
 
-    /// The number that a sample of the present joining has for those inside: it never goes back when the peer joins again. That of the first joining
-    /// is unchanged.
+    /// Returns the sequence number that the scene sees for `number` in the present joining: the joining, counted from 0, in the upper bits. So the numbers
+    /// never go back when a peer joins again, and in the first joining `number` is unchanged.
     pub(super) const fn number_inside(&self, number: u64) -> u64 {
         self.joinings.saturating_sub(1) << SEQUENCE_BITS | number
     }
 }
 
-/// How long ago `then` was; nothing if it is yet to come.
+/// Returns the time from `then` to `now`, or zero if `then` is later than `now`.
 const fn since(then: Instant, now: Instant) -> Duration {
     Duration::from_nanos(now.as_nanos().saturating_sub(then.as_nanos()))
 }
 
-/// How far behind the highest number one that is late is still let in, once.
+/// Length of the window of sequence numbers: a late number is admitted once if the number is less than this below the highest number seen.
 pub const WINDOW: u32 = 128;
 
-/// The numbers seen in one joining: a window of the last 128, as in RFC 4303, section 3.4.3.
+/// Sequence numbers seen in one joining: a window of 128 numbers up to the highest number seen, as in RFC 4303, section 3.4.3.
 #[derive(Clone, Copy, Debug)]
 struct Window {
+    /// Highest number seen.
     highest: u64,
-    /// Bit i: `highest` − i has been seen. Bit 0 is always set.
+    /// Bit i is set if the number `highest` − i has been seen. Bit 0 is always set.
     seen: u128,
 }
 
 impl Window {
-    /// After the first number of a joining, which may be any.
+    /// Returns the window after the first number of a joining. That number may be any number.
     const fn beginning_with(number: u64) -> Self {
         Self { highest: number, seen: 1 }
     }
 
-    /// Whether that number may pass; from now on it is seen.
+    /// Returns whether `number` is admitted: neither seen before nor below the window. An admitted number counts as seen.
     const fn accept(&mut self, number: u64) -> bool {
         if number > self.highest {
+            // A shift by 128 or more bits would overflow; after such a jump no earlier number is within the window.
             let ahead = number - self.highest;
             self.seen = if ahead < WINDOW as u64 { self.seen << ahead | 1 } else { 1 };
             self.highest = number;
@@ -186,7 +197,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Against a set of all numbers ever seen, with jumps over and within the window.
+        /// Compares the window with a set of all numbers ever seen, with jumps within the window and beyond the window.
         #[test]
         fn it_lets_in_what_a_set_would_and_nothing_older_than_the_window(steps in prop::collection::vec((-200_i64..200, any::<bool>()), 1..300)) {
             let mut seen = BTreeSet::from([1000_u64]);
