@@ -1,4 +1,4 @@
-//! What a program says to the session, and what it makes of what it hears, from the first hello to the end.
+//! State machine of a client: the datagrams that a program sends to the session and receives from the session, from the first hello to the end.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -10,88 +10,93 @@ use super::{Joined, Joining};
 use crate::handshake::HANDSHAKE_LEN;
 use crate::{Entropy, EntropyError, MAX_DATAGRAM, Place, SessionKey};
 
-/// How long to wait for a welcome before saying hello again.
+/// Time between two hellos while no welcome comes.
 pub const HELLO_EVERY: Duration = Duration::from_millis(250);
-/// Without anything new from anybody for so long, a client begins anew: the session may have been started again.
+/// Time without a new sample from any peer after which a client begins anew: the session may have been restarted.
 pub const SILENCE: Duration = Duration::from_secs(1);
 
-/// The identity of a client, and how it is to join.
+/// Identity of a client, and its way of joining.
 #[derive(Clone, Debug)]
 pub enum ClientConfig {
-    /// In a session without a key, of which everything is known beforehand.
+    /// For a session without a key. The parameters of the session must be known beforehand.
     Keyless {
-        /// The session.
+        /// Number of the session.
         session: u64,
-        /// The seat.
+        /// Place of the client's seat.
         place: Place,
-        /// What a welcome would tell.
+        /// Parameters of the session, which no welcome tells.
         info: SessionInfo,
     },
-    /// In a session with a key.
+    /// For a session with a key. The welcome tells the parameters of the session.
     Keyed {
-        /// The session.
+        /// Number of the session.
         session: u64,
-        /// The seat.
+        /// Place of the client's seat.
         place: Place,
-        /// Its key.
+        /// Session key.
         key: SessionKey,
     },
 }
 
-/// What a peer must know of a session.
+/// Parameters of a session that a peer must know.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SessionInfo {
-    /// How many axes a sample has, 1 to 3.
+    /// Number of axes of a sample, 1 to 3.
     pub axes: usize,
-    /// How many peers the scene has.
+    /// Number of peers of the scene, this peer included.
     pub peers: u32,
-    /// Tc.
+    /// Control tick Tc of the client's place.
     pub tick: Duration,
-    /// Tn.
+    /// Period of sending Tn.
     pub update: Duration,
 }
 
-/// What a datagram was.
+/// Meaning of a received datagram.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Heard {
-    /// The newest sample of its sender: to be held from now on. Axes that the session does not have are zero.
+    /// Newest sample of its sender, to be held from now on. Axes that the session does not have are zero.
     Newest(Sample<3>),
-    /// A sample that is late or repeated.
+    /// Sample that is not newer than an earlier sample of its sender.
     Late(Sample<3>),
-    /// The welcome that was waited for.
+    /// Welcome for the hello of this client. The client may now seal samples.
     Welcome,
-    /// Nothing for this client.
+    /// Datagram that is not for this client, or not valid.
     Ignored,
 }
 
-/// A program's part of the protocol, as a state machine: datagrams in with [`Client::handle_datagram`], hellos out with [`Client::poll_hello`], samples
-/// out with [`Client::seal`].
+/// Client side of the protocol as a state machine. Received datagrams go in through [`Client::handle_datagram`]. Hellos come out of [`Client::poll_hello`],
+/// and samples out of [`Client::seal`].
 ///
-/// Call [`Client::poll_hello`] at every tick, or when [`Client::poll_timeout`] says. The answer of `poll_timeout` may change after `handle_datagram`
-/// and `poll_hello`. A late call makes a hello late and nothing else.
+/// Call [`Client::poll_hello`] at every tick, or at the instant that [`Client::poll_timeout`] returns. That instant may change with each call of
+/// `handle_datagram` or `poll_hello`. A late call delays a hello and has no other effect.
 #[derive(Debug)]
 pub struct Client {
     session: u64,
     place: Place,
+    /// `None` in a session without a key.
     key: Option<SessionKey>,
+    /// Parameters of the session. `None` before the first welcome.
     info: Option<SessionInfo>,
+    /// Kind of the samples, until a welcome says otherwise.
     kind: SampleKind,
-    /// What the sample that was heard last says beyond position and velocity.
+    /// Data beyond position and velocity in the sample that was opened last.
     extra: Extra<3>,
-    /// The present joining, with a key and after the first welcome.
+    /// Present joining. `None` before the first welcome, and in a session without a key.
     joined: Option<Joined>,
-    /// The one that is asked for.
+    /// Joining for which hellos are sent. `None` while no hello needs an answer. Every repeated hello is the same datagram.
     joining: Option<Joining>,
+    /// Earliest instant of the next hello.
     next_hello: Instant,
-    /// When something new was heard last, or the client began anew.
+    /// Instant of the latest new sample, or of the latest new beginning.
     heard: Instant,
-    /// The highest number by sender: at most as many as there are peers.
+    /// Highest sequence number received, by sender. Has at most as many entries as the scene has peers, because `open` refuses other senders.
     newest: BTreeMap<u32, u64>,
+    /// Number of welcomes taken.
     joinings: u64,
 }
 
 impl Client {
-    /// A client that has said nothing yet, of a session whose samples are states.
+    /// Returns a client that has sent nothing yet, for a session whose samples are states.
     #[must_use]
     pub fn new(config: ClientConfig, now: Instant) -> Self {
         let (session, place, key, info) = match config {
@@ -115,42 +120,42 @@ impl Client {
         }
     }
 
-    /// For a session whose samples are of that kind.
+    /// Returns the client, for a session whose samples are of the kind `kind`.
     #[must_use]
     pub fn with_kind(self, kind: SampleKind) -> Self {
         Self { kind, ..self }
     }
 
-    /// What the sample that [`Client::handle_datagram`] gave last says beyond position and velocity.
+    /// Returns the data beyond position and velocity of the sample that [`Client::handle_datagram`] returned last.
     #[must_use]
     pub const fn extra(&self) -> &Extra<3> {
         &self.extra
     }
 
-    /// What samples of the session carry beyond the state; with a key, as the welcome says.
+    /// Returns the kind of the session's samples. With a key, a welcome can change the kind to attitudes.
     #[must_use]
     pub const fn kind(&self) -> SampleKind {
         self.kind
     }
 
-    /// The session's parameters; `None` before the first welcome.
+    /// Returns the parameters of the session. `None` before the first welcome.
     #[must_use]
     pub const fn info(&self) -> Option<&SessionInfo> {
         self.info.as_ref()
     }
 
-    /// How many welcomes were taken.
+    /// Returns the number of welcomes taken.
     #[must_use]
     pub const fn joinings(&self) -> u64 {
         self.joinings
     }
 
-    /// The hello that is to be sent now, if one is. With a key: before the first welcome, and while nothing new is heard. Without one it is never
-    /// any, but the numbers of the others are forgotten in their silence.
+    /// Returns the hello that is to be sent now, if any. With a key, hellos are sent before the first welcome and while no new sample comes. Without a key
+    /// there are no hellos, but after a silence the client forgets the sequence numbers of all peers.
     ///
     /// # Errors
     ///
-    /// [`EntropyError`] if a nonce is needed and there are no random bytes. It is tried again at the next call.
+    /// [`EntropyError`] if a nonce is needed and the source has no random bytes. The next call tries again.
     pub fn poll_hello(&mut self, now: Instant, entropy: &mut impl Entropy) -> Result<Option<[u8; HANDSHAKE_LEN]>, EntropyError> {
         let silent = now >= self.silent_from();
         let Some(key) = &self.key else {
@@ -160,12 +165,14 @@ impl Client {
             return Ok(None);
         };
         if self.joined.is_some() && !silent {
+            // New samples have come again without a welcome: the session still has this joining.
             self.joining = None;
             return Ok(None);
         }
         if now < self.next_hello {
             return Ok(None);
         }
+        // A repeated hello has the same nonce, so that a late welcome for an earlier hello still fits.
         let joining = match self.joining.take() {
             Some(joining) => joining,
             None => Joining::draw(self.session, self.place, key, entropy)?.with_kind(self.kind),
@@ -174,13 +181,13 @@ impl Client {
         Ok(Some(self.joining.insert(joining).hello()))
     }
 
-    /// When [`Client::poll_hello`] has something to do next.
+    /// Returns the instant at which [`Client::poll_hello`] has to be called next.
     #[must_use]
     pub fn poll_timeout(&self) -> Instant {
         if self.key.is_some() && self.joined.is_none() { self.next_hello } else { self.silent_from().max(self.next_hello) }
     }
 
-    /// Takes in a datagram from the session. Never panics; a datagram for somebody else changes nothing.
+    /// Handles a datagram from the session, received at `now`. Never panics. A datagram that is not for this client, or not valid, changes nothing.
     pub fn handle_datagram(&mut self, now: Instant, datagram: &[u8]) -> Heard {
         if let Some(joining) = &self.joining
             && let Ok(joined) = joining.handle_welcome(datagram)
@@ -192,6 +199,7 @@ impl Client {
             self.joined = Some(joined);
             self.joining = None;
             self.joinings += 1;
+            // The session may have been restarted, and its peers may count from 0 again.
             self.begin_anew(now);
             return Heard::Welcome;
         }
@@ -200,8 +208,8 @@ impl Client {
         self.take(now, sample)
     }
 
-    /// Writes a sample for the session, sealed if there is a key, and gives its length. `None` before the first welcome, where there is a key, and if
-    /// `sample` is longer than a sample.
+    /// Writes the datagram that carries `sample` to the session, sealed if there is a key, and returns its length. Returns `None` if `sample` is longer than a
+    /// sample can be, and, with a key, before the first welcome.
     pub fn seal(&self, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<usize> {
         match (&self.key, &self.joined) {
             (Some(_), joined) => joined.as_ref()?.seal(sample, out),
@@ -212,6 +220,8 @@ impl Client {
         }
     }
 
+    /// Returns the sample in a datagram, if the seal is right and the sample comes from another peer of this session. A personal sample must also be for this
+    /// client.
     fn open(&self, datagram: &[u8]) -> Option<(Sample<3>, Extra<3>)> {
         let info = self.info?;
         let plain = match (&self.key, &self.joined) {
@@ -224,6 +234,7 @@ impl Client {
         (sample.session == self.session && other && mine).then_some((sample, extra))
     }
 
+    /// Decides whether a sample is newer than all earlier samples of its sender. Only a newer sample ends a silence: a recorded sample must not.
     fn take(&mut self, now: Instant, sample: Sample<3>) -> Heard {
         if self.newest.get(&sample.sender).is_some_and(|&newest| sample.sequence <= newest) {
             return Heard::Late(sample);
@@ -233,11 +244,13 @@ impl Client {
         Heard::Newest(sample)
     }
 
+    /// Forgets the sequence numbers of all peers, and begins a new silence at `now`.
     fn begin_anew(&mut self, now: Instant) {
         self.newest.clear();
         self.heard = now;
     }
 
+    /// Returns the instant from which on the session counts as silent.
     fn silent_from(&self) -> Instant {
         self.heard.saturating_add(SILENCE)
     }

@@ -1,7 +1,7 @@
-//! The datagrams of one joining in a session with a key.
+//! Datagrams of one joining in a session with a key.
 //!
-//! [`Joining::hello`] → send, again every quarter of a second until → [`Joining::handle_welcome`] → [`Joined::seal`] each sample sent, [`Joined::open`]
-//! each datagram received.
+//! Send [`Joining::hello`] every quarter of a second, until [`Joining::handle_welcome`] accepts a received datagram. Then seal each sent sample with
+//! [`Joined::seal`], and open each received datagram with [`Joined::open`].
 
 use cohaptic_peer::wire::SampleKind;
 
@@ -9,28 +9,29 @@ use crate::handshake::{HANDSHAKE_LEN, HandshakeError, Hello, Welcome};
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, SEAL_LEN, Sealed};
 use crate::{Entropy, EntropyError, Nonce, Place, SessionKey};
 
-/// A peer that has asked for a seat, or is about to.
+/// Peer that asks for a seat: a hello that is not answered yet.
 #[derive(Clone, Debug)]
 pub struct Joining {
     hello: Hello,
     key: SessionKey,
+    /// Kind of the samples, unless the welcome says that samples carry attitudes.
     kind: SampleKind,
 }
 
 impl Joining {
-    /// For a session whose samples are states, or carry attitudes, which the welcome says. With a nonce, which must never have been used before.
+    /// Returns a joining for a session whose samples are states, or carry attitudes if the welcome says so. `client_nonce` must never have been used before.
     #[must_use]
     pub fn new(session: u64, place: Place, key: &SessionKey, client_nonce: Nonce) -> Self {
         Self { hello: Hello { session, place, client_nonce }, key: key.clone(), kind: SampleKind::State }
     }
 
-    /// For a session whose samples are of that kind.
+    /// Returns the joining, for a session whose samples are of the kind `kind`.
     #[must_use]
     pub fn with_kind(self, kind: SampleKind) -> Self {
         Self { kind, ..self }
     }
 
-    /// With a nonce that is drawn now.
+    /// Returns a joining with a nonce drawn from `entropy`.
     ///
     /// # Errors
     ///
@@ -41,41 +42,42 @@ impl Joining {
         Ok(Self::new(session, place, key, client_nonce))
     }
 
-    /// The datagram to send, the same each time.
+    /// Returns the hello to be sent. Every call returns the same datagram.
     #[must_use]
     pub fn hello(&self) -> [u8; HANDSHAKE_LEN] {
         self.hello.encode(&self.key)
     }
 
-    /// Takes in the answer.
+    /// Checks whether `datagram` is the welcome for this joining, and returns the peer that has joined.
     ///
     /// # Errors
     ///
-    /// [`WelcomeError`] if it is no welcome, or none for this joining: it should be ignored. Never panics.
+    /// [`WelcomeError`] if `datagram` is no welcome or the welcome for another joining. Such a datagram should be ignored. Never panics.
     pub fn handle_welcome(&self, datagram: &[u8]) -> Result<Joined, WelcomeError> {
         let welcome = Welcome::decode(datagram, &self.key)?;
         let Hello { session, place, client_nonce } = self.hello;
         if (welcome.session, welcome.place, welcome.client_nonce) != (session, place, client_nonce) {
             return Err(WelcomeError::Other);
         }
+        // The right tag and the nonce of this joining's hello prove that the welcome was made for this hello.
         let keys = JoiningKeys::derive(&self.key, session, place, client_nonce, welcome.server_nonce);
         let kind = if welcome.turns { SampleKind::Attitude } else { self.kind };
         Ok(Joined { welcome, keys, kind })
     }
 }
 
-/// Why a datagram is no welcome for this joining.
+/// Reason why a datagram is not the welcome for a joining.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum WelcomeError {
-    /// It is no welcome at all, or not one made with the key.
+    /// The datagram is no welcome, or was not made with the session key.
     #[error(transparent)]
     Handshake(#[from] HandshakeError),
-    /// It answers another hello.
+    /// The welcome answers another hello.
     #[error("it answers another hello")]
     Other,
 }
 
-/// A peer that may speak, and has a seat as soon as its first sample has arrived.
+/// Peer that has the keys of its joining. The peer has its seat as soon as its first sample is admitted.
 #[derive(Debug)]
 pub struct Joined {
     welcome: Welcome,
@@ -84,28 +86,29 @@ pub struct Joined {
 }
 
 impl Joined {
-    /// What the session has said of the session.
+    /// Returns the welcome, with the parameters of the session.
     #[must_use]
     pub const fn welcome(&self) -> &Welcome {
         &self.welcome
     }
 
-    /// What samples of the session carry beyond the state.
+    /// Returns the kind of the session's samples.
     #[must_use]
     pub const fn kind(&self) -> SampleKind {
         self.kind
     }
 
-    /// Writes a sample for the session and gives its length; `None` if `sample` is longer than a sample.
+    /// Writes the sealed sample to `out` and returns its length. Returns `None` if `sample` is longer than a sample can be.
     pub fn seal(&self, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<usize> {
         self.keys.to_door.seal(&self.keys.client_nonce, sample, out)
     }
 
-    /// The sample in a datagram from the session. It may be late or repeated: go by the number in it, sender by sender.
+    /// Returns the sample in a datagram from the session. The sample may be late or repeated: compare its sequence number with earlier samples of the same
+    /// sender.
     ///
     /// # Errors
     ///
-    /// [`OpenError`] if it was not made for this joining. Never panics.
+    /// [`OpenError`] if the datagram was not sealed for this joining. Never panics.
     pub fn open<'a>(&self, datagram: &'a [u8]) -> Result<&'a [u8], OpenError> {
         let expected = self.kind.datagram_len(usize::from(self.welcome.axes)) + SEAL_LEN;
         let sealed = Sealed::split(datagram).filter(|_| datagram.len() == expected).ok_or(OpenError::Length { found: datagram.len(), expected })?;
@@ -119,21 +122,21 @@ impl Joined {
     }
 }
 
-/// Why a datagram from the session cannot be opened.
+/// Reason why a datagram from the session cannot be opened.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum OpenError {
-    /// It has another length than a sealed sample of this session.
+    /// The datagram is not as long as a sealed sample of this session.
     #[error("{found} bytes; expected {expected}")]
     Length {
-        /// The length it has.
+        /// Length of the datagram \[byte\].
         found: usize,
-        /// The length that fits.
+        /// Length of a sealed sample \[byte\].
         expected: usize,
     },
-    /// It was made for another joining, perhaps an earlier one of this peer.
+    /// The datagram was made for another joining, perhaps for an earlier joining of this peer.
     #[error("made for another joining")]
     OtherJoining,
-    /// Its tag is wrong.
+    /// The tag is wrong: the datagram was made with another key, or changed.
     #[error("it was made with another key or changed on the way")]
     Forged,
 }

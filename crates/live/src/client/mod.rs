@@ -1,7 +1,8 @@
-//! The other side of [admission](crate::AdmissionControl), for programs in Rust: it makes and checks datagrams, and leaves sockets and clocks to its user.
+//! Client side of [admission](crate::AdmissionControl), for peers written in Rust: makes and checks datagrams, and leaves sockets and clocks to its user.
 //!
-//! A [`Client`] does all that `docs/live-protocol.md` asks of a program: it says hello until it is answered, seals and opens, tells new samples from
-//! late ones, and begins anew when it has heard nothing new for a second. [`Joining`] and [`Joined`] are the datagrams alone.
+//! A [`Client`] does all that `docs/live-protocol.md` asks of a program. A client says hello until a welcome comes, seals sent samples and opens received
+//! samples, tells new samples from late samples, and begins anew when no new sample has come for a second. [`Joining`] and [`Joined`] only make and check the
+//! datagrams.
 
 mod conversation;
 mod joining;

@@ -1,4 +1,4 @@
-//! A peer asks for its seat.
+//! Hello: the datagram with which a peer asks for its seat.
 //!
 //! ```text
 //! offset  size  field
@@ -16,34 +16,36 @@
 use super::{BODY_LEN, HANDSHAKE_LEN, HandshakeError, VERSION, finish, open, part, verify};
 use crate::{Nonce, Place, SessionKey};
 
-/// The first four bytes of a hello.
+/// First four bytes of a hello.
 pub const HELLO_MAGIC: [u8; 4] = *b"CHPH";
 
-/// A peer asks for its seat.
+/// Request of a peer for its seat.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hello {
-    /// The session.
+    /// Number of the session.
     pub session: u64,
-    /// The seat it wants.
+    /// Place of the seat that the peer asks for.
     pub place: Place,
-    /// Drawn by the peer for this joining.
+    /// Nonce of the client, drawn by the peer for one joining only.
     pub client_nonce: Nonce,
 }
 
 impl Hello {
-    /// The datagram.
+    /// Returns the datagram, tagged under `key`.
     #[must_use]
     pub fn encode(&self, key: &SessionKey) -> [u8; HANDSHAKE_LEN] {
         let mut body = [0; BODY_LEN];
         body[0..4].copy_from_slice(&HELLO_MAGIC);
         body[4..6].copy_from_slice(&VERSION.to_le_bytes());
+        // Bytes 6 to 7, 20 to 23 and 40 to 71 stay zero: the format reserves these bytes.
         body[8..16].copy_from_slice(&self.session.to_le_bytes());
         body[16..20].copy_from_slice(&self.place.0.to_le_bytes());
         body[24..40].copy_from_slice(&self.client_nonce);
         finish(key, &body)
     }
 
-    /// Reads a hello, and then checks its tag with [`UncheckedHello::verify`].
+    /// Reads a hello without checking the tag, so that cheap checks of the content can come first. Fails if first bytes, version, length or reserved bytes are
+    /// wrong. The caller then checks the tag with [`UncheckedHello::verify`].
     pub(crate) fn decode(datagram: &[u8]) -> Result<UncheckedHello<'_>, HandshakeError> {
         let (body, tag) = open(datagram, HELLO_MAGIC)?;
         if body[6..8] != [0; 2] || body[20..24] != [0; 4] || body[40..72] != [0; 32] {
@@ -55,7 +57,7 @@ impl Hello {
     }
 }
 
-/// A hello whose tag has not been looked at: what it says may be a lie.
+/// Hello whose tag has not been checked: its content may be forged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct UncheckedHello<'a> {
     pub(crate) hello: Hello,
@@ -64,6 +66,7 @@ pub(crate) struct UncheckedHello<'a> {
 }
 
 impl UncheckedHello<'_> {
+    /// Checks the tag. Fails with [`HandshakeError::Forged`] if the tag is not the tag of the hello under `key`.
     pub(crate) fn verify(&self, key: &SessionKey) -> Result<(), HandshakeError> {
         verify(key, self.body, self.tag)
     }

@@ -1,8 +1,7 @@
-//! The two datagrams before the samples, in sessions with a key: a [`Hello`] is answered by a [`Welcome`].
+//! The two datagrams that precede the samples in sessions with a key: a [`Hello`] from the peer, and a [`Welcome`] from the session.
 //!
-//! Both are 88 bytes: an answer that is no longer than its request amplifies nothing for a sender with a false address. They end
-//! with a tag under the session key, and differ in their first four bytes, so that neither passes for the other. A hello alone changes nothing in the
-//! session.
+//! Both datagrams are 88 bytes long. An answer no longer than its request amplifies nothing for a sender with a false address. Both datagrams end with a tag
+//! under the session key. Their first four bytes differ, so that neither datagram passes for the other. A hello alone changes nothing in the session.
 
 mod hello;
 mod welcome;
@@ -13,45 +12,47 @@ pub use welcome::{WELCOME_MAGIC, Welcome};
 use crate::SessionKey;
 use crate::seal::{TAG_LEN, Tag, session_tag, verify_session_tag};
 
-/// The version of the protocol, in both datagrams.
+/// Version of the protocol, in hellos and welcomes.
 pub const VERSION: u16 = 1;
-/// The length of a hello and of a welcome \[byte\].
+/// Length of a hello and of a welcome \[byte\].
 pub const HANDSHAKE_LEN: usize = BODY_LEN + TAG_LEN;
 
+/// Length of a hello or a welcome without the tag \[byte\].
 const BODY_LEN: usize = 72;
 
-/// The fault of a hello or a welcome.
+/// Fault of a hello or a welcome.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum HandshakeError {
-    /// It begins with other bytes.
+    /// The datagram begins with other bytes than a hello or a welcome does.
     #[error("it is no such datagram")]
     Magic,
-    /// It is of another version.
+    /// The datagram has another version of the protocol.
     #[error("version {found} of the protocol; expected {VERSION}")]
     Version {
-        /// The version it has.
+        /// Version in the datagram.
         found: u16,
     },
-    /// It has another length.
+    /// The datagram is not [`HANDSHAKE_LEN`] bytes long.
     #[error("{found} bytes; expected {HANDSHAKE_LEN}")]
     Length {
-        /// The length it has.
+        /// Length of the datagram \[byte\].
         found: usize,
     },
-    /// A byte that must be zero is not, or a number is out of its range.
+    /// A byte that must be zero is not zero, or a number is out of its range.
     #[error("a reserved byte is not zero or a number is out of its range")]
     Reserved,
-    /// Its tag is wrong: it was made with another key, or changed.
+    /// The tag is wrong: the datagram was made with another key, or changed.
     #[error("it was made with another key or changed on the way")]
     Forged,
 }
 
-/// Checks what both have in common, and gives the body.
+/// Checks first bytes, version and length, in this order. Returns body and tag; the tag is not checked here.
 fn open(datagram: &[u8], magic: [u8; 4]) -> Result<(&[u8; BODY_LEN], &Tag), HandshakeError> {
     let Some(start) = datagram.first_chunk::<6>() else { return Err(HandshakeError::Length { found: datagram.len() }) };
     if start[..4] != magic {
         return Err(HandshakeError::Magic);
     }
+    // The version is checked before the length: another version may have another length, and the version is the better explanation.
     let version = u16::from_le_bytes([start[4], start[5]]);
     if version != VERSION {
         return Err(HandshakeError::Version { found: version });
@@ -62,10 +63,12 @@ fn open(datagram: &[u8], magic: [u8; 4]) -> Result<(&[u8; BODY_LEN], &Tag), Hand
     Ok((body, tag))
 }
 
+/// Checks the tag of a body.
 fn verify(key: &SessionKey, body: &[u8; BODY_LEN], tag: &Tag) -> Result<(), HandshakeError> {
     if verify_session_tag(key, body, tag) { Ok(()) } else { Err(HandshakeError::Forged) }
 }
 
+/// Returns the datagram: the body, and its tag under `key`.
 fn finish(key: &SessionKey, body: &[u8; BODY_LEN]) -> [u8; HANDSHAKE_LEN] {
     let mut datagram = [0; HANDSHAKE_LEN];
     datagram[..BODY_LEN].copy_from_slice(body);
@@ -73,7 +76,7 @@ fn finish(key: &SessionKey, body: &[u8; BODY_LEN]) -> [u8; HANDSHAKE_LEN] {
     datagram
 }
 
-/// The bytes at a place of a body.
+/// Returns the `N` bytes of a body from index `start` on. Callers pass a start of at most `BODY_LEN - N`.
 fn part<const N: usize>(body: &[u8; BODY_LEN], start: usize) -> [u8; N] {
     let mut part = [0; N];
     part.copy_from_slice(&body[start..start + N]);

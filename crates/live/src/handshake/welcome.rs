@@ -1,4 +1,4 @@
-//! The session answers a hello with what a peer must know of the session.
+//! Welcome: the datagram with which the session answers a hello. A welcome tells the peer the parameters of the session.
 //!
 //! ```text
 //! offset  size  field
@@ -21,34 +21,34 @@ use core::time::Duration;
 use super::{BODY_LEN, HANDSHAKE_LEN, HandshakeError, VERSION, finish, open, part, verify};
 use crate::{Nonce, Place, SessionKey};
 
-/// The first four bytes of a welcome.
+/// First four bytes of a welcome.
 pub const WELCOME_MAGIC: [u8; 4] = *b"CHPW";
 
-/// What the session tells a peer that has said [`Hello`](super::Hello).
+/// Answer of the session to a [`Hello`](super::Hello): parameters of the session, and the nonces of both sides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Welcome {
-    /// How many axes a sample has.
+    /// Number of axes of a sample, 1 to 3.
     pub axes: u8,
-    /// Whether samples carry attitudes: the object turns.
+    /// Whether samples carry attitudes, as in scenes whose object turns.
     pub turns: bool,
-    /// The session.
+    /// Number of the session.
     pub session: u64,
-    /// The seat.
+    /// Place of the seat, as in the hello. Below `peers`.
     pub place: Place,
-    /// How many peers the scene has, this one among them.
+    /// Number of peers of the scene, this peer included.
     pub peers: u32,
-    /// The nonce of the hello that this answers.
+    /// Nonce of the client, copied from the hello. A peer recognizes the answer to its own hello by this nonce.
     pub client_nonce: Nonce,
-    /// The other half of what the keys are derived from.
+    /// Nonce of the server. The keys of the joining are derived from both nonces.
     pub server_nonce: Nonce,
-    /// Tc, rounded to nanoseconds and at most 584 years.
+    /// Control tick Tc of the place, above zero. Encoded in whole nanoseconds, at most 2⁶⁴ − 1 (584 years).
     pub tick: Duration,
-    /// Tn, rounded to nanoseconds and at most 584 years.
+    /// Period of sending Tn, above zero. Encoded in whole nanoseconds, at most 2⁶⁴ − 1 (584 years).
     pub update: Duration,
 }
 
 impl Welcome {
-    /// The datagram.
+    /// Returns the datagram, tagged under `key`.
     #[must_use]
     pub fn encode(&self, key: &SessionKey) -> [u8; HANDSHAKE_LEN] {
         let nanos = |span: Duration| u64::try_from(span.as_nanos()).unwrap_or(u64::MAX).to_le_bytes();
@@ -71,10 +71,11 @@ impl Welcome {
     ///
     /// # Errors
     ///
-    /// [`HandshakeError`] at the first thing that is wrong: first four bytes, version, length, tag, reserved bytes and ranges (1 to 3 axes, a place
-    /// below the number of peers, periods above zero). Never panics.
+    /// [`HandshakeError`] for the first fault, in this order: first four bytes, version, length, tag, reserved bytes and ranges (1 to 3 axes, a place below
+    /// the number of peers, periods above zero). Never panics.
     pub fn decode(datagram: &[u8], key: &SessionKey) -> Result<Self, HandshakeError> {
         let (body, tag) = open(datagram, WELCOME_MAGIC)?;
+        // The tag is checked before any field is read: a welcome without the right tag says nothing.
         verify(key, body, tag)?;
         let welcome = Self {
             axes: body[6],
