@@ -1,21 +1,21 @@
-//! Where keys and nonces come from.
+//! Source of the random bytes for keys and nonces.
 
-/// A source of bytes that nobody can guess and that never repeat.
+/// Source of random bytes that nobody can guess and that never repeat.
 pub trait Entropy {
-    /// Fills `bytes`.
+    /// Fills `bytes` with random bytes.
     ///
     /// # Errors
     ///
-    /// [`EntropyError`] if the source has none to give. What stands in `bytes` then must not be used.
+    /// [`EntropyError`] if the source has no random bytes. The content of `bytes` must not be used then.
     fn fill(&mut self, bytes: &mut [u8]) -> Result<(), EntropyError>;
 }
 
-/// The system could not give random bytes.
+/// Error of the operating system when random bytes are drawn.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("the system gives no random bytes, and without them nobody can join safely: {0}")]
 pub struct EntropyError(#[from] getrandom::Error);
 
-/// The random bytes of the operating system.
+/// Random bytes of the operating system.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct SystemEntropy;
 

@@ -2,11 +2,11 @@
 //!
 //! Use this crate if you host a session with peers in other programs, or write such a peer in Rust. It needs Linux.
 //!
-//! [`Session`] is such a session, with its sockets and its clock. [`AdmissionControl`] decides which datagrams from outside reach the scene, and makes those to
-//! the outside; it does no input or output and reads no clock. [`client`] is the other side, for programs in Rust, and [`handshake`] has the datagrams that
-//! both exchange. The protocol is written byte by byte in `docs/live-protocol.md`.
+//! [`Session`] is such a session, with its sockets and its clock. [`AdmissionControl`] decides which datagrams from outside reach the scene, and makes the
+//! datagrams to programs outside. It does no input or output and reads no clock. [`client`] is the side of a peer, for programs in Rust, and [`handshake`] has
+//! the datagrams that both sides exchange before the samples. The protocol is written byte by byte in `docs/live-protocol.md`.
 //!
-//! It does not encrypt: a [`SessionKey`] keeps others from speaking, not from listening. Read [`AdmissionControl`] first.
+//! The crate does not encrypt: with a [`SessionKey`] strangers cannot send samples, but can still read samples. Read [`AdmissionControl`] first.
 //!
 //! ```
 //! use std::time::Duration;

@@ -1,7 +1,8 @@
 //! Pointers: mice, pens, fingers and sticks that pull the simulated device of a peer.
 //!
-//! What moves a pointer tells its [`Pointer`] where it is, at the rate of a display. The thread that has to be on time reads it at each tick, as it reads a
-//! device: on the straight way from where the pointer was to where it was last told to be, so that the hand has a velocity and no steps.
+//! The program that follows a pointer tells its position to a [`Pointer`], at the rate of a display. The session's thread reads the pointer at each tick, as
+//! the thread reads a device. Between two told positions, the read position moves on a straight line at constant speed, so that the hand has a velocity and
+//! makes no steps.
 
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use std::time::Duration;
@@ -10,55 +11,61 @@ use cohaptic_harness::live::LiveDevice;
 use cohaptic_peer::State;
 use cohaptic_units::Instant;
 
-/// No pointer is farther from the origin along an axis \[m\]: so far reaches nobody's arm.
+/// Largest absolute value of a pointer's coordinate \[m\]. No arm reaches so far.
 pub const REACH: f64 = 10.0;
 
-/// A pointer that has told nothing for so long is not there.
+/// Time without a new position after which a pointer counts as absent.
 const OLD: Duration = Duration::from_millis(100);
-/// Between two places the way takes as long as passed between their coming, within these limits: a screen shows 60 a second, or 144.
+/// Limits of the time that the way to a new position takes. Within the limits, the way takes as long as the time between the arrivals of the last two
+/// positions. Displays give 60 to 144 positions a second.
 const QUICKEST: Duration = Duration::from_millis(2);
+/// Largest duration of a way that follows from arrivals.
 const SLOWEST: Duration = Duration::from_millis(50);
-/// Of the first place that a session reads nobody knows how long ago the one before it came. The way there is slow, so that the arm does not jerk.
+/// Duration of the way to the first position that a session reads. The time since the position before is not known then. The way is slow, so that the arm does
+/// not jerk.
 const FIRST: Duration = Duration::from_millis(80);
-/// A way is no quicker than this share of the one before it: what was missed while nobody read is caught up little by little.
+/// Smallest ratio of the durations of two successive ways. After a gap in reading, the pointer catches up step by step.
 const CATCHES_UP: f64 = 0.85;
 
-/// Why a place is no place of a pointer.
+/// Error of [`Pointer::tell`]: a coordinate is beyond [`REACH`] or not a number.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error("a pointer at {found:?} m: expected numbers from -{REACH} to {REACH}")]
 pub struct BeyondReach {
-    /// The place.
+    /// Position that was told \[m\].
     pub found: [f64; 3],
 }
 
-/// A pointer, shared by what moves it and the session. It outlives the session: the next one begins with the pointer where it is.
+/// Pointer, shared by the program that moves the pointer and by the session. A pointer outlives the session: in the next session the hand begins where the
+/// pointer is.
 #[derive(Clone, Debug, Default)]
 pub struct Pointer(Arc<Mutex<Shared>>);
 
+/// Data exchanged between the program and the session's thread.
 #[derive(Clone, Copy, Debug, Default)]
 struct Shared {
     told: Told,
-    /// The rest of its way when a session last read it: the next session goes on from there.
+    /// Rest of the way at the end of the session's latest tick, on a clock that begins with the next session. The next session goes on with this way. `None`
+    /// if there is no way.
     rest: Option<Way>,
-    /// FC \[N\].
+    /// Coupling force FC of the latest tick \[N\].
     force: [f64; 3],
 }
 
-/// What a pointer was told last.
+/// Position that was told last.
 #[derive(Clone, Copy, Debug, Default)]
 struct Told {
-    /// Counts up.
+    /// Number of times that the program has told a position or a release. A changed number marks news, even if the position is the same.
     number: u64,
-    /// `None`: it has let go.
+    /// Position \[m\]. `None`: the pointer has let go.
     position: Option<[f64; 3]>,
 }
 
 impl Pointer {
-    /// The pointer is there now, or has let go.
+    /// Tells the position of the pointer \[m\] from now on. `None`: the pointer lets go.
     ///
     /// # Errors
     ///
-    /// [`BeyondReach`] if that is no place; nothing changes.
+    /// [`BeyondReach`] if a coordinate is not a number from `-REACH` to `REACH`. The previous position stays.
     pub fn tell(&self, position: Option<[f64; 3]>) -> Result<(), BeyondReach> {
         if let Some(found) = position
             && !found.iter().all(|x| x.abs() <= REACH)
@@ -70,13 +77,13 @@ impl Pointer {
         Ok(())
     }
 
-    /// The force that the session last computed between device and copy \[N\], for motors.
+    /// Returns the force that the session last computed between device and copy \[N\], for motors in the pointer.
     #[must_use]
     pub fn force(&self) -> [f64; 3] {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).force
     }
 
-    /// The pointer as a session reads it.
+    /// Returns the pointer as a device of a session.
     #[must_use]
     pub fn device(&self) -> Box<dyn LiveDevice> {
         let shared = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -84,24 +91,28 @@ impl Pointer {
     }
 }
 
-/// The straight way from one place to another, at constant speed.
+/// Straight way between two positions, at constant speed. Position and velocity stay defined after the end: the pointer rests at `to`.
 #[derive(Clone, Copy, Debug)]
 struct Way {
+    /// Position at `begin` \[m\].
     from: [f64; 3],
+    /// Position at the end, `begin` plus `span` \[m\].
     to: [f64; 3],
     begin: Instant,
+    /// Duration of the way. Never zero, because both positions and velocities divide by the duration.
     span: Duration,
 }
 
 impl Way {
-    /// The remaining way at `now`, for a clock that begins then.
+    /// Returns the rest of the way after `now`, for a clock that begins at `now`.
     fn rest(&self, now: Instant) -> Self {
         let left = self.begin.saturating_add(self.span).saturating_duration_since(now);
         let State { position: from, .. } = self.at(now);
-        // Where nothing is left both ends are the same place.
+        // After the end of the way both positions are the same, and any duration above zero will do.
         Self { from, to: self.to, begin: Instant::ZERO, span: if left.is_zero() { QUICKEST } else { left } }
     }
 
+    /// Returns position \[m\] and velocity [m/s] at the instant `now`.
     fn at(&self, now: Instant) -> State<3> {
         let Self { from, to, begin, span } = *self;
         let gone = now.saturating_duration_since(begin).as_secs_f64() / span.as_secs_f64();
@@ -115,38 +126,44 @@ impl Way {
     }
 }
 
+/// Pointer as the session reads it.
 struct PointerDevice {
     pointer: Pointer,
+    /// Position that the session read last.
     told: Told,
-    /// When it was told that; `None` if that was before this session.
+    /// Instant of the tick at which the session first read `told`. `None` if `told` is older than the session.
     newest: Option<Instant>,
-    /// `None` before it was told anything, and when it has let go.
+    /// Present way. `None` before the first position, and after the pointer has let go.
     way: Option<Way>,
 }
 
 impl LiveDevice for PointerDevice {
     fn read(&mut self, now: Instant) -> Option<State<3>> {
-        // The other side holds the lock for nanoseconds; if it is held just now, the next tick is soon enough.
+        // The program holds the lock only while it copies a few numbers. If the lock is held, the next tick is soon enough: this thread must not wait.
         let told = match self.pointer.0.try_lock() {
             Ok(shared) => shared.told,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner().told,
             Err(TryLockError::WouldBlock) => self.told,
         };
         if told.number != self.told.number {
+            // A way lasts as long as the news took to come, but does not become much shorter than the way before.
             let since = self.newest.map_or(FIRST, |newest| now.saturating_duration_since(newest).clamp(QUICKEST, SLOWEST));
             let span = self.way.as_ref().map_or(since, |way| since.max(way.span.mul_f64(CATCHES_UP)));
             self.way = told.position.map(|to| match &self.way {
+                // The new way begins at the present position on the old way, so that the position makes no step.
                 Some(way) => Way { from: way.at(now).position, to, begin: now, span },
                 None => Way { from: to, to, begin: now, span: QUICKEST },
             });
             (self.told, self.newest) = (told, Some(now));
         }
+        // A position from before the session counts as fresh for the first 100 ms of the session.
         let is_fresh = now.saturating_duration_since(self.newest.unwrap_or(Instant::ZERO)) < OLD;
         self.told.position.filter(|_| is_fresh)?;
         self.way.as_ref().map(|way| way.at(now))
     }
 
     fn hold(&mut self, now: Instant, _span: Duration, coupling_force: [f64; 3]) {
+        // If the lock is held, the force of the next tick is soon enough.
         if let Ok(mut shared) = self.pointer.0.try_lock() {
             shared.force = coupling_force;
             shared.rest = self.way.as_ref().map(|way| way.rest(now));
@@ -182,15 +199,15 @@ mod tests {
         near(x(&mut *device, 20), [0.01, 0.0]);
         near(x(&mut *device, 30), [0.01, 0.0]);
         pointer.tell(Some([0.03, 0.0, 0.0])).unwrap();
-        // 20 ms after the place before it: 20 mm in 20 ms.
+        // The position arrives 20 ms after the position before: 20 mm in 20 ms.
         near(x(&mut *device, 40), [0.01, 1.0]);
         near(x(&mut *device, 45), [0.015, 1.0]);
         near(x(&mut *device, 60), [0.03, 0.0]);
-        // From where it is on its way, not from where it was to be.
+        // The new way begins at the present position on the way, not at the end of the way.
         pointer.tell(Some([0.05, 0.0, 0.0])).unwrap();
         near(x(&mut *device, 80), [0.03, 0.5]);
         pointer.tell(Some([0.0, 0.0, 0.0])).unwrap();
-        // 40 mm back, 20 ms later: in 85 % of the 40 ms before, not at once.
+        // 40 mm back, 20 ms later. The way takes 85 % of the 40 ms before, not 20 ms.
         near(x(&mut *device, 100), [0.04, -0.04 / 0.034]);
     }
 
@@ -206,13 +223,13 @@ mod tests {
         assert!(x(&mut *device, 102).is_some());
         pointer.tell(None).unwrap();
         assert_eq!(x(&mut *device, 103), None);
-        // Elsewhere it takes hold there; nothing drags the device from where it let go.
+        // A pointer that takes hold again begins at its new position. The device is not dragged from the position where the pointer let go.
         pointer.tell(Some([0.07, 0.0, 0.0])).unwrap();
         near(x(&mut *device, 104), [0.07, 0.0]);
     }
 
-    /// The device of the next session goes on along the way of the last one, as fast; the first place that is new is reached in 80 ms, because nobody knows
-    /// how long the session was away.
+    /// The device of the next session goes on along the way of the last session, at the same speed. The first new position is reached in 80 ms, because the
+    /// time between the sessions is not known.
     #[test]
     fn the_next_session_goes_on_along_the_way() {
         let pointer = Pointer::default();
@@ -220,7 +237,7 @@ mod tests {
         pointer.tell(Some([0.01, 0.0, 0.0])).unwrap();
         near(x(&mut *device, 10), [0.01, 0.0]);
         pointer.tell(Some([0.03, 0.0, 0.0])).unwrap();
-        // 20 mm in 20 ms, of which 15 ms are gone when the session ends.
+        // 20 mm in 20 ms, of which 15 ms have passed when the session ends.
         near(x(&mut *device, 30), [0.01, 1.0]);
         near(x(&mut *device, 45), [0.025, 1.0]);
         device.hold(at(45), Duration::from_millis(1), [0.25, 0.0, 0.0]);
@@ -228,7 +245,7 @@ mod tests {
         let mut next = pointer.device();
         near(x(&mut *next, 0), [0.025, 1.0]);
         pointer.tell(Some([0.108, 0.0, 0.0])).unwrap();
-        // 80 mm in 80 ms, though it was told after 3 ms of this session; then 60 mm in 85 % of that.
+        // 80 mm in 80 ms, although the position was told after 3 ms of this session. Then 60 mm in 85 % of that time.
         near(x(&mut *next, 3), [0.028, 1.0]);
         pointer.tell(Some([0.096, 0.0, 0.0])).unwrap();
         near(x(&mut *next, 11), [0.036, 0.06 / 0.068]);
@@ -239,7 +256,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Whatever is told at whatever times: what is read is finite, and no farther than the farthest place that was accepted.
+        /// For any positions told at any times, the read position is finite, and no farther from the origin than the farthest accepted position.
         #[test]
         fn what_is_read_lies_among_the_places_told(steps in prop::collection::vec((0_u64..300, prop::option::of(prop::num::f64::ANY)), 1..40)) {
             let pointer = Pointer::default();

@@ -1,4 +1,4 @@
-//! Tags and the keys they are made with: HMAC-SHA256 (RFC 2104, FIPS 180-4), cut to its first 16 bytes.
+//! Tags of datagrams, and the keys that make the tags. All tags and keys are HMAC-SHA256 (RFC 2104, FIPS 180-4); a tag is the first 16 bytes.
 //!
 //! ```text
 //! sealed sample = sample ‖ client nonce (16) ‖ tag (16)
@@ -6,7 +6,7 @@
 //! tag           = first 16 bytes of HMAC(key of the way, everything before the tag)
 //! ```
 //!
-//! The nonce of the client travels with every sample, so that the session need not remember requests: see [`crate::admission`].
+//! The client's nonce travels with every sample, so that the session can derive the keys again and need not remember hellos: see [`crate::admission`].
 
 use core::fmt;
 
@@ -17,25 +17,28 @@ use zeroize::Zeroizing;
 
 use crate::{Place, SessionKey};
 
-/// The length of a nonce \[byte\].
+/// Length of a nonce \[byte\].
 pub const NONCE_LEN: usize = 16;
-/// The length of a tag \[byte\].
+/// Length of a tag \[byte\].
 pub const TAG_LEN: usize = 16;
-/// By how much a sealed sample is longer than the sample in it \[byte\].
+/// Length that a seal adds to a sample: nonce and tag \[byte\].
 pub const SEAL_LEN: usize = NONCE_LEN + TAG_LEN;
-/// The length of the largest datagram of a session \[byte\]. A buffer to receive into must be longer, or a longer datagram would pass for one of
-/// this length.
+/// Length of the longest datagram of a session \[byte\]. A buffer for receiving must be longer: the system would cut a longer datagram to this length, and the
+/// datagram would pass for a valid one.
 pub const MAX_DATAGRAM: usize = wire::MAX_LEN + SEAL_LEN;
 
-/// Bytes that are used once: for one joining.
+/// Random bytes that are used for one joining only.
 pub type Nonce = [u8; NONCE_LEN];
+/// First bytes of an HMAC, which prove that a datagram was made by a holder of the key.
 pub(crate) type Tag = [u8; TAG_LEN];
 
+/// Label of the key for samples to the session. Different labels give different keys, so that a sample cannot be sent back to its sender.
 const TO_DOOR: &[u8] = b"cohaptic 1 to door";
+/// Label of the key for samples to the peer.
 const TO_PEER: &[u8] = b"cohaptic 1 to peer";
 
-/// The secret with which the samples of one joining are tagged, on one way: HMAC that has taken in its key, which is two fifths of the work for a
-/// sample of one axis. It is overwritten when it is dropped.
+/// Key that tags the samples of one joining in one direction. Kept as an HMAC state that has absorbed the key already: the key need not be hashed again for
+/// every sample. The state is overwritten when dropped.
 pub(crate) struct WayKey(Hmac<Sha256>);
 
 impl fmt::Debug for WayKey {
@@ -44,7 +47,7 @@ impl fmt::Debug for WayKey {
     }
 }
 
-/// Both ways of one joining.
+/// Keys of one joining, for both directions, and the client's nonce, which every sample carries.
 #[derive(Debug)]
 pub(crate) struct JoiningKeys {
     pub(crate) to_door: WayKey,
@@ -53,15 +56,16 @@ pub(crate) struct JoiningKeys {
 }
 
 impl JoiningKeys {
-    /// The keys of the joining that these two nonces are of.
+    /// Returns the keys of the joining of `place` that has the two nonces.
     pub(crate) fn derive(key: &SessionKey, session: u64, place: Place, client_nonce: Nonce, server_nonce: Nonce) -> Self {
         let way = |label| WayKey::derive(label, key, session, place, &client_nonce, &server_nonce);
         Self { to_door: way(TO_DOOR), to_peer: way(TO_PEER), client_nonce }
     }
 
-    /// The keys of the joining that this sample is of, if it was sealed under them with that nonce of the server.
+    /// Returns the keys of the joining in which `sealed` was made, with `server_nonce` as nonce of the server. Returns `None` if the tag does not fit these
+    /// keys.
     pub(crate) fn of_sample(key: &SessionKey, session: u64, place: Place, sealed: Sealed<'_>, server_nonce: &Nonce) -> Option<Self> {
-        // Half the work is enough for a sample that is forged.
+        // The key of the other direction is derived only after the tag has been verified, so that a forged sample costs one derivation, not two.
         let way = |label| WayKey::derive(label, key, session, place, sealed.client_nonce, server_nonce);
         let to_door = way(TO_DOOR);
         to_door.verify(sealed.body, sealed.tag).then(|| Self { to_door, to_peer: way(TO_PEER), client_nonce: *sealed.client_nonce })
@@ -69,15 +73,18 @@ impl JoiningKeys {
 }
 
 impl WayKey {
+    /// Returns the key of the direction that `label` names.
     fn derive(label: &[u8], key: &SessionKey, session: u64, place: Place, client_nonce: &Nonce, server_nonce: &Nonce) -> Self {
         Self(begin(&way_secret(label, key, session, place, client_nonce, server_nonce)[..]))
     }
 
-    /// Writes `sample`, the nonce and the tag, and gives the length; `None` if `sample` is longer than a sample can be.
+    /// Writes `sample`, the client's nonce and the tag to `out`, and returns the length of the three. Returns `None` if `sample` is longer than
+    /// [`wire::MAX_LEN`].
     pub(crate) fn seal(&self, client_nonce: &Nonce, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<usize> {
         if sample.len() > wire::MAX_LEN {
             return None;
         }
+        // `body + TAG_LEN` is at most `MAX_DATAGRAM`, because `sample` is at most `wire::MAX_LEN` long.
         let body = sample.len() + NONCE_LEN;
         out[..sample.len()].copy_from_slice(sample);
         out[sample.len()..body].copy_from_slice(client_nonce);
@@ -88,24 +95,24 @@ impl WayKey {
         Some(body + TAG_LEN)
     }
 
-    /// Whether `tag` is that of `body`, in a time that does not depend on where they differ.
+    /// Returns whether `tag` is the tag of `body`. The time taken does not depend on the position of the first difference.
     pub(crate) fn verify(&self, body: &[u8], tag: &Tag) -> bool {
         verify(self.0.clone(), body, tag)
     }
 }
 
-/// A sealed sample, taken apart.
+/// Parts of a sealed sample.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sealed<'a> {
     pub(crate) sample: &'a [u8],
     pub(crate) client_nonce: &'a Nonce,
-    /// The sample and the nonce: what the tag is of.
+    /// Sample and nonce together: the bytes from which the tag is computed.
     pub(crate) body: &'a [u8],
     pub(crate) tag: &'a Tag,
 }
 
 impl<'a> Sealed<'a> {
-    /// `None` if it is shorter than a seal alone.
+    /// Splits a datagram into its parts. Returns `None` if the datagram is shorter than a seal. The sample can be empty.
     pub(crate) fn split(datagram: &'a [u8]) -> Option<Self> {
         let (body, tag) = datagram.split_last_chunk::<TAG_LEN>()?;
         let (sample, client_nonce) = body.split_last_chunk::<NONCE_LEN>()?;
@@ -113,29 +120,33 @@ impl<'a> Sealed<'a> {
     }
 }
 
-/// The tag of `body` under the session key itself: for the handshake.
+/// Returns the tag of `body` under the session key itself, as hellos and welcomes carry it.
 pub(crate) fn session_tag(key: &SessionKey, body: &[u8]) -> Tag {
     cut(&mac(key.as_bytes(), &[body]))
 }
 
-/// Whether `tag` is that of `body` under the session key itself.
+/// Returns whether `tag` is the tag of `body` under the session key itself.
 pub(crate) fn verify_session_tag(key: &SessionKey, body: &[u8], tag: &Tag) -> bool {
     verify(begin(key.as_bytes()), body, tag)
 }
 
-/// 16 bytes that only the holder of `secret` can tell beforehand, different for each input.
+/// Returns 16 bytes that differ from input to input, and that only a holder of `secret` can predict.
 pub(crate) fn nonce_of(secret: &[u8; 32], parts: &[&[u8]]) -> Nonce {
     cut(&mac(secret, parts))
 }
 
+/// Returns the secret of one direction. All parts but the label have a fixed length, and both labels have the same length, so that different inputs never give
+/// the same bytes.
 fn way_secret(label: &[u8], key: &SessionKey, session: u64, place: Place, client_nonce: &Nonce, server_nonce: &Nonce) -> Zeroizing<[u8; 32]> {
     mac(key.as_bytes(), &[label, &session.to_le_bytes(), &place.0.to_le_bytes(), client_nonce, server_nonce])
 }
 
+/// Returns an HMAC state that has absorbed `key`.
 fn begin(key: &[u8]) -> Hmac<Sha256> {
     Hmac::new_from_slice(key).expect("HMAC takes keys of any length")
 }
 
+/// Returns the HMAC of the concatenated `parts`.
 fn mac(key: &[u8], parts: &[&[u8]]) -> Zeroizing<[u8; 32]> {
     let mut state = begin(key);
     for part in parts {
@@ -144,11 +155,13 @@ fn mac(key: &[u8], parts: &[&[u8]]) -> Zeroizing<[u8; 32]> {
     Zeroizing::new(state.finalize().into_bytes().into())
 }
 
+/// Compares the first bytes of the HMAC of `body` with `tag`, in constant time.
 fn verify(mut state: Hmac<Sha256>, body: &[u8], tag: &Tag) -> bool {
     state.update(body);
     state.verify_truncated_left(tag).is_ok()
 }
 
+/// Returns the first bytes of an HMAC as a tag.
 fn cut(whole: &[u8; 32]) -> Tag {
     let mut tag = [0; TAG_LEN];
     tag.copy_from_slice(&whole[..TAG_LEN]);
@@ -159,7 +172,7 @@ fn cut(whole: &[u8; 32]) -> Tag {
 mod tests {
     use super::*;
 
-    /// `docs/examples/live-protocol.txt` has the same keys; they were computed by another program.
+    /// Compares the keys of both directions with `docs/examples/live-protocol.txt`, whose keys another program computed.
     #[test]
     fn the_keys_of_both_ways_are_those_of_the_page() {
         let counting = |from: u8| std::array::from_fn(|place| from + u8::try_from(place).unwrap());
@@ -173,7 +186,7 @@ mod tests {
         }
     }
 
-    /// RFC 4231, test case 2.
+    /// The expected value is RFC 4231, test case 2.
     #[test]
     fn hmac_is_that_of_the_rfc() {
         let expected = [0x5b, 0xdc, 0xc1, 0x46, 0xbf, 0x60, 0x75, 0x4e, 0x6a, 0x04, 0x24, 0x26, 0x08, 0x95, 0x75, 0xc7];

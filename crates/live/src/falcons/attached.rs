@@ -1,4 +1,4 @@
-//! A Falcon as the device of a peer in a session.
+//! Falcon as the device of a peer: translates between the snapshots of [`FalconDevice`] and the [`LiveDevice`] of a session.
 
 use std::time::Duration;
 
@@ -10,26 +10,27 @@ use cohaptic_units::Instant;
 
 use super::hand::Beginning;
 
-/// A device that has said nothing new for so long does not answer. Its own driver has switched its force off long before.
+/// Time without a new snapshot after which a device counts as absent. The device's own driver has switched its force off long before.
 const OLD: Duration = Duration::from_millis(20);
 
-/// How far a Falcon is.
+/// Readiness of a Falcon for a session.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Readiness {
-    /// Whether it takes part: homed, and its user has switched forces on.
+    /// Whether the Falcon takes part: the device is homed, and its user has switched forces on.
     pub is_ready: bool,
-    /// Whether it is simulated.
+    /// Whether the Falcon is simulated.
     pub is_simulated: bool,
-    /// Where it stands.
+    /// Phase of the device's driver.
     pub phase: Phase,
 }
 
+/// Driven Falcon with `A` axes, and the bookkeeping by which its silence is noticed.
 #[derive(Debug)]
 pub(super) struct Attached<const A: usize> {
     device: FalconDevice<A>,
-    /// Of a simulated one, when the session begins for its hand.
+    /// Beginning of the session for the hand on a simulated Falcon. `None` for a real Falcon.
     beginning: Option<Beginning>,
-    /// The time on the device's clock of its newest snapshot, and when that came.
+    /// Newest snapshot: its time on the clock of the device, and the instant of the session at which the snapshot was first seen.
     newest: Option<(Instant, Instant)>,
 }
 
@@ -39,7 +40,8 @@ impl<const A: usize> Attached<A> {
     }
 
     pub(super) fn readiness(&self) -> Readiness {
-        // Its light is green only when somebody asks for force, which nobody does before the session begins.
+        // `is_ready` decides here, and not the green light of the device: the light also needs a session that asks for force, and no session asks before it
+        // begins.
         let (phase, is_ready) = self.device.snapshot().map_or((Phase::Silent, false), |snapshot| (snapshot.phase, snapshot.is_ready()));
         Readiness { is_ready, is_simulated: self.beginning.is_some(), phase }
     }
@@ -48,9 +50,10 @@ impl<const A: usize> Attached<A> {
         self.device.stopper()
     }
 
-    /// The newest snapshot, if the device takes part and goes on saying so.
+    /// Returns the newest snapshot, if the device takes part and has given a new snapshot at most `OLD` ago.
     fn answer(&mut self, now: Instant) -> Option<Snapshot> {
         let snapshot = self.device.snapshot()?;
+        // A repeated time stamp is a repeated snapshot, which keeps the instant of its first appearance.
         let came = match self.newest {
             Some((at, came)) if at == snapshot.at => came,
             _ => now,
@@ -64,10 +67,12 @@ impl<const A: usize> Attached<A> {
 impl<const A: usize> LiveDevice for Attached<A> {
     fn read(&mut self, now: Instant) -> Option<State<3>> {
         let snapshot = self.answer(now);
+        // The hand begins to follow the scene at the first tick at which the session reads the device. Later calls of `begin` change nothing.
         if let (Some(beginning), Some(snapshot)) = (&self.beginning, &snapshot) {
             beginning.begin(snapshot.at);
         }
         snapshot.map(|_| {
+            // Axes that the scene does not have are zero.
             let State { position, velocity } = self.device.state();
             let widen = |values: [f64; A]| core::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0));
             State { position: widen(position), velocity: widen(velocity) }

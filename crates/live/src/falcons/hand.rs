@@ -1,4 +1,4 @@
-//! The hand of a scene on the grip of a simulated Falcon.
+//! Hand of a scene on the grip of a simulated Falcon.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,10 +7,12 @@ use std::time::Duration;
 use cohaptic_falcon::simulator::{Hand, Waypoints};
 use cohaptic_units::Instant;
 
-/// When the session begins for a hand, on the clock of its device; it homes the device until then.
+/// Beginning of the session on the clock of a simulated device, in nanoseconds. Shared by the session's thread, which sets the beginning, and the device's
+/// thread, which reads the beginning. Until then the hand homes the device.
 #[derive(Clone, Debug)]
 pub(super) struct Beginning(Arc<AtomicU64>);
 
+/// Value before the session begins: not an instant that a device reaches.
 const NOT_YET: u64 = u64::MAX;
 
 impl Default for Beginning {
@@ -20,34 +22,38 @@ impl Default for Beginning {
 }
 
 impl Beginning {
-    /// The session begins at `at`, unless it has begun.
+    /// Sets the beginning to `at`, unless the session has begun.
     pub(super) fn begin(&self, at: Instant) {
-        // The first thread has set it.
+        // A failed exchange means that the beginning is set already, and the first call counts. `Relaxed` is enough, because no other data depends on the
+        // value.
         let _ = self.0.compare_exchange(NOT_YET, at.as_nanos(), Ordering::Relaxed, Ordering::Relaxed);
     }
 
+    /// Returns the time of the session at the device's time `now`, or `None` before the session begins.
     fn since(&self, now: Instant) -> Option<Instant> {
         let begun = self.0.load(Ordering::Relaxed);
         (begun != NOT_YET).then(|| Instant::from_nanos(now.as_nanos().saturating_sub(begun)))
     }
 }
 
-/// Homes the device, waits at the origin, and does what the scene says from the beginning of the session on.
+/// Hand that homes the device and holds the device at the origin until the session begins. From then on the hand does as the scene says.
 #[derive(Debug)]
 pub(super) struct SceneHand {
     homing: Waypoints,
+    /// Hand of the peer in the scene. `None` applies no force.
     hand: Option<cohaptic_peer::Hand>,
+    /// Origin of the scene in the frame of the device \[m\].
     origin: [f64; 3],
     beginning: Beginning,
 }
 
 impl SceneHand {
-    /// `origin`: the origin of the scene in the frame of the device.
+    /// Returns a hand that waits for `beginning`. `origin`: origin of the scene in the frame of the device \[m\].
     pub(super) fn new(hand: Option<cohaptic_peer::Hand>, origin: [f64; 3], beginning: Beginning) -> Self {
         Self { homing: Waypoints::homing(Duration::ZERO), hand, origin, beginning }
     }
 
-    /// What an arm adds to the mass of the grip \[kg\].
+    /// Mass that an arm adds to the mass of the grip \[kg\]. Zero for other hands.
     pub(super) fn mass(&self) -> f64 {
         match &self.hand {
             Some(cohaptic_peer::Hand::Arm { arm, .. }) => arm.mass,
@@ -63,6 +69,7 @@ impl Hand for SceneHand {
             None => [0.0; 3],
             Some(cohaptic_peer::Hand::Force(signal)) => signal.value(elapsed),
             Some(cohaptic_peer::Hand::Arm { arm, follows }) => {
+                // The arm as spring and damper between grip and wanted position. The mass of the arm is part of the mechanics of the device.
                 let (wanted, speed) = (follows.value::<3>(elapsed), follows.slope::<3>(elapsed));
                 core::array::from_fn(|axis| {
                     arm.stiffness * (self.origin[axis] + wanted[axis] - position[axis]) + arm.damping * (speed[axis] - velocity[axis])

@@ -1,8 +1,8 @@
-//! The Falcons of a scene: opened, made ready, and handed to the session as devices of its peers.
+//! Falcons of a scene: opens the Falcons, makes them ready, and hands each Falcon to the session as the device of its peer.
 //!
-//! A real one is found over USB, given its firmware if it has none, and joins the session when its user has homed it. A simulated one
-//! (`falcon = { device = "simulated" }`) is a Falcon down to its bytes, in the time of the wall, in the hand that the scene gives its peer; that hand homes
-//! it before the session begins.
+//! A real Falcon is found over USB, is given its firmware if it has no firmware, and joins the session when its user has homed the device. A simulated Falcon
+//! (`falcon = { device = "simulated" }`) speaks the same bytes, runs in real time, and is held by the hand that the scene gives its peer. That hand homes the
+//! device before the session begins.
 
 mod attached;
 mod hand;
@@ -27,51 +27,52 @@ use hand::{Beginning, SceneHand};
 
 pub use attached::Readiness;
 
-/// Why a Falcon of the scene cannot be had.
+/// Reason why a Falcon of the scene cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("the Falcon of {peer}: {fault}")]
 pub struct FalconFault {
-    /// The peer.
+    /// Name of the peer that has the Falcon.
     pub peer: String,
-    /// Why.
+    /// Fault of the Falcon.
     pub fault: FaultKind,
 }
 
-/// Why a Falcon cannot be had.
+/// Fault for which a Falcon cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FaultKind {
-    /// It is not there, or may not be opened.
+    /// The Falcon is not connected, or must not be opened.
     #[error(transparent)]
     Usb(#[from] UsbError),
-    /// It was lost while it was made ready.
+    /// The connection to the Falcon broke while the Falcon was made ready.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// Its numbers in the scene make no sense.
+    /// The calibration of the Falcon in the scene is not valid.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// It runs no firmware, and none was given.
+    /// The Falcon runs no firmware, and no file with firmware was given.
     #[error("it has no firmware yet: give the path of the one that came with it with --firmware FILE (docs/falcon.md)")]
     NoFirmware,
-    /// The firmware cannot be read.
+    /// The file with the firmware cannot be read.
     #[error(transparent)]
     Firmware(#[from] FirmwareError),
-    /// The firmware cannot be loaded.
+    /// The firmware cannot be loaded into the Falcon.
     #[error(transparent)]
     Boot(#[from] BootError),
-    /// It cannot be driven.
+    /// The driver of the Falcon cannot be opened, or its thread cannot be started.
     #[error(transparent)]
     Start(#[from] StartError),
 }
 
-/// The Falcons of a scene, each driven by a thread of its own.
+/// Falcons of a scene, each driven by a thread of its own.
 #[derive(Debug)]
 pub struct Falcons {
-    /// By the places of the peers.
+    /// Falcons that the session has not taken yet, indexed by peer. `None` for peers of other kinds and for Falcons that the session has taken.
     devices: Vec<Option<AnyAttached>>,
+    /// Stoppers of all opened Falcons. These stay valid after the session has taken the devices.
     stoppers: Vec<Stopper>,
 }
 
-/// A Falcon with as many axes as the scene has.
+/// Falcon with as many axes as the scene.
 #[derive(Debug)]
 enum AnyAttached {
     One(Attached<1>),
@@ -80,12 +81,12 @@ enum AnyAttached {
 }
 
 impl Falcons {
-    /// Opens every Falcon of the scene. `firmware`: the file with which those are made ready that have none; `wishes`:
-    /// what their threads ask of the system. `progress` is told what takes time.
+    /// Opens every Falcon of the scene. `firmware`: file with the firmware for Falcons that run no firmware. `wishes`: requests to the system for the thread
+    /// of each Falcon. `progress` is called with the name of the peer and with the step, for steps that take time.
     ///
     /// # Errors
     ///
-    /// [`FalconFault`] of the first that cannot be had; those before it are stopped in good order.
+    /// [`FalconFault`] of the first Falcon that cannot be used. The Falcons opened before are stopped in good order.
     pub fn open(scene: &Scene, firmware: Option<&Path>, wishes: Wishes, mut progress: impl FnMut(&str, Progress)) -> Result<Self, FalconFault> {
         let mut falcons = Self { devices: Vec::new(), stoppers: Vec::new() };
         let mut taken = Vec::new();
@@ -94,6 +95,7 @@ impl Falcons {
                 falcons.devices.push(None);
                 continue;
             };
+            // Each simulated Falcon has random numbers of its own, which are the same in every run of the scene.
             let seed = scene.seed.wrapping_add(place as u64);
             let opened = open(scene, peer, spec, seed, firmware, wishes, &mut taken, &mut |told| progress(&peer.name, told));
             let device = opened.map_err(|fault| FalconFault { peer: peer.name.clone(), fault })?;
@@ -103,24 +105,25 @@ impl Falcons {
         Ok(falcons)
     }
 
-    /// Each Falcon by the place of its peer: whether it is ready.
+    /// Returns the readiness of each Falcon that the session has not taken yet, with the index of its peer.
     pub fn readiness(&self) -> impl Iterator<Item = (usize, Readiness)> + '_ {
         self.devices.iter().enumerate().filter_map(|(place, device)| device.as_ref().map(|device| (place, device.readiness())))
     }
 
-    /// Whether every simulated one is ready: their hands home them within some seconds. Real ones may take their time, and join when they are ready.
+    /// Returns whether every simulated Falcon is ready. The hands home simulated Falcons within seconds. Real Falcons are not waited for: a real Falcon joins
+    /// the session when ready.
     #[must_use]
     pub fn simulated_are_ready(&self) -> bool {
         self.readiness().all(|(_, readiness)| readiness.is_ready || !readiness.is_simulated)
     }
 
-    /// Something that switches all forces off, from wherever it is called.
+    /// Returns a stopper for each opened Falcon. A stopper switches all forces of its Falcon off, and can be used from any thread.
     #[must_use]
     pub fn stoppers(&self) -> Vec<Stopper> {
         self.stoppers.clone()
     }
 
-    /// The device of a peer, for the session, which has it from then on.
+    /// Removes the Falcon of a peer and returns the Falcon as the session's device. Returns `None` if the peer has no Falcon, or its Falcon was taken before.
     pub fn take(&mut self, peer: usize) -> Option<Box<dyn LiveDevice>> {
         Some(match self.devices.get_mut(peer)?.take()? {
             AnyAttached::One(device) => Box::new(device),
@@ -130,6 +133,8 @@ impl Falcons {
     }
 }
 
+/// Opens the Falcon of one peer and starts the thread that drives it. `taken`: serial numbers of the real Falcons opened so far; the serial number of this
+/// Falcon is added.
 #[expect(clippy::too_many_arguments, reason = "what a Falcon is made of, each once")]
 fn open(
     scene: &Scene,
@@ -147,6 +152,7 @@ fn open(
     if spec.device == Which::Simulated {
         let beginning = Beginning::default();
         let hand = SceneHand::new(peer.hand.clone(), spec.origin, beginning.clone());
+        // The hand's arm moves with the grip, so that the mechanics have the mass of both.
         let mechanics = MechanicsConfig { mass: peer.device.mass + hand.mass(), damping: peer.device.damping, ..MechanicsConfig::DEFAULT };
         let config = SimulatorConfig { seed, running: true, mechanics, ..SimulatorConfig::default() };
         let transport = SimulatedTransport::in_real_time(Simulator::new(config, hand));
@@ -154,6 +160,7 @@ fn open(
     }
     let serial = match &spec.device {
         Which::Serial(serial) => Some(serial.clone()),
+        // A simulated Falcon has been returned above.
         Which::First | Which::Simulated => first_free(taken)?,
     };
     let mut transport = UsbTransport::open(serial.as_deref())?;
@@ -163,18 +170,21 @@ fn open(
         Some(path) => {
             boot::ensure_loaded(&mut transport, &Firmware::read(path)?, &options, progress)?;
         }
+        // Without a file, a Falcon must run firmware already, from an earlier run.
         None if boot::is_loaded(&mut transport, &options)? => {}
         None => return Err(FaultKind::NoFirmware),
     }
     start(scene, transport, driver, wishes, None)
 }
 
-/// The serial number of the first Falcon that no peer has yet; `None` if it tells none, or none is found: opening it says so.
+/// Returns the serial number of the first listed Falcon that no peer has yet. Returns `None` if every listed Falcon is taken or tells no serial number.
+/// Opening without a serial number then takes the only connected Falcon, or reports the fault.
 fn first_free(taken: &[String]) -> Result<Option<String>, UsbError> {
     let listed = cohaptic_falcon::usb::list()?;
     Ok(listed.into_iter().filter_map(|falcon| falcon.serial).find(|serial| !taken.contains(serial)))
 }
 
+/// Starts the thread that drives a Falcon, with as many axes as the scene.
 fn start<T: Transport + Send + 'static>(
     scene: &Scene,
     transport: T,
@@ -182,7 +192,7 @@ fn start<T: Transport + Send + 'static>(
     wishes: Wishes,
     beginning: Option<Beginning>,
 ) -> Result<AnyAttached, FaultKind> {
-    // The first axes of the scene and of the device are the same.
+    // The axes of the scene are the first axes of the device.
     let all = [Axis::X, Axis::Y, Axis::Z];
     match scene.axes {
         cohaptic_scene::Axes::One => attach(transport, [all[0]], driver, wishes, beginning).map(AnyAttached::One),
@@ -191,6 +201,7 @@ fn start<T: Transport + Send + 'static>(
     }
 }
 
+/// Starts the thread that drives a Falcon with `A` axes.
 fn attach<const A: usize, T: Transport + Send + 'static>(
     transport: T,
     axes: [Axis; A],
@@ -200,7 +211,7 @@ fn attach<const A: usize, T: Transport + Send + 'static>(
 ) -> Result<Attached<A>, FaultKind> {
     let axes = Axes::new(axes).expect("no axis is named twice");
     let device = FalconDevice::start_with(transport, DeviceConfig { driver, ..DeviceConfig::new(axes) }, move || {
-        // A wish that is refused here is refused to the session's thread too, which says so.
+        // The report is dropped: a wish that the system refuses to this thread is also refused to the session's thread, and the session reports the refusal.
         let _ = prepare_thread(&wishes);
     })?;
     Ok(Attached::new(device, beginning))
@@ -224,5 +235,5 @@ impl AnyAttached {
     }
 }
 
-/// How long a simulated hand may take to home its device. It takes a second; a busy machine takes its time.
+/// Time limit for the homing of simulated Falcons. Homing takes about a second; the limit allows for a busy machine.
 pub const SIMULATED_HOMING: Duration = Duration::from_secs(60);

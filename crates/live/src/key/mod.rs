@@ -1,4 +1,4 @@
-//! The key of a session: 32 bytes that all its participants have.
+//! Session key: 32 secret bytes that all participants of a session have, and the file that holds the key.
 
 use core::fmt;
 use std::fs::{File, OpenOptions};
@@ -9,23 +9,23 @@ use zeroize::Zeroizing;
 
 use crate::{Entropy, EntropyError};
 
-/// The length of a session key \[byte\].
+/// Length of a session key \[byte\].
 const KEY_LEN: usize = 32;
 
-/// The secret of a session. A program that has it may take any seat of the session; it does not tell peers from each other.
+/// Secret of a session. A program with the key can take any seat of the session: the key does not tell peers apart.
 ///
-/// It is overwritten when it is dropped, and never printed.
+/// The key is overwritten in memory when dropped, and never printed.
 #[derive(Clone)]
 pub struct SessionKey(Zeroizing<[u8; KEY_LEN]>);
 
 impl SessionKey {
-    /// That key. It should be drawn at random: see [`SessionKey::generate`].
+    /// Returns the key with the bytes `bytes`, which should be drawn at random: see [`SessionKey::generate`].
     #[must_use]
     pub fn from_bytes(bytes: [u8; KEY_LEN]) -> Self {
         Self(Zeroizing::new(bytes))
     }
 
-    /// A new key.
+    /// Returns a new key, drawn from `entropy`.
     ///
     /// # Errors
     ///
@@ -47,54 +47,55 @@ impl fmt::Debug for SessionKey {
     }
 }
 
-/// No key file, of 64 hexadecimal digits and then at most white space (text, as `openssl rand -hex 32` makes it), is longer \[byte\]: what follows is not looked at, so that a wrong path cannot fill the memory.
+/// Largest length of a key file \[byte\]. A key file is text: 64 hexadecimal digits, as `openssl rand -hex 32` makes them, followed by white space at most.
+/// Longer files are refused, and the bytes beyond this length are not read, so that a wrong path cannot fill the memory.
 const MAX_FILE_LEN: u16 = 1024;
 
-/// Why a key file was not read or written.
+/// Reason why a key file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyFileError {
-    /// It cannot be opened or read.
+    /// The file cannot be opened or read.
     #[error("cannot read the key file {}: {source}", path.display())]
     Read {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
-    /// Others than its owner may read or change it.
+    /// Other users than the owner may read or change the file.
     #[error("the key file {0} is open to others than its owner (mode {mode:03o}); close it with: chmod 600 {0}", path.display())]
     Open {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
-        /// Its permissions.
+        /// Permission bits of the file, such as 0o644.
         mode: u32,
     },
-    /// It is no key.
+    /// The file does not hold a key.
     #[error("{} is no key file: it must hold 64 hexadecimal digits and nothing else; make one with: cohaptic live --new-key FILE", path.display())]
     Content {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
     },
-    /// It cannot be made. A file that is there already is never replaced.
+    /// The file cannot be created or written. An existing file is never replaced.
     #[error("cannot make the key file {}: {source}", path.display())]
     Write {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
-    /// There are no random bytes.
+    /// The system has no random bytes.
     #[error(transparent)]
     Entropy(#[from] EntropyError),
 }
 
 impl SessionKey {
-    /// Reads a key file.
+    /// Reads a key file of at most 1024 bytes.
     ///
     /// # Errors
     ///
-    /// [`KeyFileError`] if it cannot be read, if others than its owner may read or change it (on Unix; elsewhere nobody asks), or if it does not
-    /// hold exactly 64 hexadecimal digits, with white space after them at most.
+    /// [`KeyFileError`] if the file cannot be read, if other users than the owner may read or change the file (checked on Unix only), or if the content is not
+    /// exactly 64 hexadecimal digits, followed by white space at most.
     pub fn read_from(path: impl AsRef<Path>) -> Result<Self, KeyFileError> {
         let path = path.as_ref();
         let read_error = |source| KeyFileError::Read { path: path.to_owned(), source };
@@ -102,23 +103,25 @@ impl SessionKey {
         if let Some(mode) = cohaptic_files::open_to_others(&file).map_err(read_error)? {
             return Err(KeyFileError::Open { path: path.to_owned(), mode });
         }
-        // One allocation, so that no copy of the text is left behind by a growing buffer.
+        // One allocation that holds the longest text: a growing buffer would leave copies of the key in memory.
         let mut text = Zeroizing::new(Vec::with_capacity(2 * usize::from(MAX_FILE_LEN)));
+        // One byte more than allowed is read, so that `parse` can tell a file that is too long.
         file.take(u64::from(MAX_FILE_LEN) + 1).read_to_end(&mut text).map_err(read_error)?;
         parse(&text).ok_or_else(|| KeyFileError::Content { path: path.to_owned() })
     }
 
-    /// Draws a new key and writes it to a new file that only its owner may read. The content is on the disk when this returns.
+    /// Draws a new key and writes the key to a new file that only its owner may read. The content is on the disk when this function returns.
     ///
     /// # Errors
     ///
-    /// [`KeyFileError`] if there are no random bytes, if the file is there already, or if it cannot be written.
+    /// [`KeyFileError`] if there are no random bytes, if the file exists already, or if the file cannot be written.
     pub fn generate_to(path: impl AsRef<Path>, entropy: &mut impl Entropy) -> Result<Self, KeyFileError> {
         let path = path.as_ref();
         let key = Self::generate(entropy)?;
         let mut text = Zeroizing::new(String::with_capacity(2 * KEY_LEN + 1));
         for byte in key.as_bytes() {
             for nibble in [byte >> 4, byte & 0x0f] {
+                // A nibble is below 16, the number of digits.
                 text.push(char::from(b"0123456789abcdef"[usize::from(nibble)]));
             }
         }
@@ -133,6 +136,8 @@ impl SessionKey {
     }
 }
 
+/// Returns the options that create a file for its owner only, and fail if the file exists. The mode is given on creation, so that the file is at no time open
+/// to other users.
 fn new_file_options() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
@@ -141,6 +146,7 @@ fn new_file_options() -> OpenOptions {
     options
 }
 
+/// Returns the key in the text of a key file, or `None` if the text is not a key.
 fn parse(text: &[u8]) -> Option<SessionKey> {
     let (digits, rest) = text.split_at_checked(2 * KEY_LEN)?;
     if text.len() > usize::from(MAX_FILE_LEN) || !rest.iter().all(u8::is_ascii_whitespace) {
@@ -148,11 +154,13 @@ fn parse(text: &[u8]) -> Option<SessionKey> {
     }
     let mut key = Zeroizing::new([0; KEY_LEN]);
     for (byte, pair) in key.iter_mut().zip(digits.chunks_exact(2)) {
+        // `chunks_exact(2)` yields slices of two bytes.
         *byte = nibble(pair[0])? << 4 | nibble(pair[1])?;
     }
     Some(SessionKey(key))
 }
 
+/// Returns the value of a hexadecimal digit of either case.
 const fn nibble(digit: u8) -> Option<u8> {
     match digit {
         b'0'..=b'9' => Some(digit - b'0'),
