@@ -16,8 +16,8 @@ pub const REACH: f64 = 10.0;
 
 /// Time without a new position after which a pointer counts as absent.
 const OLD: Duration = Duration::from_millis(100);
-/// Limits of the time that the way to a new position takes. Within the limits, the way takes as long as the time between the arrivals of the last two
-/// positions. Displays give 60 to 144 positions a second.
+/// Least duration of a way that follows from arrivals. A way takes as long as the time between the arrivals of the last two positions, from [`QUICKEST`] to
+/// [`SLOWEST`]. Displays give 60 to 144 positions a second.
 const QUICKEST: Duration = Duration::from_millis(2);
 /// Largest duration of a way that follows from arrivals.
 const SLOWEST: Duration = Duration::from_millis(50);

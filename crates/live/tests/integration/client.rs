@@ -1,4 +1,4 @@
-//! The client's side, where the door is not asked.
+//! Client side of the protocol: welcomes and samples that a client must refuse.
 
 use cohaptic_live::client::{Joining, OpenError, WelcomeError};
 use cohaptic_live::handshake::{HandshakeError, Welcome};
@@ -51,6 +51,7 @@ fn every_flipped_bit_of_what_the_door_sends_is_refused() {
     for bit in 0..8 * len {
         let mut bad = out[..len].to_vec();
         bad[bit / 8] ^= 1 << (bit % 8);
+        // Bytes 64 to 79 are the nonce of the client, which is compared before the tag is verified.
         let nonce = (64..80).contains(&(bit / 8));
         assert_eq!(joined.open(&bad), Err(if nonce { OpenError::OtherJoining } else { OpenError::Forged }), "bit {bit}");
     }

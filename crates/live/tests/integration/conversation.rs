@@ -1,4 +1,4 @@
-//! A client and a door in virtual time, over a way that loses, doubles and reorders.
+//! A client and a door in virtual time, over a network that loses, duplicates and reorders datagrams.
 
 use cohaptic_live::client::{Client, ClientConfig, Heard, SessionInfo};
 use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, SystemEntropy};
@@ -9,13 +9,13 @@ use std::time::Duration;
 
 use crate::support::{Counting, SEAT, SESSION, address, at, cases, config, key, sample};
 
-/// What happens to the datagrams of one tick of 8 ms, on each way.
+/// Fate of the datagrams of one tick of 8 ms, in one direction.
 #[derive(Clone, Copy, Debug)]
 enum Way {
     Lost,
     Passed,
     Doubled,
-    /// It comes 24 ms later.
+    /// Delivered 24 ms later.
     Late,
 }
 
@@ -23,7 +23,7 @@ fn way() -> impl Strategy<Value = Way> {
     prop_oneof![3 => Just(Way::Lost), 4 => Just(Way::Passed), 1 => Just(Way::Doubled), 2 => Just(Way::Late)]
 }
 
-/// Datagrams on one way, with the instants at which they come.
+/// Datagrams under way in one direction, with the instants of their delivery.
 #[derive(Default)]
 struct OnTheWay(Vec<(Instant, Vec<u8>)>);
 
@@ -38,6 +38,7 @@ impl OnTheWay {
         }
     }
 
+    /// Removes and returns the datagrams delivered by the instant `now`.
     fn arrived(&mut self, now: Instant) -> Vec<Vec<u8>> {
         let (arrived, rest) = std::mem::take(&mut self.0).into_iter().partition(|(at, _)| *at <= now);
         self.0 = rest;
@@ -45,6 +46,7 @@ impl OnTheWay {
     }
 }
 
+/// Returns a client at `SEAT`.
 fn client(with_key: bool) -> Client {
     let info = SessionInfo { axes: 1, peers: 3, tick: Duration::from_millis(1), update: Duration::from_millis(8) };
     let config = if with_key {
@@ -55,16 +57,19 @@ fn client(with_key: bool) -> Client {
     Client::new(config, at(0))
 }
 
+/// Returns a door with random nonces, so that no two doors of a test give the same nonces.
 fn door(with_key: bool) -> AdmissionControl {
     AdmissionControl::new(config().with_key(with_key.then(key)), &mut SystemEntropy).unwrap()
 }
 
-/// Plays a session, begun anew in the middle, and gives what was let in and heard as new in each half.
+/// Plays a session that is restarted in the middle. Returns, for each half, the sequence numbers that the door admitted and the sequence numbers that the
+/// client heard as new.
 fn play(with_key: bool, ways: &[(Way, Way)]) -> ([Vec<u64>; 2], [Vec<u64>; 2]) {
     let (mut client, mut entropy) = (client(with_key), Counting::default());
     let (mut up, mut down) = (OnTheWay::default(), OnTheWay::default());
     let (mut admitted, mut heard) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
     let mut out = [0; MAX_DATAGRAM];
+    // The door's numbers begin high in the first half and at 0 in the second half: the client must accept numbers that go back.
     let (mut number, mut answer) = (0, 1_000_000);
     let middle = ways.len() / 2;
     let mut door_now = door(with_key);
@@ -108,9 +113,9 @@ fn play(with_key: bool, ways: &[(Way, Way)]) -> ([Vec<u64>; 2], [Vec<u64>; 2]) {
 proptest! {
     #![proptest_config(cases(48))]
 
-    /// 2.4 s on a way that loses three of ten and delays two of ten, 1.28 s on one that loses nothing; then the session is started again, and both
-    /// once more. Whatever was lost: a client that is not welcome asks every 250 ms, and one that hears nothing new asks after a second, so at the
-    /// end of either half it must be there.
+    /// Each half has 2.4 s of a bad network, which loses three of ten ticks and delays two of ten, and then 1.28 s of a network that loses nothing. Between
+    /// the halves the session is restarted. A client that has no welcome repeats its hello every 250 ms, and a client that hears nothing new says hello after
+    /// a second. So at the end of either half the client must have joined, whatever was lost.
     #[test]
     fn it_joins_and_comes_back_over_a_bad_way(with_key: bool, bad in prop::collection::vec((way(), way()), 2 * 300)) {
         let good = [(Way::Passed, Way::Passed); 160];
@@ -118,12 +123,12 @@ proptest! {
         let (admitted, heard) = play(with_key, &ways);
         for half in 0..2 {
             prop_assert!(!admitted[half].is_empty() && !heard[half].is_empty(), "{admitted:?} {heard:?}");
-            // Nothing is let in twice.
+            // No sample is admitted twice.
             let mut numbers = admitted[half].clone();
             numbers.sort_unstable();
             prop_assert!(numbers.windows(2).all(|pair| pair[0] != pair[1]), "{numbers:?}");
         }
-        // On the good way at the end everything passes: at least what is sent in the last 100 ms.
+        // The good network at the end delivers everything: at least the samples of the last 100 ms.
         prop_assert!(heard[1].len() >= 12 && heard[1].iter().rev().take(12).is_sorted_by(|after, before| after > before));
     }
 }
@@ -131,10 +136,11 @@ proptest! {
 #[test]
 fn on_a_good_way_nothing_is_lost_and_hellos_end() {
     let (admitted, heard) = play(true, &[(Way::Passed, Way::Passed); 500]);
-    // Hello and welcome in the first tick, and a sample in each from the second on.
+    // Hello and welcome pass in the first tick, and a sample in each tick from the second tick on.
     assert_eq!(admitted[0].len(), 249);
     assert_eq!(heard[0], (1_000_001..1_000_250).collect::<Vec<_>>());
-    // The last one was new in tick 249; a second later, in tick 249 + 125, it says hello, and from the next on it is there.
+    // The last new sample of the first half came in tick 249. A second later, in tick 249 + 125, the client says hello, and from the next tick on the client
+    // takes part again.
     assert_eq!(admitted[1].len(), 500 - 375);
     assert_eq!(heard[1], (375 - 250..250).collect::<Vec<_>>());
 }

@@ -1,4 +1,4 @@
-//! Floods of hellos with a right tag, in virtual time: recorded ones that are sent again, and those of a guest who has the key.
+//! Floods of hellos with a right tag, in virtual time: recorded hellos that are sent again, and new hellos of a guest who has the key.
 
 use std::net::SocketAddr;
 
@@ -8,30 +8,30 @@ use cohaptic_units::Instant;
 
 use crate::support::{SEAT, SESSION, address, admitted, assert_counts, at, joining, key, keyed_door, sample, sealed, shake_hands};
 
-/// Between two hellos of a flood \[ns\]: 9,700 a second.
+/// Time between two hellos of a flood \[ns\]: 9,700 hellos a second.
 const EVERY: u64 = 1_000_000_000 / 9_700;
-/// Peers that join during a flood, one after another, at the seat that the flood is for.
+/// Number of honest peers that join during a flood, one after another, at the seat that the flood asks for.
 const HONEST: u8 = 20;
-/// From one honest peer to the next one \[ms\]: the former one has been silent for longer than a session waits.
+/// Time between the joinings of two honest peers \[ms\]. In this time the former peer becomes silent for longer than the session waits.
 const SPACING: u64 = 150;
-/// Samples that an honest peer sends, one each 8 ms.
+/// Number of samples that an honest peer sends, one sample every 8 ms.
 const SAMPLES: u64 = 5;
 
-/// Sender and source addresses of the hellos of a flood.
+/// Contents and source addresses of the hellos of a flood.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Flood {
     /// A recorded hello, from the address of the attacker.
     Recorded,
     /// A recorded hello, each time from another false address.
     FromFalseAddresses,
-    /// The hello of the peer that joins, from the address of that peer: by somebody on the path.
+    /// The hello of the honest peer that joins, sent from the address of that peer by an attacker on the path.
     OnThePath,
-    /// A new hello each time, by a guest who has the key, from false addresses.
+    /// A new hello each time, from false addresses, by a guest who has the key.
     OfAGuest,
 }
 
 impl Flood {
-    /// The hello of that number, and the address that it seems to come from, while a peer joins or has joined.
+    /// Returns the hello number `number` of the flood with its source address, while the peer `honest` joins or has joined.
     fn hello(self, number: u64, honest: u8) -> (SocketAddr, Joining) {
         let [low, high, ..] = number.to_le_bytes();
         let anywhere = SocketAddr::from(([198, 51, 100, high], 1024 + u16::from(low)));
@@ -52,7 +52,7 @@ fn honest_address(honest: u8) -> SocketAddr {
     address(7000 + u16::from(honest))
 }
 
-/// A peer that is in already, at the other seat, and sends a sample each 8 ms.
+/// Peer that has joined at the other seat before the flood, and sends a sample every 8 ms.
 struct Present {
     joined: Joined,
     sent: u64,
@@ -65,6 +65,7 @@ impl Present {
         Self { joined: shake_hands(door, at(0), address(3), &Joining::new(SESSION, Self::PLACE, &key(), [3; 16])), sent: 0 }
     }
 
+    /// Sends the next sample, which the door must admit.
     fn speak(&mut self, door: &mut AdmissionControl, now: Instant) {
         let admission = door.handle_datagram(now, address(3), &sealed(&self.joined, &sample(2, self.sent)));
         assert!(matches!(admission, Admission::Sample { place: Self::PLACE, .. }), "sample {} of a peer that is in: {admission:?}", self.sent);
@@ -72,7 +73,7 @@ impl Present {
     }
 }
 
-/// How many honest peers were answered at their first hello, and joined.
+/// Runs a flood and returns the number of honest peers that were answered at their first hello and joined.
 fn came_in(flood: Flood) -> u8 {
     let mut door = keyed_door();
     let mut present = Present::join(&mut door);
@@ -80,6 +81,7 @@ fn came_in(flood: Flood) -> u8 {
     let mut joined: Option<(Joined, u64)> = None;
     for tick in 0..u64::from(HONEST) * SPACING {
         let now = at(tick);
+        // All hellos of the flood that are sent before this millisecond.
         while EVERY * hellos < now.as_nanos() {
             let (from, joining) = flood.hello(hellos, honest);
             match door.handle_datagram(Instant::from_nanos(EVERY * hellos), from, &joining.hello()) {
@@ -89,6 +91,7 @@ fn came_in(flood: Flood) -> u8 {
             }
             hellos += 1;
         }
+        // Halfway through a spacing the next honest peer says hello, once only.
         if tick % SPACING == SPACING / 2 {
             honest += 1;
             if let Admission::Reply { bytes, .. } = door.handle_datagram(now, honest_address(honest), &joining(honest).hello()) {
@@ -105,7 +108,7 @@ fn came_in(flood: Flood) -> u8 {
             }
         }
     }
-    // The flood has changed nothing: the seat was taken by honest peers alone, and not a datagram was refused.
+    // The flood has changed nothing: only honest peers took the seat, and no datagram was refused.
     assert_eq!(door.seat(at(0), SEAT).unwrap().joinings, u64::from(came_in));
     assert_counts(&door, present.sent + u64::from(came_in) * SAMPLES, hellos + u64::from(came_in) + 1, &[]);
     came_in

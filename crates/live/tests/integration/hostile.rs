@@ -1,4 +1,4 @@
-//! Whatever a stranger sends: nothing moves, nothing panics, nothing grows, and every datagram is counted once.
+//! Datagrams of strangers: no datagram changes a seat, causes a panic or uses up memory, and every datagram is counted once.
 
 use cohaptic_live::client::{Client, ClientConfig, Heard, Joined};
 use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Refusal};
@@ -8,7 +8,7 @@ use crate::support::{
     Counting, SEAT, SESSION, address, admitted, assert_counts, at, cases, joining, key, keyed_door, keyless_door, sample, sealed, shake_hands,
 };
 
-/// An admission control whose seat is taken from address 1, with the number 10.
+/// Returns a door whose `SEAT` is taken from address 1 by a sample with the number 10, and the peer that took the seat.
 fn taken() -> (AdmissionControl, Joined) {
     let mut door = keyed_door();
     let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
@@ -16,7 +16,7 @@ fn taken() -> (AdmissionControl, Joined) {
     (door, joined)
 }
 
-/// What a stranger must not be able to change, wherever it is kept: all that the door shows but its counters.
+/// Returns the state of all seats as text, without the counters of the door. A stranger must not be able to change this text.
 fn shown(door: &AdmissionControl) -> String {
     door.seats(at(50)).map(|seat| format!("{seat:?}")).collect()
 }
@@ -31,9 +31,9 @@ fn every_flipped_bit_of_a_sealed_sample_is_refused() {
         let mut bad = good.clone();
         bad[bit / 8] ^= 1 << (bit % 8);
         let Admission::Refused(cause) = door.handle_datagram(at(1), address(1), &bad) else { panic!("bit {bit} passed") };
-        // What the tag alone protects: the number, the send time, the state and the seal.
+        // The tag alone protects the sequence number, the time of sending, the state and the seal.
         if (24..40).contains(&(bit / 8)) || bit / 8 >= 48 {
-            // Bit 62 of −1.5 is the one of its exponent that is not set: without it, a number that is none.
+            // Bit 62 of −1.5 is the only bit of its exponent that is not set. Setting the bit makes a number that is not a number.
             let nan = bit == 8 * 56 + 62;
             assert_eq!(cause, if nan { Refusal::NotFinite } else { Refusal::Forged }, "bit {bit}");
             forged += u32::from(!nan);
@@ -41,7 +41,8 @@ fn every_flipped_bit_of_a_sealed_sample_is_refused() {
     }
     assert_eq!(forged, 8 * (16 + 48) - 1);
     assert_eq!(shown(&door), before);
-    // By field: magic, version, axes, motion, session, sender (1 becomes 3, 0 and many others, of which 3 and 0 are no seats; none is 2), zeros.
+    // Refusals by field: magic, version, axes, motion, session, sender and zeros. A flipped bit makes the sender 1 into 3, 0 and others, but never into 2, so
+    // that no changed sender has a seat.
     let count = |cause: Refusal| door.stats().refused(cause);
     assert_eq!([Refusal::Magic, Refusal::Version, Refusal::Axes, Refusal::Motion].map(count), [32, 16, 8, 8]);
     assert_eq!([Refusal::Reserved, Refusal::ForeignSession, Refusal::UnknownSeat].map(count), [32 + 64, 64, 32]);
@@ -71,11 +72,11 @@ fn every_cut_of_a_sealed_sample_is_refused() {
     for len in 0..good.len() {
         door.handle_datagram(at(1), address(1), &good[..len]);
     }
-    // 48 to 95 bytes are no sealed sample but for 64: a sample without its seal.
+    // Cuts of 48 to 95 bytes have no valid length. The cut of 64 bytes is a sample without its seal.
     assert_counts(&door, 1, 1, &[(Refusal::TooShort, 48), (Refusal::Length, 47), (Refusal::Unsealed, 1)]);
 }
 
-/// One datagram of a stranger: noise, or something that was good once, changed.
+/// Generates a datagram of a stranger: noise, or a good datagram with changed bytes.
 fn datagram() -> impl Strategy<Value = Vec<u8>> {
     let noise = prop::collection::vec(any::<u8>(), 0..200);
     let joined = {
@@ -99,7 +100,8 @@ fn datagram() -> impl Strategy<Value = Vec<u8>> {
 proptest! {
     #![proptest_config(cases(300))]
 
-    /// 100 datagrams in each of 300 cases. Two changes of one byte can cancel out: then it is the good datagram, which a stranger can only repeat.
+    /// Sends 100 datagrams in each of 300 cases. Two changes of the same byte can cancel out. The datagram is then good, and is skipped, because a stranger
+    /// can only repeat a good datagram.
     #[test]
     fn strangers_change_nothing_at_a_door_with_a_key(datagrams in prop::collection::vec((datagram(), 1..4_u16), 100)) {
         let (mut door, joined) = taken();
@@ -117,7 +119,7 @@ proptest! {
         prop_assert_eq!(door.stats().handled, 2 + door.stats().refused_in_all());
     }
 
-    /// Without a key what is let in is a good sample of this session from a seat, with a number that was not there before.
+    /// Without a key, an admitted datagram is a good sample of this session from a seat, and a sample that joins has a higher number than all joinings before.
     #[test]
     fn a_door_without_a_key_lets_in_good_samples_alone(datagrams in prop::collection::vec((datagram(), 1..4_u16, 0..60_u64), 100)) {
         let mut door = keyless_door();
@@ -145,7 +147,7 @@ proptest! {
         prop_assert_eq!(stats.handled, stats.admitted + stats.refused_in_all());
     }
 
-    /// The client is as careful: nothing but what the door made opens, and nothing but its welcome is one.
+    /// The client accepts only samples that the door made, and only the welcome for its own hello.
     #[test]
     fn strangers_tell_a_client_nothing(datagrams in prop::collection::vec(datagram(), 100)) {
         let (mut door, joined) = taken();
@@ -163,7 +165,7 @@ proptest! {
 
 #[test]
 fn nothing_is_kept_of_who_has_tried() {
-    // The size of a door is that of its seats: it owns two vectors of fixed length, and the test above shows that they do not change.
+    // A door owns memory for its seats only, and its text shows all of its data. A list of senders that have tried would make the text longer.
     let (mut door, _) = taken();
     let before = format!("{door:?}");
     for port in 2..60_000 {
@@ -171,6 +173,6 @@ fn nothing_is_kept_of_who_has_tried() {
     }
     let after = format!("{door:?}");
     assert_eq!(door.stats().refused(Refusal::Unsealed), 59_998);
-    // But for the digits of its counters it prints the same.
+    // Only the digits of the counters differ.
     assert!(after.len() < before.len() + 20, "{after}");
 }

@@ -1,4 +1,4 @@
-//! Key files, as they are made, read and refused.
+//! Key files: made, read and refused.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use cohaptic_live::{KeyFileError, SessionKey, SystemEntropy};
 
 use crate::support::{Counting, SEAT, SESSION};
 
-/// What a key makes of fixed bytes: keys themselves cannot be compared from outside.
+/// Returns a hello under the key with a fixed nonce. Equal keys give equal hellos; the keys themselves cannot be read from outside the crate.
 fn fingerprint(key: &SessionKey) -> Vec<u8> {
     Joining::new(SESSION, SEAT, key, [0; 16]).hello().to_vec()
 }

@@ -1,4 +1,4 @@
-//! A session with a key: hello, welcome, and samples under keys of their joining.
+//! Sessions with a key: hello, welcome, and samples sealed under the keys of their joining.
 
 use cohaptic_live::client::OpenError;
 use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Place, Refusal, SessionKey};
@@ -46,7 +46,7 @@ fn a_seal_is_good_for_one_address() {
     assert_eq!(door.handle_datagram(at(0), address(2), &first), Admission::Refused(Refusal::NotJoined), "faster than its owner");
     admitted(door.handle_datagram(at(0), address(1), &first));
     assert_eq!(door.handle_datagram(at(0), address(2), &sealed(&joined, &sample(1, 1))), Admission::Refused(Refusal::Forged));
-    // An IPv4 address is the same where a socket of IPv6 shows it mapped, but for the comparison with the owner of the seat.
+    // An IPv4 address and its mapped form give the same nonce, but the owner of a seat is compared by the address as the socket shows it.
     let mapped = std::net::SocketAddr::new("::ffff:192.0.2.1".parse().unwrap(), 1);
     assert_eq!(door.handle_datagram(at(0), mapped, &sealed(&joined, &sample(1, 1))), Admission::Refused(Refusal::Forged));
 }
@@ -57,7 +57,7 @@ fn what_the_door_sends_cannot_be_sent_back() {
     let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
     admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 0))));
     let mut out = [0; MAX_DATAGRAM];
-    // A sample that says it is from the seat itself, which the door would never send there: only the tag can tell.
+    // The sample claims to come from the seat itself. The door never sends such a sample to the seat, so that only the tag can refuse the sample.
     let (_, len) = door.seal(at(0), SEAT, &sample(1, 1), &mut out).unwrap();
     assert_eq!(door.handle_datagram(at(0), address(1), &out[..len]), Admission::Refused(Refusal::Forged));
     assert_eq!(joined.open(&sealed(&joined, &sample(1, 1))), Err(OpenError::Forged), "nor the other way round");
@@ -74,25 +74,25 @@ fn a_recording_of_an_earlier_joining_is_worthless() {
         recording.push(sealed(&joined, &sample(1, number)));
         admitted(door.handle_datagram(at(number), address(1), recording.last().unwrap()));
     }
-    // At once, from the same address: every number has been seen, and the hello is answered, which changes nothing.
+    // Replayed at once, from the same address: every number has been seen before. The hello is answered, which changes nothing.
     for datagram in &recording {
         door.handle_datagram(at(50), address(1), datagram);
     }
     assert_counts(&door, 50, 2, &[(Refusal::Replayed, 50)]);
     assert_eq!(door.seat(at(50), SEAT).unwrap().heard, Some(at(49)));
-    // After the peer has gone: still.
+    // Replayed after the peer has gone: refused in the same way.
     for datagram in &recording {
         door.handle_datagram(at(5000), address(1), datagram);
     }
     assert_counts(&door, 50, 3, &[(Refusal::Replayed, 100)]);
-    // After it has joined again.
+    // Replayed after the peer has joined again: the keys have changed.
     let again = shake_hands(&mut door, at(6000), address(1), &joining(2));
     assert!(admitted(door.handle_datagram(at(6000), address(1), &sealed(&again, &sample(1, 0)))).0);
     for datagram in &recording {
         door.handle_datagram(at(7000), address(1), datagram);
     }
     assert_counts(&door, 51, 5, &[(Refusal::Replayed, 100), (Refusal::Forged, 50)]);
-    // At another door with the same key and session.
+    // Replayed at another door with the same key and the same session: the nonces differ.
     let mut other = Counting::default();
     cohaptic_live::Entropy::fill(&mut other, &mut [0; 64]).unwrap();
     let mut door = AdmissionControl::new(config().with_key(Some(crate::support::key())), &mut other).unwrap();
@@ -107,14 +107,14 @@ fn a_present_peer_is_not_thrown_out_and_a_silent_one_is_replaced() {
     let mut door = keyed_door();
     let first = shake_hands(&mut door, at(0), address(1), &joining(1));
     admitted(door.handle_datagram(at(0), address(1), &sealed(&first, &sample(1, 0))));
-    // A second program with the key and the same place.
+    // A second program has the key, and asks for the same place.
     let second = shake_hands(&mut door, at(10), address(2), &joining(2));
     assert_eq!(door.handle_datagram(at(10), address(2), &sealed(&second, &sample(1, 0))), Admission::Refused(Refusal::SeatTaken));
     admitted(door.handle_datagram(at(11), address(1), &sealed(&first, &sample(1, 1))));
     let (joined, passed) = admitted(door.handle_datagram(at(111), address(2), &sealed(&second, &sample(1, 1))));
     assert!(joined, "its welcome is still good: nobody has joined since");
     assert_eq!(wire::Sample::<1>::decode(passed.bytes(), 1).unwrap().sequence, 1 << 40 | 1);
-    // The first one comes back too late: its joining is over, and it can tell nobody apart from a forger.
+    // The first program comes back too late: its joining is over, and the door cannot tell its samples from forged samples.
     assert_eq!(door.handle_datagram(at(112), address(1), &sealed(&first, &sample(1, 2))), Admission::Refused(Refusal::Forged));
     let mut out = [0; MAX_DATAGRAM];
     let (to, len) = door.seal(at(113), SEAT, &sample(0, 0), &mut out).unwrap();
@@ -128,7 +128,7 @@ fn a_program_that_starts_again_at_its_address_joins_at_once() {
     let first = shake_hands(&mut door, at(0), address(1), &joining(1));
     admitted(door.handle_datagram(at(0), address(1), &sealed(&first, &sample(1, 500))));
     let again = shake_hands(&mut door, at(1), address(1), &joining(2));
-    // Until the new keys are used the old ones are good.
+    // The old keys are valid until the first sample under the new keys.
     admitted(door.handle_datagram(at(2), address(1), &sealed(&first, &sample(1, 501))));
     assert!(admitted(door.handle_datagram(at(3), address(1), &sealed(&again, &sample(1, 0)))).0);
     assert_eq!(door.handle_datagram(at(4), address(1), &sealed(&first, &sample(1, 502))), Admission::Refused(Refusal::Forged));
@@ -178,7 +178,7 @@ fn secrets_are_not_printed() {
     let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
     admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 0))));
     let printed = format!("{door:?} {joined:?} {:?} {:?}", config().with_key(Some(crate::support::key())), joining(1));
-    // The key is 32 times 0xa5, 165.
+    // The key is 32 times the byte 0xa5, which is 165.
     assert!(!printed.contains("165, 165") && !printed.to_lowercase().contains("a5a5"), "{printed}");
     assert!(printed.contains("SessionKey(secret)") && printed.contains("WayKey(secret)"));
 }

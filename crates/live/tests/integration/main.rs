@@ -1,4 +1,4 @@
-//! The door against its peers and against strangers, and the example programs against the door.
+//! Tests of the admission control, called the door here, against its peers and against strangers, and of the example programs against the door.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, reason = "tests: what fails here fails the test, and exact values are compared")]
 #![allow(clippy::print_stderr, reason = "a test that cannot run here says so")]
 

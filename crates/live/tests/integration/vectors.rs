@@ -1,4 +1,4 @@
-//! The worked examples of `docs/live-protocol.md`, which were computed by another program.
+//! Worked examples of `docs/live-protocol.md`, whose bytes were computed by another program.
 
 use std::time::Duration;
 
@@ -12,9 +12,10 @@ use crate::support::{at, encode};
 const EXAMPLES: &str = include_str!("../../../../docs/examples/live-protocol.txt");
 const SESSION: u64 = 0x0123_4567_89ab_cdef;
 
-/// The bytes of the block of that title.
+/// Returns the bytes of the block with the title `title`.
 fn bytes(title: &str) -> Vec<u8> {
     let (_, rest) = EXAMPLES.split_once(&format!("[{title}]\n")).expect(title);
+    // A line is an offset of four digits, two spaces, and up to 16 bytes in 47 characters; a text may follow.
     let hex = rest
         .lines()
         .take_while(|line| !line.is_empty())
@@ -22,6 +23,7 @@ fn bytes(title: &str) -> Vec<u8> {
     hex.filter(|pair| !pair.is_empty()).map(|pair| u8::from_str_radix(&pair, 16).unwrap()).collect()
 }
 
+/// Returns bytes that count up from `from`.
 fn counting<const N: usize>(from: u8) -> [u8; N] {
     std::array::from_fn(|place| from + u8::try_from(place).unwrap())
 }
