@@ -1,7 +1,7 @@
-//! The programs of `docs/examples`, compiled, run, and checked against a door on a loopback socket and against the peers of this project.
+//! The programs of `docs/examples`, compiled, run, and compared with a door on a loopback socket and with the peers of this project.
 //!
-//! Nothing here depends on how fast the machine is: what the programs compute is the same however late they are, and where one must hear something
-//! before it ends, it is given more time until it has.
+//! No result depends on the speed of the machine: the programs compute the same numbers however late the programs are. A program that must hear something
+//! before its end is run again for a longer time until the program has heard it.
 
 mod programs;
 mod served;
@@ -19,7 +19,7 @@ use std::time::Duration;
 use crate::support::SESSION;
 use programs::{Language, finish};
 
-/// What the options of a program say of its mechanics.
+/// Mechanics of a program, as its options give them.
 struct Mechanics {
     axes: usize,
     peers: u32,
@@ -27,12 +27,14 @@ struct Mechanics {
     device: DeviceConfig,
     coupling: Gains,
     coordination: Gains,
+    /// Constant force of the hand along the first axis \[N\].
     force: f64,
-    /// Of an object that turns the whole inertia, and the grasp point.
+    /// Inertia of the whole object \[kg·m²\] and grasp point \[m\]. `None` if the object does not turn.
     turning: Option<([f64; 3], [f64; 3])>,
 }
 
 impl Mechanics {
+    /// Returns the options of the program for these mechanics.
     fn options(&self) -> Vec<String> {
         let Self { axes, peers, object, device, coupling, coordination, force, turning } = self;
         let whole = object.mass * f64::from(*peers);
@@ -53,7 +55,7 @@ impl Mechanics {
         options.into_iter().chain(turning).flat_map(|(name, value)| [name.to_owned(), value]).collect()
     }
 
-    /// Device and copy after this number of ticks of 1 ms without a word from the others, by the peer of this project.
+    /// Returns device, copy and attitude after `ticks` ticks of 1 ms without samples from other peers, computed by the peer of this project.
     fn alone(&self, ticks: u64) -> (State<3>, State<3>, Option<Attitude>) {
         let tick = Duration::from_millis(1);
         let clock = Clock::regular(tick);
@@ -100,10 +102,11 @@ impl Mechanics {
     }
 }
 
-/// A program that hears nobody moves exactly as a simulated peer does: its equations, its step and its order of things are the same.
+/// Checks that a program without samples from other peers moves exactly as a simulated peer: with the same equations, the same step and the same order of
+/// operations.
 fn moves_as_a_simulated_peer_does(language: Language) {
     let Some(program) = language.program() else { return };
-    // A socket that never answers.
+    // The socket never answers.
     let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
     let door = silent.local_addr().unwrap().to_string();
     let usual = Mechanics {
@@ -116,7 +119,7 @@ fn moves_as_a_simulated_peer_does(language: Language) {
         force: 0.5,
         turning: None,
     };
-    // Dampings for which each branch of the step is taken: b·h/m is 1e-4 for the device and 0.02 for the copy.
+    // The dampings take each branch of the step: b·h/m is 1e-4 for the device and 0.02 for the copy.
     let other = Mechanics {
         axes: 3,
         peers: 2,
@@ -127,7 +130,7 @@ fn moves_as_a_simulated_peer_does(language: Language) {
         force: -1.25,
         turning: None,
     };
-    // Runge and Kutta's method in the program is as exact as the step here: 3 rad/s and 1 ms leave less than 1e-13 rad a step.
+    // The Runge-Kutta method of the program is as exact as the step here: at 3 rad/s and 1 ms the error is below 1e-13 rad per step.
     let turning = Mechanics {
         axes: 3,
         peers: 3,
@@ -147,8 +150,8 @@ fn moves_as_a_simulated_peer_does(language: Language) {
         for axis in 0..mechanics.axes {
             let pairs = [(summary.position[axis], copy.position[axis]), (summary.velocity[axis], copy.velocity[axis])];
             for (found, expected) in pairs.into_iter().chain([(summary.device[axis], device.position[axis])]) {
-                // 250 steps of a stable system, each rounded a few times: some 1e3 ulp of the forces' quotients. A wrong order of two steps shows
-                // at 1e-4 of the motion.
+                // The tolerance is for 250 steps of a stable system, each rounded a few times: some 1e3 ulp of the forces' quotients. A wrong order of two
+                // operations changes the motion by 1e-4 of its size.
                 assert!((found - expected).abs() <= 1e-10 * (1.0 + expected.abs()), "axis {axis}: {found} instead of {expected}");
             }
         }

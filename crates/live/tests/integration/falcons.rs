@@ -1,7 +1,9 @@
-//! Three simulated Falcons hold one object over 24 ms, bytes and all, in virtual time: the scene `scenarios/live/three-falcons.toml`.
+//! Three simulated Falcons hold one object over links of 24 ms, down to the bytes of the device, in virtual time: the scene
+//! `scenarios/live/three-falcons.toml`.
 //!
-//! Expected is the scene's equilibrium: arm ka and coupling KC in series are k = ka·KC/(ka + KC), W is the sum of the wanted places w, and a copy rests at
-//! x = (k·w + KT·W/2)/(k + 3/2·KT). All parts are positive and those of one copy add up to 1, so what shifts the w by at most Δ shifts no copy by more.
+//! The expected positions are the equilibrium of the scene. Arm ka and coupling KC in series have the stiffness k = ka·KC/(ka + KC). With W the sum of the
+//! wanted positions w, a copy rests at x = (k·w + KT·W/2)/(k + 3/2·KT). The weights of all w in this sum are positive and add up to 1 for each copy. So if
+//! every w shifts by at most Δ, no copy shifts by more than Δ.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -22,23 +24,24 @@ use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::Instant;
 
 const PEERS: usize = 3;
-/// Of an arm and of the coupling in the scene \[N/m\].
+/// Stiffness of an arm in the scene \[N/m\].
 const ARM: f64 = 100.0;
-/// The hand on each grip wants to be there \[m\].
+/// Position that the hand on each grip wants \[m\], indexed by peer.
 const WANTED: [[f64; 3]; PEERS] = [[0.03, 0.0, -0.015], [0.0; 3], [0.0; 3]];
-/// The dry friction of a simulated grip \[N\].
+/// Dry friction of a simulated grip \[N\].
 const COULOMB: f64 = MechanicsConfig::DEFAULT.coulomb;
 
-/// How far whole counts shift the place that a hand seems to want \[m\]. An encoder is at most one count off, 0.06 mm each (docs/falcon.md): √3·0.06 mm. A motor is at
-/// most half a count off, 5e-5 N·m at 10,000 counts per N·m, and three of them √3 times that; the force on the grip is at most 29 rad/m times the torques (a count
-/// of 6.36e-4 rad is at least 0.022 mm), so 2.5 mN, which ka holds on 0.025 mm.
+/// Largest apparent shift of a hand's wanted position through rounding to whole counts \[m\]. Each of the three encoders is off by at most one count of 0.06
+/// mm (docs/falcon.md): √3·0.06 mm together. Each motor is off by at most half a count, which is 5e-5 N·m at 10,000 counts per N·m: √3 times that together.
+/// The force on the grip is at most 29 rad/m times the torques, because a count of 6.36e-4 rad is at least 0.022 mm. The force of 2.5 mN shifts a grip that ka
+/// holds by 0.025 mm.
 const COUNTS: f64 = 1.732 * 0.06e-3 + 1.732 * 5e-5 * 29.0 / ARM;
 
 fn scene() -> Scene {
     Scene::read_live(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/live/three-falcons.toml"), &[]).unwrap()
 }
 
-/// A transport that keeps every byte that passes.
+/// Transport that records every byte in both directions.
 struct Tapped {
     inner: SimulatedTransport,
     bytes: Arc<Mutex<Vec<u8>>>,
@@ -69,9 +72,10 @@ impl Transport for Tapped {
     }
 }
 
-/// A Falcon that the ticks of its peer drive.
+/// Falcon that the ticks of its peer drive.
 struct Stepped {
     falcon: SteppedFalcon<Tapped, 3>,
+    /// Largest force sent to the device \[N\].
     largest: Arc<Mutex<f64>>,
 }
 
@@ -87,14 +91,14 @@ impl LiveDevice for Stepped {
     }
 }
 
-/// What is kept of a device while the scene has it.
+/// Access to a simulated device while the scene owns the Falcon.
 struct Desk {
     simulator: SharedSimulator,
     bytes: Arc<Mutex<Vec<u8>>>,
     largest: Arc<Mutex<f64>>,
 }
 
-/// A homed Falcon in a hand that wants to be at `wanted`.
+/// Returns a homed Falcon in a hand that wants the position `WANTED[place]`. `coulomb`: dry friction \[N\]. `limit`: limit of the force \[N\].
 fn falcon(scene: &Scene, place: usize, coulomb: f64, limit: f64) -> (Stepped, Desk) {
     let peer = &scene.peers[place];
     let (PeerKind::Falcon(_, spec), Some(cohaptic_peer::Hand::Arm { arm, follows })) = (&peer.kind, peer.hand.clone()) else {
@@ -112,6 +116,7 @@ fn falcon(scene: &Scene, place: usize, coulomb: f64, limit: f64) -> (Stepped, De
     let mut falcon = SteppedFalcon::start(transport, DeviceConfig { driver, ..DeviceConfig::new(axes) }).unwrap();
     assert!(falcon.wait(Duration::from_millis(4500)).unwrap().is_ready());
     let (origin, wanted) = (spec.origin, WANTED[place]);
+    // The hand homes the device first, and becomes the arm of the scene only now.
     simulator.with(|device| {
         device.set_hand(move |_: Instant, position: [f64; 3], velocity: [f64; 3]| {
             [0, 1, 2].map(|axis| arm.stiffness * (origin[axis] + wanted[axis] - position[axis]) - arm.damping * velocity[axis])
@@ -120,12 +125,14 @@ fn falcon(scene: &Scene, place: usize, coulomb: f64, limit: f64) -> (Stepped, De
     (Stepped { falcon, largest: Arc::clone(&largest) }, Desk { simulator, bytes, largest })
 }
 
-/// Every number of every tick, and the mean place of each copy and device over the last half second.
+/// All numbers of all ticks as bits, and the mean positions of each copy and each device over the last half second.
 #[derive(Default)]
 struct Trace {
     bits: Vec<u64>,
     from: Instant,
+    /// Sums of positions, indexed by peer, then copy (0) and device (1), then axis.
     sums: [[[f64; 3]; 2]; PEERS],
+    /// Number of ticks in the sums, of all peers together.
     count: u32,
 }
 
@@ -170,12 +177,13 @@ impl Observer for Trace {
     }
 }
 
-/// What came of a session.
+/// Result of a session.
 struct Session {
     trace: Trace,
     desks: Vec<Desk>,
 }
 
+/// Runs the scene to its end, and checks that all devices joined once, exchanged no garbage, and kept the limit of the force.
 fn session(scene: &Scene, coulomb: f64, limit: f64) -> Session {
     let mut desks = Vec::new();
     let mut live = LiveScene::new(scene, |place| {
@@ -217,13 +225,13 @@ fn the_same_session_is_the_same_to_the_last_byte() {
     assert!(one.trace.bits == two.trace.bits, "motion");
     for (one, two) in one.desks.iter().zip(&two.desks) {
         let (one, two) = (one.bytes.lock().unwrap(), two.bytes.lock().unwrap());
-        // Homing and session, 6 s: a packet out and a report in each millisecond. An exchange takes 1.02 ms here, with 0.02 ms for the call that ends it.
+        // Homing and session last 6 s, with one exchange of a packet and a report per 1.02 ms: 0.02 ms is the duration of the call that ends the exchange.
         assert!(one.len() >= 32 * 5850, "{}", one.len());
         assert!(*one == *two, "bytes");
     }
 }
 
-/// The copies rest where those of plain masses do, but for what whole counts and dry friction leave open.
+/// The copies rest where the copies of plain masses rest, within the uncertainty of whole counts and dry friction.
 #[test]
 fn the_copies_rest_where_plain_masses_do() {
     let scene = scene();
@@ -231,18 +239,18 @@ fn the_copies_rest_where_plain_masses_do() {
     let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut plain);
     for coulomb in [0.0, COULOMB] {
         let Session { trace, desks } = session(&scene, coulomb, 4.0);
-        // Friction of a grip at rest is as good as a hand that wants to be elsewhere.
+        // Friction of a grip at rest shifts the copies like a hand whose wanted position is shifted.
         let shift = coulomb / ARM + COUNTS;
         for (peer, desk) in desks.iter().enumerate() {
             let off = distance(trace.copy(peer), plain.copy(peer));
             assert!(off <= shift, "{peer}, friction {coulomb} N: {off} m off, at most {shift} m expected");
-            // The driver knows where the grip truly is, but for its counts: KC·(grip − copy) is what the hand holds.
+            // The driver must know the true position of the grip within the rounding of counts, because KC·(grip − copy) is the force that the hand feels.
             let grip = desk.simulator.with(|device| device.position());
             let seen = trace.device(peer);
             let off = distance(seen, [grip[0], grip[1], grip[2] - 0.125]);
             assert!(off <= COUNTS + 2e-5, "{peer}: the device is {off} m from where it is seen");
         }
-        // As far apart as the formula says: k·w/(k + 3/2·KT), with w = 33.5 mm.
+        // The expected distance of the copies is k·w/(k + 3/2·KT), with w = 33.5 mm.
         let apart = distance(trace.copy(0), trace.copy(1));
         let k = ARM * 1000.0 / (ARM + 1000.0);
         let expected = k / (k + 450.0);
@@ -250,7 +258,7 @@ fn the_copies_rest_where_plain_masses_do() {
     }
 }
 
-/// Left pulls with 1.69 N where nothing limits it. With 1 N its hand gets 6.9 mm nearer to where it wants to be.
+/// Without a limit, the peer `left` pulls with 1.69 N. With a limit of 1 N, its hand comes 6.9 mm closer to its wanted position.
 #[test]
 fn a_limit_of_force_gives_way_to_the_hand() {
     let Session { trace, desks } = session(&scene(), COULOMB, 1.0);

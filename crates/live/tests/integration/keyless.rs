@@ -1,4 +1,4 @@
-//! A session without a key: the first good sample takes a seat.
+//! Sessions without a key: the first good sample takes a seat.
 
 use cohaptic_live::AdmissionControl;
 use cohaptic_live::{Admission, AdmissionConfig, AdmissionConfigError, Limits, MAX_DATAGRAM, Place, Refusal, Seat};
@@ -29,11 +29,11 @@ fn a_present_peer_keeps_its_seat_and_a_silent_one_loses_it() {
     let mut door = keyless_door();
     admitted(door.handle_datagram(at(0), address(1), &sample(1, 500)));
     assert_eq!(door.handle_datagram(at(99), address(2), &sample(1, 0)), Admission::Refused(Refusal::SeatTaken));
-    // What was refused is not heard: at 100 ms the first one is gone.
+    // A refused sample does not count as heard: at 100 ms the first program is gone.
     assert!(!door.seat(at(100), SEAT).unwrap().present);
     let (joined, passed) = admitted(door.handle_datagram(at(100), address(2), &sample(1, 3)));
     assert!(joined);
-    // For those inside it is newer than everything before, although it counts anew.
+    // Inside the session the sample is newer than all samples before, although the program counts anew.
     let inside = wire::Sample::<1>::decode(passed.bytes(), 1).unwrap();
     assert_eq!(inside.sequence, 1 << 40 | 3);
     assert_eq!(door.handle_datagram(at(101), address(1), &sample(1, 501)), Admission::Refused(Refusal::SeatTaken));
@@ -56,7 +56,7 @@ fn late_samples_pass_once_within_the_window() {
     for number in [0, 200, 73, 72, 199, 73, 200, 201] {
         door.handle_datagram(at(number / 8), address(1), &sample(1, number));
     }
-    // 72 is 128 behind, 73 and 200 are repeated.
+    // Number 72 is 128 below the highest number. Numbers 73 and 200 are repeated.
     assert_counts(&door, 5, 0, &[(Refusal::Replayed, 3)]);
 }
 

@@ -1,4 +1,4 @@
-//! A session on loopback. Its thread is held up on purpose, and nothing depends on for how long a busy machine holds it up besides.
+//! Sessions on a loopback socket. The session's thread is held up on purpose; no result depends on further delays by a busy machine.
 
 use std::collections::BTreeSet;
 use std::net::{SocketAddr, UdpSocket};
@@ -14,7 +14,7 @@ use cohaptic_units::Instant;
 
 use crate::support::SESSION;
 
-/// Two who are simulated and tick together, and between them a program at place 1.
+/// Returns a scene of two simulated peers, which tick together, and a peer in another program at place 1.
 fn scene() -> String {
     format!(
         "scene = {{ duration = \"1h\", seed = {SESSION} }}\nobject = {{ mass = 0.45 }}\n\
@@ -24,7 +24,7 @@ fn scene() -> String {
     )
 }
 
-/// Opens a session without a key that records into `out` of that folder.
+/// Opens a session without a key that records into the folder `out` in `folder`. Returns the session and the address of its socket.
 fn open(folder: &Path, tolerance: Tolerance) -> (Session, SocketAddr) {
     let path = folder.join("scene.toml");
     std::fs::write(&path, scene()).unwrap();
@@ -36,19 +36,20 @@ fn open(folder: &Path, tolerance: Tolerance) -> (Session, SocketAddr) {
     (session, address)
 }
 
-/// The lines of a file of the record without the first one, in fields.
+/// Returns the lines of a file of the record, without the header, split into fields.
 fn read(folder: &Path, name: &str) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(folder.join("out").join(name)).unwrap();
     text.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }
 
-/// What `lateness.csv` says of ticks, or releases: so late were so many.
+/// Returns the histogram of ticks or of releases in `lateness.csv`: latenesses, each with its count.
 fn late(folder: &Path, of: &'static str) -> impl Iterator<Item = (Duration, u64)> {
     let lines = read(folder, "lateness.csv").into_iter().filter(move |line| line[0] == of);
-    // Microseconds with three decimals.
+    // The file has microseconds with three decimals: without the point, the digits are nanoseconds.
     lines.map(|line| (Duration::from_nanos(line[1].replace('.', "").parse().unwrap()), line[2].parse().unwrap()))
 }
 
+/// Sends the sample number `number` of the program at place 1.
 fn send(socket: &UdpSocket, door: SocketAddr, number: u64) {
     let sample = Sample { session: SESSION, sender: 1, sequence: number, sent: Instant::ZERO, state: State::<1>::REST };
     let mut bytes = [0; MAX_LEN];
@@ -56,23 +57,24 @@ fn send(socket: &UdpSocket, door: SocketAddr, number: u64) {
     socket.send_to(&bytes[..len], door).unwrap();
 }
 
-/// At the border of two steps of the histogram: what is later is later to all its digits.
+/// Tolerance at the border of two steps of the histogram, so that the rounded latenesses of the file and the exact latenesses are on the same side.
 const TOLERANCE: Tolerance = Tolerance { limit: Duration::from_nanos((1 << 25) - 1) };
 
-/// Between the two samples of a pair the thread of the session stands still.
+/// Time for which the session's thread is held up between the two samples of a pair.
 const HELD_UP: Duration = Duration::from_millis(100);
-/// The kernel's stamps are by the time of day, which may be adjusted meanwhile, by far less than that.
+/// Allowance for adjustments of the time of day, to which the kernel's time stamps refer.
 const ADJUSTED: Duration = Duration::from_millis(1);
-/// A stamp that is a second old when it is read is not believed; a pair that was read within this is looked at.
+/// Time within which a pair must have been read: the session does not believe a time stamp that is a second old.
 const IN_TIME: Duration = Duration::from_millis(900);
 
-/// Sends pairs of samples while it holds the session up, until one pair was read in time.
+/// Conductor that sends pairs of samples and holds the session up between the two samples, until a pair was read in time.
 struct HoldsUp {
     socket: UdpSocket,
     door: SocketAddr,
     number: u64,
+    /// Beginning of the latest pair.
     begun: Option<Wall>,
-    /// It has said that the session is to end, and is not asked again.
+    /// Whether the conductor has ended the session. The conductor must not be called afterwards.
     ended: bool,
 }
 
@@ -104,8 +106,8 @@ impl Conductor for HoldsUp {
     fn show(&mut self, _: Status) {}
 }
 
-/// Both samples of a pair are read at once, after the second one was sent. Each counts from when the kernel had it: so the first one counts earlier, by at least as
-/// long as the thread stood still between them.
+/// Both samples of a pair are read together, after the second sample was sent. Each sample counts from the instant at which the kernel received the datagram.
+/// So the two instants differ by at least the time for which the thread was held up.
 #[test]
 fn a_sample_counts_from_when_the_kernel_had_it_and_not_from_when_it_was_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -121,31 +123,32 @@ fn a_sample_counts_from_when_the_kernel_had_it_and_not_from_when_it_was_read() {
     let apart = Duration::from_nanos(last - first);
     assert!(apart >= HELD_UP - ADJUSTED, "{apart:?} apart");
 
-    // The ticks that were due while the thread stood still were late, one a millisecond; the last of them not later than is tolerated.
+    // Ticks that were due while the thread was held up were late, one tick per millisecond. The last of these ticks were within the tolerance.
     let counts = |of| late(folder.path(), of).map(|(_, count)| count).sum::<u64>();
     let late = |of| late(folder.path(), of).filter(|(late, _)| *late > TOLERANCE.limit).map(|(_, count)| count).sum::<u64>();
     assert_eq!((report.late_ticks, report.ticks.count, report.releases.count), (late("tick"), counts("tick"), counts("release")));
     let pairs = conductor.number / 2;
     let most = u64::try_from((HELD_UP - TOLERANCE.limit).as_millis()).unwrap();
     assert!(late("tick") >= pairs * (most - 1), "{} ticks were late", late("tick"));
-    // What was sent meanwhile counts as well.
+    // Late releases count as well.
     let (late, of) = (late("tick") + late("release"), counts("tick") + counts("release"));
     assert_eq!(report.validity, Validity::NotValid { late, of, limit: TOLERANCE.limit });
-    // Two who tick at the same instant are one tick of the loop.
+    // Peers that tick at the same instant are one tick of the loop.
     let instants: BTreeSet<_> = read(folder.path(), "trajectory.csv").into_iter().map(|line| line[0].clone()).collect();
     assert_eq!(report.ticks.count, instants.len() as u64);
 }
 
-/// A program that takes part until it has been sent some samples. Then the link to it is changed, and then the session ended.
+/// Conductor that acts as a program, until the session has sent some samples to the program. Then the conductor changes the link to the program, and then ends
+/// the session.
 struct TakesPart {
     socket: UdpSocket,
     door: SocketAddr,
     number: u64,
     begun: Wall,
-    /// So many were sent when it was last shown.
+    /// Number of samples sent to the program, from the latest status.
     released: u64,
     change: Option<LinkChange>,
-    /// It has said that the session is to end, and is not asked again.
+    /// Whether the conductor has ended the session. The conductor must not be called afterwards.
     ended: bool,
 }
 
@@ -172,12 +175,13 @@ impl Conductor for TakesPart {
     }
 }
 
+/// Number of samples to the program before the link is changed.
 const ENOUGH: u64 = 3;
-/// Long enough for any machine; it is the end of a test that fails.
+/// Time limit of the test, long enough for any machine. Only a failing test takes this long.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Whatever the network delivers to a program while it is there is sent to it and recorded: when it was due, which is when the network delivered it, and how late it
-/// was. A link that is changed is the one that was meant.
+/// Every sample that the network delivers to a present program is sent and recorded, with the instant of its delivery, which is its deadline, and with its
+/// lateness. The changed link is the link that the conductor named.
 #[test]
 fn what_is_sent_to_a_program_is_recorded_and_the_link_that_was_meant_is_changed() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Finding, compiling and running the programs, and reading what they say.
+//! Finds, compiles and runs the example programs, and reads their summaries.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// No program of these tests needs a minute, however busy the machine is: one that takes longer hangs.
+/// Time limit for a program. A program of these tests ends within a minute even on a busy machine, so that a program that takes longer hangs.
 const AT_MOST: Duration = Duration::from_secs(120);
 
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,7 @@ pub(super) enum Language {
     Cpp,
 }
 
-/// A program that can be run.
+/// Program that can be run: the command and its first arguments.
 #[derive(Clone, Debug)]
 pub(super) struct Program {
     words: Vec<PathBuf>,
@@ -31,7 +31,7 @@ impl Program {
     }
 }
 
-/// The compiled program, made once for all tests. It is `None` where there is no compiler.
+/// The compiled C++ program, made once for all tests, and its folder. `None` on a machine without a compiler.
 static CPP: LazyLock<Option<(TempDir, PathBuf)>> = LazyLock::new(|| {
     let compiler = ["c++", "g++", "clang++"].into_iter().find(|name| is_there(name))?;
     let folder = tempfile::tempdir().unwrap();
@@ -46,7 +46,7 @@ static CPP: LazyLock<Option<(TempDir, PathBuf)>> = LazyLock::new(|| {
 });
 
 impl Language {
-    /// The program, or `None` and a message where it cannot be run.
+    /// Returns the program. Prints a message and returns `None` if the machine lacks the interpreter or the compiler.
     pub(super) fn program(self) -> Option<Program> {
         let words = match self {
             Self::Python => is_there("python3").then(|| vec!["python3".into(), example("udp_peer.py")]),
@@ -67,7 +67,7 @@ fn is_there(program: &str) -> bool {
     Command::new(program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success())
 }
 
-/// A program that is ended with the test, should that fail.
+/// Running program, which is killed when dropped, so that a failing test leaves no program behind.
 pub(super) struct Running {
     child: Child,
     since: Instant,
@@ -78,14 +78,14 @@ impl Running {
         Self { child, since: Instant::now() }
     }
 
-    /// Whether it is still running. Fails if it has for too long.
+    /// Returns whether the program is still running. Fails if the program has been running for longer than `AT_MOST`.
     pub(super) fn is_running(&mut self) -> bool {
         let running = self.child.try_wait().unwrap().is_none();
         assert!(!running || self.since.elapsed() < AT_MOST, "it does not end");
         running
     }
 
-    /// What it has said, after it has ended.
+    /// Waits for the end of the program. Returns whether the program succeeded, its standard output and its standard error.
     pub(super) fn output(mut self) -> (bool, String, String) {
         while self.is_running() {
             std::thread::sleep(Duration::from_millis(2));
@@ -101,13 +101,13 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It has ended already, unless a test fails.
+        // The program has ended already, unless a test fails.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// What a program says at its end.
+/// Summary that a program prints at its end.
 #[derive(Debug)]
 pub(super) struct Summary {
     pub(super) ticks: u64,
@@ -129,7 +129,7 @@ pub(super) struct Other {
     pub(super) stale: bool,
 }
 
-/// Waits for its end and reads its summary.
+/// Waits for the end of the program and returns its summary.
 pub(super) fn finish(child: Child) -> Summary {
     summary(Running::new(child))
 }

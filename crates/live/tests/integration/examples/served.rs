@@ -1,4 +1,4 @@
-//! The programs in a session: a door behind a loopback socket, and two others who answer every sample that is let in.
+//! The example programs in a session: a door with a loopback socket, and two other peers that answer every admitted sample.
 
 use std::net::UdpSocket;
 use std::time::{Duration, Instant as Wall};
@@ -10,22 +10,22 @@ use cohaptic_units::Instant;
 use super::programs::{Language, Running, Summary, summary};
 use crate::support::{SEAT, SESSION, config, encode};
 
-/// Where the others say that their copies are \[m\].
+/// Position that the other peers claim for their copies \[m\].
 const THERE: f64 = 0.02;
 
-/// A door, its socket, and what came through.
+/// Door with its socket, and the counts of a session.
 struct Served {
     socket: UdpSocket,
     door: AdmissionControl,
     began: Wall,
     key: Option<SessionKey>,
-    /// The numbers of the samples that were let in, as the door numbered them.
+    /// Sequence numbers of the admitted samples, as the door numbered them.
     numbers: Vec<u64>,
-    /// How many samples each of the others has sent.
+    /// Number of samples that each of the other peers has sent.
     answers: u64,
-    /// The number of the first.
+    /// Sequence number of the first sample of each other peer.
     first_number: u64,
-    /// Whether each of them comes with a false one.
+    /// Whether false samples are sent before the samples of the other peers.
     strangers: bool,
 }
 
@@ -37,7 +37,7 @@ impl Served {
         Self { socket, door, began: Wall::now(), key, numbers: Vec::new(), answers: 0, first_number: 1_000_000, strangers }
     }
 
-    /// As if the session had been ended and started again.
+    /// Replaces the door and counts anew, as a restarted session does.
     fn start_again(&mut self) {
         self.door = new_door(self.key.clone());
         self.numbers.clear();
@@ -45,10 +45,10 @@ impl Served {
         self.first_number = 0;
     }
 
-    /// Takes in one datagram, if one comes. Whether one did.
+    /// Handles one datagram, if a datagram comes within 5 ms. Returns whether a datagram came.
     fn serve_one(&mut self) -> bool {
         let mut buffer = [0; 2048];
-        // An error is a timeout, or says that the program has ended.
+        // An error is a timeout, or the system's report that the program has closed its socket.
         let Ok((len, from)) = self.socket.recv_from(&mut buffer) else { return false };
         let now = Instant::ZERO.saturating_add(self.began.elapsed());
         match self.door.handle_datagram(now, from, &buffer[..len]) {
@@ -64,6 +64,7 @@ impl Served {
         true
     }
 
+    /// Sends a sample of each other peer to the program, after false samples if `strangers`.
     fn answer(&mut self, now: Instant) {
         let mut out = [0; MAX_DATAGRAM];
         let mut send = |sender: u32, session: u64, position: f64, flip: u8| {
@@ -74,7 +75,8 @@ impl Served {
             drop(self.socket.send_to(&out[..len], to));
         };
         if self.strangers {
-            // From nowhere near, if one of them were believed: of another session, with a wrong tag, not a number, from the peer itself.
+            // False samples: of another session, not a number, from the program's own place, and with a wrong tag. A believed sample would pull the program
+            // far away.
             send(0, SESSION + 1, 1e6, 0);
             send(0, SESSION, f64::NAN, 0);
             send(SEAT.0, SESSION, 1e6, 0);
@@ -89,12 +91,12 @@ impl Served {
 }
 
 fn new_door(key: Option<SessionKey>) -> AdmissionControl {
-    // Long enough for any pause that a busy machine makes.
+    // Ten minutes are longer than any pause of a busy machine.
     AdmissionControl::new(AdmissionConfig { stale_after: Duration::from_secs(600), ..config() }.with_key(key), &mut SystemEntropy).unwrap()
 }
 
-/// Starts a program for so many seconds, serves it to its end, and gives both sides' accounts. `restart_after`: how many samples are let in before
-/// the session is started again.
+/// Starts a program for `seconds` seconds and serves the program until its end. Returns the door's side and the program's summary, or `None` if the program
+/// cannot be run. `restart_after`: number of admitted samples after which the session is restarted.
 fn serve(language: Language, with_key: bool, strangers: bool, seconds: f64, restart_after: Option<usize>) -> Option<(Served, Summary)> {
     let program = language.program()?;
     let folder = tempfile::tempdir().unwrap();
@@ -108,7 +110,7 @@ fn serve(language: Language, with_key: bool, strangers: bool, seconds: f64, rest
     command.arg(served.socket.local_addr().unwrap().to_string());
     command.args(["--session", &SESSION.to_string(), "--place", "1", "--duration", &seconds.to_string(), "--patience", "100"]);
     if with_key {
-        // Axes, peers and periods are told by the door.
+        // The welcome tells axes, peers and periods.
         command.arg("--key-file").arg(&path);
     } else {
         command.args(["--peers", "3"]);
@@ -125,8 +127,8 @@ fn serve(language: Language, with_key: bool, strangers: bool, seconds: f64, rest
     Some((served, summary(running)))
 }
 
-/// Serves it for a longer and longer time until it has heard the others: on a busy machine it may end before it is answered. Nothing is checked
-/// before.
+/// Serves a program for a longer and longer time until `enough` is true: on a busy machine a program may end before the program is answered. Results are
+/// checked only after that.
 fn serve_until(
     language: Language,
     with_key: bool,
@@ -145,12 +147,12 @@ fn serve_until(
 }
 
 fn takes_part(language: Language, with_key: bool) {
-    // What it hears in its last tick does not move it any more.
+    // Samples heard in the last tick no longer move the program, so that the position is checked too.
     let heard = |_: &Served, summary: &Summary| summary.others.iter().all(|other| other.received > 0) && summary.position[0] != 0.0;
     let Some((served, summary)) = serve_until(language, with_key, true, [0.3, 2.0, 10.0, 40.0], None, heard) else { return };
     let stats = served.door.stats();
-    // Every sample that it sent was let in, in order: what is on loopback is not lost while the socket has room, which it has for 100 of them
-    // even if nobody reads.
+    // Every sample of the program was admitted, in order. Loopback loses no datagram while the socket has room, and the socket has room for 100 datagrams even
+    // if nobody reads.
     let joinings_differ = served.numbers.iter().any(|number| number >> 40 > 0);
     let numbers: Vec<u64> = served.numbers.iter().map(|number| number & ((1 << 40) - 1)).collect();
     if summary.sent <= 100 {
@@ -159,7 +161,7 @@ fn takes_part(language: Language, with_key: bool) {
     assert!(numbers.is_sorted_by(|before, after| before < after) && numbers.iter().all(|&number| number < summary.sent));
     assert_eq!(summary.sent, summary.ticks.div_ceil(8));
     assert_eq!(joinings_differ, stats.joinings > 1);
-    // It may have said hello again if it heard nothing for a second.
+    // The program may have said hello again after a second without a new sample.
     assert!(stats.joinings >= 1 && stats.joinings <= summary.joinings.max(1), "{stats:?} {summary:?}");
     assert_eq!(stats.refused_in_all(), 0, "{stats:?}");
     assert_eq!(stats.welcomed > 0, with_key);
@@ -167,7 +169,7 @@ fn takes_part(language: Language, with_key: bool) {
     for other in &summary.others {
         assert!(other.received <= served.answers, "{summary:?}");
     }
-    // Nothing false was believed: it was drawn to where the others are, and by nothing else. It swings no farther than as far again.
+    // No false sample was believed: only the other peers drew the program, which can overshoot their position by at most the distance itself.
     assert!(summary.position[0] > 0.0 && summary.position[0] < 2.0 * THERE, "{summary:?}");
     assert!(summary.ignored > 0, "{summary:?}");
     let false_ones = if with_key { 4 } else { 3 };
@@ -175,9 +177,9 @@ fn takes_part(language: Language, with_key: bool) {
     assert!(served.door.seat(Instant::MAX, Place(2)).is_some_and(|seat| seat.address.is_none()));
 }
 
-/// The session is started again under the program: it hears nothing for a second, says hello again, and is there again with new keys.
+/// The session is restarted while the program runs: the program hears nothing new for a second, says hello again, and joins again with new keys.
 fn comes_back(language: Language) {
-    // Samples of the second session are answered from number 0, below what it has heard before.
+    // In the second session, samples to the program count from 0, below the numbers that the program has heard before.
     let back = |served: &Served, summary: &Summary| {
         let is_back = served.first_number == 0 && summary.joinings >= 2 && served.answers > 0 && summary.position[0] != 0.0;
         is_back && served.door.stats().refused(Refusal::NotJoined) > 0
@@ -189,7 +191,7 @@ fn comes_back(language: Language) {
     assert!(summary.position[0] > 0.0 && summary.position[0] < 2.0 * THERE, "{summary:?}");
 }
 
-/// Without a key nobody tells it that the session was started again, but all that it hears is old; after a second it believes that.
+/// Without a key no welcome tells the program of the restart. All samples seem old until the program forgets the old numbers after a second.
 fn believes_the_new_session(language: Language) {
     let back = |served: &Served, summary: &Summary| {
         served.first_number == 0 && summary.others.iter().all(|other| other.late > 0 && other.received > other.late && !other.stale)
@@ -237,7 +239,7 @@ fn the_cpp_peer_comes_back_when_the_session_is_started_again() {
     comes_back(Language::Cpp);
 }
 
-/// A program with another key is told nothing, and says so.
+/// A program with another key is never answered, and reports the possible cause.
 fn gives_up(language: Language) {
     let Some(program) = language.program() else { return };
     let folder = tempfile::tempdir().unwrap();
