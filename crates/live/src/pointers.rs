@@ -67,6 +67,7 @@ impl Pointer {
     ///
     /// [`BeyondReach`] if a coordinate is not a number from `-REACH` to `REACH`. The previous position stays.
     pub fn tell(&self, position: Option<[f64; 3]>) -> Result<(), BeyondReach> {
+        // The comparison is false for a number that is not a number, so that such a coordinate is refused too.
         if let Some(found) = position
             && !found.iter().all(|x| x.abs() <= REACH)
         {
@@ -115,6 +116,7 @@ impl Way {
     /// Returns position \[m\] and velocity [m/s] at the instant `now`.
     fn at(&self, now: Instant) -> State<3> {
         let Self { from, to, begin, span } = *self;
+        // Before `begin` the difference is zero, so that the position is `from`.
         let gone = now.saturating_duration_since(begin).as_secs_f64() / span.as_secs_f64();
         if gone >= 1.0 {
             return State { position: to, velocity: [0.0; 3] };
@@ -152,6 +154,7 @@ impl LiveDevice for PointerDevice {
             self.way = told.position.map(|to| match &self.way {
                 // The new way begins at the present position on the old way, so that the position makes no step.
                 Some(way) => Way { from: way.at(now).position, to, begin: now, span },
+                // Without a way the pointer appears at its position: both ends are the same, and there is no velocity.
                 None => Way { from: to, to, begin: now, span: QUICKEST },
             });
             (self.told, self.newest) = (told, Some(now));

@@ -97,6 +97,7 @@ impl AdmissionConfig {
             if seat.place.0 >= self.peers {
                 return Err(AdmissionConfigError::Beyond { place: seat.place, peers: self.peers });
             }
+            // The seat itself is among the seats counted, so that a count of 1 means no duplicate.
             if self.seats.iter().filter(|other| other.place == seat.place).count() > 1 {
                 return Err(AdmissionConfigError::Twice { place: seat.place });
             }

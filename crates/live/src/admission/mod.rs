@@ -140,6 +140,7 @@ impl AdmissionControl {
         let mut secret = Zeroizing::new([0; 32]);
         entropy.fill(&mut secret[..])?;
         let AdmissionConfig { session, axes, kind, peers, update, mut seats, key, stale_after, limits } = config;
+        // `find` searches the seats by place.
         seats.sort_by_key(|seat| seat.place);
         let seats = seats.into_iter().map(SeatState::free).collect();
         let secret = Secret(secret);
@@ -152,6 +153,7 @@ impl AdmissionControl {
     /// buffer would cut an oversized datagram to a length that may be admitted.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) -> Admission {
         self.stats.handled += 1;
+        // Every decision is counted here and nowhere else, so that the counts add up.
         let admission = self.decide(now, from, datagram);
         match admission {
             Ok(Admission::Sample { joined, .. }) => {
@@ -212,6 +214,7 @@ impl AdmissionControl {
     /// welcome.
     fn handle_hello(&self, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
         let unchecked = Hello::decode(datagram).map_err(Refusal::of_hello)?;
+        // Without a key there is nothing to answer; the hello is counted under a cause that tells its sender's mistake.
         let Some(key) = &self.key else { return Err(Refusal::Keyless) };
         let Hello { session, place, client_nonce } = unchecked.hello;
         if session != self.session {
@@ -269,6 +272,7 @@ impl AdmissionControl {
     /// Checks the seal of a sample, first under the keys of the present joining, then under keys derived for a new joining from `from`.
     fn unseal(&self, key: &SessionKey, index: usize, from: SocketAddr, sealed: Sealed<'_>) -> Result<Under, Refusal> {
         let seat = &self.seats[index];
+        // The address is compared first, and the nonce before the tag, so that only samples that claim the present joining cost a hash here.
         if let Some(Occupant { address, keys: Some(keys), .. }) = seat.occupant()
             && *address == from
             && keys.client_nonce == *sealed.client_nonce
@@ -278,6 +282,7 @@ impl AdmissionControl {
         }
         // Not sealed under the present keys: a program that joins, or a forgery. `of_sample` returns keys only if the tag fits.
         let keys = JoiningKeys::of_sample(key, self.session, seat.place(), sealed, &self.server_nonce(index, from));
+        // A sample for a seat that was never taken can be an honest peer's: its session was restarted, and the peer must say hello again.
         let otherwise = if seat.occupant().is_some() { Refusal::Forged } else { Refusal::NotJoined };
         keys.map(|keys| Under::New(Box::new(keys))).ok_or(otherwise)
     }

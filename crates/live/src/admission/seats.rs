@@ -108,11 +108,13 @@ impl SeatState {
         if present && !same_address {
             return Err(Refusal::SeatTaken);
         }
+        // One more joining would make the numbers inside the session overflow.
         if self.joinings == JOININGS_END {
             return Err(Refusal::JoiningsUsedUp);
         }
         self.joinings += 1;
         self.admitted += 1;
+        // The window begins anew, because a peer that joins may count from any number.
         self.occupant = Some(Occupant { address: from, keys, heard: now, window: Window::beginning_with(number) });
         Ok(true)
     }
@@ -123,6 +125,7 @@ impl SeatState {
         if !occupant.window.accept(number) {
             return Err(Refusal::Replayed);
         }
+        // Only an admitted sample counts as heard: repetitions must not keep a silent peer present.
         occupant.heard = now;
         self.admitted += 1;
         Ok(false)

@@ -157,6 +157,7 @@ impl Client {
     ///
     /// [`EntropyError`] if a nonce is needed and the source has no random bytes. The next call tries again.
     pub fn poll_hello(&mut self, now: Instant, entropy: &mut impl Entropy) -> Result<Option<[u8; HANDSHAKE_LEN]>, EntropyError> {
+        // A client without a key has nothing to ask, but after a silence the peers may count from 0 again.
         let silent = now >= self.silent_from();
         let Some(key) = &self.key else {
             if silent {
@@ -177,6 +178,7 @@ impl Client {
             Some(joining) => joining,
             None => Joining::draw(self.session, self.place, key, entropy)?.with_kind(self.kind),
         };
+        // The time counts from this call and not from the last deadline, so that a late call does not cause two hellos in a row.
         self.next_hello = now.saturating_add(HELLO_EVERY);
         Ok(Some(self.joining.insert(joining).hello()))
     }
@@ -229,6 +231,7 @@ impl Client {
             (None, _) => datagram,
         };
         let (sample, extra) = Sample::decode_as(plain, self.kind, info.axes).ok()?;
+        // The client's own samples can come back only from a stranger.
         let other = sample.sender < info.peers && sample.sender != self.place.0;
         let mine = !self.kind.is_personal() || extra.receiver == self.place.0;
         (sample.session == self.session && other && mine).then_some((sample, extra))

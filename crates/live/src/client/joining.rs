@@ -112,6 +112,7 @@ impl Joined {
     pub fn open<'a>(&self, datagram: &'a [u8]) -> Result<&'a [u8], OpenError> {
         let expected = self.kind.datagram_len(usize::from(self.welcome.axes)) + SEAL_LEN;
         let sealed = Sealed::split(datagram).filter(|_| datagram.len() == expected).ok_or(OpenError::Length { found: datagram.len(), expected })?;
+        // The nonce is compared before the tag, because the comparison is cheap and names the likelier cause, a sample of an earlier joining.
         if *sealed.client_nonce != self.keys.client_nonce {
             return Err(OpenError::OtherJoining);
         }

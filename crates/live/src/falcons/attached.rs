@@ -59,6 +59,7 @@ impl<const A: usize> Attached<A> {
             _ => now,
         };
         self.newest = Some((snapshot.at, came));
+        // A device whose thread has ended keeps its last snapshot, which may say that the device is ready.
         let takes_part = snapshot.is_ready() && self.device.ended().is_none();
         (takes_part && now.saturating_duration_since(came) <= OLD).then_some(snapshot)
     }

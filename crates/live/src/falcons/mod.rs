@@ -164,8 +164,10 @@ fn open(
         Which::First | Which::Simulated => first_free(taken)?,
     };
     let mut transport = UsbTransport::open(serial.as_deref())?;
+    // Added only after the Falcon has been opened, so that a failure does not reserve its serial number.
     taken.extend(serial);
     let options = BootOptions::DEFAULT;
+    // A file is not loaded again into a Falcon that already runs firmware.
     match firmware {
         Some(path) => {
             boot::ensure_loaded(&mut transport, &Firmware::read(path)?, &options, progress)?;

@@ -30,6 +30,7 @@ impl Driven for Session {
     /// Reads one batch of datagrams and hands each admitted sample to the scene, at the instant at which the kernel received the datagram.
     fn receive(&mut self, now: Instant) -> Result<Received, SessionError> {
         let Self { outside, live, watch, clock, is_stopped, .. } = self;
+        // Before a sample is handed over, the scene handles the ticks due before the sample. The lateness of these ticks counts up to now.
         watch.woken = now;
         let Some(outside) = outside else { return Ok(Received { count: 0, until: now }) };
         let count = outside.receive(clock, |at, peer, sample| {
@@ -49,6 +50,7 @@ impl Driven for Session {
 
     /// Handles the next deadline, if due. Handles one deadline per call, so that samples received before the following deadline are read first.
     fn handle_timeout(&mut self, now: Instant) -> bool {
+        // The tick is handled with its deadline as instant, not with `now`: the lateness must not change the motion.
         if let Some(due) = self.live.poll_timeout().filter(|due| *due <= now && !self.is_stopped) {
             let passed = self.live.handle_timeout(due, &mut self.watch);
             self.note(passed);
@@ -68,6 +70,7 @@ impl Driven for Session {
                 count += 1;
             }
         }
+        // All samples are queued before the first is sent, so that one call of the kernel can send many.
         outside.flush();
         count
     }

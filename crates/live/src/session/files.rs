@@ -37,6 +37,7 @@ impl Releases {
     }
 
     pub(super) fn write(&mut self, row: &Release) -> Result<(), RecordError> {
+        // Microseconds with three decimals, computed in whole nanoseconds, so that no digit is rounded.
         let nanos = row.late.as_nanos();
         let line = format!("{},{},{}.{:03}\n", self.names[row.to], Seconds(row.due), nanos / 1000, nanos % 1000);
         self.file.write(line.as_bytes())

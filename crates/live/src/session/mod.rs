@@ -130,6 +130,7 @@ impl Session {
         let prepared = prepare_thread(&self.config.wishes);
         self.clock = MonotonicClock::start();
         let driven = self.conduct(conductor);
+        // `open` is the instant up to which logical time has passed. Nothing moves logical time after the loop.
         let behind = self.clock.now().saturating_duration_since(self.live.open());
         let summary = self.live.summary();
         // The record is finished before `driven` is looked at: after an error of the loop, the rows recorded so far are kept.
@@ -185,9 +186,11 @@ impl Session {
     /// Applies the changes that the conductor wants, ends the scene if the conductor says so, and shows the state: the motion at each look, the status if
     /// `show`.
     fn look(&mut self, conductor: &mut impl Conductor, now: Instant, show: bool) -> Result<(), Stopped> {
+        // Changes come before the question whether to go on, so that a change made just before the end is in the record.
         while let Some(LinkChange { from, to, keys, model }) = conductor.next_change() {
             self.live.set_link(now, (from, to), &keys, &model, &mut self.watch)?;
         }
+        // `stop` handles everything due until `now` first. Afterwards there is no deadline, and `is_over` ends the loop.
         if !conductor.keep_going() {
             self.live.stop(now, &mut self.watch)?;
             return Ok(());
@@ -203,6 +206,7 @@ impl Session {
 
     /// Judges ticks and releases together against the tolerance.
     fn validity(&self) -> cohaptic_realtime::Validity {
+        // A histogram can be merged only into another histogram, and both are still needed alone.
         let mut all = self.watch.ticks.clone();
         all.merge(&self.watch.releases);
         self.config.tolerance.judge(&all)

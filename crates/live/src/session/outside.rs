@@ -54,11 +54,14 @@ impl Outside {
             })
             .collect();
         // One time for all seats, the longest of the peers' silences: a seat can be taken again only when the scene, too, counts its peer as silent.
+        // No maximum means no seats: the scene has no peer in another program, and needs no socket.
         let Some(stale_after) = seats.iter().map(|(_, after)| *after).max() else { return Ok(None) };
         let address = config.listen;
+        // A mapped IPv4 address must be judged as IPv4: `::ffff:127.0.0.1` is a loopback address, too.
         if !address.ip().to_canonical().is_loopback() && config.key.is_none() && !config.allow_remote {
             return Err(SessionError::NotLoopback { address });
         }
+        // With a single peer outside, received samples go to peers of this process only.
         let passes_on = seats.len() > 1;
         let peers = u32::try_from(scene.peers.len()).expect("a scene that runs has few peers");
         let seats = seats.into_iter().map(|(seat, _)| seat).collect();
@@ -80,8 +83,8 @@ impl Outside {
         self.socket.local_address()
     }
 
-    /// Returns the socket if a datagram must wake the loop before the next deadline. With one peer outside, samples are for simulated peers only, and can wait
-    /// in the kernel until the next tick: each counts from the instant at which the kernel received the datagram.
+    /// Returns the socket if a datagram must wake the loop before the next deadline. With one peer outside, samples are for peers of this process only, and
+    /// can wait in the kernel until the next tick: each counts from the instant at which the kernel received the datagram.
     pub(super) fn readable(&self) -> Option<BorrowedFd<'_>> {
         (self.passes_on || self.is_more).then(|| std::os::fd::AsFd::as_fd(&self.socket))
     }
@@ -97,6 +100,7 @@ impl Outside {
             Admission::Reply { to, bytes } => replies.push((to, bytes)),
             Admission::Refused(_) => {}
         })?;
+        // A batch that is not full has emptied the socket.
         *is_more = count == UdpEndpoint::BATCH;
         Ok(count)
     }
@@ -105,6 +109,7 @@ impl Outside {
     pub(super) fn queue(&mut self, clock: &MonotonicClock, transmit: &Transmit) -> Option<Release> {
         // Peers of a scene are counted in `u32`, so the conversion does not fail for a receiver in the scene.
         let place = Place(u32::try_from(transmit.to).ok()?);
+        // One reading of the clock serves the admission and the lateness, so that the lateness does not contain the time for the seal.
         let now = clock.now();
         let (to, len) = self.admission.seal(now, place, &transmit.datagram, &mut self.sealed)?;
         self.socket.queue(to, &self.sealed[..len], None);

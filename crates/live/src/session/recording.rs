@@ -74,6 +74,7 @@ impl Recording {
     pub(crate) fn finish(self, summary: &Summary, ticks: &Lateness, releases: &Lateness) -> Result<Vec<PathBuf>, RecordError> {
         // The writer ends when the queue is closed and empty, so that the queue must be closed before the thread is joined.
         drop(self.rows);
+        // A panic of the writer goes on in this thread: the panic is a fault of the program, and not an error of the disk.
         let files = self.writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
         let Some((recorder, sent)) = files.others else { return Ok(vec![files.inputs.finish()?]) };
         let mut written = recorder.finish(summary)?;

@@ -125,6 +125,7 @@ impl InputCopy {
     }
 }
 
+/// Copies position and velocity of a row.
 fn state(row: StateRow<'_>) -> Numbers {
     [padded(row.position), padded(row.velocity)]
 }

@@ -57,6 +57,7 @@ impl Carried {
     fn deliver(&mut self, bytes: u64, delay: Duration) {
         self.bytes += bytes;
         self.recent[self.next] = delay;
+        // The ring overwrites its oldest delay.
         self.next = (self.next + 1) % RECENT;
         self.filled = (self.filled + 1).min(RECENT);
     }
@@ -136,6 +137,7 @@ impl Observer for Watch {
             self.last_tick = Some(row.at);
             self.ticks.record(self.woken.saturating_duration_since(row.at));
         }
+        // A row has as many components as the scene has axes; the others are zero.
         self.forces[row.peer] = std::array::from_fn(|axis| row.coupling_force.get(axis).copied().unwrap_or(0.0));
         // The measures cannot fail: their error type has no value.
         let Ok(()) = self.measures.on_tick(row);
