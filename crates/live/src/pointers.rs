@@ -148,7 +148,7 @@ impl LiveDevice for PointerDevice {
             Err(TryLockError::WouldBlock) => self.told,
         };
         if told.number != self.told.number {
-            // A way lasts as long as the news took to come, but does not become much shorter than the way before.
+            // The new way lasts as long as the time since the last news, but not much less than the way before lasted.
             let since = self.newest.map_or(FIRST, |newest| now.saturating_duration_since(newest).clamp(QUICKEST, SLOWEST));
             let span = self.way.as_ref().map_or(since, |way| since.max(way.span.mul_f64(CATCHES_UP)));
             self.way = told.position.map(|to| match &self.way {

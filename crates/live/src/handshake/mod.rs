@@ -57,7 +57,7 @@ fn open(datagram: &[u8], magic: [u8; 4]) -> Result<(&[u8; BODY_LEN], &Tag), Hand
     if version != VERSION {
         return Err(HandshakeError::Version { found: version });
     }
-    // From here on the length is right, and body and tag are fixed parts of the datagram.
+    // After this last check the length is right, so that body and tag are fixed parts of the datagram.
     let datagram: &[u8; HANDSHAKE_LEN] = datagram.try_into().map_err(|_| HandshakeError::Length { found: datagram.len() })?;
     let body = datagram.first_chunk().expect("a body is shorter");
     let tag = datagram.last_chunk().expect("a tag is shorter");

@@ -48,7 +48,7 @@ impl fmt::Debug for SessionKey {
 }
 
 /// Largest length of a key file \[byte\]. A key file is text: 64 hexadecimal digits, as `openssl rand -hex 32` makes them, followed by white space at most.
-/// Longer files are refused, and the bytes beyond this length are not read, so that a wrong path cannot fill the memory.
+/// Longer files are refused, and at most one byte beyond this length is read, so that a wrong path cannot fill the memory.
 const MAX_FILE_LEN: u16 = 1024;
 
 /// Reason why a key file cannot be read or written.
