@@ -1,13 +1,15 @@
-//! The checksum of the Internet (RFC 1071).
+//! Internet checksum (RFC 1071).
 
-/// A sum of 16-bit words in ones' complement, before it is folded.
+/// Sum of 16-bit words in ones' complement, before the carries are folded.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sum(u64);
 
 impl Sum {
-    /// Adds octets; an odd last one is padded with zero.
+    /// Adds octets as big-endian words of 16 bits. If the number of octets is odd, the last octet is padded with zero, so only the last call may add an odd
+    /// number.
     pub(super) fn add(mut self, bytes: &[u8]) -> Self {
-        // Eight octets a step: the carries of 32-bit words are folded at the end, and 2^32 steps do not overflow.
+        // Words of 32 bits may be added in place of words of 16 bits, because 2^16 is 1 modulo 2^16 − 1. The carries are folded in `finish`. 64 bits hold
+        // the sum of 2^32 words.
         let mut chunks = bytes.chunks_exact(8);
         for chunk in &mut chunks {
             if let [a, b, c, d, e, f, g, h] = *chunk {
@@ -20,12 +22,12 @@ impl Sum {
         self
     }
 
-    /// Adds a word of a pseudo header.
+    /// Adds words of a pseudo header, given as their sum.
     pub(super) const fn add_word(self, word: u64) -> Self {
         Self(self.0 + word)
     }
 
-    /// The checksum: zero if the octets contain a right one.
+    /// Returns the checksum. Returns zero if the added octets contain their own correct checksum.
     pub(super) fn finish(self) -> u16 {
         let mut sum = self.0;
         while sum > 0xffff {

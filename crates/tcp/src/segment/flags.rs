@@ -1,14 +1,14 @@
-//! The flags of the TCP header.
+//! Flags of the TCP header.
 
 use core::fmt;
 use core::ops::{BitOr, BitOrAssign};
 
-/// The eight flags of the TCP header (RFC 9293, section 3.1, and RFC 3168).
+/// Set of the eight flags of the TCP header (RFC 9293, section 3.1, and RFC 3168).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Flags(u8);
 
 impl Flags {
-    /// No flag.
+    /// Empty set.
     pub const NONE: Self = Self(0);
     /// The sender has no more data.
     pub const FIN: Self = Self(0x01);
@@ -16,36 +16,36 @@ impl Flags {
     pub const SYN: Self = Self(0x02);
     /// The connection is reset.
     pub const RST: Self = Self(0x04);
-    /// The data is to be given to the program at once.
+    /// The receiver should hand the data to its program at once.
     pub const PSH: Self = Self(0x08);
-    /// The acknowledgement number counts.
+    /// The acknowledgement number is valid.
     pub const ACK: Self = Self(0x10);
-    /// The urgent pointer counts. This crate ignores it.
+    /// The urgent pointer is valid. This crate ignores the urgent pointer.
     pub const URG: Self = Self(0x20);
-    /// A packet arrived marked by congestion.
+    /// The sender of the segment has received a packet with a mark of congestion.
     pub const ECE: Self = Self(0x40);
-    /// The sender has reduced its window because of such a mark.
+    /// The sender of the segment has reduced its congestion window because of a mark.
     pub const CWR: Self = Self(0x80);
 
-    /// The flags of the octet on the wire.
+    /// Returns the flags of octet 13 of the TCP header.
     #[must_use]
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits)
     }
 
-    /// The octet on the wire.
+    /// Returns octet 13 of the TCP header.
     #[must_use]
     pub const fn bits(self) -> u8 {
         self.0
     }
 
-    /// Whether all flags of `other` are set.
+    /// Returns whether all flags of `other` are set.
     #[must_use]
     pub const fn has(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// These flags, and those of `other` if `condition` holds.
+    /// Returns the union with `other` if `condition` holds, and these flags alone otherwise.
     #[must_use]
     pub(crate) const fn with_if(self, other: Self, condition: bool) -> Self {
         if condition { Self(self.0 | other.0) } else { self }
@@ -72,7 +72,7 @@ impl fmt::Debug for Flags {
 }
 
 impl fmt::Display for Flags {
-    /// The names, joined: `SYN|ACK`; `-` for none.
+    /// Writes the names of the set flags, joined as in `SYN|ACK`. Writes `-` for the empty set.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const NAMES: [&str; 8] = ["FIN", "SYN", "RST", "PSH", "ACK", "URG", "ECE", "CWR"];
         let mut separator = "";

@@ -1,4 +1,4 @@
-//! A segment with its addresses, and the packet that it is on the wire.
+//! A segment with its addresses, and the reading and writing of its IP packet.
 
 mod checksum;
 mod encode;
@@ -15,21 +15,22 @@ pub(crate) use options::TIMESTAMPS_LENGTH;
 pub use options::{Options, SackBlocks};
 pub use parse::ParseError;
 
-/// The two bits of the IP header that tell of congestion (RFC 3168, section 5).
+/// Value of the two ECN bits of the IP header (RFC 3168, section 5).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug)]
 pub enum Ecn {
-    /// The transport does not use it.
+    /// The transport does not use ECN (Not-ECT).
     #[default]
     NotCapable,
-    /// ECT(1).
+    /// The transport uses ECN, with the codepoint ECT(1).
     Capable1,
-    /// ECT(0).
+    /// The transport uses ECN, with the codepoint ECT(0).
     Capable0,
-    /// A router marked the packet instead of dropping it.
+    /// A router marked the packet instead of dropping the packet (CE).
     Congestion,
 }
 
 impl Ecn {
+    /// Returns the two bits, 0 to 3.
     pub(crate) const fn bits(self) -> u8 {
         match self {
             Self::NotCapable => 0,
@@ -39,6 +40,7 @@ impl Ecn {
         }
     }
 
+    /// Returns the value of the low two bits. The other bits (the DSCP) are ignored.
     pub(crate) const fn from_bits(bits: u8) -> Self {
         match bits & 3 {
             1 => Self::Capable1,
@@ -49,46 +51,46 @@ impl Ecn {
     }
 }
 
-/// A TCP segment, and of its IP header what matters to a connection.
+/// TCP segment, with the fields of the IP header that a connection uses.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Segment<'a> {
-    /// Where it comes from.
+    /// Address and port of the sender.
     pub source: SocketAddr,
-    /// Where it goes. Of the same version as `source`.
+    /// Address and port of the receiver. The IP version must be the version of `source`.
     pub destination: SocketAddr,
-    /// The sequence number of the first octet, or of the SYN.
+    /// Sequence number of the SYN, or of the first octet of the data. Without SYN and data, the next sequence number of the sender.
     pub sequence: u32,
-    /// The next octet that the sender expects. Counts with [`Flags::ACK`].
+    /// Sequence number of the next octet that the sender expects. Valid only with [`Flags::ACK`].
     pub acknowledgement: u32,
-    /// The flags.
+    /// Flags of the TCP header.
     pub flags: Flags,
-    /// The receive window \[byte\], not yet scaled.
+    /// Receive window as in the header: on a SYN in bytes, otherwise in units of 2 to the power of the window scale.
     pub window: u16,
-    /// The options.
+    /// Options of the TCP header.
     pub options: Options,
-    /// The mark of the IP header.
+    /// ECN bits of the IP header.
     pub ecn: Ecn,
-    /// Time to live, or hop limit.
+    /// Time to live (IPv4) or hop limit (IPv6).
     pub ttl: u8,
-    /// The data.
+    /// Data of the segment.
     pub payload: Cow<'a, [u8]>,
 }
 
 impl Segment<'_> {
-    /// The sequence numbers that it occupies: octets of data, and one each for SYN and FIN.
+    /// Returns the number of sequence numbers that the segment occupies: one per octet of data, one for SYN and one for FIN.
     #[must_use]
     pub fn sequence_length(&self) -> usize {
         self.payload.len() + usize::from(self.flags.has(Flags::SYN)) + usize::from(self.flags.has(Flags::FIN))
     }
 
-    /// The length of the whole IP packet \[byte\].
+    /// Returns the length of the whole IP packet \[byte\].
     #[must_use]
     pub fn packet_length(&self) -> usize {
         let ip = if self.source.is_ipv4() { encode::IPV4_HEADER } else { encode::IPV6_HEADER };
         ip + encode::TCP_HEADER + self.options.length() + self.payload.len()
     }
 
-    /// The segment with data of its own.
+    /// Returns the segment with owned data. Borrowed data is copied.
     #[must_use]
     pub fn into_owned(self) -> Segment<'static> {
         Segment { payload: Cow::Owned(self.payload.into_owned()), ..self }

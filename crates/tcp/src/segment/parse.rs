@@ -1,4 +1,4 @@
-//! From the octets of an IP packet to a segment.
+//! Reading of a segment from the octets of an IP packet.
 
 use alloc::borrow::Cow;
 use core::fmt;
@@ -8,21 +8,21 @@ use super::checksum::Sum;
 use super::encode::{IPV4_HEADER, IPV6_HEADER, TCP, TCP_HEADER, pseudo};
 use super::{Ecn, Flags, Options, Segment};
 
-/// Why octets are not a segment.
+/// Reason for which octets are not a valid segment.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[non_exhaustive]
 pub enum ParseError {
-    /// Fewer octets than the headers say.
+    /// The packet has fewer octets than its headers need or say.
     Truncated,
-    /// Neither IPv4 nor IPv6.
+    /// The version of the packet is neither IPv4 nor IPv6.
     Version,
-    /// A length in a header is impossible.
+    /// A length in a header is impossible: shorter than the fixed header, or a TCP header longer than the packet.
     Length,
-    /// Another protocol, or behind extension headers.
+    /// The protocol of the packet is not TCP, or the TCP header comes after IPv6 extension headers.
     Protocol,
-    /// A fragment of a packet.
+    /// The packet is a fragment of an IPv4 packet.
     Fragment,
-    /// The checksum of the IPv4 header or of the segment is wrong.
+    /// The checksum of the IPv4 header or of the TCP segment is wrong.
     Checksum,
 }
 
@@ -42,11 +42,11 @@ impl fmt::Display for ParseError {
 impl core::error::Error for ParseError {}
 
 impl<'a> Segment<'a> {
-    /// Reads an IP packet, checks both checksums, and borrows the data.
+    /// Reads an IPv4 or IPv6 packet and checks its checksums. The segment borrows its data from `packet`. Octets after the end of the packet are ignored.
     ///
     /// # Errors
     ///
-    /// If the packet is damaged, or is no TCP segment.
+    /// If the packet is damaged, is a fragment, or does not carry TCP.
     pub fn parse(packet: &'a [u8]) -> Result<Self, ParseError> {
         match packet.first().ok_or(ParseError::Truncated)? >> 4 {
             4 => Self::parse_v4(packet),
@@ -62,19 +62,22 @@ impl<'a> Segment<'a> {
         if header_length < IPV4_HEADER || length < header_length {
             return Err(ParseError::Length);
         }
+        // Ethernet pads short frames, so that octets may follow the packet.
         let packet = packet.get(..length).ok_or(ParseError::Truncated)?;
         let (header, tcp) = packet.split_at(header_length);
+        // The sum over a header that contains its own checksum is zero if the checksum is right.
         if Sum::default().add(header).finish() != 0 {
             return Err(ParseError::Checksum);
         }
         if fixed[9] != TCP {
             return Err(ParseError::Protocol);
         }
-        // The flag of more fragments and the offset.
+        // The flag of more fragments and the 13 bits of the fragment offset must be zero.
         if fixed[6] & 0x3f != 0 || fixed[7] != 0 {
             return Err(ParseError::Fragment);
         }
         let address = |at: usize| Ipv4Addr::new(fixed[at], fixed[at + 1], fixed[at + 2], fixed[at + 3]);
+        // The pseudo header begins with both addresses.
         let sum = Sum::default().add(&fixed[12..20]);
         Self::parse_tcp(tcp, sum, [IpAddr::V4(address(12)), IpAddr::V4(address(16))], Ecn::from_bits(fixed[1]), fixed[8])
     }
@@ -91,9 +94,11 @@ impl<'a> Segment<'a> {
             octets.copy_from_slice(&fixed[at..at + 16]);
             IpAddr::V6(Ipv6Addr::from(octets))
         };
+        // ECN is in the low two bits of the traffic class, which begins in the middle of octet 0. Both addresses, in octets 8 to 39, begin the pseudo header.
         Self::parse_tcp(tcp, Sum::default().add(&fixed[8..]), [address(8), address(24)], Ecn::from_bits(fixed[1] >> 4), fixed[7])
     }
 
+    /// Reads the TCP segment `tcp`. `addresses_sum` is the sum over both addresses of the pseudo header; the other arguments are fields of the IP header.
     fn parse_tcp(tcp: &'a [u8], addresses_sum: Sum, [from, to]: [IpAddr; 2], ecn: Ecn, ttl: u8) -> Result<Self, ParseError> {
         let fixed = tcp.first_chunk::<TCP_HEADER>().ok_or(ParseError::Truncated)?;
         if addresses_sum.add_word(pseudo(tcp.len())).add(tcp).finish() != 0 {

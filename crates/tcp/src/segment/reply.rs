@@ -1,18 +1,20 @@
-//! The answer to segments of no connection.
+//! Reset in answer to a segment that belongs to no connection.
 
 use alloc::borrow::Cow;
 
 use super::{Ecn, Flags, Options, Segment};
 
 impl Segment<'_> {
-    /// The RST that answers this segment where no connection and no listener takes it (RFC 9293, section 3.10.7.1), with that `ttl`.
+    /// Returns the RST that answers this segment if neither a connection nor a listener accepts the segment (RFC 9293, section 3.10.7.1). The RST has the time
+    /// to live `ttl`.
     ///
-    /// `None` for a RST, which nothing answers.
+    /// Returns `None` if this segment is a RST, because a RST is never answered.
     #[must_use]
     pub fn refusal(&self, ttl: u8) -> Option<Segment<'static>> {
         if self.flags.has(Flags::RST) {
             return None;
         }
+        // The numbers must be acceptable to the sender: its own acknowledgement number if there is one, or otherwise an acknowledgement of the whole segment.
         let (sequence, acknowledgement, flags) = if self.flags.has(Flags::ACK) {
             (self.acknowledgement, 0, Flags::RST)
         } else {
