@@ -1,4 +1,4 @@
-//! What was received: in order and unread, or out of order.
+//! Received octets: in order and unread, or out of order.
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
@@ -7,28 +7,33 @@ use crate::ranges::Ranges;
 use crate::send_buffer::KEPT;
 use crate::sequence::Position;
 
-/// Octets in order, which can be read, and pieces that wait for missing ones before them.
+/// Octets in order, which the program can read, and pieces that wait for missing octets before them.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Assembler {
+    /// Octets in order that the program has not read.
     ready: VecDeque<u8>,
+    /// Data out of order, by the position of its first octet.
     pieces: BTreeMap<Position, Vec<u8>>,
-    /// Octets in `pieces`.
+    /// Number of octets in `pieces`.
     waiting: usize,
+    /// Positions of the octets in `pieces`, with neighbouring pieces joined to one range.
     ranges: Ranges,
-    /// A position in each of the ranges that changed last, the latest first (RFC 2018, section 4).
+    /// One position in each of the at most four ranges that changed last, the latest first (RFC 2018, section 4).
     recent: Vec<Position>,
 }
 
 impl Assembler {
-    /// Takes data in whose first octet is at `start`, and moves `next`, the first octet that is missing, on.
+    /// Takes in `data`, whose first octet is at `start`. Moves `next`, the position of the first missing octet, over all octets that are now in order.
     pub(crate) fn insert(&mut self, next: &mut Position, start: Position, data: &[u8]) {
         let end = start + data.len() as u64;
         if end <= *next {
             return;
         }
+        // Index in `data`. Each position that is asked for lies between `start` and `end`.
         let offset = |position: Position| usize::try_from(position - start).unwrap_or(data.len());
         if start > *next {
             let (pieces, waiting) = (&mut self.pieces, &mut self.waiting);
+            // Only missing parts are copied, so that an octet that arrives twice takes memory once.
             self.ranges.insert(start, end, |from, to| {
                 let piece = data[offset(from)..offset(to)].to_vec();
                 *waiting += piece.len();
@@ -45,11 +50,12 @@ impl Assembler {
         }
     }
 
-    /// Appends the pieces that now follow.
+    /// Moves the pieces that follow at `next` without a gap to the octets in order.
     fn join(&mut self, next: &mut Position) {
         while let Some(first) = self.pieces.first_entry().filter(|first| first.key() <= next) {
             let (start, piece) = first.remove_entry();
             self.waiting -= piece.len();
+            // The data in order may have ended inside this piece: its first `known` octets are already there.
             let known = usize::try_from(*next - start).map_or(piece.len(), |known| known.min(piece.len()));
             self.ready.extend(&piece[known..]);
             *next += (piece.len() - known) as u64;
@@ -60,24 +66,26 @@ impl Assembler {
         }
     }
 
+    /// Notes that the range around `position` has changed last.
     fn remember(&mut self, position: Position) {
         let Some((start, end)) = self.ranges.around(position) else { return };
+        // The range may have grown over other noted ranges. One position for each range is enough.
         self.recent.retain(|other| !(start..end).contains(other));
         self.recent.insert(0, position);
         self.recent.truncate(4);
     }
 
-    /// The ranges out of order that changed last, the latest first, four at most.
+    /// Returns the ranges out of order that changed last, at most four, the latest first.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (Position, Position)> {
         self.recent.iter().filter_map(|position| self.ranges.around(*position))
     }
 
-    /// The range out of order that holds all of this, if one does.
+    /// Returns the range out of order that contains all positions from `start` to `end` (exclusive), if there is such a range.
     pub(crate) fn holding(&self, start: Position, end: Position) -> Option<(Position, Position)> {
         self.ranges.around(start).filter(|range| range.1 >= end)
     }
 
-    /// Whether pieces wait for missing ones.
+    /// Returns whether data out of order waits for missing octets.
     pub(crate) fn has_gaps(&self) -> bool {
         !self.ranges.is_empty()
     }
@@ -86,13 +94,14 @@ impl Assembler {
         self.ready.len()
     }
 
-    /// Octets that lie here, in order or not.
+    /// Returns the number of octets held, in order or not.
     pub(crate) fn held(&self) -> usize {
         self.ready.len() + self.waiting
     }
 
-    /// Copies what can be read, without taking it.
+    /// Copies octets in order into `to` without removing them. Returns their number.
     pub(crate) fn peek(&self, to: &mut [u8]) -> usize {
+        // The ring has at most two contiguous parts.
         let (first, second) = self.ready.as_slices();
         let count = to.len().min(self.ready.len());
         let split = count.min(first.len());
@@ -101,16 +110,18 @@ impl Assembler {
         count
     }
 
+    /// Moves octets in order into `to`. Returns their number.
     pub(crate) fn read(&mut self, to: &mut [u8]) -> usize {
         let count = self.peek(to);
         self.ready.drain(..count);
+        // An empty ring keeps its capacity, and an idle connection is to be small.
         if self.ready.is_empty() && self.ready.capacity() > KEPT {
             self.ready = VecDeque::new();
         }
         count
     }
 
-    /// Lets go of the pieces out of order, which nobody will complete.
+    /// Drops the data out of order, because the missing octets will not arrive any more.
     pub(crate) fn forget_gaps(&mut self) {
         self.pieces.clear();
         self.waiting = 0;

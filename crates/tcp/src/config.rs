@@ -1,103 +1,106 @@
-//! Every constant of a connection.
+//! Constants of a connection, their defaults and their limits.
 
 use core::fmt;
 use core::time::Duration;
 
-/// The constants of a connection. [`TcpConfig::default`] is Linux 6, [`TcpConfig::textbook`] what books teach.
+/// Constants of a connection. [`TcpConfig::default`] has the values of Linux 6, [`TcpConfig::textbook`] the values of textbooks.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct TcpConfig {
-    /// The longest IP packet that is sent \[byte\]. Linux has 65,536 on the loopback interface. Default 1500.
+    /// Length of the longest IP packet that the connection sends \[byte\], at least 128. Linux uses 65,536 on the loopback interface. Default 1500.
     pub mtu: usize,
-    /// The time to live, or hop limit. Default 64.
+    /// Time to live (IPv4) or hop limit (IPv6) of the packets, not zero. Default 64.
     pub ttl: u8,
-    /// The sequence number of the SYN; `None`: the one handed to the constructor. Default `None`.
+    /// Sequence number of the SYN. `None` selects the `initial_sequence` that the constructor receives. Default `None`.
     pub initial_sequence: Option<u32>,
-    /// The congestion window at the beginning \[segments\] (RFC 6928). Default 10.
+    /// Congestion window at the beginning \[segments\] (RFC 6928), not zero. Default 10.
     pub initial_window: u32,
-    /// How the window grows and shrinks. Default CUBIC.
+    /// Algorithm that changes the congestion window. Default CUBIC.
     pub congestion: CongestionControl,
-    /// Selective acknowledgements (RFC 2018, 2883). Default on.
+    /// Whether the SYN offers selective acknowledgements (RFC 2018, 2883). Default on.
     pub sack: bool,
-    /// Loss detection by time (RFC 8985); without it, by three duplicates (RFC 6675). Needs `sack`. Default on.
+    /// Whether losses are detected by time (RFC 8985). Otherwise three segments that arrived later tell of a loss (RFC 6675). Needs `sack`. Default on.
     pub rack: bool,
-    /// Tail loss probes (RFC 8985). Needs `sack`. Default on.
+    /// Whether the sender sends tail loss probes (RFC 8985). Needs `sack`. Default on.
     pub tail_loss_probe: bool,
-    /// Timestamps (RFC 7323). Default on.
+    /// Whether the SYN offers timestamps (RFC 7323). Default on.
     pub timestamps: bool,
-    /// Explicit congestion notification (RFC 3168), asked for and granted. Default off.
+    /// Whether the SYN asks for explicit congestion notification (RFC 3168), and an answer to a SYN grants it. Default off.
     pub ecn: bool,
-    /// When a connection that asks for ECN goes on without, since a box on the way takes such a SYN for an attack. Default: when a SYN is lost.
+    /// Condition under which a connection that asks for ECN continues without ECN, because a middlebox may drop or refuse a SYN that asks. Default: when a SYN
+    /// is lost.
     pub ecn_fallback: EcnFallback,
-    /// The retransmission timeout before a round trip is known. Default 1 s.
+    /// Retransmission timeout before the first sample of the round trip, not zero. Default 1 s.
     pub initial_timeout: Duration,
-    /// The least of 4·RTTVAR in a timeout SRTT + 4·RTTVAR. Default 200 ms.
+    /// Lower bound of the term 4·RTTVAR in the timeout SRTT + 4·RTTVAR. Default 200 ms.
     pub least_variance: Duration,
-    /// The least timeout. Default zero, since `least_variance` bounds it.
+    /// Lower bound of the retransmission timeout. Default zero, because `least_variance` already bounds the timeout.
     pub least_timeout: Duration,
-    /// The greatest timeout, also between probes of a closed window. Default 120 s.
+    /// Upper bound of the retransmission timeout and of the time between two probes of a closed window. Default 120 s.
     pub greatest_timeout: Duration,
-    /// How often a SYN is repeated before the connection is given up. Default 6: 127 s.
+    /// Number of repetitions of a SYN before the connection ends with [`Error::TimedOut`](crate::Error::TimedOut). Default 6, that is, 127 s.
     pub syn_retries: u32,
-    /// How many of these come at equal distance before the distance doubles. Linux 6.5 and later have 4. Default 0.
+    /// Number of repetitions of a SYN at equal distance before the distance doubles. Linux 6.5 and later have 4. Default 0.
     pub linear_syn_retries: u32,
-    /// How often a SYN with ACK is repeated. Default 5: 63 s.
+    /// Number of repetitions of a SYN with ACK before the connection ends. Default 5, that is, 63 s.
     pub syn_ack_retries: u32,
-    /// After how many timeouts of 200 ms, each twice the one before up to `greatest_timeout`, data is given up that nobody answers. Default 15: 924.6 s.
+    /// Limit for unanswered data, given as a number of doublings. The connection ends if the time since the first timeout reaches the sum of `retries` + 1
+    /// timeouts, of which the first is 200 ms and each other timeout is twice the timeout before, up to `greatest_timeout`. Also the number of unanswered
+    /// probes of a closed window that ends the connection. Default 15, that is, 924.6 s.
     pub retries: u32,
-    /// The same for a connection whose program has dropped it. Default 8.
+    /// Limit like `retries` for a connection that the program has closed; the smaller of the two limits counts. Default 8.
     pub orphan_retries: u32,
-    /// How long data may stay unanswered (RFC 5482); `None`: as `retries` says. Default `None`.
+    /// Time for which data may stay unanswered (RFC 5482). `None` leaves the limit to `retries`. Default `None`.
     pub user_timeout: Option<Duration>,
-    /// How long an acknowledgement may wait. Default 40 ms.
+    /// Longest delay of an acknowledgement. Default 40 ms.
     pub delayed_ack: Duration,
-    /// How many acknowledgements at the beginning do not wait. Default 16.
+    /// Number of acknowledgements that leave without delay, at the beginning, after a pause of the peer and after a duplicate. Default 16.
     pub quick_acks: u32,
-    /// How long TIME-WAIT lasts, and FIN-WAIT-2 of a dropped connection. Default 60 s.
+    /// Length of TIME-WAIT, and of FIN-WAIT-2 once the program has closed the connection. Default 60 s.
     pub time_wait: Duration,
-    /// The largest receive buffer, and so window \[byte\]. Default 6 MiB.
+    /// Size of the receive buffer, which bounds the offered window \[byte\], from 1 to 1 GiB. Default 6 MiB.
     pub receive_buffer: usize,
-    /// The largest send buffer \[byte\]. Default 4 MiB.
+    /// Upper bound of the send buffer \[byte\]. Default 4 MiB.
     pub send_buffer: usize,
-    /// The send buffer to begin with \[byte\]; later it is twice the congestion window if that is more. Default 64 KiB.
+    /// Lower bound of the send buffer \[byte\], not zero. The buffer is twice the congestion window, within both bounds. Default 64 KiB.
     pub least_send_buffer: usize,
-    /// Whether small segments leave while others are unanswered, without Nagle's algorithm. Default off.
+    /// Whether Nagle's algorithm is off, so that a small segment leaves while another small segment is unacknowledged. Default off.
     pub nodelay: bool,
-    /// Whether an idle connection is probed. Default `None`.
+    /// Times of the probes of an idle connection. `None` sends no probes. Default `None`.
     pub keepalive: Option<Keepalive>,
     /// Whether the congestion window shrinks while the program sends nothing (RFC 2861). Default on.
     pub slow_start_after_idle: bool,
 }
 
-/// How the congestion window grows and shrinks.
+/// Algorithm by which the congestion window grows and shrinks.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum CongestionControl {
     /// CUBIC (RFC 9438).
     #[default]
     Cubic,
-    /// Reno (RFC 5681) with NewReno's recovery (RFC 6582) where there are no selective acknowledgements.
+    /// Reno (RFC 5681). Without selective acknowledgements, recovery follows NewReno (RFC 6582).
     Reno,
 }
 
-/// When a SYN that asks for ECN is followed by one that does not (RFC 3168, section 6.1.1.1).
+/// Condition under which a SYN that asks for ECN is followed by a SYN that does not ask (RFC 3168, section 6.1.1.1).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum EcnFallback {
     /// Every SYN asks.
     Never,
-    /// Only the first SYN asks: nobody answered it. This is Linux with `tcp_ecn_fallback`.
+    /// The first SYN asks, and no later SYN asks. Linux does so with `tcp_ecn_fallback`.
     #[default]
     Lost,
-    /// The same, and a reset that answers a SYN which asks is no refusal yet: a SYN that does not ask follows at once.
+    /// Like [`Lost`](Self::Lost). In addition, a reset in answer to a SYN that asks does not end the connection: a SYN that does not ask follows at once.
     LostOrReset,
 }
 
-/// The times of keep-alive probes.
+/// Times of keep-alive probes.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Keepalive {
-    /// How long nothing must have arrived before the first probe. Default 7200 s.
+    /// Time without an arrived segment after which the first probe leaves, not zero. Default 7200 s.
     pub idle: Duration,
-    /// The time between probes. Default 75 s.
+    /// Time between two probes, not zero. Default 75 s.
     pub interval: Duration,
-    /// After how many unanswered probes the connection is given up. Default 9.
+    /// Number of unanswered probes after which the connection ends. Default 9.
     pub probes: u32,
 }
 
@@ -144,17 +147,17 @@ impl Default for TcpConfig {
     }
 }
 
-/// Why a [`TcpConfig`] cannot be.
+/// Reason for which [`TcpConfig::check`] refuses a configuration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// An MTU below 128: headers of IPv6 and TCP with all options take 100 octets.
+    /// The MTU \[byte\] is below 128. The headers of IPv6 and TCP with all options take 100 octets.
     Mtu(usize),
-    /// A count, size or time that must not be zero.
+    /// The named count, size or time is zero.
     Zero(&'static str),
-    /// A least above a greatest.
+    /// The lower bound, named first, is above the upper bound, named second.
     Order(&'static str, &'static str),
-    /// A receive buffer beyond 1 GiB, the largest window (RFC 7323, section 2.3).
+    /// The receive buffer \[byte\] is above 1 GiB, the largest window (RFC 7323, section 2.3).
     ReceiveBuffer(usize),
 }
 
@@ -172,8 +175,8 @@ impl fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 impl TcpConfig {
-    /// TCP as in books: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, no selective acknowledgements, timestamps or tail
-    /// loss probes. Where ECN is asked for, a reset is answered without, as RFC 3168 says and Linux does not.
+    /// Returns TCP as in textbooks: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, no selective acknowledgements, no timestamps
+    /// and no tail loss probes. If ECN is on, a SYN without ECN follows a reset, as RFC 3168 says and Linux does not.
     #[must_use]
     pub fn textbook() -> Self {
         Self {
@@ -191,15 +194,16 @@ impl TcpConfig {
         }
     }
 
-    /// Checks that the constants can be.
+    /// Checks the limits of the constants.
     ///
     /// # Errors
     ///
-    /// Names the first one that cannot.
+    /// Returns the first limit that a constant breaks.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.mtu < 128 {
             return Err(ConfigError::Mtu(self.mtu));
         }
+        // Without keep-alive, the defaults stand in and pass both checks of `keepalive`.
         let keepalive = self.keepalive.unwrap_or_default();
         let zeros = [
             ("ttl", self.ttl == 0),
@@ -209,6 +213,7 @@ impl TcpConfig {
             ("least_send_buffer", self.least_send_buffer == 0),
             ("the interval of keep-alive probes", keepalive.interval.is_zero()),
             ("the idle time before keep-alive probes", keepalive.idle.is_zero()),
+            // A timeout of zero would never let an answer arrive, so one of the two bounds must be above zero.
             ("least_variance and least_timeout", self.least_variance.is_zero() && self.least_timeout.is_zero()),
         ];
         if let Some((name, _)) = zeros.iter().find(|(_, is_zero)| *is_zero) {
@@ -228,12 +233,13 @@ impl TcpConfig {
         }
     }
 
-    /// The largest payload and options together that an IP packet leaves \[byte\].
+    /// Returns the octets that an IP packet of the MTU leaves for TCP options and payload together.
     pub(crate) fn segment_room(&self, is_ipv4: bool) -> usize {
+        // Headers without options: 20 octets of IPv4 or 40 of IPv6, and 20 of TCP. `check` has refused an MTU below 128, so nothing underflows.
         self.mtu.min(65_535) - if is_ipv4 { 40 } else { 60 }
     }
 
-    /// By how many bits windows are shifted, so that the whole receive buffer can be said.
+    /// Returns the number of bits by which offered windows are shifted, 0 to 14: the least shift with which 16 bits can express the whole receive buffer.
     pub(crate) fn window_scale(&self) -> u8 {
         (0..14).find(|shift| self.receive_buffer >> shift <= 65_535).unwrap_or(14)
     }

@@ -1,12 +1,12 @@
-//! What goes wrong on a connection.
+//! Errors of a connection, which the calls of the program return.
 
 use core::fmt;
 
-/// Why a call on a [`Connection`](crate::Connection) did not do what it was asked for. The names are those of `std::io::ErrorKind`.
+/// Reason for which a call on a [`Connection`](crate::Connection) failed. The variants have the names of `std::io::ErrorKind`.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is nothing to read yet, or no room to write.
+    /// No data can be read yet, or the send buffer has no room.
     WouldBlock,
     /// The peer refused the SYN with a RST.
     ConnectionRefused,
@@ -14,7 +14,7 @@ pub enum Error {
     ConnectionReset,
     /// The peer did not answer for as long as the configuration allows.
     TimedOut,
-    /// The write half is shut, by this side or because the connection is gone.
+    /// The write half is shut: the program has called `shutdown` or `close`, or the connection has ended.
     BrokenPipe,
     /// The connection is not established.
     NotConnected,

@@ -1,81 +1,81 @@
-//! What a connection tells about itself.
+//! State and figures of a connection, as its owner sees them.
 
 use core::time::Duration;
 
-/// The states of RFC 9293, section 3.3.2, apart from LISTEN, which is the listener's.
+/// State of RFC 9293, section 3.3.2. LISTEN is missing, because listeners belong to the owner of the connections.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum State {
-    /// The SYN is out.
+    /// This end's SYN was sent. No SYN of the peer has arrived.
     SynSent,
-    /// A SYN has come and was answered.
+    /// The peer's SYN has arrived and was answered. The answer is not acknowledged.
     SynReceived,
-    /// Data flows both ways.
+    /// The handshake is over, and neither end has shut its half.
     Established,
-    /// This side has shut its half; the FIN is not acknowledged.
+    /// This end has shut its half. Its FIN is not acknowledged.
     FinWait1,
-    /// The FIN is acknowledged; the peer may send on.
+    /// This end's FIN is acknowledged. The peer may still send data.
     FinWait2,
-    /// The peer has shut its half.
+    /// The peer has shut its half, and all of its data has arrived. This end may still send data.
     CloseWait,
-    /// Both have shut at once; the FIN is not acknowledged.
+    /// Both ends have shut their halves at the same time. This end's FIN is not acknowledged.
     Closing,
-    /// The peer has shut its half and then this side; the FIN is not acknowledged.
+    /// The peer has shut its half, and this end has done so afterwards. This end's FIN is not acknowledged.
     LastAck,
-    /// Both are shut; late segments are answered.
+    /// Both halves are shut. Late segments of the peer are still answered.
     TimeWait,
-    /// Nothing is left.
+    /// The connection has ended or was never opened.
     Closed,
 }
 
 impl State {
-    /// Whether the handshake is over and the connection not gone.
+    /// Returns whether the handshake is over and the connection has not ended.
     #[must_use]
     pub const fn is_synchronised(self) -> bool {
         !matches!(self, Self::SynSent | Self::SynReceived | Self::Closed)
     }
 
-    /// Whether data may still be sent or sent again.
+    /// Returns whether segments with data or FIN may still be sent, for the first time or again.
     pub(crate) const fn may_send(self) -> bool {
         matches!(self, Self::Established | Self::CloseWait | Self::FinWait1 | Self::Closing | Self::LastAck)
     }
 }
 
-/// Figures of a connection, as of Linux's `TCP_INFO`.
+/// Figures of a connection, after the example of Linux's `TCP_INFO`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct Info {
-    /// The state.
+    /// State of the connection.
     pub state: State,
-    /// The smoothed round trip (RFC 6298); `None` before the first.
+    /// Smoothed round trip (RFC 6298). `None` before the first sample.
     pub srtt: Option<Duration>,
-    /// Its variation.
+    /// Variation of the round trip, RTTVAR (RFC 6298). Zero before the first sample.
     pub rttvar: Duration,
-    /// The least round trip of the last 300 s.
+    /// Least round trip. A sample replaces a least round trip older than 300 s. `None` before the first sample.
     pub least_rtt: Option<Duration>,
-    /// The retransmission timeout, doubled as often as it has run out.
+    /// Retransmission timeout, with one doubling for each timeout since the last sample of the round trip.
     pub timeout: Duration,
-    /// The congestion window \[segments\].
+    /// Congestion window \[segments\].
     pub congestion_window: u32,
-    /// The threshold of slow start \[segments\]; `u32::MAX` before the first loss.
+    /// Threshold of slow start \[segments\]. `u32::MAX` before the first reduction and the first long pause.
     pub slow_start_threshold: u32,
-    /// Segments on the way, by the sender's estimate.
+    /// Sender's estimate of the number of segments on the way.
     pub in_flight: u32,
-    /// Segments sent again, since the connection began.
+    /// Segments sent again since the connection began, SYNs included.
     pub retransmissions: u64,
-    /// Timeouts, since the connection began.
+    /// Retransmission timeouts since the end of the handshake.
     pub timeouts: u64,
-    /// How often recovery was entered.
+    /// Number of times that the sender has entered recovery.
     pub recoveries: u64,
-    /// How often a recovery was taken back, because nothing had been lost.
+    /// Number of reductions of the window that were taken back because nothing had been lost.
     pub undone: u64,
-    /// The most data that a segment carries now \[byte\].
+    /// Most data that a segment carries at present, apart from the room for selective acknowledgements \[byte\].
     pub segment_size: usize,
-    /// The peer's window \[byte\].
+    /// Window that the peer has offered, from the first unacknowledged octet on \[byte\].
     pub send_window: u64,
-    /// Octets written and not acknowledged.
+    /// Octets that the program has written and the peer has not acknowledged, sent or not.
     pub unacknowledged: usize,
-    /// Octets received and not read.
+    /// Octets that have arrived in order and that the program has not read.
     pub unread: usize,
-    /// Probes of a closed window that were sent since it closed.
+    /// Probes of the peer's closed window since an acknowledgement last opened the window.
     pub window_probes: u32,
 }

@@ -3,15 +3,16 @@
 //! Use this crate if a test or a simulation of yours wants real TCP in virtual time: handshakes, retransmissions, congestion control, windows, resets and
 //! their errors, to the nanosecond and the same on every run.
 //!
-//! A [`Connection`] is one end. Time is an argument: segments go in by [`Connection::handle_segment`], time by [`Connection::handle_timeout`], segments come
-//! out of [`Connection::poll_transmit`] and the next deadline of [`Connection::poll_timeout`]. The program has [`Connection::read`],
-//! [`Connection::write`], [`Connection::shutdown`] and [`Connection::close`]. [`Segment::to_packet`] and [`Segment::parse`] are the way to real IP packets and
-//! back. [`TcpConfig`] has every constant.
+//! A [`Connection`] is one end of a TCP connection. Time is an argument of its calls. The owner of a connection hands arrived segments to
+//! [`Connection::handle_segment`], takes segments to send from [`Connection::poll_transmit`], and calls [`Connection::handle_timeout`] at the instant that
+//! [`Connection::poll_timeout`] returns. The program that uses the connection calls [`Connection::read`], [`Connection::write`], [`Connection::shutdown`]
+//! and [`Connection::close`]. [`Segment::to_packet`] writes a real IP packet, [`Segment::parse`] reads a real IP packet. [`TcpConfig`] holds every constant.
 //!
-//! There are RFC 9293 (TCP), 5961 (resets off the mark), 7323 (timestamps, large windows), 6298 (timeouts), 5681 and 6582 (Reno, NewReno), 2018, 2883 and
-//! 6675 (selective acknowledgements), 6937 (rate reduction), 8985 (RACK-TLP), 9438 (CUBIC) and 3168 (ECN), with Linux's choice where they leave one. There
-//! are not: urgent data, ICMP, path MTU discovery, Fast Open, pacing, `HyStart`, F-RTO. Listeners are left to the owner of the connections, which knows ports:
-//! it makes a connection of a SYN with [`Connection::accept`], and counts those that nobody has taken.
+//! The crate implements RFC 9293 (TCP), 5961 (resets with an inexact sequence number), 7323 (timestamps, large windows), 6298 (timeouts), 5681 and 6582
+//! (Reno, NewReno), 2018, 2883 and 6675 (selective acknowledgements), 6937 (rate reduction), 8985 (RACK-TLP), 9438 (CUBIC) and 3168 (ECN). Where an RFC
+//! leaves a choice, the crate chooses as Linux does. The crate leaves out urgent data, ICMP, path MTU discovery, Fast Open, pacing, `HyStart` and F-RTO.
+//! Listeners belong to the owner of the connections, because the owner knows the ports: the owner makes a connection of a SYN with
+//! [`Connection::accept`], and counts the connections that no program has accepted yet.
 //!
 //! ```
 //! use cohaptic_tcp::{Connection, TcpConfig};
@@ -57,7 +58,7 @@ pub use error::Error;
 pub use info::{Info, State};
 pub use segment::{Ecn, Flags, Options, ParseError, SackBlocks, Segment};
 
-/// Runs the code of the README.
+/// Compiles and runs the code blocks of the README as doc tests.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

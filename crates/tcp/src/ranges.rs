@@ -1,19 +1,20 @@
-//! A set of positions as ranges.
+//! A set of positions in the sequence space, kept as ranges.
 
 use alloc::collections::BTreeMap;
 
 use crate::sequence::Position;
 
-/// Disjoint ranges that do not touch, from their start to their end (exclusive).
+/// Ranges of positions, as a map from the start of a range to its end (exclusive). Two ranges neither overlap nor touch.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Ranges(BTreeMap<Position, Position>);
 
 impl Ranges {
-    /// Adds a range. `on_new` hears of each part that was not in the set.
+    /// Adds the positions from `start` to `end` (exclusive). Calls `on_new`, in ascending order, with the start and the end of each part that was missing.
     pub(crate) fn insert(&mut self, start: Position, end: Position, mut on_new: impl FnMut(Position, Position)) {
         if start >= end {
             return;
         }
+        // `from` and `to` bound the merged range. All positions of the new range below `covered` are known or were handed to `on_new`.
         let (mut from, mut to, mut covered) = (start, end, start);
         if let Some((&before, &before_end)) = self.0.range(..start).next_back()
             && before_end >= start
@@ -22,6 +23,7 @@ impl Ranges {
             to = to.max(before_end);
             covered = before_end;
         }
+        // `end` is included, because a range that begins there touches the new range and must be merged.
         while let Some((&next, &next_end)) = self.0.range(start..=end).next() {
             if next > covered {
                 on_new(covered, next);
@@ -33,10 +35,11 @@ impl Ranges {
         if covered < end {
             on_new(covered, end);
         }
+        // If a range before the new range was merged, its key is `from`, so that this entry replaces it.
         self.0.insert(from, to);
     }
 
-    /// Takes out all that is below `position`.
+    /// Removes all positions below `position`.
     pub(crate) fn remove_below(&mut self, position: Position) {
         while let Some(first) = self.0.first_entry().filter(|first| *first.key() < position) {
             let end = first.remove();
@@ -46,13 +49,13 @@ impl Ranges {
         }
     }
 
-    /// The range in which `position` lies.
+    /// Returns the range that contains `position`.
     pub(crate) fn around(&self, position: Position) -> Option<(Position, Position)> {
         let (&start, &end) = self.0.range(..=position).next_back()?;
         (position < end).then_some((start, end))
     }
 
-    /// The end of the highest range.
+    /// Returns the end (exclusive) of the highest range.
     pub(crate) fn end(&self) -> Option<Position> {
         self.0.last_key_value().map(|(_, &end)| end)
     }

@@ -1,4 +1,4 @@
-//! Round trips and the timeout that follows from them (RFC 6298).
+//! Estimator of the round trip, and the retransmission timeout that follows from the estimate (RFC 6298).
 
 use core::time::Duration;
 
@@ -6,27 +6,33 @@ use cohaptic_units::Instant;
 
 use crate::TcpConfig;
 
-/// How long a least round trip counts.
+/// Age above which any new sample replaces the least round trip.
 const LEAST_COUNTS: Duration = Duration::from_secs(300);
 
-/// The estimator of RFC 6298, in nanoseconds without rounding: eight times SRTT and four times RTTVAR are whole.
+/// Estimator of RFC 6298 in whole nanoseconds. SRTT is kept times eight and RTTVAR times four, because the gains of 1/8 and 1/4 would otherwise round at each
+/// sample.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RoundTrips {
+    /// Eight times SRTT \[ns\]. Zero before the first sample.
     srtt_8: u64,
+    /// Four times RTTVAR \[ns\].
     var_4: u64,
+    /// Least round trip, and the instant at which it was measured.
     least: Option<(Duration, Instant)>,
-    /// How often the timeout was doubled since the last sample.
+    /// Number of doublings of the timeout since the last sample.
     pub(crate) backoff: u32,
 }
 
 impl RoundTrips {
-    /// Takes a round trip in, and ends the doubling.
+    /// Takes a measured round trip into the estimate, and ends the doubling of the timeout. A round trip of zero counts as 1 ns.
     pub(crate) fn sample(&mut self, now: Instant, round_trip: Duration) {
         let nanos = nanos(round_trip).max(1);
         if self.srtt_8 == 0 {
+            // The first sample R gives SRTT = R and RTTVAR = R/2.
             (self.srtt_8, self.var_4) = (nanos * 8, nanos * 2);
         } else {
-            // In units of an eighth: the error is a fraction.
+            // RTTVAR becomes 3/4·RTTVAR + 1/4·|SRTT − R| with SRTT before this sample. The difference is taken times eight, because SRTT has a fraction of
+            // a nanosecond.
             let error_8 = (nanos * 8).abs_diff(self.srtt_8);
             self.var_4 = self.var_4 - self.var_4 / 4 + error_8 / 8;
             self.srtt_8 = self.srtt_8 - self.srtt_8 / 8 + nanos;
@@ -50,7 +56,7 @@ impl RoundTrips {
         self.least.map(|(least, _)| least)
     }
 
-    /// SRTT + 4·RTTVAR within the bounds, without doubling.
+    /// Returns SRTT + 4·RTTVAR within the bounds of `config`, without doubling. Before the first sample, returns the initial timeout.
     pub(crate) fn base_timeout(&self, config: &TcpConfig) -> Duration {
         let timeout = match self.srtt() {
             Some(srtt) => srtt + Duration::from_nanos(self.var_4).max(config.least_variance),
@@ -59,18 +65,19 @@ impl RoundTrips {
         timeout.clamp(config.least_timeout, config.greatest_timeout)
     }
 
-    /// The timeout, doubled as often as it has run out.
+    /// Returns the timeout with its doublings, at most the greatest timeout of `config`.
     pub(crate) fn timeout(&self, config: &TcpConfig) -> Duration {
         doubled(self.base_timeout(config), self.backoff, config)
     }
 }
 
-/// A time, doubled `times` times, up to the greatest.
+/// Returns `base` times 2 to the power of `times`, at most the greatest timeout of `config`.
 pub(crate) fn doubled(base: Duration, times: u32, config: &TcpConfig) -> Duration {
-    // Beyond 30 doublings any time is above the greatest, and none below it overflows.
+    // At most 30 doublings, so that the factor fits into 32 bits.
     base.saturating_mul(1 << times.min(30)).min(config.greatest_timeout)
 }
 
+/// Returns the nanoseconds of `span`, at most 1/16 of the range, so that eight times the result does not overflow.
 fn nanos(span: Duration) -> u64 {
     u64::try_from(span.as_nanos()).unwrap_or(u64::MAX / 16).min(u64::MAX / 16)
 }

@@ -1,17 +1,19 @@
-//! What was written and not acknowledged.
+//! Octets that the program has written and the peer has not acknowledged.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
 use crate::sequence::Position;
 
-/// Above this an empty buffer gives its memory back, so that an idle connection is small \[byte\].
+/// Capacity above which an empty buffer releases its memory, so that an idle connection is small \[byte\].
 pub(crate) const KEPT: usize = 1024;
 
-/// Octets from the first unacknowledged one on. Takes no memory while it is empty.
+/// Octets from the first unacknowledged octet on, sent or not.
 #[derive(Clone, Debug)]
 pub(crate) struct SendBuffer {
+    /// The octet at index `i` has the position `start + i`.
     octets: VecDeque<u8>,
+    /// Position of the first octet in the buffer.
     start: Position,
 }
 
@@ -28,15 +30,17 @@ impl SendBuffer {
         self.octets.len()
     }
 
-    /// The position behind the last octet.
+    /// Returns the position after the last octet.
     pub(crate) fn end(&self) -> Position {
         self.start + self.octets.len() as u64
     }
 
-    /// Copies what lies between two positions, as far as it is there.
+    /// Returns a copy of the octets from `start` to `end` (exclusive). Positions outside the buffer are left out.
     pub(crate) fn copy(&self, start: Position, end: Position) -> Vec<u8> {
+        // Index of a position, cut to the buffer: 0 below the first octet, the length above the last octet.
         let at = |position: Position| usize::try_from(position.saturating_sub(self.start)).map_or(self.octets.len(), |at| at.min(self.octets.len()));
         let (from, to) = (at(start), at(end));
+        // The ring has at most two contiguous parts.
         let (first, second) = self.octets.as_slices();
         let mut copy = Vec::with_capacity(to.saturating_sub(from));
         if from < first.len() {
@@ -48,8 +52,9 @@ impl SendBuffer {
         copy
     }
 
-    /// Lets go of all below `position`.
+    /// Removes the octets below `position`.
     pub(crate) fn acknowledge(&mut self, position: Position) {
+        // `position` may be one above the last octet: the acknowledgement of the FIN, which takes a position but no octet.
         let count = usize::try_from(position.saturating_sub(self.start)).map_or(self.octets.len(), |count| count.min(self.octets.len()));
         self.octets.drain(..count);
         self.start += count as u64;

@@ -1,23 +1,23 @@
-//! Sequence numbers of 32 bits, extended to 64, so that nothing else in the crate wraps.
+//! Sequence numbers of 32 bits, extended to 64 bits, so that the rest of the crate compares positions without wrapping.
 
-/// Where a sequence number stands on a line of 64 bits: the low 32 bits are the number on the wire.
+/// Sequence number extended to 64 bits. The low 32 bits are the number on the wire.
 ///
-/// Positions begin at 2³² plus the initial sequence number, so that a position below the first one is a number as well.
+/// Positions begin at 2³² plus the initial sequence number, so that numbers up to 2³² below the initial sequence number have a position as well.
 pub(crate) type Position = u64;
 
-/// The position of the SYN.
+/// Returns the position of the SYN whose sequence number is `initial_sequence`.
 pub(crate) const fn first(initial_sequence: u32) -> Position {
     (1 << 32) | initial_sequence as Position
 }
 
-/// The position nearest to `near` whose number on the wire is `wire` (RFC 9293, section 3.4).
+/// Returns the position nearest to `near` whose number on the wire is `wire` (RFC 9293, section 3.4).
 #[expect(clippy::cast_possible_wrap, reason = "the difference modulo 2^32 is read as a signed number on purpose")]
 pub(crate) const fn extend(wire: u32, near: Position) -> Position {
     let difference = wire.wrapping_sub(on_wire(near)) as i32;
     near.wrapping_add_signed(difference as i64)
 }
 
-/// The number on the wire.
+/// Returns the sequence number on the wire of `position`.
 #[expect(clippy::cast_possible_truncation, reason = "the wire carries the low 32 bits")]
 pub(crate) const fn on_wire(position: Position) -> u32 {
     position as u32
