@@ -1,4 +1,4 @@
-//! Which segments are lost.
+//! Detection of lost segments: by time, by count, or by the retransmission timer.
 
 use core::time::Duration;
 
@@ -9,6 +9,7 @@ use cohaptic_units::Instant;
 use super::{Scoreboard, SentAt};
 
 impl Scoreboard {
+    /// Marks the segment at `index` as lost and queues it to be sent again. A segment that was sent again is lost a second time.
     fn mark_lost(&mut self, index: usize) {
         let sent = &mut self.queue[index];
         if sent.again {
@@ -23,7 +24,7 @@ impl Scoreboard {
         self.to_send.insert(sent.start);
     }
 
-    /// The first segment is lost, unless that is known. Whether it was not.
+    /// Marks the first segment as lost if it is not marked yet. Returns whether the mark is new.
     pub(crate) fn mark_first_lost(&mut self) -> bool {
         let is_new = self.queue.front().is_some_and(|first| !first.lost);
         if is_new {
@@ -32,13 +33,14 @@ impl Scoreboard {
         is_new
     }
 
-    /// Loss by time (RFC 8985, section 6.2): what was sent before `delivered`, and longer ago than `patience`, is lost.
+    /// Marks as lost each segment that was sent before the transmission `delivered` and at least `patience` before `now` (RFC 8985, section 6.2).
     ///
-    /// Returns when the rest of what was sent before will be.
+    /// Returns the instant at which all other segments sent before `delivered` are lost, or `None` if there are no such segments.
     pub(crate) fn detect_by_time(&mut self, now: Instant, delivered: SentAt, patience: Duration) -> Option<Instant> {
         while let Some(&(sent_at, start)) = self.by_time.front() {
             let index = self.index(start).filter(|index| self.is_undecided(*index, sent_at));
             if let Some(index) = index {
+                // Entries ascend in time: from here on, every transmission is later than `delivered`.
                 if sent_at >= delivered {
                     return None;
                 }
@@ -47,24 +49,27 @@ impl Scoreboard {
                 }
                 self.mark_lost(index);
             }
+            // The entry is decided: the segment was just marked, has arrived, or was sent again and has a later entry.
             self.by_time.pop_front();
         }
+        // The last transmission before `delivered` has the last deadline, so that one timer covers all waiting segments.
         let before = self.by_time.partition_point(|(sent_at, _)| *sent_at < delivered);
         let last = self.by_time.range(..before).next_back()?;
         Some(last.0.0.saturating_add(patience))
     }
 
-    /// Whether that transmission is the last one of its segment, of which nothing is known.
+    /// Returns whether `sent_at` is the last transmission of the segment at `index`, and the fate of this transmission is unknown.
     fn is_undecided(&self, index: usize, sent_at: SentAt) -> bool {
         let sent = &self.queue[index];
         (sent.at, sent.order) == sent_at && !sent.sacked && (!sent.lost || sent.again)
     }
 
-    /// Loss by count (RFC 6675, IsLost): whatever has `duplicates` sacked segments above it is lost, unless it was sent again.
+    /// Marks as lost each segment that has at least `duplicates` sacked segments above it and was never sent again (`IsLost` of RFC 6675).
     pub(crate) fn detect_by_count(&mut self, duplicates: u32) {
         if self.sacked_out < duplicates {
             return;
         }
+        // Walk down from the highest sacked segment over `duplicates` sacked segments. Every segment below `below` has enough sacked segments above it.
         let mut left = duplicates;
         let highest = self.sacked.end().unwrap_or(0);
         let mut below = self.queue.partition_point(|sent| sent.start < highest);
@@ -72,7 +77,7 @@ impl Scoreboard {
             below -= 1;
             left -= u32::from(self.queue[below].sacked);
         }
-        // From above: what lies below a segment that is decided was decided with it.
+        // Downwards: if a segment was marked lost before, every segment below it was decided at the same time.
         for index in (0..below).rev() {
             let sent = &self.queue[index];
             if sent.sacked {
@@ -85,11 +90,14 @@ impl Scoreboard {
         }
     }
 
-    /// The timer ran out: all that has not arrived is lost, but what was sent less than `patience` ago (RFC 8985, section 6.3), the first apart.
+    /// Marks all segments that have not arrived as lost, after the retransmission timer has run out. With `patience`, segments that were sent less than
+    /// `patience` before `now` are spared (RFC 8985, section 6.3), except for the first segment.
     pub(crate) fn mark_all_lost(&mut self, now: Instant, patience: Option<Duration>, has_sack: bool) {
+        // The receiver acknowledges in order, so the first unacknowledged segment cannot have arrived unless the receiver has dropped it again.
         let has_reneged = self.queue.front().is_some_and(|first| first.sacked);
         if has_reneged || !has_sack {
-            // The receiver has dropped what it had (RFC 2018, section 8), or duplicates stood for it.
+            // Either the receiver has dropped data that it had sacked (RFC 2018, section 8), or the count of sacked segments came from duplicates, which do not
+            // tell which segments have arrived. In both cases no segment is known to have arrived.
             self.sacked.clear();
             self.sacked_out = 0;
             self.queue.iter_mut().for_each(|sent| sent.sacked = false);
@@ -103,11 +111,12 @@ impl Scoreboard {
         }
     }
 
-    /// Nothing was lost after all.
+    /// Takes back all marks of loss, because nothing was lost.
     pub(crate) fn unmark_lost(&mut self) {
         self.to_send.clear();
         self.lost_out = 0;
         self.queue.iter_mut().for_each(|sent| sent.lost = false);
+        // Loss detection has dropped the entries of lost segments from `by_time`. All segments on the way need an entry again.
         let mut by_time: Vec<_> = self.queue.iter().filter(|sent| !sent.sacked).map(|sent| ((sent.at, sent.order), sent.start)).collect();
         by_time.sort_unstable();
         self.by_time = by_time.into();

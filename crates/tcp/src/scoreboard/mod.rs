@@ -1,4 +1,5 @@
-//! Which segments are on the way, have arrived out of order, are lost, or were sent again.
+//! State of each sent segment: on the way, arrived out of order (sacked), lost, or sent again. Acknowledgements and instants come in as arguments. The
+//! scoreboard decides nothing about windows and timers.
 
 mod loss;
 
@@ -11,61 +12,69 @@ use cohaptic_units::Instant;
 use crate::ranges::Ranges;
 use crate::sequence::Position;
 
-/// A segment that was sent and is not acknowledged.
+/// Segment that was sent and is not acknowledged, from `start` to `end` (exclusive).
 #[derive(Clone, Debug)]
 pub(crate) struct Sent {
     pub(crate) start: Position,
     pub(crate) end: Position,
-    /// When it was sent last.
+    /// Instant of the last transmission.
     pub(crate) at: Instant,
-    /// Which transmission that was, counted over the connection.
+    /// Number of the last transmission, counted over all transmissions of the connection.
     order: u64,
+    /// The segment has arrived out of order.
     sacked: bool,
+    /// The segment was found lost, and has not arrived since.
     pub(crate) lost: bool,
-    /// Sent again and on the way.
+    /// The last transmission repeated the segment and counts as on the way.
     again: bool,
-    /// Sent again at some time.
+    /// The segment was repeated at least once.
     ever_again: bool,
 }
 
-/// When a segment was sent, so that two of one instant differ.
+/// Instant and number of a transmission. The number orders transmissions of the same instant.
 pub(crate) type SentAt = (Instant, u64);
 
-/// The segments between the first unacknowledged position and the last one sent, without holes.
+/// Segments from the first unacknowledged position to the last position sent.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Scoreboard {
+    /// Segments in the order of positions. Each segment begins where the segment before ends.
     queue: VecDeque<Sent>,
-    /// Each transmission in the order of time, with the start of its segment. Those that no longer matter are skipped.
+    /// Transmissions in the order of time, with the start of their segment. An entry stays after its segment was sent again or has arrived; readers skip it.
     by_time: VecDeque<(SentAt, Position)>,
-    /// The lost ones that are to be sent again.
+    /// Starts of the lost segments that wait to be sent again.
     to_send: BTreeSet<Position>,
+    /// Positions that have arrived out of order, as the receiver has told.
     sacked: Ranges,
-    /// Segments that arrived out of order. Without selective acknowledgements, duplicates stand for them.
+    /// Number of segments that have arrived out of order. Without selective acknowledgements, each duplicate acknowledgement counts as a segment.
     pub(crate) sacked_out: u32,
+    /// Number of segments with `lost`.
     pub(crate) lost_out: u32,
+    /// Number of segments with `again`.
     pub(crate) again_out: u32,
+    /// Number of transmissions so far.
     transmissions: u64,
-    /// How often a segment was found lost.
+    /// Number of times that a segment was found lost.
     pub(crate) losses: u64,
 }
 
-/// What an acknowledgement says about segments.
+/// Result of one acknowledgement: which segments have arrived.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct News {
-    /// Segments acknowledged, sacked before or not.
+    /// Number of segments acknowledged, sacked before or not.
     pub(crate) acked: u32,
-    /// Segments heard of for the first time, sacked or acknowledged.
+    /// Number of segments newly known to have arrived, by a block or by the acknowledgement number.
     pub(crate) delivered: u32,
-    /// Whether a segment was sacked that was not before.
+    /// Whether a segment became sacked.
     pub(crate) has_sacked: bool,
-    /// Whether one that was sent again was acknowledged, so that round trips are ambiguous (Karn).
+    /// Whether a segment that was sent again, and not sacked before, was acknowledged, so that a round trip is ambiguous (Karn's rule).
     pub(crate) has_acked_again: bool,
-    /// When the first was sent that was acknowledged, or sacked, and never sent again.
+    /// Instant at which the first acknowledged segment that was neither sacked before nor ever sent again was sent.
     pub(crate) first_acked: Option<Instant>,
+    /// Instant at which the first newly sacked segment that was never sent again was sent.
     pub(crate) first_sacked: Option<Instant>,
-    /// The latest transmission that arrived, and whether it was sent again.
+    /// Latest transmission among the segments that arrived, and whether its segment was ever sent again.
     pub(crate) latest: Option<(SentAt, bool)>,
-    /// The first segment that arrived after one that was sent later, and was never sent again.
+    /// Start of the first segment that arrived after a later segment, although the first was never sent again.
     pub(crate) reordered: Option<Position>,
 }
 
@@ -74,12 +83,12 @@ impl Scoreboard {
         self.queue.is_empty()
     }
 
-    /// The segments between the first unacknowledged one and the last.
+    /// Returns the number of segments that are not acknowledged.
     pub(crate) fn packets_out(&self) -> u32 {
         u32::try_from(self.queue.len()).unwrap_or(u32::MAX)
     }
 
-    /// The estimate of segments on the way (RFC 6675, pipe).
+    /// Returns the estimate of the number of segments on the way (`pipe` of RFC 6675).
     pub(crate) fn in_flight(&self) -> u32 {
         (self.packets_out() + self.again_out).saturating_sub(self.sacked_out + self.lost_out)
     }
@@ -92,12 +101,12 @@ impl Scoreboard {
         self.queue.back()
     }
 
-    /// The end of what has arrived out of order, as far as it is known.
+    /// Returns the end of the highest range that has arrived out of order.
     pub(crate) fn highest_sacked(&self) -> Option<Position> {
         self.sacked.end()
     }
 
-    /// A new segment leaves.
+    /// Appends a segment that is sent for the first time at `at`. The segment must begin where the last segment ends.
     pub(crate) fn push(&mut self, start: Position, end: Position, at: Instant) {
         self.transmissions += 1;
         let order = self.transmissions;
@@ -105,12 +114,15 @@ impl Scoreboard {
         self.queue.push_back(Sent { start, end, at, order, sacked: false, lost: false, again: false, ever_again: false });
     }
 
+    /// Returns the index in `queue` of the segment that contains `start`.
     fn index(&self, start: Position) -> Option<usize> {
+        // The ends ascend, because the segments follow each other without gaps.
         let index = self.queue.partition_point(|sent| sent.end <= start);
         (index < self.queue.len()).then_some(index)
     }
 
-    /// All below `position` has arrived.
+    /// Removes the segments below `position`, all of which have arrived, and adds them to `news`. `highest_sacked` is the end of the highest range that was
+    /// sacked before this acknowledgement.
     pub(crate) fn acknowledge(&mut self, position: Position, highest_sacked: Position, news: &mut News) {
         while self.queue.front().is_some_and(|first| first.end <= position) {
             let Some(sent) = self.queue.pop_front() else { break };
@@ -123,6 +135,7 @@ impl Scoreboard {
             if sent.sacked {
                 self.sacked_out -= 1;
             } else {
+                // A sacked segment was counted when its block came.
                 news.delivered += 1;
                 news.hear(&sent);
                 if sent.ever_again {
@@ -135,13 +148,15 @@ impl Scoreboard {
         }
         self.sacked.remove_below(position);
         let Some(first) = self.queue.front_mut() else {
-            // An idle connection is to be small.
+            // Nothing is on the way. The memory of the queues is released, because an idle connection is to be small.
             *self = Self { transmissions: self.transmissions, losses: self.losses, ..Self::default() };
             return;
         };
+        // Entries of removed segments are dropped at the front. Entries further back are skipped when they come to the front.
         while self.by_time.front().is_some_and(|(_, start)| *start < first.start) {
             self.by_time.pop_front();
         }
+        // The acknowledgement ends inside the segment: the rest of the segment remains, and `to_send` is keyed by its start.
         if first.start < position {
             if self.to_send.remove(&first.start) {
                 self.to_send.insert(position);
@@ -150,15 +165,17 @@ impl Scoreboard {
         }
     }
 
-    /// All between these positions has arrived (RFC 2018). A segment of which only a part has counts as missing.
+    /// Notes that all positions from `start` to `end` (exclusive) have arrived (RFC 2018), and adds the segments to `news`. A segment counts as arrived only if
+    /// all of its positions have. `highest_sacked` is the end of the highest range that was sacked before this acknowledgement.
     pub(crate) fn sack(&mut self, start: Position, end: Position, highest_sacked: Position, news: &mut News) {
         let mut gaps = Vec::new();
         self.sacked.insert(start, end, |from, to| gaps.push((from, to)));
         let Some((low, high)) = self.sacked.around(start) else { return };
         for (from, to) in gaps {
-            // A segment may have begun in what was known before.
+            // The search begins with the segment that contains `from`: a part of that segment may have been sacked before, and this block completes it.
             let begin = self.queue.partition_point(|sent| sent.end <= from);
             for sent in self.queue.range_mut(begin..).take_while(|sent| sent.start < to) {
+                // `low` and `high` bound the sacked range around this block, so that a segment must lie in this range as a whole.
                 if sent.sacked || sent.start < low || sent.end > high {
                     continue;
                 }
@@ -180,12 +197,13 @@ impl Scoreboard {
         }
     }
 
-    /// The first lost segment that is to be sent again.
+    /// Returns the first lost segment that waits to be sent again.
     pub(crate) fn next_lost(&self) -> Option<&Sent> {
         self.queue.get(self.index(*self.to_send.first()?)?)
     }
 
-    /// A segment leaves again. `counts`: it is on the way from now on, its lost transmission apart.
+    /// Notes that the segment that contains `start` is sent again at `at`. If `counts` is set, the segment no longer waits to be sent again, and its new
+    /// transmission is on the way beside the lost one. A probe does not count.
     pub(crate) fn sent_again(&mut self, start: Position, at: Instant, counts: bool) {
         let Some(index) = self.index(start) else { return };
         self.transmissions += 1;
@@ -199,19 +217,21 @@ impl Scoreboard {
         self.by_time.push_back(((at, self.transmissions), sent.start));
     }
 
-    /// Whether segments that were sent again are still unacknowledged.
+    /// Returns whether a segment that was sent again is on the way, or is the first unacknowledged segment.
     pub(crate) fn has_sent_again(&self) -> bool {
         self.again_out > 0 || self.queue.front().is_some_and(|first| first.ever_again)
     }
 }
 
 impl News {
+    /// Notes a reordering if the segment at `start` lies below a segment that was sacked before.
     fn note_order(&mut self, start: Position, highest_sacked: Position) {
         if start < highest_sacked {
             self.reordered = Some(self.reordered.map_or(start, |other| other.min(start)));
         }
     }
 
+    /// Notes the last transmission of a segment that has arrived.
     fn hear(&mut self, sent: &Sent) {
         let sent_at = (sent.at, sent.order);
         if self.latest.is_none_or(|(latest, _)| sent_at > latest) {
@@ -219,7 +239,8 @@ impl News {
         }
     }
 
-    /// The round trip of what has arrived, if it is not ambiguous.
+    /// Returns the round trip: the time since `first_acked`, or, if acknowledged segments are missing or ambiguous, the time since `first_sacked`. Returns `None`
+    /// without both instants.
     pub(crate) fn round_trip(&self, now: Instant) -> Option<Duration> {
         let acked = self.first_acked.filter(|_| !self.has_acked_again);
         Some(now.saturating_duration_since(acked.or(self.first_sacked)?))
