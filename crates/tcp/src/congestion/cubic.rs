@@ -1,43 +1,51 @@
-//! CUBIC (RFC 9438), in whole numbers.
+//! CUBIC (RFC 9438), in integer arithmetic, so that results are equal on every machine.
 
 use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-/// β = 717/1024, as in Linux.
+/// Numerator and denominator of the factor β of a reduction: 717/1024, as in Linux.
 const BETA: (u64, u64) = (717, 1024);
 
+/// State of CUBIC. The epoch is the present stage of growth: from the first acknowledgement after a reduction to the next reduction.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Cubic {
-    /// The window before the last reduction \[segments\].
+    /// W_max: the window before the last reduction \[segments\], lowered by fast convergence if that window had not reached the earlier W_max. Zero before any
+    /// reduction and after a timeout.
     last_most: u32,
-    /// When this stage of growth began.
+    /// Beginning of the epoch. `None` until the first acknowledgement after a reduction.
     epoch: Option<Instant>,
+    /// Target of the window during the epoch.
     curve: Curve,
-    /// What Reno would have, and what was acknowledged towards its next segment.
+    /// Window that Reno would have reached in this epoch \[segments\].
     reno_window: u32,
+    /// Number of segments acknowledged since the last increase of `reno_window`.
     acked: u32,
-    /// The window and the instant of the last step, and that step.
+    /// Window, instant and result of the last full computation of [`step`](Self::step).
     last: Option<(u32, Instant, u32)>,
 }
 
-/// W(t) = C·(t − K)³ + origin with C = 0.4 segments/s³.
+/// Cubic curve W(t) = C·(t − K)³ + origin with C = 0.4 segments/s³, where t is the time since the beginning of the epoch.
 #[derive(Clone, Default, Debug)]
 struct Curve {
+    /// Window at the plateau of the curve \[segments\].
     origin: u32,
+    /// Time of the plateau, K \[ns\].
     k: u64,
 }
 
 impl Curve {
-    /// The curve that begins at `window` and is flat at `origin`: K = ∛((origin − window)/C).
+    /// Returns the curve with W(0) = `window` and the plateau at `origin`, so that K = ∛((origin − window)/C). If `window` is above `origin`, the curve begins
+    /// on a plateau at `window`.
     fn new(window: u32, origin: u32) -> Self {
         let rise = origin.saturating_sub(window);
         Self { origin: origin.max(window), k: cube_root(u128::from(rise) * 10 * NANOS_CUBED / 4) }
     }
 
-    /// The window `t` nanoseconds after the beginning \[1/1000 segment\].
+    /// Returns the window `t` nanoseconds after the beginning of the epoch \[1/1000 segment\].
     fn at(&self, t: u64) -> u64 {
-        // Beyond 1000 s the cube would not fit, and no window would either.
+        // The cube of at most 1000 s times four is 4·10³⁶ ns³, which 128 bits hold. At 1000 s the curve is 4·10⁸ segments away from the plateau, above
+        // any real window.
         let distance = u128::from(t.abs_diff(self.k)).min(1_000_000_000_000);
         let change = u64::try_from(distance.pow(3) * 4 / (NANOS_CUBED / 100)).unwrap_or(u64::MAX);
         let origin = u64::from(self.origin) * 1000;
@@ -45,11 +53,12 @@ impl Curve {
     }
 }
 
-/// Nanoseconds cubed in a second cubed.
+/// Number of cubic nanoseconds in a cubic second.
 const NANOS_CUBED: u128 = 1_000_000_000_000_000_000_000_000_000;
 
 impl Cubic {
-    /// The threshold after a loss at that window. A window that did not reach the last one makes room (RFC 9438, section 4.7).
+    /// Ends the epoch and returns the threshold after a loss at `window` \[segments\], at least 2. A window below the last W_max lowers W_max further, so that
+    /// the flow makes room for new flows (fast convergence, RFC 9438, section 4.7).
     pub(crate) fn reduced(&mut self, window: u32) -> u32 {
         let (numerator, denominator) = BETA;
         let scaled = |factor: u64, by: u64| u32::try_from(u64::from(window) * factor / by).unwrap_or(u32::MAX);
@@ -58,9 +67,11 @@ impl Cubic {
         scaled(numerator, denominator).max(2)
     }
 
-    /// After how many acknowledged segments the window grows by one.
+    /// Returns the number of acknowledged segments after which the window grows by one segment, at least 2. `acked` counts the segments acknowledged since the
+    /// last call, `least_rtt` is the least round trip.
     pub(crate) fn step(&mut self, now: Instant, window: u32, acked: u32, least_rtt: Duration) -> u32 {
         self.acked = self.acked.saturating_add(acked);
+        // As in Linux, a result counts for 31 ms (1/32 s) while the window is the same.
         if let Some((last_window, at, step)) = self.last
             && self.epoch.is_some()
             && last_window == window
@@ -74,9 +85,13 @@ impl Cubic {
             self.curve = Curve::new(window, self.last_most);
             now
         });
+        // The target is the window one round trip ahead, where the growth decided now takes effect.
         let t = now.saturating_duration_since(epoch) + least_rtt;
         let target = u32::try_from(self.curve.at(u64::try_from(t.as_nanos()).unwrap_or(u64::MAX)) / 1000).unwrap_or(u32::MAX);
+        // Reaching the target within a window of acknowledgements takes one increase per window/(target − window). At or above the target, the window almost
+        // stands still.
         let mut step = if target > window { window / (target - window) } else { window.saturating_mul(100) };
+        // Before any reduction the curve knows no plateau and would begin too slowly.
         if self.last_most == 0 {
             step = step.min(20);
         }
@@ -85,10 +100,10 @@ impl Cubic {
         step
     }
 
-    /// Where Reno would be faster, as fast as Reno (RFC 9438, section 4.3).
+    /// Returns the smaller of `step` and the step with which the window keeps up with Reno (RFC 9438, section 4.3).
     fn at_least_reno(&mut self, window: u32, step: u32) -> u32 {
         let (numerator, denominator) = BETA;
-        // Segments for one more: window·(1 + β)/(3·(1 − β)).
+        // Reno's estimate grows by one segment per window·(1 + β)/(3·(1 − β)) acknowledged segments.
         let share = u64::from(window) * (denominator + numerator) / (3 * (denominator - numerator));
         let share = u32::try_from(share).unwrap_or(u32::MAX).max(1);
         self.reno_window = self.reno_window.saturating_add(self.acked / share);
@@ -99,14 +114,15 @@ impl Cubic {
         }
     }
 
-    /// Nothing was sent for that long: the time does not count.
+    /// Moves the beginning of the epoch by `idle`, so that the curve does not rise while nothing is sent.
     pub(crate) fn shift(&mut self, idle: Duration) {
         self.epoch = self.epoch.map(|epoch| epoch.saturating_add(idle));
     }
 }
 
-/// The cube root, rounded down.
+/// Returns the cube root of `number`, rounded down. `number` must be below 2^126.
 fn cube_root(number: u128) -> u64 {
+    // Bisection: the cube of `low` is at most `number`, the cube of `high` is above.
     let (mut low, mut high) = (0u64, 1 << 42);
     while high - low > 1 {
         let middle = low.midpoint(high);
@@ -119,7 +135,7 @@ fn cube_root(number: u128) -> u64 {
 mod tests {
     use super::*;
 
-    /// RFC 9438 by hand: W_max = 100, β = 0.7, C = 0.4.
+    /// RFC 9438, calculated by hand: W_max = 100, β = 0.7, C = 0.4.
     #[test]
     fn the_curve_after_a_loss_at_100_segments() {
         let mut cubic = Cubic::default();

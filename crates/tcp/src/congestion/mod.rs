@@ -1,4 +1,5 @@
-//! How many segments may be on the way.
+//! Congestion window: the number of segments that may be on the way. The algorithms work with counts of segments. Positions serve only to tell one flight from
+//! the next flight.
 
 mod cubic;
 mod reduction;
@@ -12,21 +13,27 @@ use crate::sequence::Position;
 use cubic::Cubic;
 pub(crate) use reduction::Reduction;
 
-/// No threshold yet.
+/// Threshold of slow start before any reduction.
 pub(crate) const UNBOUNDED: u32 = u32::MAX;
 
-/// The congestion window in segments, and how it grows (RFC 5681 with RFC 3465's counting of acknowledged segments, without its limit, as Linux).
+/// Congestion window and its growth (RFC 5681). Growth counts acknowledged segments as in RFC 3465, but without the limit of RFC 3465, as Linux does.
 #[derive(Clone, Debug)]
 pub(crate) struct Congestion {
+    /// Congestion window \[segments\], at least 1.
     pub(crate) window: u32,
+    /// Threshold of slow start \[segments\]: slow start below, congestion avoidance from there on.
     pub(crate) threshold: u32,
-    /// Segments acknowledged towards the next increase.
+    /// Number of segments acknowledged since the last increase in congestion avoidance.
     count: u32,
+    /// State of CUBIC. `None` with Reno.
     cubic: Option<Cubic>,
+    /// Initial window \[segments\].
     initial: u32,
-    /// Whether the window, not the program, held the last flight back, how large that was, and where it ends.
+    /// Whether the window, and not the program, held back data in the last flight.
     is_limiting: bool,
+    /// Largest number of unacknowledged segments in the last flight.
     most_out: u32,
+    /// End of the last flight. `is_limiting` and `most_out` are measured anew once this position is acknowledged.
     usage_end: Position,
 }
 
@@ -41,7 +48,7 @@ impl Congestion {
         self.window < self.threshold
     }
 
-    /// The threshold after a loss; from here on growth begins anew.
+    /// Returns the threshold after a loss at the present window \[segments\], at least 2, and lets growth begin anew. The caller sets `window` and `threshold`.
     pub(crate) fn reduced(&mut self) -> u32 {
         self.count = 0;
         match &mut self.cubic {
@@ -50,7 +57,7 @@ impl Congestion {
         }
     }
 
-    /// A timeout: one segment, and what was learnt about the path is forgotten.
+    /// Sets the window after a timeout, to at least one segment, and drops the state of CUBIC.
     pub(crate) fn restart(&mut self, window: u32) {
         self.window = window.max(1);
         if let Some(cubic) = &mut self.cubic {
@@ -58,13 +65,14 @@ impl Congestion {
         }
     }
 
-    /// Segments were acknowledged while nothing is amiss.
+    /// Lets the window grow after `acked` acknowledged segments. Does nothing unless the window has limited the sender. `least_rtt` is the least round trip.
     pub(crate) fn grow(&mut self, now: Instant, acked: u32, least_rtt: Duration) {
         if !self.is_limited() {
             return;
         }
         let mut acked = acked;
         if self.is_slow_start() {
+            // Segments that are left over when slow start reaches the threshold count for congestion avoidance.
             let grown = self.window.saturating_add(acked).min(self.threshold);
             acked -= grown - self.window;
             self.window = grown;
@@ -76,6 +84,7 @@ impl Congestion {
             Some(cubic) => cubic.step(now, self.window, acked, least_rtt),
             None => self.window,
         };
+        // The count may have been collected at a larger step. The window then grows by one segment only, as in Linux.
         if self.count >= step {
             self.count = 0;
             self.window = self.window.saturating_add(1);
@@ -87,27 +96,31 @@ impl Congestion {
         }
     }
 
-    /// Whether it was the window that held the sender back: only then may it grow (RFC 7661 in the form of Linux).
+    /// Returns whether the window limits the sender, which is the condition for growth (RFC 7661 in the form of Linux).
     fn is_limited(&self) -> bool {
+        // In slow start a window that is more than half used counts as limiting, because the window may double within a round trip.
         self.is_limiting || (self.is_slow_start() && self.window < self.most_out.saturating_mul(2))
     }
 
-    /// Segments have left up to `next`: `out` are unacknowledged, and `is_limiting` says whether the window held more back.
+    /// Notes the use of the window: segments up to `next` have been sent, positions from `una` on and `out` segments are unacknowledged. `is_limiting` says
+    /// whether the window has held back more.
     pub(crate) fn used(&mut self, una: Position, next: Position, out: u32, is_limiting: bool) {
         if una >= self.usage_end || is_limiting || (!self.is_limiting && out > self.most_out) {
             (self.is_limiting, self.most_out, self.usage_end) = (is_limiting, out, next);
         }
     }
 
-    /// Nothing was sent for `idle` (RFC 2861): half for each timeout, down to the initial window.
+    /// Shrinks the window after a pause of `idle` in sending (RFC 2861): by half for each timeout, down to the initial window.
     pub(crate) fn rest(&mut self, idle: Duration, timeout: Duration) {
         if let Some(cubic) = &mut self.cubic {
+            // The curve of CUBIC must not rise during the pause, also if the pause is too short to shrink the window.
             cubic.shift(idle);
         }
         if idle <= timeout {
             return;
         }
         let least = self.initial.min(self.window);
+        // The threshold keeps three quarters of the window, so that slow start returns there if the path has not changed.
         self.threshold = self.threshold.max(self.window / 4 * 3);
         let mut rest = idle.saturating_sub(timeout);
         while !rest.is_zero() && self.window > least {
