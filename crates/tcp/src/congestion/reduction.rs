@@ -16,8 +16,8 @@ impl Reduction {
         Self { prior_window, delivered: 0, sent: 0 }
     }
 
-    /// Returns the window \[segments\] after `delivered` more segments have arrived, or `None` if no segment has arrived. `in_flight` is the estimate of segments
-    /// on the way, `has_advanced` says that the acknowledgement number has moved, `has_lost` that a segment was found lost.
+    /// Returns the window \[segments\] after `delivered` more segments have arrived, or `None` if no segment has arrived. `in_flight` is the estimate of
+    /// segments on the way, `has_advanced` says that the acknowledgement number has moved, `has_lost` that a segment was found lost.
     pub(crate) fn window(&mut self, threshold: u32, in_flight: u32, delivered: u32, has_advanced: bool, has_lost: bool) -> Option<u32> {
         if delivered == 0 || self.prior_window == 0 {
             return None;

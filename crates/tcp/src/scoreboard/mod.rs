@@ -239,8 +239,8 @@ impl News {
         }
     }
 
-    /// Returns the round trip: the time since `first_acked`, or, if acknowledged segments are missing or ambiguous, the time since `first_sacked`. Returns `None`
-    /// without both instants.
+    /// Returns the round trip: the time since `first_acked`, or, if acknowledged segments are missing or ambiguous, the time since `first_sacked`. Returns
+    /// `None` without both instants.
     pub(crate) fn round_trip(&self, now: Instant) -> Option<Duration> {
         let acked = self.first_acked.filter(|_| !self.has_acked_again);
         Some(now.saturating_duration_since(acked.or(self.first_sacked)?))
