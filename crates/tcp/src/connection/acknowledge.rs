@@ -1,4 +1,4 @@
-//! An acknowledgement arrives.
+//! Arrival of an acknowledgement: the peer's window, the segments that have arrived, the round trip, and then losses and the congestion window.
 
 use cohaptic_units::Instant;
 
@@ -9,24 +9,30 @@ use crate::scoreboard::News;
 use crate::segment::{Flags, Segment};
 use crate::sequence::{Position, extend};
 
-/// What an acknowledgement says, beside its segments.
+/// Content of an acknowledgement.
 #[derive(Clone, Default, Debug)]
 pub(super) struct Ack {
+    /// Position that is acknowledged, at least `una` before this acknowledgement.
     pub(super) position: Position,
+    /// The acknowledgement number is above all earlier acknowledgement numbers.
     pub(super) has_advanced: bool,
-    /// It repeats the last one, and carries nothing else.
+    /// The segment repeats the last acknowledgement and carries no data, no new window and no new block.
     pub(super) is_duplicate: bool,
+    /// The peer reports a mark of congestion.
     pub(super) tells_mark: bool,
+    /// The peer reports a duplicate.
     pub(super) tells_duplicate: bool,
-    /// When the timestamp that came back was sent \[ticks\].
+    /// Timestamp of this end that the peer echoes \[ticks\].
     pub(super) echo: Option<u32>,
+    /// Segments that have arrived at the peer.
     pub(super) news: News,
 }
 
 impl Connection {
-    /// Whether the rest of the segment counts.
+    /// Handles the acknowledgement of `segment`, which begins at the peer's position `start`. Returns whether the rest of the segment is to be handled.
     pub(super) fn handle_acknowledgement(&mut self, now: Instant, segment: &Segment<'_>, start: Position) -> bool {
         let position = extend(segment.acknowledgement, self.send.una);
+        // An acknowledgement of octets that were never sent, or older than the peer's largest window, may be forged (RFC 5961, section 5).
         if position > self.send.next || position + self.send.max_window.max(65_535) < self.send.una {
             self.challenge(now);
             return false;
@@ -41,14 +47,17 @@ impl Connection {
             echo: segment.options.timestamps.map(|(_, echo)| echo).filter(|echo| self.receive.has_timestamps && *echo != 0),
             ..Ack::default()
         };
+        // Nothing was on the way, so the acknowledgement can only tell of the window.
         if was_empty {
             self.hear_of_window(now);
             return true;
         }
+        // Both counters are kept to see the effect of this acknowledgement alone.
         let delivered = self.send.delivered;
         let losses = self.send.board.losses;
         self.take_news(segment, &mut ack);
         ack.is_duplicate = position == self.send.una && !has_advanced && !has_widened && segment.sequence_length() == 0 && !ack.news.has_sacked;
+        // If segments were sent again, only the echo of a timestamp tells which transmission was answered.
         let round_trip = ack.news.round_trip(now).or_else(|| if has_advanced { self.echoed(now, segment) } else { None });
         if let Some(round_trip) = round_trip {
             self.round_trips.sample(now, round_trip);
@@ -62,9 +71,11 @@ impl Connection {
         true
     }
 
-    /// The window that the segment offers (RFC 9293, section 3.10.7.4). Whether it changed.
+    /// Takes over the window that the segment offers (RFC 9293, section 3.10.7.4). Returns whether the window has changed.
     fn learn_window(&mut self, segment: &Segment<'_>, start: Position, has_advanced: bool) -> bool {
         let window = u64::from(segment.window) << self.send.scale;
+        // An overtaken segment has an old window. Among segments from the same position with the same acknowledgement, only a larger window is sure to be
+        // newer.
         let is_newer = has_advanced || start > self.send.window_from || (start == self.send.window_from && window > self.send.window);
         if !is_newer {
             return false;
@@ -75,9 +86,10 @@ impl Connection {
         has_changed
     }
 
-    /// Which segments have arrived.
+    /// Notes which segments have arrived, in the scoreboard, in the send buffer and in `ack`.
     fn take_news(&mut self, segment: &Segment<'_>, ack: &mut Ack) {
         let una = self.send.una;
+        // The highest sacked position before this acknowledgement: a segment below this position that arrives now was reordered.
         let highest = self.send.board.highest_sacked().unwrap_or(una);
         if ack.has_advanced {
             self.send.board.acknowledge(ack.position, highest, &mut ack.news);
@@ -95,13 +107,15 @@ impl Connection {
         }
     }
 
+    /// Takes over the selective acknowledgements of `segment`. `una` and `highest` are the values before this acknowledgement.
     fn take_blocks(&mut self, segment: &Segment<'_>, una: Position, highest: Position, ack: &mut Ack) {
         let block = |&(start, end): &(u32, u32)| (extend(start, una), extend(end, una));
         let blocks = segment.options.sack.as_slice();
         let mut rest = blocks;
         if let Some((start, end)) = blocks.first().map(block) {
             let is_within_next = blocks.get(1).map(block).is_some_and(|next| next.0 <= start && end <= next.1);
-            // Below what this segment acknowledges, which an earlier one may have overtaken.
+            // The first block reports a duplicate if it lies below the acknowledgement number of its segment, or within the second block (RFC 2883, section 4).
+            // The segment's own number counts here, because a later acknowledgement may have overtaken the segment.
             if start < extend(segment.acknowledgement, una) || is_within_next {
                 rest = &blocks[1..];
                 ack.tells_duplicate = true;
@@ -109,13 +123,14 @@ impl Connection {
             }
         }
         for (start, end) in rest.iter().map(block) {
+            // An invalid block, or a block of octets that were never sent, is ignored.
             if start < end && end <= self.send.next {
                 self.send.board.sack(start.max(ack.position), end, highest, &mut ack.news);
             }
         }
     }
 
-    /// Nothing was on the way: it may be the answer to a probe of the window.
+    /// Handles an acknowledgement while no segment is on the way. The acknowledgement may answer a probe of the window.
     fn hear_of_window(&mut self, now: Instant) {
         self.counters.probes = 0;
         if !self.send.has_new() {
@@ -128,20 +143,23 @@ impl Connection {
                 self.timer = None;
             }
         } else {
+            // The window is still closed, but the peer is there: the next probe follows at the present distance.
             self.timer = Some((now.saturating_add(self.probe_distance()), Timer::WindowProbe));
         }
     }
 
-    /// The congestion window after an acknowledgement.
+    /// Changes the congestion window after an acknowledgement with which `delivered` segments arrived. `has_lost` says that a segment was found lost.
     fn adapt_window(&mut self, now: Instant, ack: &Ack, delivered: u32, has_lost: bool) {
         if matches!(self.recovery.phase, Phase::Reduced | Phase::Recovery) {
             self.reduce_window(delivered, ack.has_advanced, has_lost);
         } else if ack.has_advanced || (ack.news.has_sacked && self.rack.degree > DUPLICATES) {
+            // On a path with strong reordering, segments that arrive out of order are no sign of loss, so the window grows with them as well.
             let least = self.round_trips.least().unwrap_or_default();
             self.congestion.grow(now, delivered, least);
         }
     }
 
+    /// Moves the congestion window during a reduction, after `delivered` segments have arrived.
     pub(super) fn reduce_window(&mut self, delivered: u32, has_advanced: bool, has_lost: bool) {
         let in_flight = self.send.board.in_flight();
         if let Some(window) = self.recovery.reduction.window(self.congestion.threshold, in_flight, delivered, has_advanced, has_lost) {

@@ -1,4 +1,4 @@
-//! Segments to send.
+//! Construction of segments: flags, options, and the window to offer.
 
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
@@ -12,13 +12,15 @@ use crate::segment::{Ecn, Flags, Options, SackBlocks, Segment, TIMESTAMPS_LENGTH
 use crate::sequence::{Position, on_wire};
 
 impl Connection {
-    /// The SYN, with ACK if one has come.
+    /// Returns this end's SYN. In SYN-RECEIVED, the SYN has an ACK.
     pub(super) fn build_syn(&self, now: Instant) -> Segment<'static> {
         let has_come = self.state == State::SynReceived;
+        // The window of a SYN is never scaled (RFC 7323, section 2.2).
         let window = self.config.receive_buffer.min(65_535);
         let room = self.config.segment_room(self.local.is_ipv4());
         let options = Options {
             mss: Some(u16::try_from(room).unwrap_or(u16::MAX)),
+            // An answer may have a window scale only if the peer's SYN has one. `learn_syn` sets the receive scale to zero otherwise.
             window_scale: (!has_come || self.receive.scale > 0 || self.send.scale > 0).then_some(self.receive.scale),
             sack_permitted: self.receive.has_sack,
             timestamps: self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value))),
@@ -39,12 +41,13 @@ impl Connection {
         }
     }
 
-    /// Whether the SYN that is to leave asks for ECN. Linux keeps to ECN if the answer grants it all the same: to the SYN before.
+    /// Returns whether the next SYN asks for ECN. If the next SYN does not ask but the answer grants ECN, the answer belongs to an earlier SYN. The connection
+    /// then uses ECN, as in Linux.
     pub(super) fn asks_for_ecn(&self) -> bool {
         self.send.has_ecn && (self.counters.retries == 0 || self.config.ecn_fallback == EcnFallback::Never)
     }
 
-    /// A segment without data, options or window, at the next position.
+    /// Returns a segment at the next position without data and options, and with a window of zero.
     fn empty(&self, flags: Flags) -> Segment<'static> {
         Segment {
             source: self.local,
@@ -60,13 +63,15 @@ impl Connection {
         }
     }
 
-    /// A reset at the next position.
+    /// Returns a reset at the next position.
     pub(super) fn build_reset(&self) -> Segment<'static> {
         self.empty(Flags::RST | Flags::ACK)
     }
 
-    /// A segment with ACK from `start` to `end`, which may include the FIN. It acknowledges all that has come.
+    /// Returns a segment with the positions from `start` to `end` (exclusive), which may include the FIN. The segment acknowledges all octets that have arrived
+    /// in order, so that no other acknowledgement is due afterwards.
     pub(super) fn build(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
+        // The FIN has the position after the last octet, so a position beyond the buffer is the FIN.
         let data_end = end.min(self.send.buffer.end()).max(start);
         let payload = if data_end > start { self.send.buffer.copy(start, data_end) } else { Vec::new() };
         let has_fin = end > data_end;
@@ -76,6 +81,7 @@ impl Connection {
             .with_if(Flags::PSH, is_last)
             .with_if(Flags::ECE, self.send.tells_mark)
             .with_if(Flags::CWR, self.send.tells_reduction && !payload.is_empty());
+        // CWR travels once, with data (RFC 3168, section 6.1.2).
         if !payload.is_empty() {
             self.send.tells_reduction = false;
         }
@@ -85,7 +91,7 @@ impl Connection {
         Segment { sequence: on_wire(start), flags, window, options, payload: Cow::Owned(payload), ..self.empty(flags) }
     }
 
-    /// Timestamps and as many selective acknowledgements as fit beside the data.
+    /// Returns timestamps, and as many selective acknowledgements as fit beside `payload` octets of data.
     fn options(&mut self, now: Instant, payload: usize) -> Options {
         let timestamps = self.receive.has_timestamps.then(|| (Self::ticks(now), self.receive.recent.map_or(0, |(value, _)| value)));
         let mut sack = SackBlocks::default();
@@ -96,12 +102,13 @@ impl Connection {
                 sack.push(on_wire(start), on_wire(end));
             }
             sack.truncate((room.saturating_sub(4) / 8).min(if timestamps.is_some() { 3 } else { 4 }));
+            // A duplicate is reported once (RFC 2883, section 4).
             self.receive.duplicate = None;
         }
         Options { timestamps, sack, ..Options::default() }
     }
 
-    /// What selective acknowledgements take beside data \[byte\].
+    /// Returns the length of the selective acknowledgements of the next segment \[byte\].
     pub(super) fn sack_length(&self) -> usize {
         if !self.receive.has_sack {
             return 0;
@@ -111,20 +118,22 @@ impl Connection {
         if blocks == 0 { 0 } else { 4 + 8 * blocks.min(if self.receive.has_timestamps { 3 } else { 4 }) }
     }
 
-    /// The window to offer, scaled: the free part of the buffer, but nothing small (RFC 9293, section 3.8.6.2.2), and never less than before.
+    /// Returns the window to offer as the header has it, in units of the window scale, and moves the edge of the window. The window is the free part of the
+    /// buffer, but never a small window (RFC 9293, section 3.8.6.2.2), and never moves the edge back.
     fn offer_window(&mut self) -> u16 {
         let unit = 1u64 << self.receive.scale;
         let most = 65_535u64 << self.receive.scale;
         let current = self.receive.window();
         let free = self.free_window();
         let window = if free > current { (free & !(unit - 1)).max(current) } else { current };
-        // A window that is kept may not shrink by being said in units.
+        // An unchanged window is rounded up to whole units, because rounding down would move its edge back.
         let window = window.next_multiple_of(unit).min(most);
         self.receive.edge = self.receive.edge.max(self.receive.next + window);
         u16::try_from(window >> self.receive.scale).unwrap_or(u16::MAX)
     }
 
-    /// What the receive buffer has free, zero if that is little \[byte\].
+    /// Returns the free octets of the receive buffer. Returns zero if less than half of the buffer is free, and the free part is below a sixteenth of the
+    /// buffer or below a segment.
     pub(super) fn free_window(&self) -> u64 {
         let capacity = self.config.receive_buffer;
         let free = capacity.saturating_sub(self.receive.assembler.unread());
@@ -132,7 +141,7 @@ impl Connection {
         if is_little { 0 } else { free as u64 }
     }
 
-    /// An acknowledgement has left.
+    /// Notes that an acknowledgement of all octets in order has left.
     fn has_acknowledged(&mut self) {
         self.receive.acked = self.receive.next;
         self.receive.has_offered = true;

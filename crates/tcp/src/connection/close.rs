@@ -1,4 +1,4 @@
-//! The end of a connection.
+//! End of a connection: the program's calls, the passage through the closing states, and TIME-WAIT.
 
 use cohaptic_units::Instant;
 
@@ -8,7 +8,7 @@ use crate::segment::{Flags, Segment};
 use crate::sequence::extend;
 
 impl Connection {
-    /// Shuts the sending half: a FIN follows the data. The peer may send on. Again, or after the end, it does nothing.
+    /// Shuts the sending half, so that a FIN follows the data. The peer may continue to send. A second call, or a call after the end, does nothing.
     pub fn shutdown(&mut self) {
         if self.send.is_shut || matches!(self.state, State::Closed | State::TimeWait) {
             return;
@@ -17,6 +17,7 @@ impl Connection {
         self.state = match self.state {
             State::Established => State::FinWait1,
             State::CloseWait => State::LastAck,
+            // During the handshake the state stays: `establish` sees `is_shut` and goes to FIN-WAIT-1.
             other @ (State::SynSent
             | State::SynReceived
             | State::FinWait1
@@ -28,8 +29,8 @@ impl Connection {
         };
     }
 
-    /// The program drops the connection: a FIN follows the data, and data that arrives later is answered by a RST. If there is data that was not read, the
-    /// connection is reset at once, as in Linux.
+    /// Closes the connection for a program that drops it. A FIN follows the data, and data that arrives later is answered by a RST. If there is unread data,
+    /// the connection is reset at once, as in Linux. A second call does nothing.
     pub fn close(&mut self, now: Instant) {
         if self.is_orphan {
             return;
@@ -37,8 +38,10 @@ impl Connection {
         self.is_orphan = true;
         match self.state {
             State::SynSent => self.die(None),
+            // The reset tells the peer that its data was lost, although this end has acknowledged the data.
             _ if self.receive.assembler.unread() > 0 => self.abort(),
             State::SynReceived => self.abort(),
+            // The peer may never shut its half, and no program is left to wait for the peer.
             State::FinWait2 => self.linger_until = Some(now.saturating_add(self.config.time_wait)),
             State::Established | State::FinWait1 | State::CloseWait | State::Closing | State::LastAck | State::TimeWait | State::Closed => {
                 self.shutdown()
@@ -46,7 +49,7 @@ impl Connection {
         }
     }
 
-    /// Resets the connection: what was not sent is lost, and the peer hears of it by a RST. This is `SO_LINGER` with zero seconds.
+    /// Resets the connection. Unsent data is lost, and a RST tells the peer. Corresponds to closing with `SO_LINGER` of zero seconds.
     pub fn abort(&mut self) {
         if matches!(
             self.state,
@@ -55,12 +58,13 @@ impl Connection {
             let reset = self.build_reset();
             self.replies.push_back(reset);
         }
+        // TIME-WAIT stays, because its purpose is to keep late segments away from the next connection with these addresses.
         if self.state != State::TimeWait {
             self.die(None);
         }
     }
 
-    /// What follows when the FIN is acknowledged.
+    /// Goes to the next closing state if the FIN is acknowledged.
     pub(super) fn advance_close(&mut self, now: Instant) {
         if !self.send.is_all_acked() {
             return;
@@ -78,38 +82,42 @@ impl Connection {
         }
     }
 
+    /// Enters TIME-WAIT. All deadlines but its end are removed.
     pub(super) fn enter_time_wait(&mut self, now: Instant) {
         self.state = State::TimeWait;
         (self.timer, self.keepalive_at, self.receive.ack_at) = (None, None, None);
         self.linger_until = Some(now.saturating_add(self.config.time_wait));
     }
 
-    /// A late segment (RFC 9293, section 3.10.7.4, TIME-WAIT).
+    /// Handles a segment that arrives in TIME-WAIT (RFC 9293, section 3.10.7.4).
     pub(super) fn handle_in_time_wait(&mut self, now: Instant, segment: &Segment<'_>) {
+        // The owner may leave the end of TIME-WAIT out of its timers, so the end is checked here as well.
         if self.time_wait_ends().is_some_and(|end| now >= end) {
             self.die(None);
             self.replies.extend(segment.refusal(self.config.ttl));
         } else if segment.flags.has(Flags::RST) {
+            // Only a reset at exactly the expected number ends TIME-WAIT, so that a stray reset cannot.
             if extend(segment.sequence, self.receive.next) == self.receive.next {
                 self.die(None);
             }
         } else if segment.sequence_length() > 0 {
             self.receive.ack_now = true;
+            // A FIN shows that the last acknowledgement was lost, so TIME-WAIT begins anew.
             if segment.flags.has(Flags::FIN) {
                 self.linger_until = Some(now.saturating_add(self.config.time_wait));
             }
         }
     }
 
-    /// When TIME-WAIT is over; `None` in other states. Nothing is seen of it, so an owner may leave it out of its timers and look when the addresses are
-    /// wanted again.
+    /// Returns the end of TIME-WAIT, or `None` in other states. Neither the peer nor the program notices this end, so an owner may leave it out of its timers
+    /// and check it when a new connection needs the addresses.
     #[must_use]
     pub fn time_wait_ends(&self) -> Option<Instant> {
         self.linger_until.filter(|_| self.state == State::TimeWait)
     }
 
-    /// Whether a SYN that arrives in TIME-WAIT may open a new connection at once: its sequence number or its timestamp is beyond the last one
-    /// (RFC 6191).
+    /// Returns whether the connection is in TIME-WAIT and `syn` may open a new connection at once, because the sequence number or the timestamp of `syn` is
+    /// beyond the last number or timestamp of the peer (RFC 6191).
     #[must_use]
     pub fn gives_way_to(&self, syn: &Segment<'_>) -> bool {
         let is_syn = syn.flags.has(Flags::SYN) && !syn.flags.has(Flags::RST) && !syn.flags.has(Flags::ACK);

@@ -1,45 +1,46 @@
-//! What a connection tells about itself.
+//! Calls that report the state of a connection to its owner, and change nothing.
 
 use super::Connection;
 use crate::info::Info;
 use crate::sequence::on_wire;
 
 impl Connection {
-    /// Whether data is left that only the peer's program can set free: the window is closed, and a probe was answered by that (nothing is on the way).
+    /// Returns whether only the peer's program can let this connection continue: data waits, the peer's window is closed, no segment is on the way, and the
+    /// peer has answered a probe of the window.
     ///
-    /// An owner that sees this at every connection, while no program waits for time, knows that nothing will happen any more.
+    /// If this holds for every connection and no program waits for an instant, nothing will happen any more.
     #[must_use]
     pub fn is_held_by_window(&self) -> bool {
         let is_answered = self.counters.window_probes > 0 && self.counters.probes == 0;
         is_answered && self.send.board.is_empty() && self.send.has_new() && !self.is_window_open()
     }
 
-    /// Whether nothing is left to do but to ask an idle peer whether it is there, and no such probe is unanswered.
+    /// Returns whether keep-alive probes are the only thing that this connection waits for, and no probe is unanswered.
     #[must_use]
     pub const fn is_only_kept_alive(&self) -> bool {
         let is_idle = self.timer.is_none() && self.receive.ack_at.is_none() && self.linger_until.is_none();
         is_idle && self.keepalive_at.is_some() && self.counters.probes == 0
     }
 
-    /// How many octets the connection holds: those that were written and not acknowledged, and those that have arrived and were not read, in order or not.
+    /// Returns the number of octets in the buffers: octets written and not acknowledged, and octets that have arrived, in order or not, and were not read.
     #[must_use]
     pub fn held(&self) -> usize {
         self.send.buffer.len() + self.receive.assembler.held()
     }
 
-    /// The sequence numbers of the SYNs, this end's and the peer's, once that has come: for tools that show numbers counted from them.
+    /// Returns the sequence number of this end's SYN, and of the peer's SYN once that SYN has arrived. Tools need both to show relative sequence numbers.
     #[must_use]
     pub const fn initial_sequences(&self) -> (u32, Option<u32>) {
         (on_wire(self.send.first), self.receive.first)
     }
 
-    /// By how many bits the windows of this end's segments are shifted, apart from SYNs (RFC 7323, section 2).
+    /// Returns the number of bits by which the windows of this end's segments are shifted, apart from SYNs (RFC 7323, section 2).
     #[must_use]
     pub const fn window_shift(&self) -> u8 {
         self.receive.scale
     }
 
-    /// Figures, as of Linux's `TCP_INFO`.
+    /// Returns the figures of the connection, after the example of Linux's `TCP_INFO`.
     #[must_use]
     pub fn info(&self) -> Info {
         Info {

@@ -1,4 +1,4 @@
-//! Which segments are lost: by time (RFC 8985), by count (RFC 6675), by duplicates (RFC 6582) or by the timer (RFC 6298).
+//! Detection of losses by time (RFC 8985), by count (RFC 6675), by duplicates (RFC 6582) or by the retransmission timer (RFC 6298).
 
 use core::time::Duration;
 
@@ -10,22 +10,22 @@ use super::recovery::DUPLICATES;
 use super::{Connection, Timer};
 use crate::sequence::Position;
 
-/// For how many recoveries a larger reordering window stays (RFC 8985, section 6.2).
+/// Number of recoveries for which a larger reordering window stays (RFC 8985, section 6.2).
 const PERSISTS: u32 = 16;
 
 impl Connection {
-    /// What begins at `start` has arrived behind what ends at `end`, and was sent once.
+    /// Notes that a segment that begins at `start` and was sent once has arrived after a segment that ends at `end`.
     pub(super) fn note_reordering(&mut self, start: Position, end: Position) {
         self.rack.has_reordering = true;
         let degree = end.saturating_sub(start).div_ceil(self.send.mss as u64);
         self.rack.degree = self.rack.degree.max(u32::try_from(degree).unwrap_or(u32::MAX));
     }
 
-    /// The latest transmission that has arrived (RFC 8985, section 6.2, step 2).
+    /// Notes the latest transmission that has arrived, and its round trip (RFC 8985, section 6.2, step 2).
     fn advance_rack(&mut self, now: Instant, ack: &Ack) {
         let Some((sent_at, was_again)) = ack.news.latest else { return };
         let round_trip = now.saturating_duration_since(sent_at.0);
-        // An answer sooner than any round trip is the answer to the first transmission.
+        // An answer to a repeated segment that comes sooner than any round trip must be the answer to an earlier transmission.
         if was_again && self.round_trips.least().is_some_and(|least| round_trip < least) {
             return;
         }
@@ -33,8 +33,9 @@ impl Connection {
         self.rack.delivered = self.rack.delivered.max(Some(sent_at));
     }
 
-    /// How long a segment may be late (RFC 8985, section 6.2, step 4).
+    /// Returns the time by which a segment may be late before it counts as lost (RFC 8985, section 6.2, step 4).
     fn reordering_window(&self) -> Duration {
+        // On a path that has never reordered, waiting during recovery, or after three segments out of order, would only delay the repair.
         if !self.rack.has_reordering && (self.recovery.phase >= Phase::Recovery || self.send.board.sacked_out >= DUPLICATES) {
             return Duration::ZERO;
         }
@@ -42,7 +43,7 @@ impl Connection {
         (least / 4 * self.rack.quarters.max(1)).min(self.round_trips.srtt().unwrap_or_default())
     }
 
-    /// A larger reordering window for each round trip with a duplicate.
+    /// Enlarges the reordering window once per round trip in which a duplicate was reported, because a duplicate means that a loss was declared too early.
     pub(super) fn adapt_patience(&mut self, ack: &Ack) {
         if self.rack.saw_duplicate && self.send.una >= self.rack.grown_at {
             self.rack.quarters = (self.rack.quarters.max(1) + 1).min(255);
@@ -54,12 +55,13 @@ impl Connection {
         self.rack.saw_duplicate = false;
     }
 
-    /// Returns whether the timer was set for segments that may only be late.
+    /// Marks lost segments after the acknowledgement `ack`. Returns whether the timer was set for segments that may only be late.
     pub(super) fn find_losses(&mut self, now: Instant, ack: &Ack) -> bool {
         if self.send.board.is_empty() {
             return false;
         }
         if !self.receive.has_sack {
+            // NewReno: three duplicates tell of the loss of the first segment. In recovery, a partial acknowledgement tells that the next segment is lost too.
             let is_told = self.recovery.phase < Phase::Recovery && self.send.board.sacked_out >= DUPLICATES;
             if is_told || (self.recovery.phase == Phase::Recovery && ack.has_advanced) {
                 self.send.board.mark_first_lost();
@@ -74,6 +76,7 @@ impl Connection {
         self.detect_by_time(now)
     }
 
+    /// Marks segments that are lost by time, and sets the reordering timer for segments that may only be late. Returns whether the timer was set.
     fn detect_by_time(&mut self, now: Instant) -> bool {
         let Some(delivered) = self.rack.delivered else { return false };
         let patience = self.rack.rtt.saturating_add(self.reordering_window());
@@ -82,7 +85,7 @@ impl Connection {
         true
     }
 
-    /// The reordering timer has run out.
+    /// Handles the end of the reordering timer: the late segments are lost.
     pub(super) fn reordering_is_over(&mut self, now: Instant) {
         let before = self.send.board.lost_out;
         self.timer = None;
@@ -91,6 +94,7 @@ impl Connection {
             if self.recovery.phase < Phase::Recovery {
                 self.enter_recovery(false);
             }
+            // No acknowledgement has arrived. One segment counts as delivered, because otherwise the window would not be computed and nothing could leave.
             self.reduce_window(1, false, true);
         }
         if !waits {
@@ -98,8 +102,9 @@ impl Connection {
         }
     }
 
-    /// The retransmission timer has run out (RFC 5681, section 3.1, and RFC 6298, section 5).
+    /// Handles the end of the retransmission timer (RFC 5681, section 3.1, and RFC 6298, section 5).
     pub(super) fn enter_loss(&mut self, now: Instant) {
+        // The threshold is reduced once per loss event. Another timeout of the same event must not reduce it again.
         let is_first = self.recovery.phase <= Phase::Disorder
             || self.send.una >= self.recovery.high
             || (self.recovery.phase == Phase::Loss && self.counters.retries == 0);
@@ -120,18 +125,21 @@ impl Connection {
         self.counters.timeouts += 1;
     }
 
-    /// Whether the tail loss probe has repaired a loss (RFC 8985, section 7.4).
+    /// Decides whether the tail loss probe has repaired a loss, which reduces the window (RFC 8985, section 7.4).
     pub(super) fn end_tail_probe(&mut self, ack: &Ack) {
         let Some(end) = self.tail.end.filter(|end| ack.position >= *end) else { return };
+        // A probe with new data repairs nothing. A reported duplicate means that the last segment and the probe have both arrived.
         if !self.tail.is_again || ack.tells_duplicate {
             self.tail.end = None;
         } else if ack.position > end {
+            // Later data is acknowledged and no duplicate was reported: the last segment was lost, and the probe has replaced it.
             self.tail.end = None;
             self.enter_reduced();
             if self.recovery.phase == Phase::Reduced {
                 self.end_reduction_at_once(ack);
             }
         } else if ack.is_duplicate {
+            // A duplicate acknowledgement at `end` answers the probe, so that the last segment had arrived before.
             self.tail.end = None;
         }
     }

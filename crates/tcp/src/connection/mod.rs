@@ -1,4 +1,4 @@
-//! One end of a connection.
+//! One end of a connection: the state machine and its public calls. Segments and instants come in, segments and deadlines go out.
 
 mod acknowledge;
 mod build;
@@ -30,19 +30,19 @@ use crate::segment::Segment;
 use parts::{Counters, Rack, Receive, Recovery, Send, TailProbe};
 use timers::Timer;
 
-/// One end of a TCP connection: a state machine that is told the time.
+/// One end of a TCP connection: a state machine without a clock, which receives the time with each call.
 ///
-/// After each call, [`poll_transmit`](Self::poll_transmit) is to be called until it returns `None`, and [`handle_timeout`](Self::handle_timeout) at the instant
-/// that [`poll_timeout`](Self::poll_timeout) says. Instants must not go back.
+/// After each call, the owner calls [`poll_transmit`](Self::poll_transmit) until `poll_transmit` returns `None`, and later
+/// [`handle_timeout`](Self::handle_timeout) at the instant that [`poll_timeout`](Self::poll_timeout) returns. The instants of the calls must not decrease.
 #[derive(Clone, Debug)]
 pub struct Connection {
     config: TcpConfig,
     local: SocketAddr,
     remote: SocketAddr,
     state: State,
-    /// What the next call is told, once.
+    /// Reason for the end of the connection, until a call of the program has returned the reason once.
     error: Option<Error>,
-    /// The program has dropped it.
+    /// The program has closed the connection, so that nobody will read data any more.
     is_orphan: bool,
     send: Send,
     receive: Receive,
@@ -51,51 +51,54 @@ pub struct Connection {
     recovery: Recovery,
     rack: Rack,
     tail: TailProbe,
+    /// Deadline of the sending half, and its purpose.
     timer: Option<(Instant, Timer)>,
     keepalive_at: Option<Instant>,
-    /// When TIME-WAIT, or FIN-WAIT-2 of an orphan, is over.
+    /// End of TIME-WAIT, or of FIN-WAIT-2 of an orphan.
     linger_until: Option<Instant>,
-    /// A segment that is sent whatever the windows say.
+    /// Purpose of the next segment that is sent regardless of the congestion window.
     probe: Option<Probe>,
+    /// Segments that leave before all others: SYNs and resets.
     replies: VecDeque<Segment<'static>>,
     counters: Counters,
 }
 
-/// Why a segment is forced.
+/// Purpose of a segment that is sent regardless of the congestion window.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Probe {
-    /// The last flight is unanswered (RFC 8985, section 7).
+    /// The last flight is unanswered, and an answer to one more segment would show a loss at its end (RFC 8985, section 7).
     Tail,
-    /// The peer's window is closed, or the connection idle.
+    /// The peer's window is closed, or the connection is idle, and the peer should answer.
     Window,
 }
 
 impl Connection {
-    /// The state.
+    /// Returns the state.
     #[must_use]
     pub const fn state(&self) -> State {
         self.state
     }
 
-    /// The address of this end.
+    /// Returns the address of this end.
     #[must_use]
     pub const fn local_addr(&self) -> SocketAddr {
         self.local
     }
 
-    /// The address of the other end.
+    /// Returns the address of the other end.
     #[must_use]
     pub const fn peer_addr(&self) -> SocketAddr {
         self.remote
     }
 
-    /// Whether the connection is over, has nothing to send, and its owner may forget it once the program has dropped it.
+    /// Returns whether the connection has ended and has nothing to send. The owner may then drop the connection, once the program has closed it.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         self.state == State::Closed && self.replies.is_empty()
     }
 
-    /// The connection is over, and the program hears of it once.
+    /// Ends the connection. The next call of the program returns `error`, once. Data that has arrived in order stays readable, unless the connection is an
+    /// orphan.
     fn die(&mut self, error: Option<Error>) {
         self.state = State::Closed;
         self.error = error;
@@ -110,20 +113,21 @@ impl Connection {
         }
     }
 
-    /// The clock of timestamps.
+    /// Returns the value of the timestamps clock at `now` \[ticks\].
     fn ticks(now: Instant) -> u32 {
-        // One tick of the timestamps clock is a millisecond, as in Linux; the count wraps after 49 days.
+        // A tick of the timestamps clock is a millisecond, as in Linux. The count wraps after 49 days.
         u32::try_from(now.as_nanos() / 1_000_000 % (1 << 32)).unwrap_or(0)
     }
 
-    /// Octets that a segment may carry, apart from selective acknowledgements.
+    /// Returns the octets of data that a segment may carry if it has no selective acknowledgements, at least 48 unless the MSS is smaller.
     fn segment_size(&self) -> usize {
-        // Half the peer's largest window at most, so that a small window is not one segment (RFC 9293, section 3.8.6.2.1).
+        // At most half of the peer's largest window, so that a small window takes two segments (RFC 9293, section 3.8.6.2.1).
         let window = usize::try_from(self.send.max_window).unwrap_or(usize::MAX);
         let most = if window > 536 { window / 2 } else { window };
         self.send.mss.min(most.max(48))
     }
 
+    /// Returns the blocks for a selective acknowledgement: first the duplicate, if there is one, because RFC 2883 gives the first place a meaning.
     fn blocks(&self) -> Vec<(u64, u64)> {
         self.receive.duplicate.into_iter().chain(self.receive.assembler.blocks()).collect()
     }

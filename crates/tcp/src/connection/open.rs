@@ -1,4 +1,4 @@
-//! The handshake.
+//! Handshake: construction of a connection, SYN-SENT, and the passage to ESTABLISHED.
 
 use core::net::SocketAddr;
 use core::time::Duration;
@@ -16,27 +16,28 @@ use crate::segment::{Flags, Options, Segment, TIMESTAMPS_LENGTH};
 use crate::send_buffer::SendBuffer;
 use crate::sequence::{extend, first};
 
-/// What a peer takes that does not say how much (RFC 9293, section 3.7.1).
+/// Maximum segment size of a peer whose SYN has no MSS option \[byte\] (RFC 9293, section 3.7.1).
 const DEFAULT_MSS: usize = 536;
 
 impl Connection {
-    /// An end that opens the connection: its SYN is the first segment to send. `initial_sequence` counts unless the configuration has one.
+    /// Returns an end that opens the connection, in SYN-SENT. Its SYN is the first segment to send. `initial_sequence` is the sequence number of the SYN,
+    /// unless the configuration has one.
     ///
     /// # Errors
     ///
-    /// If the configuration cannot be.
+    /// If [`TcpConfig::check`] refuses the configuration.
     pub fn connect(now: Instant, config: TcpConfig, local: SocketAddr, remote: SocketAddr, initial_sequence: u32) -> Result<Self, ConfigError> {
         let mut connection = Self::new(now, config, local, remote, initial_sequence)?;
         connection.send_syn(now);
         Ok(connection)
     }
 
-    /// An end that answers a SYN: its own SYN with ACK is the first segment to send. A segment that is no SYN makes a connection that is closed at once, and
-    /// refuses it.
+    /// Returns an end that answers the SYN `syn`, in SYN-RECEIVED. Its SYN with ACK is the first segment to send. If `syn` is not a SYN, returns a closed
+    /// connection whose only segment is the reset in answer.
     ///
     /// # Errors
     ///
-    /// If the configuration cannot be.
+    /// If [`TcpConfig::check`] refuses the configuration.
     pub fn accept(now: Instant, config: TcpConfig, syn: &Segment<'_>, initial_sequence: u32) -> Result<Self, ConfigError> {
         let mut connection = Self::new(now, config, syn.destination, syn.source, initial_sequence)?;
         if syn.flags.has(Flags::SYN) && !syn.flags.has(Flags::ACK) && !syn.flags.has(Flags::RST) {
@@ -52,6 +53,7 @@ impl Connection {
         Ok(connection)
     }
 
+    /// Returns an end in SYN-SENT that has not sent its SYN.
     fn new(now: Instant, config: TcpConfig, local: SocketAddr, remote: SocketAddr, initial_sequence: u32) -> Result<Self, ConfigError> {
         config.check()?;
         let first = first(config.initial_sequence.unwrap_or(initial_sequence));
@@ -122,7 +124,7 @@ impl Connection {
         })
     }
 
-    /// Sends the SYN for the first time.
+    /// Sends the SYN, or the SYN with ACK, for the first time.
     fn send_syn(&mut self, now: Instant) {
         self.send.next = self.send.first + 1;
         self.send.board.push(self.send.first, self.send.next, now);
@@ -131,38 +133,44 @@ impl Connection {
         self.replies.push_back(syn);
     }
 
-    /// Takes over what a SYN says.
+    /// Takes over the options, the ECN flags and the sequence number of the peer's SYN.
     fn learn_syn(&mut self, now: Instant, syn: &Segment<'_>) {
         let Options { mss, window_scale, sack_permitted, timestamps, .. } = syn.options;
         self.receive.has_sack &= sack_permitted;
         self.receive.has_timestamps &= timestamps.is_some();
         self.receive.recent = timestamps.filter(|_| self.receive.has_timestamps).map(|(value, _)| (value, now));
         match window_scale {
+            // RFC 7323, section 2.3: a shift above 14 counts as 14. If one SYN has no scale, neither end may scale its windows.
             Some(scale) => self.send.scale = scale.min(14),
             None => self.receive.scale = 0,
         }
         let room = self.config.segment_room(self.local.is_ipv4());
         let options = if self.receive.has_timestamps { TIMESTAMPS_LENGTH } else { 0 };
+        // The MSS counts neither headers nor options, so the timestamps of each segment take their octets from the data (RFC 9293, section 3.7.1).
         self.send.mss = mss.map_or(DEFAULT_MSS, usize::from).max(64).min(room) - options;
+        // A SYN asks for ECN with ECE and CWR. A SYN with ACK grants ECN with ECE.
         let asked = Flags::ECE.with_if(Flags::CWR, !syn.flags.has(Flags::ACK));
         self.send.has_ecn &= syn.flags.has(asked);
         self.receive.first = Some(syn.sequence);
         self.receive.next = first(syn.sequence) + 1;
         self.receive.acked = self.receive.next;
+        // The window on this end's SYN has 16 bits and is not scaled.
         self.receive.edge = self.receive.next + self.config.receive_buffer.min(65_535) as u64;
         self.receive.segment = self.receive.segment.min(self.send.mss);
         self.receive.last_heard = now;
         self.send.window_from = self.receive.next - 1;
     }
 
-    /// A segment in SYN-SENT (RFC 9293, section 3.10.7.3).
+    /// Handles a segment that arrives in SYN-SENT (RFC 9293, section 3.10.7.3).
     pub(super) fn handle_in_syn_sent(&mut self, now: Instant, segment: &Segment<'_>) {
         let has_ack = segment.flags.has(Flags::ACK);
+        // An acknowledgement of anything but the SYN belongs to an older connection. This check comes first, so that such a reset has no effect.
         if has_ack && extend(segment.acknowledgement, self.send.una) != self.send.next {
             self.replies.extend(segment.refusal(self.config.ttl));
             return;
         }
         if segment.flags.has(Flags::RST) {
+            // A reset without ACK is ignored, because it does not show that its sender has seen the SYN.
             if has_ack && self.asks_for_ecn() && self.config.ecn_fallback == EcnFallback::LostOrReset {
                 self.send.has_ecn = false;
                 self.send.board.sent_again(self.send.first, now, false);
@@ -182,16 +190,17 @@ impl Connection {
         if has_ack {
             self.establish(now, segment);
             self.receive.ack_now = true;
+            // The answer to a SYN may carry data.
             self.accept_data(now, segment, self.receive.next);
         } else {
-            // Both have begun at once: the SYN is sent again, with ACK.
+            // Both ends have opened at once. This end's SYN is sent again, with ACK.
             self.state = State::SynReceived;
             let answer = self.build_syn(now);
             self.replies.push_back(answer);
         }
     }
 
-    /// The handshake is over: the SYN is acknowledged.
+    /// Ends the handshake, because this end's SYN is acknowledged. The SYN gives the first sample of the round trip.
     pub(super) fn establish(&mut self, now: Instant, segment: &Segment<'_>) {
         let mut news = News::default();
         let ack = self.send.first + 1;
@@ -201,7 +210,7 @@ impl Connection {
             self.round_trips.sample(now, round_trip);
         }
         if self.counters.retries > 1 {
-            // RFC 5681, section 3.1: a SYN that was lost twice tells of a full path.
+            // RFC 5681, section 3.1, asks for a window of one segment after a loss of the SYN. Linux does so after the second timeout.
             self.congestion.window = 1;
         }
         (self.counters.retries, self.counters.stalled_since) = (0, None);
@@ -211,10 +220,11 @@ impl Connection {
         self.restart_keepalive(now);
     }
 
-    /// The round trip by the timestamp that came back.
+    /// Returns the round trip since the timestamp that `segment` echoes, at least 1 ms. Returns `None` without a usable echo.
     pub(super) fn echoed(&self, now: Instant, segment: &Segment<'_>) -> Option<Duration> {
         let (_, echo) = segment.options.timestamps.filter(|(_, echo)| self.receive.has_timestamps && *echo != 0)?;
         let ticks = Self::ticks(now).wrapping_sub(echo);
+        // The difference wraps: half of the range or more means an echo from the future, which is not one of this end's timestamps.
         (ticks < 1 << 31).then_some(Duration::from_millis(u64::from(ticks.max(1))))
     }
 }

@@ -1,4 +1,4 @@
-//! What a connection remembers, by concern.
+//! State of a connection, one type per concern.
 
 use core::time::Duration;
 
@@ -10,167 +10,198 @@ use crate::scoreboard::{Scoreboard, SentAt};
 use crate::send_buffer::SendBuffer;
 use crate::sequence::Position;
 
-/// The sending half.
+/// State of the sending half.
 #[derive(Clone, Debug)]
 pub(super) struct Send {
-    /// The position of the SYN.
+    /// Position of the SYN.
     pub(super) first: Position,
-    /// The first position that is not acknowledged.
+    /// First position that is not acknowledged.
     pub(super) una: Position,
-    /// The first one that was never sent.
+    /// First position that was never sent.
     pub(super) next: Position,
-    /// The peer's window \[byte\], the largest so far, and the sequence number that it came with.
+    /// Peer's window, counted from `una` \[byte\].
     pub(super) window: u64,
+    /// Largest window that the peer has offered so far \[byte\].
     pub(super) max_window: u64,
+    /// Peer's position of the segment that set `window`. Segments from before this position must not set `window`, because they were overtaken.
     pub(super) window_from: Position,
+    /// Number of bits by which the peer's windows are shifted.
     pub(super) scale: u8,
     pub(super) buffer: SendBuffer,
     pub(super) board: Scoreboard,
-    /// Octets that a segment may carry beside timestamps.
+    /// Most octets of data that a segment may carry beside timestamps.
     pub(super) mss: usize,
-    /// The end of the last segment that was not full (Minshall's form of Nagle's algorithm).
+    /// End of the last segment that was not full (for Minshall's form of Nagle's algorithm).
     pub(super) small_end: Position,
-    /// The program has shut this half: a FIN follows the data.
+    /// The program has shut this half, so that a FIN follows the data.
     pub(super) is_shut: bool,
+    /// Instant at which new data, or the SYN, was sent last.
     pub(super) last_data_at: Instant,
+    /// Number of segments known to have arrived at the peer.
     pub(super) delivered: u64,
-    /// Explicit congestion notification: agreed upon, the peer is to be told of a mark, of a reduction.
+    /// Both ends use explicit congestion notification.
     pub(super) has_ecn: bool,
+    /// Segments carry ECE, because a packet with a mark has arrived and the peer has not answered with CWR.
     pub(super) tells_mark: bool,
+    /// The next segment with data carries CWR, because this end has reduced its window.
     pub(super) tells_reduction: bool,
 }
 
 impl Send {
-    /// The position behind the last octet to send, the FIN included.
+    /// Returns the position after the last octet to send, or after the FIN if this half is shut.
     pub(super) fn end(&self) -> Position {
         self.buffer.end() + u64::from(self.is_shut)
     }
 
-    /// Whether something was never sent.
+    /// Returns whether an octet or the FIN was never sent.
     pub(super) fn has_new(&self) -> bool {
         self.next < self.end()
     }
 
-    /// Whether the FIN is acknowledged.
+    /// Returns whether the FIN is acknowledged.
     pub(super) fn is_all_acked(&self) -> bool {
         self.is_shut && self.una == self.end()
     }
 
+    /// Returns the end (exclusive) of the peer's window.
     pub(super) fn window_end(&self) -> Position {
         self.una + self.window
     }
 }
 
-/// The receiving half.
+/// State of the receiving half.
 #[derive(Clone, Debug)]
 pub(super) struct Receive {
-    /// The number of the peer's SYN, once it has come.
+    /// Sequence number of the peer's SYN. `None` until the SYN has arrived.
     pub(super) first: Option<u32>,
-    /// The next position that is expected.
+    /// Position of the first octet that is missing.
     pub(super) next: Position,
-    /// The end of the window that was offered.
+    /// End (exclusive) of the offered window.
     pub(super) edge: Position,
-    /// What was expected when the last acknowledgement left.
+    /// Value of `next` when the last acknowledgement left.
     pub(super) acked: Position,
+    /// Number of bits by which the offered windows are shifted.
     pub(super) scale: u8,
+    /// Both ends use selective acknowledgements. Until the peer's SYN has arrived, this end offers them.
     pub(super) has_sack: bool,
+    /// Both ends use timestamps. Until the peer's SYN has arrived, this end offers them.
     pub(super) has_timestamps: bool,
-    /// The timestamp to echo, and when it came.
+    /// Timestamp to echo, and the instant of its arrival.
     pub(super) recent: Option<(u32, Instant)>,
     pub(super) assembler: Assembler,
-    /// Where the peer's FIN is, and whether all before it has come.
+    /// Position of the peer's FIN, once the FIN has arrived, also out of order.
     pub(super) fin: Option<Position>,
+    /// The peer's FIN and all octets before the FIN have arrived.
     pub(super) is_ended: bool,
-    /// A duplicate to tell of (RFC 2883).
+    /// Positions of a duplicate that the next acknowledgement reports (RFC 2883).
     pub(super) duplicate: Option<(Position, Position)>,
-    /// The largest segment so far, at least a guess.
+    /// Estimate of the peer's full segment: the largest data so far, but at least the first guess \[byte\].
     pub(super) segment: usize,
+    /// An acknowledgement is due at once.
     pub(super) ack_now: bool,
-    /// A window has been offered after the smaller one of the SYN.
+    /// A segment after the SYN has offered a window, which may be larger than the window of the SYN.
     pub(super) has_offered: bool,
-    /// When a delayed acknowledgement is due.
+    /// Instant at which a delayed acknowledgement is due.
     pub(super) ack_at: Option<Instant>,
-    /// How many more acknowledgements do not wait.
+    /// Number of further acknowledgements that leave without delay.
     pub(super) quick: u32,
-    /// Data flows both ways in turn: acknowledgements wait for data to travel with.
+    /// Both ends send data in turn. Acknowledgements then wait, because they can travel with data.
     pub(super) is_interactive: bool,
-    /// A segment that was not full has come, or two, since the last acknowledgement.
+    /// Number of segments that were not full since the last acknowledgement, at most 2.
     pub(super) pushed: u8,
+    /// Instant at which data in the window arrived last.
     pub(super) last_data_at: Option<Instant>,
+    /// Instant at which a valid segment arrived last.
     pub(super) last_heard: Instant,
-    /// When a segment out of window was answered last.
+    /// Instant of the last rate-limited answer: to a segment out of window, or a challenge.
     pub(super) challenged_at: Option<Instant>,
 }
 
 impl Receive {
+    /// Returns the part of the offered window that the peer has not filled \[byte\].
     pub(super) const fn window(&self) -> u64 {
         self.edge.saturating_sub(self.next)
     }
 }
 
-/// How the sender reacts to losses (RFC 5681, 6582, 6675; the names of Linux in brackets).
+/// Reaction of the sender to losses (RFC 5681, 6582, 6675). Brackets contain the names of Linux. The order is that of severity, and comparisons use it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 pub(super) enum Phase {
+    /// No sign of a loss (Open).
     #[default]
     Open,
-    /// Something arrived out of order (Disorder).
+    /// Segments have arrived out of order, or a duplicate acknowledgement has arrived (Disorder).
     Disorder,
-    /// The window shrinks because of a mark (CWR).
+    /// The window shrinks because of a mark, or of a loss that a tail probe repaired (CWR).
     Reduced,
-    /// Lost segments are sent again (Recovery).
+    /// Lost segments are sent again while the window shrinks (Recovery).
     Recovery,
-    /// The timer has run out (Loss).
+    /// The retransmission timer has run out (Loss).
     Loss,
 }
 
+/// State of loss recovery.
 #[derive(Clone, Default, Debug)]
 pub(super) struct Recovery {
     pub(super) phase: Phase,
-    /// What was sent when the phase began: it ends when this is acknowledged.
+    /// End of the data sent when the phase began. The phase ends when this position is acknowledged.
     pub(super) high: Position,
+    /// Progress of the window from its value before the phase to the threshold.
     pub(super) reduction: Reduction,
-    /// The threshold and the window before, in case nothing was lost.
+    /// Threshold before the phase, to return to if nothing was lost. `None` if the reduction must stay, as after a mark.
     pub(super) prior_threshold: Option<u32>,
+    /// Window before the phase \[segments\], to return to if nothing was lost.
     pub(super) prior_window: u32,
-    /// Where the phase began, and how many that were sent again have not been reported as duplicates; `None` before any.
+    /// First unacknowledged position when the phase began. `None` if no reduction can be taken back.
     pub(super) undo_from: Option<Position>,
+    /// Number of segments sent again in the phase that the peer has not reported as duplicates. `None` before a segment was sent again.
     pub(super) undo_left: Option<u32>,
-    /// When the first segment of the phase was sent again.
+    /// Instant at which a segment of the phase was sent again for the first time.
     pub(super) again_at: Option<Instant>,
 }
 
-/// Loss detection by time (RFC 8985).
+/// State of loss detection by time (RFC 8985).
 #[derive(Clone, Default, Debug)]
 pub(super) struct Rack {
-    /// The latest transmission that has arrived, and its round trip.
+    /// Latest transmission that has arrived.
     pub(super) delivered: Option<SentAt>,
+    /// Round trip of the transmission that arrived last.
     pub(super) rtt: Duration,
+    /// The network has reordered segments at least once.
     pub(super) has_reordering: bool,
-    /// By how many segments at most.
+    /// Largest extent of a reordering so far \[segments\].
     pub(super) degree: u32,
-    /// The reordering window in quarters of the least round trip, and for how many recoveries it stays.
+    /// Reordering window in quarters of the least round trip. Zero counts as one.
     pub(super) quarters: u32,
+    /// Number of recoveries after which `quarters` returns to one.
     pub(super) persists: u32,
-    /// What was delivered when the window grew last.
+    /// Value of [`Send::next`] when the reordering window grew last. The window grows again once this position is acknowledged: at most once per round trip.
     pub(super) grown_at: u64,
+    /// The present acknowledgement reports a duplicate, so that a loss was declared too early.
     pub(super) saw_duplicate: bool,
 }
 
-/// The tail loss probe on the way.
+/// Tail loss probe on the way.
 #[derive(Clone, Default, Debug)]
 pub(super) struct TailProbe {
+    /// Value of [`Send::next`] after the probe was sent. `None` if no probe is on the way.
     pub(super) end: Option<Position>,
+    /// The probe repeats the last segment and carries no new data.
     pub(super) is_again: bool,
 }
 
+/// Counters of events, for decisions and for [`Info`](crate::Info).
 #[derive(Clone, Default, Debug)]
 pub(super) struct Counters {
-    /// Timeouts in a row, and when the first of them was.
+    /// Number of timeouts since the last progress.
     pub(super) retries: u32,
+    /// Instant of the first timeout, or of the first probe of a closed window, since the last progress.
     pub(super) stalled_since: Option<Instant>,
-    /// Probes of a closed window, or of an idle peer, without an answer; how often their distance was doubled.
+    /// Number of unanswered probes of a closed window or of an idle peer.
     pub(super) probes: u32,
+    /// Number of doublings of the distance between probes of a closed window.
     pub(super) probe_backoff: u32,
+    /// Number of probes since an acknowledgement last opened the window.
     pub(super) window_probes: u32,
     pub(super) retransmissions: u64,
     pub(super) timeouts: u64,

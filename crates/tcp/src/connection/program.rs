@@ -1,4 +1,4 @@
-//! What the program calls.
+//! Calls of the program: reading, writing and socket options. No call blocks.
 
 use cohaptic_units::Instant;
 
@@ -8,11 +8,12 @@ use crate::error::Error;
 use crate::info::State;
 
 impl Connection {
-    /// Reads what has arrived in order; zero octets when the peer has shut its half.
+    /// Reads data that has arrived in order into `to`. Returns the number of octets, which is zero if `to` is empty, or at the end of the peer's data.
     ///
     /// # Errors
     ///
-    /// [`Error::WouldBlock`] if nothing is there. Why the connection ended, after all that has arrived was read, and once; then zero octets.
+    /// [`Error::WouldBlock`] if no data has arrived yet. After all arrived data was read, the reason for the end of the connection, once. Later calls return
+    /// zero octets.
     pub fn read(&mut self, to: &mut [u8]) -> Result<usize, Error> {
         if self.may_read(to)? {
             let count = self.receive.assembler.read(to);
@@ -22,20 +23,21 @@ impl Connection {
         Ok(0)
     }
 
-    /// Reads without taking.
+    /// Copies data that has arrived in order into `to`, like [`read`](Self::read), but leaves the data in the buffer.
     ///
     /// # Errors
     ///
-    /// As [`read`](Self::read).
+    /// The errors of [`read`](Self::read).
     pub fn peek(&mut self, to: &mut [u8]) -> Result<usize, Error> {
         if self.may_read(to)? { Ok(self.receive.assembler.peek(to)) } else { Ok(0) }
     }
 
-    /// Whether there is something to read. `false`: zero octets are the answer.
+    /// Returns whether there is data to read. If not, `read` returns zero octets.
     fn may_read(&mut self, to: &[u8]) -> Result<bool, Error> {
         if to.is_empty() {
             return Ok(false);
         }
+        // Arrived data comes before the error, so that a reset does not take data from the program.
         if self.receive.assembler.unread() > 0 {
             return Ok(true);
         }
@@ -48,11 +50,11 @@ impl Connection {
         if self.state == State::Closed { Ok(false) } else { Err(Error::WouldBlock) }
     }
 
-    /// Writes as much as the send buffer takes.
+    /// Writes octets of `data` into the send buffer. Returns the number of octets written, which may be smaller than the length of `data`.
     ///
     /// # Errors
     ///
-    /// [`Error::WouldBlock`] if it takes nothing, or the handshake is not over. Why the connection ended, once; then, and after
+    /// [`Error::WouldBlock`] if the send buffer is full, or the handshake is not over. The reason for the end of the connection, once. Afterwards, and after
     /// [`shutdown`](Self::shutdown), [`Error::BrokenPipe`].
     pub fn write(&mut self, data: &[u8]) -> Result<usize, Error> {
         if let Some(error) = self.error.take() {
@@ -78,104 +80,109 @@ impl Connection {
         Ok(count)
     }
 
-    /// How much can be written. As in Linux, memory is asked for a segment at a time, and one that is begun is filled: else one in the middle of a stream would be small,
-    /// and Nagle's algorithm would hold the last one back until that is answered.
+    /// Returns the octets that can be written. As in Linux, the room is rounded up so that the unsent data ends with a full segment. Otherwise a small segment
+    /// could leave in the middle of a stream, and Nagle's algorithm would hold back the last segment until the small segment is acknowledged.
     fn room(&self) -> usize {
         let room = self.send_capacity().saturating_sub(self.send.buffer.len());
         let unsent = usize::try_from(self.send.buffer.end().saturating_sub(self.send.next)).unwrap_or(usize::MAX);
         unsent.saturating_add(room).next_multiple_of(self.segment_size().max(1)) - unsent
     }
 
-    /// What the send buffer holds \[byte\]: twice the congestion window, as Linux tunes it.
+    /// Returns the size of the send buffer \[byte\]: twice the congestion window within the bounds of the configuration, as Linux tunes the buffer.
     fn send_capacity(&self) -> usize {
         let window = usize::try_from(self.congestion.window).unwrap_or(usize::MAX);
         window.saturating_mul(2 * self.send.mss).max(self.config.least_send_buffer).min(self.config.send_buffer)
     }
 
-    /// Whether [`read`](Self::read) would not block.
+    /// Returns whether [`read`](Self::read) would not block.
     #[must_use]
     pub fn is_readable(&self) -> bool {
         self.receive.assembler.unread() > 0 || self.receive.is_ended || self.error.is_some() || self.state == State::Closed
     }
 
-    /// Whether a program that waits to write is to be woken: [`write`](Self::write) would not block, and a third of the buffer is free, as in Linux.
+    /// Returns whether a program that waits to write should be woken: [`write`](Self::write) would not block, and a third of the send buffer is free, as in
+    /// Linux.
     #[must_use]
     pub fn is_writable(&self) -> bool {
         let used = self.send.buffer.len();
         match self.state {
             State::SynSent | State::SynReceived => self.error.is_some() || self.send.is_shut,
+            // Free room of at least half of the used room is a third of the whole buffer.
             State::Established | State::CloseWait => self.error.is_some() || self.send_capacity().saturating_sub(used) >= (used / 2).max(1),
             State::FinWait1 | State::FinWait2 | State::Closing | State::LastAck | State::TimeWait | State::Closed => true,
         }
     }
 
-    /// Whether the peer has shut its half and all before was read, or the connection is gone.
+    /// Returns whether no more data will arrive: the peer's FIN and all data before the FIN have arrived, or the connection has ended. Arrived data may still
+    /// be unread.
     #[must_use]
     pub fn is_read_closed(&self) -> bool {
         self.receive.is_ended || self.state == State::Closed
     }
 
-    /// Whether nothing can be written any more.
+    /// Returns whether nothing can be written any more, because this half is shut or the connection has ended.
     #[must_use]
     pub fn is_write_closed(&self) -> bool {
         !matches!(self.state, State::SynSent | State::SynReceived | State::Established | State::CloseWait)
     }
 
-    /// Takes the pending error, as `SO_ERROR` does.
+    /// Returns the pending error and clears it, as `SO_ERROR` does.
     pub const fn take_error(&mut self) -> Option<Error> {
         self.error.take()
     }
 
-    /// The pending error, which stays.
+    /// Returns the pending error without clearing it.
     #[must_use]
     pub const fn error(&self) -> Option<Error> {
         self.error
     }
 
-    /// Whether small segments leave while others are unanswered (`TCP_NODELAY`).
+    /// Switches Nagle's algorithm off (`true`) or on (`TCP_NODELAY`).
     pub const fn set_nodelay(&mut self, nodelay: bool) {
         self.config.nodelay = nodelay;
     }
 
-    /// Whether small segments leave while others are unanswered.
+    /// Returns whether Nagle's algorithm is off.
     #[must_use]
     pub const fn nodelay(&self) -> bool {
         self.config.nodelay
     }
 
-    /// Acknowledges at once from now on, or lets acknowledgements wait (`TCP_QUICKACK`). As in Linux, it does not stay so.
+    /// Lets acknowledgements leave at once (`true`) or wait (`TCP_QUICKACK`). As in Linux, the setting is not permanent: later traffic changes it.
     pub fn set_quickack(&mut self, quickack: bool) {
         self.receive.is_interactive = !quickack;
         if quickack {
             self.receive.quick = self.receive.quick.max(self.config.quick_acks);
+            // An acknowledgement that waits already leaves now.
             self.receive.ack_now |= self.receive.ack_at.is_some();
         }
     }
 
-    /// Whether acknowledgements leave at once now.
+    /// Returns whether acknowledgements may leave at once at present, as `TCP_QUICKACK` reports.
     #[must_use]
     pub const fn quickack(&self) -> bool {
         !self.receive.is_interactive
     }
 
-    /// Probes the peer while the connection is idle (`SO_KEEPALIVE`, `TCP_KEEPIDLE`, `TCP_KEEPINTVL`, `TCP_KEEPCNT`), or does not.
+    /// Sets the times of keep-alive probes (`SO_KEEPALIVE`, `TCP_KEEPIDLE`, `TCP_KEEPINTVL`, `TCP_KEEPCNT`). The idle time begins at `now`. `None` ends the
+    /// probes.
     pub fn set_keepalive(&mut self, now: Instant, keepalive: Option<Keepalive>) {
         self.config.keepalive = keepalive;
         self.counters.probes = 0;
         self.restart_keepalive(now);
     }
 
-    /// How long data may stay unanswered (`TCP_USER_TIMEOUT`); `None`: as the configuration counts retries.
+    /// Sets the time for which data may stay unanswered (`TCP_USER_TIMEOUT`). `None` leaves the limit to the number of retries in the configuration.
     pub const fn set_user_timeout(&mut self, timeout: Option<core::time::Duration>) {
         self.config.user_timeout = timeout;
     }
 
-    /// Sets the time to live of segments from now on.
+    /// Sets the time to live, or hop limit, of later segments.
     pub const fn set_ttl(&mut self, ttl: u8) {
         self.config.ttl = ttl;
     }
 
-    /// The configuration, with what was set since.
+    /// Returns the configuration, including later changes by the setters.
     #[must_use]
     pub const fn config(&self) -> &crate::TcpConfig {
         &self.config

@@ -1,4 +1,4 @@
-//! A segment arrives: whether it counts (RFC 9293, section 3.10.7.4, and RFC 5961).
+//! Arrival of a segment: the checks that decide whether the segment is valid (RFC 9293, section 3.10.7.4, and RFC 5961).
 
 use core::time::Duration;
 
@@ -10,14 +10,14 @@ use crate::info::State;
 use crate::segment::{Flags, Segment};
 use crate::sequence::{Position, extend};
 
-/// Segments out of window without data are answered once in that time at most, so that two ends never answer each other for ever.
+/// Least time between two answers to segments out of window without data. Without this limit, two ends could answer each other for ever.
 const BETWEEN_ANSWERS: Duration = Duration::from_millis(500);
 
-/// Timestamps older than that say nothing (RFC 7323, section 5.5).
+/// Age above which the timestamp to echo no longer proves that a segment is old (RFC 7323, section 5.5).
 const TIMESTAMPS_COUNT: Duration = Duration::from_secs(24 * 86_400);
 
 impl Connection {
-    /// Takes a segment in that is for this connection: the owner has looked at its addresses.
+    /// Handles a segment that arrives at `now`. The owner has checked that the addresses and ports of the segment are those of this connection.
     pub fn handle_segment(&mut self, now: Instant, segment: &Segment<'_>) {
         match self.state {
             State::Closed => self.replies.extend(segment.refusal(self.config.ttl)),
@@ -29,17 +29,21 @@ impl Connection {
         }
     }
 
+    /// Handles a segment after the peer's SYN has arrived.
     fn handle_synchronised(&mut self, now: Instant, segment: &Segment<'_>) {
         let start = extend(segment.sequence, self.receive.next);
         if !self.answers_own_syn(segment, start) && !self.is_valid(now, segment, start) {
             return;
         }
+        // After the SYN, every valid segment has an ACK (RFC 9293, section 3.10.7.4).
         if !segment.flags.has(Flags::ACK) {
             return;
         }
         self.counters.probes = 0;
         self.receive.last_heard = now;
         self.restart_keepalive(now);
+        // Only a segment that contains the last acknowledged position sets the timestamp to echo, so that a delayed acknowledgement counts into the round
+        // trip (RFC 7323, section 4.3).
         if let (Some((value, _)), true) = (segment.options.timestamps, self.receive.has_timestamps)
             && start <= self.receive.acked
         {
@@ -59,12 +63,12 @@ impl Connection {
         if matches!(self.state, State::Established | State::FinWait1 | State::FinWait2) {
             self.accept_data(now, segment, start);
         } else if segment.sequence_length() > 0 && start < self.receive.next && self.state != State::Closed {
-            // The FIN again: its acknowledgement was lost.
+            // The peer has sent its FIN again, because the acknowledgement was lost.
             self.receive.ack_now = true;
         }
     }
 
-    /// Both ends opened at once, and this is the answer to this end's SYN: its own SYN again, and an ACK that counts.
+    /// Returns whether both ends opened at once and `segment` is the peer's answer to this end's SYN: the peer's SYN again, with an ACK of this end's SYN.
     fn answers_own_syn(&self, segment: &Segment<'_>, start: Position) -> bool {
         self.state == State::SynReceived
             && segment.flags.has(Flags::SYN | Flags::ACK)
@@ -72,7 +76,7 @@ impl Connection {
             && extend(segment.acknowledgement, self.send.una) == self.send.next
     }
 
-    /// Timestamps, window, RST and SYN. What does not count is answered as it must be.
+    /// Checks timestamps, window, RST and SYN. Returns whether the rest of the segment is to be handled. Prepares the answer to an invalid segment.
     fn is_valid(&mut self, now: Instant, segment: &Segment<'_>, start: Position) -> bool {
         let end = start + segment.sequence_length() as u64;
         let is_reset = segment.flags.has(Flags::RST);
@@ -80,6 +84,7 @@ impl Connection {
             self.answer_out_of_window(now, segment, start, end);
             return false;
         }
+        // As in Linux, the lower limit is the last acknowledged position instead of `next`: the peer does not know `next` yet.
         if end < self.receive.acked || start > self.receive.edge.max(self.receive.next) {
             if self.state == State::SynReceived && segment.flags.has(Flags::SYN) {
                 self.repeat_syn(now);
@@ -89,6 +94,7 @@ impl Connection {
             return false;
         }
         if is_reset {
+            // RFC 5961, section 3: only a reset at exactly the expected number counts. A reset elsewhere in the window may be forged.
             if start == self.receive.next {
                 self.be_reset();
             } else {
@@ -96,6 +102,7 @@ impl Connection {
             }
             return false;
         }
+        // A SYN in the window may be forged, or come from a peer that has restarted. The challenge makes a restarted peer answer with a reset.
         if segment.flags.has(Flags::SYN) {
             if self.state == State::SynReceived && start + 1 == self.receive.next {
                 self.repeat_syn(now);
@@ -107,22 +114,23 @@ impl Connection {
         true
     }
 
-    /// This end's SYN again: the peer has not heard it.
+    /// Sends this end's SYN again, because the peer has not received it.
     pub(super) fn repeat_syn(&mut self, now: Instant) {
         let answer = self.build_syn(now);
         self.replies.push_back(answer);
     }
 
-    /// Protection against wrapped sequence numbers (RFC 7323, section 5).
+    /// Returns whether the timestamp of `segment` shows that the segment is old (protection against wrapped sequence numbers, RFC 7323, section 5).
     fn is_old(&self, now: Instant, segment: &Segment<'_>) -> bool {
         let (Some((value, _)), Some((recent, at))) = (segment.options.timestamps, self.receive.recent) else { return false };
         let behind = recent.wrapping_sub(value);
-        // A pure acknowledgement that was overtaken by one of the same kind is harmless, and lost if refused.
+        // A pure acknowledgement at the expected number that was overtaken by less than a second is harmless, and its news would be lost if it were refused.
         let is_harmless = segment.sequence_length() == 0 && extend(segment.sequence, self.receive.next) == self.receive.next && behind < 1000;
+        // The difference wraps: a value from 1 to half of the range means that the segment is older than the timestamp to echo.
         self.receive.has_timestamps && (1..1 << 31).contains(&behind) && !is_harmless && now.saturating_duration_since(at) < TIMESTAMPS_COUNT
     }
 
-    /// A segment out of window is answered by the expected number, and a duplicate told of.
+    /// Answers a segment out of window with an acknowledgement of the expected number. The acknowledgement reports the octets that had arrived before.
     fn answer_out_of_window(&mut self, now: Instant, segment: &Segment<'_>, start: Position, end: Position) {
         if segment.flags.has(Flags::SYN) {
             self.challenge(now);
@@ -136,11 +144,12 @@ impl Connection {
         }
     }
 
-    /// A challenge ACK: the peer must know the sequence number (RFC 5961).
+    /// Sends a challenge ACK, within the limit of the rate: a peer that means its segment answers with the exact sequence number (RFC 5961).
     pub(super) fn challenge(&mut self, now: Instant) {
         self.answer_at_times(now);
     }
 
+    /// Sends an acknowledgement, unless such an answer left less than [`BETWEEN_ANSWERS`] ago.
     fn answer_at_times(&mut self, now: Instant) {
         if self.receive.challenged_at.is_none_or(|at| now.saturating_duration_since(at) >= BETWEEN_ANSWERS) {
             self.receive.challenged_at = Some(now);
@@ -148,6 +157,8 @@ impl Connection {
         }
     }
 
+    /// Notes that the octets from `start` to `end` (exclusive) have arrived twice. The next acknowledgement reports them, and the next acknowledgements are not
+    /// delayed, because the peer is recovering from a loss.
     pub(super) fn tell_duplicate(&mut self, start: Position, end: Position) {
         self.receive.quick = self.config.quick_acks;
         self.receive.is_interactive = false;
@@ -156,9 +167,10 @@ impl Connection {
         }
     }
 
-    /// The peer has reset the connection. What has arrived can still be read.
+    /// Ends the connection because the peer has reset it. Data that has arrived in order stays readable.
     fn be_reset(&mut self) {
         let error = match self.state {
+            // As in Linux: after the peer's FIN, the program hears of the reset only when it writes.
             State::CloseWait => Error::BrokenPipe,
             State::SynReceived
             | State::SynSent

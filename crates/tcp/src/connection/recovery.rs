@@ -1,4 +1,4 @@
-//! Phases of loss recovery (RFC 5681, 6582, 6675, 6937), as in Linux.
+//! Phases of loss recovery (RFC 5681, 6582, 6675, 6937), as in Linux: which phase follows an acknowledgement, and when the window shrinks.
 
 use cohaptic_units::Instant;
 
@@ -7,26 +7,31 @@ use super::acknowledge::Ack;
 use super::parts::Phase;
 use crate::congestion::{Reduction, UNBOUNDED};
 
-/// How many duplicates tell of a loss (RFC 5681, section 3.2).
+/// Number of duplicates, or of segments that arrived out of order, that tells of a loss (RFC 5681, section 3.2).
 pub(super) const DUPLICATES: u32 = 3;
 
 impl Connection {
-    /// Finds losses, changes the phase, and sets the timer.
+    /// Finds losses, changes the phase and sets the timer after the acknowledgement `ack`. `has_widened` says that the acknowledgement changed the peer's
+    /// window, `has_data` that it carries data, SYN or FIN.
     pub(super) fn recover(&mut self, now: Instant, ack: &Ack, has_widened: bool, has_data: bool) {
+        // Both calls come first, because the search for losses uses the reordering window, and a tail probe may change the phase.
         self.adapt_patience(ack);
         self.end_tail_probe(ack);
         let mut waits_for_reordering = false;
+        // An acknowledgement with ordinary news in the phase Open needs no search for losses.
         let is_dubious = !(has_data || has_widened || ack.has_advanced) || ack.news.has_sacked || ack.tells_mark || ack.tells_duplicate;
         if is_dubious || self.recovery.phase != Phase::Open {
             waits_for_reordering = self.change_phase(now, ack);
         }
+        // The sending half has one timer, and the reordering timer has priority.
         if ack.has_advanced && !waits_for_reordering {
             self.set_timer(now);
         }
     }
 
-    /// Returns whether the timer waits for reordering.
+    /// Takes back false reactions, finds losses and changes the phase. Returns whether the timer was set for segments that may only be late.
     fn change_phase(&mut self, now: Instant, ack: &Ack) -> bool {
+        // A mark tells of congestion even if nothing was lost, so this reduction must stay.
         if ack.tells_mark {
             self.recovery.prior_threshold = None;
         }
@@ -44,6 +49,7 @@ impl Connection {
                 } else if self.undo_in_recovery(ack) {
                     return false;
                 }
+                // Losses are searched after the undo, because an undo may have ended the recovery and a new loss may begin another one.
                 if self.undo_by_duplicates() {
                     self.stay_open(ack);
                 }
@@ -63,6 +69,7 @@ impl Connection {
             }
             Phase::Open | Phase::Disorder | Phase::Reduced => {
                 self.count_duplicate(ack);
+                // A reduction because of a mark is not taken back by duplicates.
                 if self.recovery.phase != Phase::Reduced {
                     self.undo_by_duplicates();
                 }
@@ -72,6 +79,7 @@ impl Connection {
         }
     }
 
+    /// Enters recovery if a segment is lost, and chooses between Open and Disorder otherwise. Returns `waits`.
     fn enter_if_lost(&mut self, ack: &Ack, waits: bool) -> bool {
         if self.send.board.lost_out == 0 {
             self.stay_open(ack);
@@ -81,17 +89,18 @@ impl Connection {
         waits
     }
 
-    /// All that was sent when the phase began is acknowledged. Whether nothing else is to be done.
+    /// Ends the phase, because all data sent before the phase is acknowledged. Returns whether this acknowledgement needs no further reaction.
     fn end_phase(&mut self, ack: &Ack) -> bool {
         match self.recovery.phase {
             Phase::Reduced => {
-                // Something above is to be acknowledged as well, so that one window has one reduction.
+                // The phase ends when a later position is acknowledged as well, so that each window of data has at most one reduction.
                 if self.send.una != self.recovery.high {
                     self.end_reduction();
                     self.recovery.phase = Phase::Open;
                 }
             }
             Phase::Recovery => {
+                // The duplicates of this phase do not count for the next phase.
                 if !self.receive.has_sack {
                     self.send.board.sacked_out = 0;
                 }
@@ -106,12 +115,13 @@ impl Connection {
         false
     }
 
-    /// Without selective acknowledgements, a duplicate stands for a segment that has arrived.
+    /// Counts a duplicate acknowledgement as a segment that has arrived. Does nothing if the peer sends selective acknowledgements.
     fn count_duplicate(&mut self, ack: &Ack) {
         let board = &mut self.send.board;
         if self.receive.has_sack || !ack.is_duplicate {
             return;
         }
+        // At least one segment is missing, because a duplicate tells of a gap.
         let most = board.packets_out().saturating_sub(board.lost_out.max(1));
         if board.sacked_out < most {
             board.sacked_out += 1;
@@ -119,20 +129,23 @@ impl Connection {
         }
     }
 
-    /// Without selective acknowledgements, `acked` segments that duplicates may have stood for.
+    /// Removes `acked` acknowledged segments from the count of duplicates. Called only if the peer sends no selective acknowledgements.
     pub(super) fn end_duplicates(&mut self, acked: u32) {
         let board = &mut self.send.board;
+        // The first of the acknowledged segments filled the gap. Duplicates may have been counted for the others.
         if acked > 0 {
             self.send.delivered += u64::from(acked.saturating_sub(board.sacked_out).max(1));
             board.sacked_out = board.sacked_out.saturating_sub(acked - 1);
         }
         board.sacked_out = board.sacked_out.min(board.packets_out().saturating_sub(board.lost_out.max(1)));
+        // An acknowledgement that advances outside of recovery shows that the duplicates were only reordering.
         if self.recovery.phase < Phase::Recovery {
             board.sacked_out = 0;
         }
     }
 
-    /// Open, or Disorder if something is amiss; a mark reduces the window.
+    /// Reduces the window after a mark. Otherwise chooses Disorder if segments are sacked, lost or sent again, or a reduction can still be taken back, and Open
+    /// if not.
     pub(super) fn stay_open(&mut self, ack: &Ack) {
         if !self.send.board.has_sent_again() {
             self.recovery.again_at = None;
@@ -151,6 +164,7 @@ impl Connection {
         }
     }
 
+    /// Begins a reduction: notes the present window, reduces the threshold, and starts the rate reduction.
     pub(super) fn begin_reduction(&mut self) {
         self.recovery.high = self.send.next;
         self.tail.end = None;
@@ -160,14 +174,16 @@ impl Connection {
         self.send.tells_reduction = self.send.has_ecn;
     }
 
+    /// Ends a reduction: sets the window to the threshold.
     fn end_reduction(&mut self) {
+        // After an undo, the window has its old value again and must keep it.
         let is_reduced = self.recovery.phase == Phase::Reduced || self.recovery.undo_from.is_some();
         if is_reduced && self.congestion.threshold < UNBOUNDED {
             self.congestion.window = self.congestion.threshold;
         }
     }
 
-    /// The window shrinks without a loss: a mark, or a loss that the tail probe repaired.
+    /// Reduces the window although no segment is missing, because of a mark or of a loss that a tail probe repaired. Does nothing during another reduction.
     pub(super) fn enter_reduced(&mut self) {
         self.recovery.prior_threshold = None;
         if self.recovery.phase < Phase::Reduced {
@@ -177,14 +193,17 @@ impl Connection {
         }
     }
 
+    /// Ends a reduction that needs no flight of its own: the threshold becomes the window at once.
     pub(super) fn end_reduction_at_once(&mut self, ack: &Ack) {
         self.end_reduction();
         self.recovery.phase = Phase::Open;
         self.stay_open(ack);
     }
 
+    /// Enters recovery. `tells_mark` says that a mark was reported, so that the reduction must not be taken back.
     pub(super) fn enter_recovery(&mut self, tells_mark: bool) {
         self.begin_undo();
+        // A reduction because of a mark continues: the same window of data is not reduced twice.
         if self.recovery.phase < Phase::Reduced {
             self.recovery.prior_threshold = (!tells_mark).then_some(self.current_threshold());
             self.begin_reduction();
@@ -194,7 +213,7 @@ impl Connection {
         self.counters.recoveries += 1;
     }
 
-    /// The threshold that holds if nothing is lost: three quarters of the window at least.
+    /// Returns the threshold to return to if nothing was lost: at least three quarters of the window, unless a reduction is in progress.
     pub(super) fn current_threshold(&self) -> u32 {
         match self.recovery.phase {
             Phase::Reduced | Phase::Recovery => self.congestion.threshold,

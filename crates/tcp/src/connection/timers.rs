@@ -1,4 +1,4 @@
-//! Deadlines.
+//! Deadlines: the timer of the sending half, delayed acknowledgements, keep-alive probes, and the end of a closed connection.
 
 use core::time::Duration;
 
@@ -11,34 +11,35 @@ use crate::error::Error;
 use crate::info::State;
 use crate::rtt::doubled;
 
-/// What the timer of the sending half waits for. There is one, as in Linux.
+/// Purpose of the timer of the sending half. As in Linux, the sending half has one timer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Timer {
-    /// An answer (RFC 6298).
+    /// Waits for an acknowledgement of the first segment (RFC 6298).
     Retransmission,
-    /// An answer to the last flight (RFC 8985, section 7).
+    /// Waits for an acknowledgement of the last flight (RFC 8985, section 7).
     TailProbe,
-    /// Segments that may only be late (RFC 8985, section 6).
+    /// Waits for segments that may only be late (RFC 8985, section 6).
     Reordering,
-    /// A window that is closed (RFC 9293, section 3.8.6.1).
+    /// Waits for the peer's window to open (RFC 9293, section 3.8.6.1).
     WindowProbe,
 }
 
-/// The least time before a tail probe where others are on the way, two of Linux's ticks.
+/// Least margin above two round trips before a tail probe: two of Linux's ticks.
 const LEAST_TAIL: Duration = Duration::from_millis(2);
 
-/// What Linux counts `retries` with: the least timeout.
+/// First timeout in the sum that limits unanswered data: Linux counts `retries` with its least timeout, whatever the round trip.
 const RETRY_BASE: Duration = Duration::from_millis(200);
 
 impl Connection {
-    /// When [`handle_timeout`](Self::handle_timeout) must be called, if nothing arrives before.
+    /// Returns the instant at which [`handle_timeout`](Self::handle_timeout) must be called if no other call comes before. Returns `None` if the connection
+    /// waits for nothing.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let timer = self.timer.map(|(at, _)| at);
         [timer, self.receive.ack_at, self.keepalive_at, self.linger_until].into_iter().flatten().min()
     }
 
-    /// Lets time pass until `now`. Earlier than [`poll_timeout`](Self::poll_timeout) it does nothing.
+    /// Handles all deadlines up to `now`. Does nothing before the instant of [`poll_timeout`](Self::poll_timeout).
     pub fn handle_timeout(&mut self, now: Instant) {
         let is_due = |at: Option<Instant>| at.is_some_and(|at| at <= now);
         if is_due(self.linger_until) {
@@ -48,12 +49,14 @@ impl Connection {
         if is_due(self.receive.ack_at) {
             self.receive.ack_at = None;
             self.receive.ack_now = true;
+            // No data came for the acknowledgement to travel with, so the next acknowledgements need not wait for data.
             self.receive.is_interactive = false;
         }
         if is_due(self.keepalive_at) {
             self.keep_alive(now);
         }
         if let Some((_, timer)) = self.timer.filter(|(at, _)| *at <= now) {
+            // The timer is cleared first, because each branch may set it again.
             self.timer = None;
             match timer {
                 Timer::Retransmission => self.time_out(now),
@@ -64,14 +67,15 @@ impl Connection {
         }
     }
 
-    /// After an acknowledgement that moved on: a probe of the tail, or the retransmission timer.
+    /// Sets the timer after an acknowledgement that has advanced: for a tail probe, or otherwise for a retransmission.
     pub(super) fn set_timer(&mut self, now: Instant) {
         if !self.set_tail_timer(now, true) {
             self.set_retransmission_timer(now, false);
         }
     }
 
-    /// Sets the retransmission timer. `anew`: counted from now, also if it stood behind another one.
+    /// Sets the retransmission timer, or removes the timer if nothing is on the way. If the timer takes the place of a tail or reordering timer, the time is
+    /// counted from the transmission of the first segment, unless `anew` is set. In all other cases the time is counted from `now`.
     pub(super) fn set_retransmission_timer(&mut self, now: Instant, anew: bool) {
         let Some(first) = self.send.board.first() else {
             self.timer = None;
@@ -83,17 +87,19 @@ impl Connection {
         self.timer = Some((at, Timer::Retransmission));
     }
 
-    /// Whether a tail probe is to come (RFC 8985, section 7.2). `has_advanced`: the retransmission timer would begin anew.
+    /// Sets the timer for a tail probe if a probe is useful (RFC 8985, section 7.2). Returns whether the timer was set. `has_advanced` says that the
+    /// retransmission timer would begin anew at `now`.
     pub(super) fn set_tail_timer(&mut self, now: Instant, has_advanced: bool) -> bool {
         let board = &self.send.board;
         let is_wanted = self.config.tail_loss_probe && self.receive.has_sack && matches!(self.recovery.phase, Phase::Open | Phase::Reduced);
         let Some(first) = board.first().filter(|_| is_wanted && self.state.may_send() && self.tail.end.is_none()) else { return false };
         let mut wait = match self.round_trips.srtt() {
-            // A single segment may wait for a delayed acknowledgement.
+            // The peer may delay the acknowledgement of a single segment.
             Some(srtt) => 2 * srtt + if board.packets_out() == 1 { self.config.least_variance.max(LEAST_TAIL) } else { LEAST_TAIL },
             None => self.config.initial_timeout,
         };
         let timeout = self.round_trips.timeout(&self.config);
+        // The probe must not come later than the retransmission timer would.
         let from = if has_advanced { now } else { first.at };
         let left = from.saturating_add(timeout).saturating_duration_since(now);
         if !left.is_zero() {
@@ -103,6 +109,7 @@ impl Connection {
         true
     }
 
+    /// Handles the end of the tail timer: sends a probe, unless a probe is on the way.
     fn probe_tail(&mut self, now: Instant) {
         if self.send.board.is_empty() {
             return;
@@ -113,7 +120,7 @@ impl Connection {
         self.set_retransmission_timer(now, true);
     }
 
-    /// The timer has run out: everything may be lost.
+    /// Handles the end of the retransmission timer: repeats the SYN, ends the connection, or enters the phase Loss.
     fn time_out(&mut self, now: Instant) {
         if self.send.board.is_empty() {
             return;
@@ -133,7 +140,7 @@ impl Connection {
         self.set_retransmission_timer(now, true);
     }
 
-    /// The timeout, cut to what the program bears.
+    /// Returns the retransmission timeout, shortened so that the timer runs out when the user timeout ends, but at least 1 ms.
     fn borne_timeout(&self, now: Instant) -> Duration {
         let timeout = self.round_trips.timeout(&self.config);
         match (self.config.user_timeout, self.counters.stalled_since) {
@@ -142,6 +149,7 @@ impl Connection {
         }
     }
 
+    /// Repeats the SYN, or ends the connection after the last repetition.
     fn repeat_handshake(&mut self, now: Instant) {
         let is_client = self.state == State::SynSent;
         let retries = if is_client { self.config.syn_retries } else { self.config.syn_ack_retries };
@@ -151,6 +159,7 @@ impl Connection {
         }
         self.counters.retries += 1;
         self.counters.retransmissions += 1;
+        // The first repetitions of a client's SYN may come at equal distance.
         if !is_client || self.counters.retries > self.config.linear_syn_retries {
             self.round_trips.backoff += 1;
         }
@@ -160,7 +169,7 @@ impl Connection {
         self.replies.push_back(syn);
     }
 
-    /// Whether nothing was answered for as long as is borne.
+    /// Returns whether the time since `since` has reached the limit for unanswered data. Returns `false` if `since` is `None`.
     fn is_given_up(&self, now: Instant, since: Option<Instant>) -> bool {
         let Some(since) = since else { return false };
         let retries = if self.is_orphan { self.config.orphan_retries.min(self.config.retries) } else { self.config.retries };
@@ -168,17 +177,19 @@ impl Connection {
         now.saturating_duration_since(since) >= limit
     }
 
-    /// The time to the next probe of a closed window.
+    /// Returns the time to the next probe of a closed window.
     pub(super) fn probe_distance(&self) -> Duration {
         doubled(self.round_trips.base_timeout(&self.config).max(self.config.least_variance), self.counters.probe_backoff, &self.config)
     }
 
-    /// A closed window is asked for (RFC 9293, section 3.8.6.1).
+    /// Handles the end of the timer of a closed window: sends a probe (RFC 9293, section 3.8.6.1), or ends the connection after too many unanswered probes.
     fn probe_window(&mut self, now: Instant) {
         if !self.send.board.is_empty() || !self.send.has_new() {
             (self.counters.probes, self.counters.probe_backoff) = (0, 0);
             return;
         }
+        // A peer may keep its window closed for ever while it answers probes. Nobody waits for the data of an orphan, so its number of probes is limited also
+        // if the peer answers.
         let is_too_long = self.is_orphan && self.counters.probe_backoff >= self.config.orphan_retries;
         let stalled = self.counters.stalled_since.filter(|_| self.config.user_timeout.is_some() && self.counters.probes > 0);
         if is_too_long || self.counters.probes >= self.config.retries || self.is_given_up(now, stalled) {
@@ -195,18 +206,20 @@ impl Connection {
         self.timer = Some((now.saturating_add(self.probe_distance()), Timer::WindowProbe));
     }
 
+    /// Begins the idle time before the first keep-alive probe anew. Removes the deadline without keep-alive, or outside of the synchronised states.
     pub(super) fn restart_keepalive(&mut self, now: Instant) {
         let idle = self.config.keepalive.filter(|_| self.state.is_synchronised()).map(|keepalive| keepalive.idle);
         self.keepalive_at = idle.map(|idle| now.saturating_add(idle));
     }
 
+    /// Handles the deadline of keep-alive: sends a probe, or ends the connection after too many unanswered probes.
     fn keep_alive(&mut self, now: Instant) {
         let Some(Keepalive { idle, interval, probes }) = self.config.keepalive.filter(|_| self.state.is_synchronised()) else {
             self.keepalive_at = None;
             return;
         };
         if !self.send.board.is_empty() || self.send.has_new() {
-            // The other timers watch.
+            // Data waits for an acknowledgement, so that the timers of the sending half notice a silent peer.
             self.keepalive_at = Some(now.saturating_add(idle));
             return;
         }
@@ -216,6 +229,7 @@ impl Connection {
             None => self.counters.probes >= probes,
         };
         if is_over {
+            // If the peer is alive after all, the reset tells the peer that this end has given the connection up.
             let reset = self.build_reset();
             self.die(Some(Error::TimedOut));
             self.replies.push_back(reset);

@@ -1,4 +1,4 @@
-//! What leaves, and when.
+//! Choice of the next segment to send, within the windows of the peer and of congestion control.
 
 use cohaptic_units::Instant;
 
@@ -8,9 +8,11 @@ use crate::segment::{Ecn, Segment};
 use crate::sequence::{Position, on_wire};
 
 impl Connection {
-    /// The next segment to send at that instant; `None` when all has left that may.
+    /// Returns the next segment to send at `now`, or `None` if no segment may leave at present.
     #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Segment<'static>> {
+        // The order of the choices matters. Every segment after the replies acknowledges all data in order, so that a pure acknowledgement comes last. Lost
+        // segments come before new data, because the peer's program waits for them.
         if let Some(reply) = self.replies.pop_front() {
             return Some(reply);
         }
@@ -32,12 +34,13 @@ impl Connection {
         None
     }
 
-    /// A lost segment once more, if the window has room.
+    /// Sends the first lost segment again, if the congestion window and the peer's window have room.
     fn lost_again(&mut self, now: Instant) -> Option<Segment<'static>> {
         let board = &self.send.board;
         let lost = board.next_lost()?;
         let (start, end) = (lost.start, lost.end);
         let is_first = start == self.send.una;
+        // The first segment may leave also beyond a peer's window that has shrunk: its answer tells the present window.
         if board.in_flight() >= self.congestion.window || (!is_first && end > self.send.window_end()) {
             return None;
         }
@@ -51,7 +54,7 @@ impl Connection {
         Some(self.again(now, start, end))
     }
 
-    /// A segment that was sent before.
+    /// Returns a segment that was sent before, and counts it for the undo.
     fn again(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
         self.counters.retransmissions += 1;
         self.recovery.again_at.get_or_insert(now);
@@ -59,7 +62,8 @@ impl Connection {
         self.build(now, start, end)
     }
 
-    /// The end of the next new segment, if the peer's window has room for a full one or for all that is left.
+    /// Returns the end of the next new segment, if the peer's window has room for a full segment or for all remaining data. A smaller part is not sent, so that
+    /// no silly window arises (RFC 9293, section 3.8.6.2.1).
     fn next_end(&self) -> Option<Position> {
         let size = self.segment_size().saturating_sub(self.sack_length()).max(1) as u64;
         let data_end = self.send.buffer.end();
@@ -69,20 +73,21 @@ impl Connection {
         if wanted <= window_end {
             return Some(wanted);
         }
-        // The data fits, only the FIN does not.
+        // If the data fits and only the FIN does not, the data leaves alone.
         (wanted == end && wanted > data_end && data_end > next && data_end <= window_end).then_some(data_end)
     }
 
-    /// Whether the peer's window lets new data leave.
+    /// Returns whether the peer's window lets new data leave.
     pub(super) fn is_window_open(&self) -> bool {
         self.next_end().is_some()
     }
 
-    /// A segment that was never sent. `is_probe`: the congestion window does not count.
+    /// Sends the next segment of new data, if the windows have room. With `is_probe`, the congestion window and Nagle's algorithm do not count.
     fn new_data(&mut self, now: Instant, is_probe: bool) -> Option<Segment<'static>> {
         if !self.send.has_new() {
             return None;
         }
+        // The pause ends here. Its length shrinks the congestion window, because the window says nothing about the path after a long pause.
         if self.send.board.is_empty() && self.send.next > self.send.first + 1 {
             let idle = now.saturating_duration_since(self.send.last_data_at);
             if self.config.slow_start_after_idle && !idle.is_zero() && self.recovery.phase == Phase::Open {
@@ -92,6 +97,7 @@ impl Connection {
         let (una, next) = (self.send.una, self.send.next);
         let in_flight = self.send.board.in_flight();
         if in_flight >= self.congestion.window && !is_probe {
+            // The window has held back data, so that it may grow.
             self.congestion.used(una, next, self.send.board.packets_out(), true);
             return None;
         }
@@ -101,7 +107,7 @@ impl Connection {
         };
         let is_small = end.min(self.send.buffer.end()) - next < self.segment_size() as u64;
         let has_fin = end > self.send.buffer.end();
-        // Nagle's algorithm (RFC 9293, section 3.7.4), in Minshall's form: only a small segment holds another one back.
+        // Nagle's algorithm (RFC 9293, section 3.7.4) in Minshall's form: a small segment waits only while another small segment is unacknowledged.
         if is_small && !has_fin && !is_probe && !self.config.nodelay && self.send.small_end > una {
             return None;
         }
@@ -111,15 +117,17 @@ impl Connection {
         Some(self.send_new(now, end))
     }
 
+    /// Sends the new segment that ends at `end`, notes it in the scoreboard, and sets the timers.
     fn send_new(&mut self, now: Instant, end: Position) -> Segment<'static> {
         let start = self.send.next;
         let was_empty = self.send.board.is_empty();
+        // New data that leaves soon after data has arrived is an answer.
         let has_answered = self.receive.last_data_at.is_some_and(|at| now.saturating_duration_since(at) < self.config.delayed_ack);
         let segment = self.build(now, start, end);
         self.send.next = end;
         self.send.board.push(start, end, now);
         self.send.last_data_at = now;
-        // Data in answer to data: later acknowledgements wait for it.
+        // After an answer, later acknowledgements wait for data to travel with.
         self.receive.is_interactive |= has_answered;
         if matches!(self.recovery.phase, Phase::Reduced | Phase::Recovery) {
             self.recovery.reduction.sent += 1;
@@ -134,15 +142,17 @@ impl Connection {
         Segment { ecn, ..segment }
     }
 
-    /// New data waits for the peer's window: if nothing is on the way that would be answered, a probe is to come.
+    /// Sets the timer for a probe of the peer's window, unless a segment is on the way whose answer will tell the window.
     fn wait_for_window(&mut self, now: Instant) {
         if self.send.board.is_empty() && self.timer.is_none() {
             self.timer = Some((now.saturating_add(self.probe_distance()), Timer::WindowProbe));
         }
     }
 
+    /// Returns the segment for `probe`, if there is one.
     fn forced(&mut self, now: Instant, probe: Probe) -> Option<Segment<'static>> {
         match probe {
+            // New data is the better probe, because it is needed anyway. Without new data, the last segment is repeated.
             Probe::Tail => {
                 let segment = self.new_data(now, true);
                 self.tail.is_again = segment.is_none();
@@ -157,14 +167,14 @@ impl Connection {
                     (self.counters.probes, self.counters.probe_backoff) = (0, 0);
                     return Some(self.send_new(now, end));
                 }
-                // Out of window, so that it is answered.
+                // A segment without data from below the peer's window carries nothing, but the peer must answer it.
                 let segment = self.build(now, self.send.next, self.send.next);
                 Some(Segment { sequence: on_wire(self.send.una - 1), ..segment })
             }
         }
     }
 
-    /// The last segment once more; the estimate of segments on the way stays.
+    /// Sends the last segment again as a probe. The estimate of the segments on the way does not change.
     fn last_again(&mut self, now: Instant) -> Option<Segment<'static>> {
         let last = self.send.board.last()?;
         let (start, end) = (last.start, last.end);

@@ -1,4 +1,5 @@
-//! Taking back a reaction to losses that were none: duplicates were reported, or the answer is older than what was sent again (RFC 3522, 3708, 4015).
+//! Undo of a reaction to losses that did not happen. Two signs show that nothing was lost: the peer reports each segment that was sent again as a duplicate, or
+//! the peer's answer echoes a timestamp from before the first segment was sent again (RFC 3522, 3708, 4015).
 
 use super::Connection;
 use super::acknowledge::Ack;
@@ -6,20 +7,22 @@ use super::parts::Phase;
 use crate::sequence::Position;
 
 impl Connection {
-    /// From here on, segments that are sent again are counted.
+    /// Begins to count the segments that are sent again, so that the reduction that follows can be taken back.
     pub(super) fn begin_undo(&mut self) {
         if !self.send.board.has_sent_again() {
             self.recovery.again_at = None;
         }
         self.recovery.undo_from = Some(self.send.una);
+        // Segments that are already on the way again count from the beginning, and so does a tail probe that repeats the last segment.
         let again = self.send.board.again_out + u32::from(self.tail.end.is_some() && self.tail.is_again);
         self.recovery.undo_left = (again > 0).then_some(again);
     }
 
-    /// The peer had received this already.
+    /// Notes that the peer has received the positions from `start` to `end` (exclusive) twice.
     pub(super) fn note_duplicate(&mut self, start: Position, end: Position) {
         self.rack.saw_duplicate = true;
         let Some(from) = self.recovery.undo_from else { return };
+        // A duplicate from before the phase says nothing about the phase. One report may cover several segments.
         if end > from && start < end {
             let segments = (end - start).div_ceil(self.send.mss as u64);
             let left = &mut self.recovery.undo_left;
@@ -27,21 +30,25 @@ impl Connection {
         }
     }
 
-    /// Whether the answer was sent before anything was sent again.
+    /// Returns whether the timestamp that `ack` echoes is older than the first segment that was sent again, so that the original transmission was answered.
     fn is_older(&self, ack: &Ack) -> bool {
         let (Some(at), Some(echo)) = (self.recovery.again_at, ack.echo) else { return false };
+        // The difference wraps. An echo of the same tick does not tell the two transmissions apart.
         (1..1 << 31).contains(&Self::ticks(at).wrapping_sub(echo))
     }
 
+    /// Returns whether one of the two signs shows that nothing was lost.
     fn may_undo(&self, ack: &Ack) -> bool {
         self.recovery.undo_from.is_some() && (self.recovery.undo_left == Some(0) || self.is_older(ack))
     }
 
+    /// Takes the reduction back: restores the window and the threshold. With `nothing_is_lost`, also removes the marks of lost segments.
     fn undo(&mut self, nothing_is_lost: bool) {
         if nothing_is_lost {
             self.send.board.unmark_lost();
         }
         if let Some(threshold) = self.recovery.prior_threshold {
+            // Window and threshold may have grown since. The undo never makes them smaller.
             self.congestion.window = self.congestion.window.max(self.recovery.prior_window);
             if threshold > self.congestion.threshold {
                 self.congestion.threshold = threshold;
@@ -52,13 +59,14 @@ impl Connection {
         self.counters.undone += 1;
     }
 
-    /// Part of what was sent when recovery began is acknowledged. Whether the phase goes on without anything else to be done.
+    /// Takes recovery back after a partial acknowledgement that answers the original transmission. Returns whether the phase continues and this acknowledgement
+    /// needs no further reaction.
     pub(super) fn undo_in_recovery(&mut self, ack: &Ack) -> bool {
         if self.recovery.undo_from.is_none() || !self.is_older(ack) {
             return false;
         }
         if self.send.board.again_out > 0 {
-            // What was sent again may fill a gap: wait.
+            // Segments that were sent again are still on the way and may fill a gap, so the decision waits for them.
             return true;
         }
         if !self.send.board.has_sent_again() {
@@ -70,7 +78,7 @@ impl Connection {
         false
     }
 
-    /// All that was sent again was a duplicate.
+    /// Takes the reduction back if the peer has reported every segment that was sent again as a duplicate. Returns whether it has.
     pub(super) fn undo_by_duplicates(&mut self) -> bool {
         let may = self.recovery.undo_from.is_some() && self.recovery.undo_left == Some(0);
         if may {
@@ -82,7 +90,8 @@ impl Connection {
         may
     }
 
-    /// All that was sent when the phase began is acknowledged. Whether it is held until something above is.
+    /// Takes the reduction back, if a sign allows it, when all data sent before the phase is acknowledged. Returns whether the phase is held until a later
+    /// position is acknowledged.
     pub(super) fn undo_at_end(&mut self, ack: &Ack) -> bool {
         if self.may_undo(ack) {
             self.undo(false);
@@ -90,7 +99,7 @@ impl Connection {
             self.rack.persists = self.rack.persists.saturating_sub(1);
         }
         if self.send.una == self.recovery.high && !self.receive.has_sack {
-            // Duplicates of what was sent again must not begin recovery anew (RFC 6582, section 4).
+            // Segments that were sent again without need cause duplicates, which must not begin another recovery (RFC 6582, section 4).
             if !self.send.board.has_sent_again() {
                 self.recovery.again_at = None;
             }
@@ -102,7 +111,7 @@ impl Connection {
         false
     }
 
-    /// After a timeout: whether it was a false one, and whether all is acknowledged.
+    /// Handles an acknowledgement in the phase Loss: takes a false timeout back, or ends the phase when all data sent before the timeout is acknowledged.
     pub(super) fn go_on_after_timeout(&mut self, ack: &Ack) {
         if ack.has_advanced && self.may_undo(ack) {
             self.undo(true);
@@ -116,6 +125,7 @@ impl Connection {
             self.undo_at_end(ack);
             return;
         }
+        // The duplicates that were counted stood for segments below the acknowledged position.
         if !self.receive.has_sack && ack.has_advanced {
             self.send.board.sacked_out = 0;
         }
