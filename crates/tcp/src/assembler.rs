@@ -10,7 +10,7 @@ use crate::sequence::Position;
 /// Octets in order, which the program can read, and pieces that wait for missing octets before them.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Assembler {
-    /// Octets in order that the program has not read.
+    /// Octets in order, not yet read by the program.
     ready: VecDeque<u8>,
     /// Data out of order, by the position of its first octet.
     pieces: BTreeMap<Position, Vec<u8>>,
@@ -23,7 +23,7 @@ pub(crate) struct Assembler {
 }
 
 impl Assembler {
-    /// Takes in `data`, whose first octet is at `start`. Moves `next`, the position of the first missing octet, over all octets that are now in order.
+    /// Takes in `data`, whose first octet is at `start`. Moves `next`, the position of the first missing octet, over all octets now in order.
     pub(crate) fn insert(&mut self, next: &mut Position, start: Position, data: &[u8]) {
         let end = start + data.len() as u64;
         if end <= *next {
@@ -50,7 +50,7 @@ impl Assembler {
         }
     }
 
-    /// Moves the pieces that follow at `next` without a gap to the octets in order.
+    /// Moves the pieces from `next` up to the first gap to the octets in order.
     fn join(&mut self, next: &mut Position) {
         while let Some(first) = self.pieces.first_entry().filter(|first| first.key() <= next) {
             let (start, piece) = first.remove_entry();
@@ -99,7 +99,7 @@ impl Assembler {
         self.ready.len() + self.waiting
     }
 
-    /// Copies octets in order into `to` without removing them. Returns their number.
+    /// Copies octets in order into `to` and keeps the octets. Returns the number of octets.
     pub(crate) fn peek(&self, to: &mut [u8]) -> usize {
         // The ring has at most two contiguous parts.
         let (first, second) = self.ready.as_slices();
@@ -110,7 +110,7 @@ impl Assembler {
         count
     }
 
-    /// Moves octets in order into `to`. Returns their number.
+    /// Moves octets in order into `to`. Returns the number of octets.
     pub(crate) fn read(&mut self, to: &mut [u8]) -> usize {
         let count = self.peek(to);
         self.ready.drain(..count);

@@ -6,7 +6,7 @@ use core::time::Duration;
 /// Constants of a connection. [`TcpConfig::default`] has the values of Linux 6, [`TcpConfig::textbook`] the values of textbooks.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct TcpConfig {
-    /// Length of the longest IP packet that the connection sends \[byte\], at least 128. Linux uses 65,536 on the loopback interface. Default 1500.
+    /// Length of the longest IP packet sent \[byte\], at least 128. Linux uses 65,536 on the loopback interface. Default 1500.
     pub mtu: usize,
     /// Time to live (IPv4) or hop limit (IPv6) of the packets, not zero. Default 64.
     pub ttl: u8,
@@ -26,7 +26,7 @@ pub struct TcpConfig {
     pub timestamps: bool,
     /// Whether the SYN asks for explicit congestion notification (RFC 3168), and an answer to a SYN grants it. Default off.
     pub ecn: bool,
-    /// Condition under which a connection that asks for ECN continues without ECN, because a middlebox may drop or refuse a SYN that asks. Default: when a SYN
+    /// Condition under which a connection with `ecn` continues without ECN, because a middlebox may drop or refuse a SYN with ECN. Default: when a SYN
     /// is lost.
     pub ecn_fallback: EcnFallback,
     /// Retransmission timeout before the first sample of the round trip, not zero. Default 1 s.
@@ -47,13 +47,13 @@ pub struct TcpConfig {
     /// timeouts, of which the first is 200 ms and each other timeout is twice the timeout before, up to `greatest_timeout`. Also the number of unanswered
     /// probes of a closed window that ends the connection. Default 15, that is, 924.6 s.
     pub retries: u32,
-    /// Limit like `retries` for a connection that the program has closed; the smaller of the two limits counts. Default 8.
+    /// Limit like `retries` for a connection closed by the program; the smaller of the two limits counts. Default 8.
     pub orphan_retries: u32,
     /// Time for which data may stay unanswered (RFC 5482). `None` leaves the limit to `retries`. Default `None`.
     pub user_timeout: Option<Duration>,
     /// Longest delay of an acknowledgement. Default 40 ms.
     pub delayed_ack: Duration,
-    /// Number of acknowledgements that leave without delay, at the beginning, after a pause of the peer and after a duplicate. Default 16.
+    /// Number of acknowledgements without delay, at the beginning, after a pause of the peer and after a duplicate. Default 16.
     pub quick_acks: u32,
     /// Length of TIME-WAIT, and of FIN-WAIT-2 once the program has closed the connection. Default 60 s.
     pub time_wait: Duration,
@@ -81,7 +81,7 @@ pub enum CongestionControl {
     Reno,
 }
 
-/// Condition under which a SYN that asks for ECN is followed by a SYN that does not ask (RFC 3168, section 6.1.1.1).
+/// Condition under which a SYN without ECN follows a SYN with ECN (RFC 3168, section 6.1.1.1).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum EcnFallback {
     /// Every SYN asks.
@@ -89,7 +89,7 @@ pub enum EcnFallback {
     /// The first SYN asks, and no later SYN asks. Linux does so with `tcp_ecn_fallback`.
     #[default]
     Lost,
-    /// Like [`Lost`](Self::Lost). In addition, a reset in answer to a SYN that asks does not end the connection: a SYN that does not ask follows at once.
+    /// Like [`Lost`](Self::Lost). In addition, a reset in answer to a SYN with ECN does not end the connection: a SYN without ECN follows at once.
     LostOrReset,
 }
 

@@ -64,17 +64,17 @@ pub struct Info {
     pub retransmissions: u64,
     /// Retransmission timeouts since the end of the handshake.
     pub timeouts: u64,
-    /// Number of times that the sender has entered recovery.
+    /// Number of recoveries.
     pub recoveries: u64,
-    /// Number of reductions of the window that were taken back because nothing had been lost.
+    /// Number of reductions of the window taken back because nothing had been lost.
     pub undone: u64,
-    /// Most data that a segment carries at present, apart from the room for selective acknowledgements \[byte\].
+    /// Most data per segment at present, apart from the room for selective acknowledgements \[byte\].
     pub segment_size: usize,
-    /// Window that the peer has offered, from the first unacknowledged octet on \[byte\].
+    /// Window offered by the peer, from the first unacknowledged octet on \[byte\].
     pub send_window: u64,
-    /// Octets that the program has written and the peer has not acknowledged, sent or not.
+    /// Octets written by the program and not acknowledged by the peer, sent or not.
     pub unacknowledged: usize,
-    /// Octets that have arrived in order and that the program has not read.
+    /// Octets in order, not yet read by the program.
     pub unread: usize,
     /// Probes of the peer's closed window since an acknowledgement last opened the window.
     pub window_probes: u32,

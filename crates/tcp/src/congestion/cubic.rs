@@ -10,8 +10,8 @@ const BETA: (u64, u64) = (717, 1024);
 /// State of CUBIC. The epoch is the present stage of growth: from the first acknowledgement after a reduction to the next reduction.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Cubic {
-    /// W_max: the window before the last reduction \[segments\], lowered by fast convergence if that window had not reached the earlier W_max. Zero before any
-    /// reduction and after a timeout.
+    /// `W_max`: the window before the last reduction \[segments\], lowered by fast convergence if that window had not reached the earlier `W_max`. Zero before
+    /// any reduction and after a timeout.
     last_most: u32,
     /// Beginning of the epoch. `None` until the first acknowledgement after a reduction.
     epoch: Option<Instant>,
@@ -57,8 +57,8 @@ impl Curve {
 const NANOS_CUBED: u128 = 1_000_000_000_000_000_000_000_000_000;
 
 impl Cubic {
-    /// Ends the epoch and returns the threshold after a loss at `window` \[segments\], at least 2. A window below the last W_max lowers W_max further, so that
-    /// the flow makes room for new flows (fast convergence, RFC 9438, section 4.7).
+    /// Ends the epoch and returns the threshold after a loss at `window` \[segments\], at least 2. A window below the last `W_max` lowers `W_max` further, so
+    /// that the flow makes room for new flows (fast convergence, RFC 9438, section 4.7).
     pub(crate) fn reduced(&mut self, window: u32) -> u32 {
         let (numerator, denominator) = BETA;
         let scaled = |factor: u64, by: u64| u32::try_from(u64::from(window) * factor / by).unwrap_or(u32::MAX);
@@ -135,7 +135,7 @@ fn cube_root(number: u128) -> u64 {
 mod tests {
     use super::*;
 
-    /// RFC 9438, calculated by hand: W_max = 100, β = 0.7, C = 0.4.
+    /// RFC 9438, calculated by hand: `W_max` = 100, β = 0.7, C = 0.4.
     #[test]
     fn the_curve_after_a_loss_at_100_segments() {
         let mut cubic = Cubic::default();

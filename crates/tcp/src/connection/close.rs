@@ -29,8 +29,8 @@ impl Connection {
         };
     }
 
-    /// Closes the connection for a program that drops it. A FIN follows the data, and data that arrives later is answered by a RST. If there is unread data,
-    /// the connection is reset at once, as in Linux. A second call does nothing.
+    /// Closes the connection, because the program drops its end. A FIN follows the data, and later data of the peer is answered by a RST. If there is unread
+    /// data, the connection is reset at once, as in Linux. A second call does nothing.
     pub fn close(&mut self, now: Instant) {
         if self.is_orphan {
             return;
@@ -96,13 +96,13 @@ impl Connection {
             self.die(None);
             self.replies.extend(segment.refusal(self.config.ttl));
         } else if segment.flags.has(Flags::RST) {
-            // Only a reset at exactly the expected number ends TIME-WAIT, so that a stray reset cannot.
+            // Only a reset at exactly the expected number ends TIME-WAIT. A stray reset cannot.
             if extend(segment.sequence, self.receive.next) == self.receive.next {
                 self.die(None);
             }
         } else if segment.sequence_length() > 0 {
             self.receive.ack_now = true;
-            // A FIN shows that the last acknowledgement was lost, so TIME-WAIT begins anew.
+            // A repeated FIN means a lost acknowledgement, so TIME-WAIT begins anew.
             if segment.flags.has(Flags::FIN) {
                 self.linger_until = Some(now.saturating_add(self.config.time_wait));
             }

@@ -10,11 +10,11 @@ use super::recovery::DUPLICATES;
 use super::{Connection, Timer};
 use crate::sequence::Position;
 
-/// Number of recoveries for which a larger reordering window stays (RFC 8985, section 6.2).
+/// Number of recoveries during which a larger reordering window is kept (RFC 8985, section 6.2).
 const PERSISTS: u32 = 16;
 
 impl Connection {
-    /// Notes that a segment that begins at `start` and was sent once has arrived after a segment that ends at `end`.
+    /// Notes a reordering: a segment from `start` on, sent once, has arrived after a segment up to `end`.
     pub(super) fn note_reordering(&mut self, start: Position, end: Position) {
         self.rack.has_reordering = true;
         let degree = end.saturating_sub(start).div_ceil(self.send.mss as u64);
@@ -25,7 +25,7 @@ impl Connection {
     fn advance_rack(&mut self, now: Instant, ack: &Ack) {
         let Some((sent_at, was_again)) = ack.news.latest else { return };
         let round_trip = now.saturating_duration_since(sent_at.0);
-        // An answer to a repeated segment that comes sooner than any round trip must be the answer to an earlier transmission.
+        // If the answer to a repeated segment comes sooner than any round trip, the answer belongs to an earlier transmission.
         if was_again && self.round_trips.least().is_some_and(|least| round_trip < least) {
             return;
         }
@@ -35,7 +35,7 @@ impl Connection {
 
     /// Returns the time by which a segment may be late before it counts as lost (RFC 8985, section 6.2, step 4).
     fn reordering_window(&self) -> Duration {
-        // On a path that has never reordered, waiting during recovery, or after three segments out of order, would only delay the repair.
+        // On a path without reordering so far, waiting during recovery, or after three segments out of order, would only delay the repair.
         if !self.rack.has_reordering && (self.recovery.phase >= Phase::Recovery || self.send.board.sacked_out >= DUPLICATES) {
             return Duration::ZERO;
         }
@@ -43,7 +43,7 @@ impl Connection {
         (least / 4 * self.rack.quarters.max(1)).min(self.round_trips.srtt().unwrap_or_default())
     }
 
-    /// Enlarges the reordering window once per round trip in which a duplicate was reported, because a duplicate means that a loss was declared too early.
+    /// Enlarges the reordering window once per round trip in which a duplicate was reported, because a duplicate means a loss declared too early.
     pub(super) fn adapt_patience(&mut self, ack: &Ack) {
         if self.rack.saw_duplicate && self.send.una >= self.rack.grown_at {
             self.rack.quarters = (self.rack.quarters.max(1) + 1).min(255);
@@ -104,7 +104,7 @@ impl Connection {
 
     /// Handles the end of the retransmission timer (RFC 5681, section 3.1, and RFC 6298, section 5).
     pub(super) fn enter_loss(&mut self, now: Instant) {
-        // The threshold is reduced once per loss event. Another timeout of the same event must not reduce it again.
+        // The threshold is reduced once per loss event. Another timeout of the same event must not reduce the threshold again.
         let is_first = self.recovery.phase <= Phase::Disorder
             || self.send.una >= self.recovery.high
             || (self.recovery.phase == Phase::Loss && self.counters.retries == 0);
@@ -128,7 +128,7 @@ impl Connection {
     /// Decides whether the tail loss probe has repaired a loss, which reduces the window (RFC 8985, section 7.4).
     pub(super) fn end_tail_probe(&mut self, ack: &Ack) {
         let Some(end) = self.tail.end.filter(|end| ack.position >= *end) else { return };
-        // A probe with new data repairs nothing. A reported duplicate means that the last segment and the probe have both arrived.
+        // A probe with new data repairs nothing. After a reported duplicate, the last segment and the probe have both arrived.
         if !self.tail.is_again || ack.tells_duplicate {
             self.tail.end = None;
         } else if ack.position > end {
@@ -139,7 +139,7 @@ impl Connection {
                 self.end_reduction_at_once(ack);
             }
         } else if ack.is_duplicate {
-            // A duplicate acknowledgement at `end` answers the probe, so that the last segment had arrived before.
+            // A duplicate acknowledgement at `end` answers the probe: the last segment had arrived before.
             self.tail.end = None;
         }
     }

@@ -42,7 +42,7 @@ pub struct Connection {
     state: State,
     /// Reason for the end of the connection, until a call of the program has returned the reason once.
     error: Option<Error>,
-    /// The program has closed the connection, so that nobody will read data any more.
+    /// The program has closed the connection: nobody will read data any more.
     is_orphan: bool,
     send: Send,
     receive: Receive,
@@ -56,14 +56,14 @@ pub struct Connection {
     keepalive_at: Option<Instant>,
     /// End of TIME-WAIT, or of FIN-WAIT-2 of an orphan.
     linger_until: Option<Instant>,
-    /// Purpose of the next segment that is sent regardless of the congestion window.
+    /// Purpose of the next segment sent regardless of the congestion window.
     probe: Option<Probe>,
-    /// Segments that leave before all others: SYNs and resets.
+    /// SYNs and resets, which leave before all other segments.
     replies: VecDeque<Segment<'static>>,
     counters: Counters,
 }
 
-/// Purpose of a segment that is sent regardless of the congestion window.
+/// Purpose of a segment sent regardless of the congestion window.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Probe {
     /// The last flight is unanswered, and an answer to one more segment would show a loss at its end (RFC 8985, section 7).
@@ -91,7 +91,7 @@ impl Connection {
         self.remote
     }
 
-    /// Returns whether the connection has ended and has nothing to send. The owner may then drop the connection, once the program has closed it.
+    /// Returns whether the connection has ended and has nothing to send. The owner may then drop the connection, once the program has closed its end.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         self.state == State::Closed && self.replies.is_empty()
@@ -119,7 +119,7 @@ impl Connection {
         u32::try_from(now.as_nanos() / 1_000_000 % (1 << 32)).unwrap_or(0)
     }
 
-    /// Returns the octets of data that a segment may carry if it has no selective acknowledgements, at least 48 unless the MSS is smaller.
+    /// Returns the most octets of data in a segment without selective acknowledgements, at least 48 unless the MSS is smaller.
     fn segment_size(&self) -> usize {
         // At most half of the peer's largest window, so that a small window takes two segments (RFC 9293, section 3.8.6.2.1).
         let window = usize::try_from(self.send.max_window).unwrap_or(usize::MAX);

@@ -53,7 +53,7 @@ impl Connection {
         Ok(connection)
     }
 
-    /// Returns an end in SYN-SENT that has not sent its SYN.
+    /// Returns an end in SYN-SENT, before its SYN is sent.
     fn new(now: Instant, config: TcpConfig, local: SocketAddr, remote: SocketAddr, initial_sequence: u32) -> Result<Self, ConfigError> {
         config.check()?;
         let first = first(config.initial_sequence.unwrap_or(initial_sequence));
@@ -164,13 +164,13 @@ impl Connection {
     /// Handles a segment that arrives in SYN-SENT (RFC 9293, section 3.10.7.3).
     pub(super) fn handle_in_syn_sent(&mut self, now: Instant, segment: &Segment<'_>) {
         let has_ack = segment.flags.has(Flags::ACK);
-        // An acknowledgement of anything but the SYN belongs to an older connection. This check comes first, so that such a reset has no effect.
+        // An acknowledgement of anything but the SYN belongs to an older connection. This check comes first, so a reset of this kind has no effect.
         if has_ack && extend(segment.acknowledgement, self.send.una) != self.send.next {
             self.replies.extend(segment.refusal(self.config.ttl));
             return;
         }
         if segment.flags.has(Flags::RST) {
-            // A reset without ACK is ignored, because it does not show that its sender has seen the SYN.
+            // A reset without ACK is ignored, because nothing shows that the sender of the reset has seen the SYN.
             if has_ack && self.asks_for_ecn() && self.config.ecn_fallback == EcnFallback::LostOrReset {
                 self.send.has_ecn = false;
                 self.send.board.sent_again(self.send.first, now, false);
@@ -224,7 +224,7 @@ impl Connection {
     pub(super) fn echoed(&self, now: Instant, segment: &Segment<'_>) -> Option<Duration> {
         let (_, echo) = segment.options.timestamps.filter(|(_, echo)| self.receive.has_timestamps && *echo != 0)?;
         let ticks = Self::ticks(now).wrapping_sub(echo);
-        // The difference wraps: half of the range or more means an echo from the future, which is not one of this end's timestamps.
+        // The difference wraps: half of the range or more means an echo from the future, so this end never sent the timestamp.
         (ticks < 1 << 31).then_some(Duration::from_millis(u64::from(ticks.max(1))))
     }
 }

@@ -15,7 +15,7 @@ use crate::sequence::Position;
 pub(super) struct Send {
     /// Position of the SYN.
     pub(super) first: Position,
-    /// First position that is not acknowledged.
+    /// First unacknowledged position.
     pub(super) una: Position,
     /// First position that was never sent.
     pub(super) next: Position,
@@ -23,7 +23,7 @@ pub(super) struct Send {
     pub(super) window: u64,
     /// Largest window that the peer has offered so far \[byte\].
     pub(super) max_window: u64,
-    /// Peer's position of the segment that set `window`. Segments from before this position must not set `window`, because they were overtaken.
+    /// Peer's position of the segment that set `window`. Segments from before this position were overtaken and must not set `window`.
     pub(super) window_from: Position,
     /// Number of bits by which the peer's windows are shifted.
     pub(super) scale: u8,
@@ -31,7 +31,7 @@ pub(super) struct Send {
     pub(super) board: Scoreboard,
     /// Most octets of data that a segment may carry beside timestamps.
     pub(super) mss: usize,
-    /// End of the last segment that was not full (for Minshall's form of Nagle's algorithm).
+    /// End of the last segment below the full size (for Minshall's form of Nagle's algorithm).
     pub(super) small_end: Position,
     /// The program has shut this half, so that a FIN follows the data.
     pub(super) is_shut: bool,
@@ -39,7 +39,7 @@ pub(super) struct Send {
     pub(super) last_data_at: Instant,
     /// Number of segments known to have arrived at the peer.
     pub(super) delivered: u64,
-    /// Both ends use explicit congestion notification.
+    /// Both ends use explicit congestion notification. Until the peer's SYN has arrived, this end asks for ECN.
     pub(super) has_ecn: bool,
     /// Segments carry ECE, because a packet with a mark has arrived and the peer has not answered with CWR.
     pub(super) tells_mark: bool,
@@ -74,7 +74,7 @@ impl Send {
 pub(super) struct Receive {
     /// Sequence number of the peer's SYN. `None` until the SYN has arrived.
     pub(super) first: Option<u32>,
-    /// Position of the first octet that is missing.
+    /// Position of the first missing octet.
     pub(super) next: Position,
     /// End (exclusive) of the offered window.
     pub(super) edge: Position,
@@ -82,9 +82,9 @@ pub(super) struct Receive {
     pub(super) acked: Position,
     /// Number of bits by which the offered windows are shifted.
     pub(super) scale: u8,
-    /// Both ends use selective acknowledgements. Until the peer's SYN has arrived, this end offers them.
+    /// Both ends use selective acknowledgements. Until the peer's SYN has arrived, this end offers SACK.
     pub(super) has_sack: bool,
-    /// Both ends use timestamps. Until the peer's SYN has arrived, this end offers them.
+    /// Both ends use timestamps. Until the peer's SYN has arrived, this end offers timestamps.
     pub(super) has_timestamps: bool,
     /// Timestamp to echo, and the instant of its arrival.
     pub(super) recent: Option<(u32, Instant)>,
@@ -99,15 +99,15 @@ pub(super) struct Receive {
     pub(super) segment: usize,
     /// An acknowledgement is due at once.
     pub(super) ack_now: bool,
-    /// A segment after the SYN has offered a window, which may be larger than the window of the SYN.
+    /// A segment after the SYN has offered a window, perhaps a larger window than the SYN.
     pub(super) has_offered: bool,
     /// Instant at which a delayed acknowledgement is due.
     pub(super) ack_at: Option<Instant>,
     /// Number of further acknowledgements that leave without delay.
     pub(super) quick: u32,
-    /// Both ends send data in turn. Acknowledgements then wait, because they can travel with data.
+    /// Both ends send data in turn. Acknowledgements then wait for data to travel with.
     pub(super) is_interactive: bool,
-    /// Number of segments that were not full since the last acknowledgement, at most 2.
+    /// Number of segments below the full size since the last acknowledgement, at most 2.
     pub(super) pushed: u8,
     /// Instant at which data in the window arrived last.
     pub(super) last_data_at: Option<Instant>,
@@ -118,13 +118,14 @@ pub(super) struct Receive {
 }
 
 impl Receive {
-    /// Returns the part of the offered window that the peer has not filled \[byte\].
+    /// Returns the unfilled part of the offered window \[byte\].
     pub(super) const fn window(&self) -> u64 {
         self.edge.saturating_sub(self.next)
     }
 }
 
-/// Reaction of the sender to losses (RFC 5681, 6582, 6675). Brackets contain the names of Linux. The order is that of severity, and comparisons use it.
+/// Reaction of the sender to losses (RFC 5681, 6582, 6675). Brackets contain the names of Linux. The variants are ordered by severity, and comparisons use this
+/// order.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 pub(super) enum Phase {
     /// No sign of a loss (Open).
@@ -132,7 +133,7 @@ pub(super) enum Phase {
     Open,
     /// Segments have arrived out of order, or a duplicate acknowledgement has arrived (Disorder).
     Disorder,
-    /// The window shrinks because of a mark, or of a loss that a tail probe repaired (CWR).
+    /// The window shrinks because of a mark, or of a loss repaired by a tail probe (CWR).
     Reduced,
     /// Lost segments are sent again while the window shrinks (Recovery).
     Recovery,
@@ -154,7 +155,7 @@ pub(super) struct Recovery {
     pub(super) prior_window: u32,
     /// First unacknowledged position when the phase began. `None` if no reduction can be taken back.
     pub(super) undo_from: Option<Position>,
-    /// Number of segments sent again in the phase that the peer has not reported as duplicates. `None` before a segment was sent again.
+    /// Number of segments sent again in the phase and not reported as duplicates by the peer. `None` before a segment was sent again.
     pub(super) undo_left: Option<u32>,
     /// Instant at which a segment of the phase was sent again for the first time.
     pub(super) again_at: Option<Instant>,
@@ -175,16 +176,16 @@ pub(super) struct Rack {
     pub(super) quarters: u32,
     /// Number of recoveries after which `quarters` returns to one.
     pub(super) persists: u32,
-    /// Value of [`Send::next`] when the reordering window grew last. The window grows again once this position is acknowledged: at most once per round trip.
+    /// Value of `Send::next` when the reordering window grew last. The window grows again once this position is acknowledged: at most once per round trip.
     pub(super) grown_at: u64,
-    /// The present acknowledgement reports a duplicate, so that a loss was declared too early.
+    /// The present acknowledgement reports a duplicate: a loss was declared too early.
     pub(super) saw_duplicate: bool,
 }
 
 /// Tail loss probe on the way.
 #[derive(Clone, Default, Debug)]
 pub(super) struct TailProbe {
-    /// Value of [`Send::next`] after the probe was sent. `None` if no probe is on the way.
+    /// Value of `Send::next` after the probe was sent. `None` if no probe is on the way.
     pub(super) end: Option<Position>,
     /// The probe repeats the last segment and carries no new data.
     pub(super) is_again: bool,

@@ -13,11 +13,11 @@ use crate::sequence::{Position, extend};
 /// Least time between two answers to segments out of window without data. Without this limit, two ends could answer each other for ever.
 const BETWEEN_ANSWERS: Duration = Duration::from_millis(500);
 
-/// Age above which the timestamp to echo no longer proves that a segment is old (RFC 7323, section 5.5).
+/// Age above which the timestamp to echo no longer proves the age of a segment (RFC 7323, section 5.5).
 const TIMESTAMPS_COUNT: Duration = Duration::from_secs(24 * 86_400);
 
 impl Connection {
-    /// Handles a segment that arrives at `now`. The owner has checked that the addresses and ports of the segment are those of this connection.
+    /// Handles a segment that arrives at `now`. The owner has checked the addresses and ports of the segment.
     pub fn handle_segment(&mut self, now: Instant, segment: &Segment<'_>) {
         match self.state {
             State::Closed => self.replies.extend(segment.refusal(self.config.ttl)),
@@ -114,7 +114,7 @@ impl Connection {
         true
     }
 
-    /// Sends this end's SYN again, because the peer has not received it.
+    /// Sends this end's SYN again, because the peer has not received the first SYN.
     pub(super) fn repeat_syn(&mut self, now: Instant) {
         let answer = self.build_syn(now);
         self.replies.push_back(answer);
@@ -124,7 +124,7 @@ impl Connection {
     fn is_old(&self, now: Instant, segment: &Segment<'_>) -> bool {
         let (Some((value, _)), Some((recent, at))) = (segment.options.timestamps, self.receive.recent) else { return false };
         let behind = recent.wrapping_sub(value);
-        // A pure acknowledgement at the expected number that was overtaken by less than a second is harmless, and its news would be lost if it were refused.
+        // A pure acknowledgement at the expected number that was overtaken by less than a second is harmless, and refusing the segment would lose its news.
         let is_harmless = segment.sequence_length() == 0 && extend(segment.sequence, self.receive.next) == self.receive.next && behind < 1000;
         // The difference wraps: a value from 1 to half of the range means that the segment is older than the timestamp to echo.
         self.receive.has_timestamps && (1..1 << 31).contains(&behind) && !is_harmless && now.saturating_duration_since(at) < TIMESTAMPS_COUNT
@@ -144,12 +144,12 @@ impl Connection {
         }
     }
 
-    /// Sends a challenge ACK, within the limit of the rate: a peer that means its segment answers with the exact sequence number (RFC 5961).
+    /// Sends a challenge ACK, within the limit of the rate: a genuine peer answers with the exact sequence number (RFC 5961).
     pub(super) fn challenge(&mut self, now: Instant) {
         self.answer_at_times(now);
     }
 
-    /// Sends an acknowledgement, unless such an answer left less than [`BETWEEN_ANSWERS`] ago.
+    /// Sends an acknowledgement, unless such an answer left less than `BETWEEN_ANSWERS` ago.
     fn answer_at_times(&mut self, now: Instant) {
         if self.receive.challenged_at.is_none_or(|at| now.saturating_duration_since(at) >= BETWEEN_ANSWERS) {
             self.receive.challenged_at = Some(now);
@@ -167,7 +167,7 @@ impl Connection {
         }
     }
 
-    /// Ends the connection because the peer has reset it. Data that has arrived in order stays readable.
+    /// Ends the connection after a reset by the peer. Data that has arrived in order stays readable.
     fn be_reset(&mut self) {
         let error = match self.state {
             // As in Linux: after the peer's FIN, the program hears of the reset only when it writes.

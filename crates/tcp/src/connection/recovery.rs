@@ -7,12 +7,12 @@ use super::acknowledge::Ack;
 use super::parts::Phase;
 use crate::congestion::{Reduction, UNBOUNDED};
 
-/// Number of duplicates, or of segments that arrived out of order, that tells of a loss (RFC 5681, section 3.2).
+/// Number of duplicates, or of segments out of order, at which a loss is assumed (RFC 5681, section 3.2).
 pub(super) const DUPLICATES: u32 = 3;
 
 impl Connection {
     /// Finds losses, changes the phase and sets the timer after the acknowledgement `ack`. `has_widened` says that the acknowledgement changed the peer's
-    /// window, `has_data` that it carries data, SYN or FIN.
+    /// window, `has_data` means data, SYN or FIN in the same segment.
     pub(super) fn recover(&mut self, now: Instant, ack: &Ack, has_widened: bool, has_data: bool) {
         // Both calls come first, because the search for losses uses the reordering window, and a tail probe may change the phase.
         self.adapt_patience(ack);
@@ -93,7 +93,7 @@ impl Connection {
     fn end_phase(&mut self, ack: &Ack) -> bool {
         match self.recovery.phase {
             Phase::Reduced => {
-                // The phase ends when a later position is acknowledged as well, so that each window of data has at most one reduction.
+                // The phase ends when a later position is acknowledged as well, so each window of data has at most one reduction.
                 if self.send.una != self.recovery.high {
                     self.end_reduction();
                     self.recovery.phase = Phase::Open;
@@ -132,13 +132,13 @@ impl Connection {
     /// Removes `acked` acknowledged segments from the count of duplicates. Called only if the peer sends no selective acknowledgements.
     pub(super) fn end_duplicates(&mut self, acked: u32) {
         let board = &mut self.send.board;
-        // The first of the acknowledged segments filled the gap. Duplicates may have been counted for the others.
+        // The first of the acknowledged segments filled the gap. Duplicates may have been counted for the remaining segments.
         if acked > 0 {
             self.send.delivered += u64::from(acked.saturating_sub(board.sacked_out).max(1));
             board.sacked_out = board.sacked_out.saturating_sub(acked - 1);
         }
         board.sacked_out = board.sacked_out.min(board.packets_out().saturating_sub(board.lost_out.max(1)));
-        // An acknowledgement that advances outside of recovery shows that the duplicates were only reordering.
+        // Progress outside of recovery shows that the duplicates were only reordering.
         if self.recovery.phase < Phase::Recovery {
             board.sacked_out = 0;
         }
@@ -176,14 +176,14 @@ impl Connection {
 
     /// Ends a reduction: sets the window to the threshold.
     fn end_reduction(&mut self) {
-        // After an undo, the window has its old value again and must keep it.
+        // After an undo, the window has its old value again and must stay.
         let is_reduced = self.recovery.phase == Phase::Reduced || self.recovery.undo_from.is_some();
         if is_reduced && self.congestion.threshold < UNBOUNDED {
             self.congestion.window = self.congestion.threshold;
         }
     }
 
-    /// Reduces the window although no segment is missing, because of a mark or of a loss that a tail probe repaired. Does nothing during another reduction.
+    /// Reduces the window although no segment is missing, because of a mark or of a loss repaired by a tail probe. Does nothing during another reduction.
     pub(super) fn enter_reduced(&mut self) {
         self.recovery.prior_threshold = None;
         if self.recovery.phase < Phase::Reduced {
@@ -200,7 +200,7 @@ impl Connection {
         self.stay_open(ack);
     }
 
-    /// Enters recovery. `tells_mark` says that a mark was reported, so that the reduction must not be taken back.
+    /// Enters recovery. `tells_mark` says that a mark was reported, so the reduction must not be taken back.
     pub(super) fn enter_recovery(&mut self, tells_mark: bool) {
         self.begin_undo();
         // A reduction because of a mark continues: the same window of data is not reduced twice.

@@ -27,7 +27,7 @@ pub(super) enum Timer {
 /// Least margin above two round trips before a tail probe: two of Linux's ticks.
 const LEAST_TAIL: Duration = Duration::from_millis(2);
 
-/// First timeout in the sum that limits unanswered data: Linux counts `retries` with its least timeout, whatever the round trip.
+/// First timeout in the limit for unanswered data: Linux counts `retries` with its least timeout, whatever the round trip.
 const RETRY_BASE: Duration = Duration::from_millis(200);
 
 impl Connection {
@@ -56,7 +56,7 @@ impl Connection {
             self.keep_alive(now);
         }
         if let Some((_, timer)) = self.timer.filter(|(at, _)| *at <= now) {
-            // The timer is cleared first, because each branch may set it again.
+            // The timer is cleared first, because each branch may set another timer.
             self.timer = None;
             match timer {
                 Timer::Retransmission => self.time_out(now),
@@ -188,7 +188,7 @@ impl Connection {
             (self.counters.probes, self.counters.probe_backoff) = (0, 0);
             return;
         }
-        // A peer may keep its window closed for ever while it answers probes. Nobody waits for the data of an orphan, so its number of probes is limited also
+        // A peer may keep its window closed for ever and answer every probe. Nobody waits for the data of an orphan, so the number of probes is limited also
         // if the peer answers.
         let is_too_long = self.is_orphan && self.counters.probe_backoff >= self.config.orphan_retries;
         let stalled = self.counters.stalled_since.filter(|_| self.config.user_timeout.is_some() && self.counters.probes > 0);

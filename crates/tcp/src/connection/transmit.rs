@@ -12,7 +12,7 @@ impl Connection {
     #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Segment<'static>> {
         // The order of the choices matters. Every segment after the replies acknowledges all data in order, so that a pure acknowledgement comes last. Lost
-        // segments come before new data, because the peer's program waits for them.
+        // segments come before new data, because the peer's program waits for lost data.
         if let Some(reply) = self.replies.pop_front() {
             return Some(reply);
         }
@@ -40,7 +40,7 @@ impl Connection {
         let lost = board.next_lost()?;
         let (start, end) = (lost.start, lost.end);
         let is_first = start == self.send.una;
-        // The first segment may leave also beyond a peer's window that has shrunk: its answer tells the present window.
+        // The first segment may leave also beyond a shrunken window of the peer: the answer tells the present window.
         if board.in_flight() >= self.congestion.window || (!is_first && end > self.send.window_end()) {
             return None;
         }
@@ -54,7 +54,7 @@ impl Connection {
         Some(self.again(now, start, end))
     }
 
-    /// Returns a segment that was sent before, and counts it for the undo.
+    /// Returns an earlier segment once more, and counts the repetition for the undo.
     fn again(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
         self.counters.retransmissions += 1;
         self.recovery.again_at.get_or_insert(now);
@@ -97,7 +97,7 @@ impl Connection {
         let (una, next) = (self.send.una, self.send.next);
         let in_flight = self.send.board.in_flight();
         if in_flight >= self.congestion.window && !is_probe {
-            // The window has held back data, so that it may grow.
+            // The window has held back data, and may therefore grow.
             self.congestion.used(una, next, self.send.board.packets_out(), true);
             return None;
         }
@@ -121,7 +121,7 @@ impl Connection {
     fn send_new(&mut self, now: Instant, end: Position) -> Segment<'static> {
         let start = self.send.next;
         let was_empty = self.send.board.is_empty();
-        // New data that leaves soon after data has arrived is an answer.
+        // New data soon after the arrival of data is an answer.
         let has_answered = self.receive.last_data_at.is_some_and(|at| now.saturating_duration_since(at) < self.config.delayed_ack);
         let segment = self.build(now, start, end);
         self.send.next = end;
@@ -149,10 +149,10 @@ impl Connection {
         }
     }
 
-    /// Returns the segment for `probe`, if there is one.
+    /// Returns the segment for `probe`, or `None` if there is nothing to send again.
     fn forced(&mut self, now: Instant, probe: Probe) -> Option<Segment<'static>> {
         match probe {
-            // New data is the better probe, because it is needed anyway. Without new data, the last segment is repeated.
+            // New data is the better probe, because new data must be sent anyway. Without new data, the last segment is repeated.
             Probe::Tail => {
                 let segment = self.new_data(now, true);
                 self.tail.is_again = segment.is_none();
@@ -167,7 +167,7 @@ impl Connection {
                     (self.counters.probes, self.counters.probe_backoff) = (0, 0);
                     return Some(self.send_new(now, end));
                 }
-                // A segment without data from below the peer's window carries nothing, but the peer must answer it.
+                // A segment without data from below the peer's window carries nothing, but forces an answer.
                 let segment = self.build(now, self.send.next, self.send.next);
                 Some(Segment { sequence: on_wire(self.send.una - 1), ..segment })
             }

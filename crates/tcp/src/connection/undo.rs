@@ -1,4 +1,4 @@
-//! Undo of a reaction to losses that did not happen. Two signs show that nothing was lost: the peer reports each segment that was sent again as a duplicate, or
+//! Undo of a reaction to supposed losses. Two signs show that nothing was lost: the peer reports each repeated segment as a duplicate, or
 //! the peer's answer echoes a timestamp from before the first segment was sent again (RFC 3522, 3708, 4015).
 
 use super::Connection;
@@ -7,13 +7,13 @@ use super::parts::Phase;
 use crate::sequence::Position;
 
 impl Connection {
-    /// Begins to count the segments that are sent again, so that the reduction that follows can be taken back.
+    /// Begins to count repeated segments, so that the coming reduction can be taken back.
     pub(super) fn begin_undo(&mut self) {
         if !self.send.board.has_sent_again() {
             self.recovery.again_at = None;
         }
         self.recovery.undo_from = Some(self.send.una);
-        // Segments that are already on the way again count from the beginning, and so does a tail probe that repeats the last segment.
+        // Repeated segments already on the way count from the beginning, and so does a tail probe with the last segment.
         let again = self.send.board.again_out + u32::from(self.tail.end.is_some() && self.tail.is_again);
         self.recovery.undo_left = (again > 0).then_some(again);
     }
@@ -30,14 +30,14 @@ impl Connection {
         }
     }
 
-    /// Returns whether the timestamp that `ack` echoes is older than the first segment that was sent again, so that the original transmission was answered.
+    /// Returns whether the timestamp echoed by `ack` is older than the first repetition of a segment, so that the original transmission was answered.
     fn is_older(&self, ack: &Ack) -> bool {
         let (Some(at), Some(echo)) = (self.recovery.again_at, ack.echo) else { return false };
         // The difference wraps. An echo of the same tick does not tell the two transmissions apart.
         (1..1 << 31).contains(&Self::ticks(at).wrapping_sub(echo))
     }
 
-    /// Returns whether one of the two signs shows that nothing was lost.
+    /// Returns whether either sign shows that nothing was lost.
     fn may_undo(&self, ack: &Ack) -> bool {
         self.recovery.undo_from.is_some() && (self.recovery.undo_left == Some(0) || self.is_older(ack))
     }
@@ -48,7 +48,7 @@ impl Connection {
             self.send.board.unmark_lost();
         }
         if let Some(threshold) = self.recovery.prior_threshold {
-            // Window and threshold may have grown since. The undo never makes them smaller.
+            // Window and threshold may have grown since. The undo never shrinks either value.
             self.congestion.window = self.congestion.window.max(self.recovery.prior_window);
             if threshold > self.congestion.threshold {
                 self.congestion.threshold = threshold;
@@ -66,7 +66,7 @@ impl Connection {
             return false;
         }
         if self.send.board.again_out > 0 {
-            // Segments that were sent again are still on the way and may fill a gap, so the decision waits for them.
+            // Repeated segments are still on the way and may fill a gap, so the decision waits for their acknowledgement.
             return true;
         }
         if !self.send.board.has_sent_again() {
@@ -78,7 +78,7 @@ impl Connection {
         false
     }
 
-    /// Takes the reduction back if the peer has reported every segment that was sent again as a duplicate. Returns whether it has.
+    /// Takes the reduction back if the peer has reported every repeated segment as a duplicate. Returns whether the reduction was taken back.
     pub(super) fn undo_by_duplicates(&mut self) -> bool {
         let may = self.recovery.undo_from.is_some() && self.recovery.undo_left == Some(0);
         if may {
@@ -99,7 +99,7 @@ impl Connection {
             self.rack.persists = self.rack.persists.saturating_sub(1);
         }
         if self.send.una == self.recovery.high && !self.receive.has_sack {
-            // Segments that were sent again without need cause duplicates, which must not begin another recovery (RFC 6582, section 4).
+            // Needlessly repeated segments cause duplicates, and these duplicates must not begin another recovery (RFC 6582, section 4).
             if !self.send.board.has_sent_again() {
                 self.recovery.again_at = None;
             }
@@ -125,7 +125,7 @@ impl Connection {
             self.undo_at_end(ack);
             return;
         }
-        // The duplicates that were counted stood for segments below the acknowledged position.
+        // The counted duplicates stood for segments below the acknowledged position.
         if !self.receive.has_sack && ack.has_advanced {
             self.send.board.sacked_out = 0;
         }

@@ -24,7 +24,7 @@ impl Scoreboard {
         self.to_send.insert(sent.start);
     }
 
-    /// Marks the first segment as lost if it is not marked yet. Returns whether the mark is new.
+    /// Marks the first segment as lost. Returns whether the mark is new.
     pub(crate) fn mark_first_lost(&mut self) -> bool {
         let is_new = self.queue.front().is_some_and(|first| !first.lost);
         if is_new {
@@ -35,7 +35,7 @@ impl Scoreboard {
 
     /// Marks as lost each segment that was sent before the transmission `delivered` and at least `patience` before `now` (RFC 8985, section 6.2).
     ///
-    /// Returns the instant at which all other segments sent before `delivered` are lost, or `None` if there are no such segments.
+    /// Returns the instant at which all other segments sent before `delivered` are lost, or `None` if no other segment is left.
     pub(crate) fn detect_by_time(&mut self, now: Instant, delivered: SentAt, patience: Duration) -> Option<Instant> {
         while let Some(&(sent_at, start)) = self.by_time.front() {
             let index = self.index(start).filter(|index| self.is_undecided(*index, sent_at));
@@ -64,7 +64,7 @@ impl Scoreboard {
         (sent.at, sent.order) == sent_at && !sent.sacked && (!sent.lost || sent.again)
     }
 
-    /// Marks as lost each segment that has at least `duplicates` sacked segments above it and was never sent again (`IsLost` of RFC 6675).
+    /// Marks as lost each segment that was never sent again and has at least `duplicates` later segments sacked (`IsLost` of RFC 6675).
     pub(crate) fn detect_by_count(&mut self, duplicates: u32) {
         if self.sacked_out < duplicates {
             return;
@@ -93,10 +93,10 @@ impl Scoreboard {
     /// Marks all segments that have not arrived as lost, after the retransmission timer has run out. With `patience`, segments that were sent less than
     /// `patience` before `now` are spared (RFC 8985, section 6.3), except for the first segment.
     pub(crate) fn mark_all_lost(&mut self, now: Instant, patience: Option<Duration>, has_sack: bool) {
-        // The receiver acknowledges in order, so the first unacknowledged segment cannot have arrived unless the receiver has dropped it again.
+        // The receiver acknowledges in order, so the first unacknowledged segment cannot have arrived unless the receiver has dropped the segment again.
         let has_reneged = self.queue.front().is_some_and(|first| first.sacked);
         if has_reneged || !has_sack {
-            // Either the receiver has dropped data that it had sacked (RFC 2018, section 8), or the count of sacked segments came from duplicates, which do not
+            // Either the receiver has dropped sacked data (RFC 2018, section 8), or the count of sacked segments came from duplicates, which do not
             // tell which segments have arrived. In both cases no segment is known to have arrived.
             self.sacked.clear();
             self.sacked_out = 0;

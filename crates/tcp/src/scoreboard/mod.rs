@@ -12,7 +12,7 @@ use cohaptic_units::Instant;
 use crate::ranges::Ranges;
 use crate::sequence::Position;
 
-/// Segment that was sent and is not acknowledged, from `start` to `end` (exclusive).
+/// Sent and unacknowledged segment, from `start` to `end` (exclusive).
 #[derive(Clone, Debug)]
 pub(crate) struct Sent {
     pub(crate) start: Position,
@@ -39,7 +39,8 @@ pub(crate) type SentAt = (Instant, u64);
 pub(crate) struct Scoreboard {
     /// Segments in the order of positions. Each segment begins where the segment before ends.
     queue: VecDeque<Sent>,
-    /// Transmissions in the order of time, with the start of their segment. An entry stays after its segment was sent again or has arrived; readers skip it.
+    /// Transmissions in the order of time, with the start of their segment. An entry stays after its segment was sent again or has arrived; readers skip old
+    /// entries.
     by_time: VecDeque<(SentAt, Position)>,
     /// Starts of the lost segments that wait to be sent again.
     to_send: BTreeSet<Position>,
@@ -53,7 +54,7 @@ pub(crate) struct Scoreboard {
     pub(crate) again_out: u32,
     /// Number of transmissions so far.
     transmissions: u64,
-    /// Number of times that a segment was found lost.
+    /// Number of detected losses. A segment may be lost several times.
     pub(crate) losses: u64,
 }
 
@@ -83,7 +84,7 @@ impl Scoreboard {
         self.queue.is_empty()
     }
 
-    /// Returns the number of segments that are not acknowledged.
+    /// Returns the number of unacknowledged segments.
     pub(crate) fn packets_out(&self) -> u32 {
         u32::try_from(self.queue.len()).unwrap_or(u32::MAX)
     }
@@ -101,12 +102,12 @@ impl Scoreboard {
         self.queue.back()
     }
 
-    /// Returns the end of the highest range that has arrived out of order.
+    /// Returns the end of the highest sacked range.
     pub(crate) fn highest_sacked(&self) -> Option<Position> {
         self.sacked.end()
     }
 
-    /// Appends a segment that is sent for the first time at `at`. The segment must begin where the last segment ends.
+    /// Appends a new segment, sent at `at`. The segment must begin where the last segment ends.
     pub(crate) fn push(&mut self, start: Position, end: Position, at: Instant) {
         self.transmissions += 1;
         let order = self.transmissions;
@@ -197,13 +198,13 @@ impl Scoreboard {
         }
     }
 
-    /// Returns the first lost segment that waits to be sent again.
+    /// Returns the first lost segment in the queue for retransmission.
     pub(crate) fn next_lost(&self) -> Option<&Sent> {
         self.queue.get(self.index(*self.to_send.first()?)?)
     }
 
     /// Notes that the segment that contains `start` is sent again at `at`. If `counts` is set, the segment no longer waits to be sent again, and its new
-    /// transmission is on the way beside the lost one. A probe does not count.
+    /// transmission is on the way beside the lost transmission. A probe does not count.
     pub(crate) fn sent_again(&mut self, start: Position, at: Instant, counts: bool) {
         let Some(index) = self.index(start) else { return };
         self.transmissions += 1;
@@ -217,21 +218,21 @@ impl Scoreboard {
         self.by_time.push_back(((at, self.transmissions), sent.start));
     }
 
-    /// Returns whether a segment that was sent again is on the way, or is the first unacknowledged segment.
+    /// Returns whether a repeated segment is on the way or is the first unacknowledged segment.
     pub(crate) fn has_sent_again(&self) -> bool {
         self.again_out > 0 || self.queue.front().is_some_and(|first| first.ever_again)
     }
 }
 
 impl News {
-    /// Notes a reordering if the segment at `start` lies below a segment that was sacked before.
+    /// Notes a reordering if the segment at `start` lies below an earlier sacked segment.
     fn note_order(&mut self, start: Position, highest_sacked: Position) {
         if start < highest_sacked {
             self.reordered = Some(self.reordered.map_or(start, |other| other.min(start)));
         }
     }
 
-    /// Notes the last transmission of a segment that has arrived.
+    /// Notes the last transmission of the arrived segment `sent`.
     fn hear(&mut self, sent: &Sent) {
         let sent_at = (sent.at, sent.order);
         if self.latest.is_none_or(|(latest, _)| sent_at > latest) {
