@@ -1,23 +1,23 @@
-//! Addresses with a port, in numbers or as `localhost`.
+//! Socket addresses in numbers or as `localhost`.
 
 use std::net::{Ipv4Addr, SocketAddr};
 
-/// A text is no address.
+/// Error: a text is no socket address.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum AddressError {
     /// An address or a name without a port.
     #[error("has no port")]
     Port,
-    /// The name of a host that has to be looked up, with a port.
+    /// The text is a port at a host whose name would have to be looked up.
     #[error("names a host that would have to be looked up")]
     Name,
-    /// Anything else.
+    /// The text has another form.
     #[error("is no address with a port")]
     Form,
 }
 
-/// Reads `127.0.0.1:7000`, `[::1]:7000` and `localhost:7000`. The last is 127.0.0.1 everywhere (RFC 6761, section 6.3: such names are answered with a loopback
-/// address and never looked up), so that reading a file asks nobody.
+/// Reads a socket address such as `127.0.0.1:7000`, `[::1]:7000` or `localhost:7000`. The name `localhost` always stands for 127.0.0.1 (RFC 6761, section 6.3:
+/// names in `localhost` resolve to a loopback address without a look-up), so that reading a file sends no query.
 ///
 /// # Errors
 ///
@@ -26,16 +26,19 @@ pub fn address(text: &str) -> Result<SocketAddr, AddressError> {
     if let Ok(address) = text.parse() {
         return Ok(address);
     }
+    // Before the split at the last colon: an IPv6 address without a port contains colons.
     if text.parse::<std::net::IpAddr>().is_ok() {
         return Err(AddressError::Port);
     }
     let (host, port) = text.rsplit_once(':').map_or((text, None), |(host, port)| (host, Some(port)));
     let is_host = !host.is_empty() && host.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'.'));
+    // Digits and dots that are no IPv4 address are a slip, and not the name of a host.
     let in_numbers = host.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
     if !is_host || in_numbers {
         return Err(AddressError::Form);
     }
     let Some(port) = port else { return Err(AddressError::Port) };
+    // `parse` also takes a sign, so the digits are checked here.
     let plain = port.bytes().all(|byte| byte.is_ascii_digit());
     let port = port.parse().ok().filter(|_| plain).ok_or(AddressError::Form)?;
     if host.eq_ignore_ascii_case("localhost") { Ok(SocketAddr::from((Ipv4Addr::LOCALHOST, port))) } else { Err(AddressError::Name) }

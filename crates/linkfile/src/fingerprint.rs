@@ -1,38 +1,41 @@
-//! A number that tells whether two texts or files are the same.
+//! Fingerprint of 64 bits, which tells whether two texts or files are the same.
 
 use core::fmt::{self, Write as _};
 use core::str::FromStr;
 
-/// A number that other texts do not have: FNV-1a of 64 bits (Fowler, Noll & Vo 1991). It is no protection against malice.
+/// Hash of a text or of bytes: FNV-1a of 64 bits (Fowler, Noll & Vo 1991). Different texts almost never have the same fingerprint by accident, but a person
+/// can construct two such texts.
 ///
-/// Its display form is 16 hexadecimal digits, which it is read from again.
+/// The display form is 16 hexadecimal digits, which [`FromStr`] reads back.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Fingerprint(u64);
 
 impl Fingerprint {
+    /// Hash of the empty text: the offset basis of FNV.
     const NONE: Self = Self(0xcbf2_9ce4_8422_2325);
 
-    /// That of a text.
+    /// Returns the fingerprint of a text.
     #[must_use]
     pub fn of(text: impl fmt::Display) -> Self {
         let mut fingerprint = Self::NONE;
-        // Writing a number does not fail.
+        // `write_str` below never fails. An implementation of `Display` that fails gives the fingerprint of the text up to the failure.
         let _ = write!(fingerprint, "{text}");
         fingerprint
     }
 
-    /// That of bytes.
+    /// Returns the fingerprint of bytes.
     #[must_use]
     pub fn of_bytes(bytes: &[u8]) -> Self {
         Self::NONE.and(bytes)
     }
 
-    /// As a number.
+    /// Returns the fingerprint as a number.
     #[must_use]
     pub const fn get(self) -> u64 {
         self.0
     }
 
+    /// Continues the hash with more bytes.
     fn and(self, bytes: &[u8]) -> Self {
         Self(bytes.iter().fold(self.0, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)))
     }
@@ -51,7 +54,7 @@ impl fmt::Display for Fingerprint {
     }
 }
 
-/// A text is no fingerprint.
+/// Error: a text is no fingerprint.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("expected 16 hexadecimal digits")]
 pub struct FingerprintError;
@@ -60,6 +63,7 @@ impl FromStr for Fingerprint {
     type Err = FingerprintError;
 
     fn from_str(text: &str) -> Result<Self, FingerprintError> {
+        // `from_str_radix` also takes a sign, so the digits are checked here.
         let digits = text.len() == 16 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
         u64::from_str_radix(text, 16).ok().filter(|_| digits).map(Self).ok_or(FingerprintError)
     }

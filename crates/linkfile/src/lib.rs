@@ -6,8 +6,8 @@
 //! relay ([`RelayFile`]) and the file of a router ([`router::RouterFile`]). Every refusal is a [`FileError`] that names file, line, column and key, shows
 //! the line, and says what was expected.
 //!
-//! It knows nothing of haptics. `cohaptic-scene` stands on it: a scene is read by the same [`reading::TableReader`] from the same
-//! [`document::Node`]s, and its links by [`mesh::read_links`].
+//! This crate knows nothing of haptics. `cohaptic-scene` reads the other parts of a scene with the same [`reading::TableReader`] from the same
+//! [`document::Node`]s, and reads links with [`mesh::read_links`].
 //!
 //! Read [`RelayFile::parse`] first, then [`link::read_link`].
 //!

@@ -1,11 +1,11 @@
-//! Numbers with a unit behind them, as overrides give them to keys.
+//! Numbers followed by a unit, as overrides write the values of keys.
 
-/// The finite number that a text is and its unit, which may be empty: `24ms`, `5 %`, `1000`. `None` for anything else. Whether a key takes that unit is another
-/// question.
+/// Splits a text such as `24ms`, `5 %` or `1000` into a finite number and a unit, which may be empty. Returns `None` for any other text. The unit is not
+/// checked against the units that a key takes.
 #[must_use]
 pub fn number_and_unit(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
-    // The longest number that it begins with: "1e-3ms" is not 1 e-3ms.
+    // The longest beginning that is a number counts, so that "1e-3ms" is 0.001 ms and not 1 with the unit "e-3ms".
     let ends = (1..=text.len()).rev().filter(|end| text.is_char_boundary(*end));
     let (end, value) = ends.filter_map(|end| text[..end].parse::<f64>().ok().map(|value| (end, value))).next()?;
     let unit = text[end..].trim();
@@ -13,11 +13,11 @@ pub fn number_and_unit(text: &str) -> Option<(f64, &str)> {
     (value.is_finite() && is_unit).then_some((value, unit))
 }
 
-/// A number with its unit so that a key reads it back the same: whole ones as integers, because keys that take an integer are content with nothing else, and
-/// with a unit never in powers of ten, which quantities are not written in.
+/// Writes a number with a unit such that a key reads back the same number. A whole number is written as an integer, because keys of integers take nothing
+/// else. A number with a unit is never written with a power of ten, because the readers of quantities take none.
 #[must_use]
 pub fn text_of_quantity(value: f64, unit: &str) -> String {
-    // Beyond 2^53 no number is written as an integer.
+    // From 2^53 on a double stands for several integers, so the number is not written as an integer. Adding zero below makes -0 an ordinary 0.
     if !unit.is_empty() || (value % 1.0).abs() == 0.0 && value.abs() < 9_007_199_254_740_992.0 {
         format!("{}{unit}", value + 0.0)
     } else {

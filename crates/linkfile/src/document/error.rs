@@ -1,4 +1,4 @@
-//! Why a file is refused, and how that is shown.
+//! Errors of files: [`FileError`], and [`Diagnostic`] with the place of a fault and the line shown to the user.
 
 use core::fmt;
 use std::io;
@@ -6,40 +6,40 @@ use std::path::{Path, PathBuf};
 
 use cohaptic_units::{Excerpt, Visible};
 
-/// Why a file is refused.
+/// Reason for refusing a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// Something in the file, in an override, or in a file that it names makes no sense.
+    /// The content of the file, of an override, or of a file named in the document is wrong.
     #[error("{0}")]
     Invalid(Box<Diagnostic>),
-    /// A file cannot be read: the document itself, or one that it names.
+    /// A file cannot be read: the document, or a file named in the document.
     #[error("{}", unreadable(path, source, place.as_deref()))]
     Read {
-        /// The file.
+        /// Path of the file that cannot be read.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
-        /// Where the document names the file; `None` for the document itself.
+        /// Place at which the document names the file, or `None` for the document itself.
         place: Option<Box<Diagnostic>>,
     },
-    /// A folder that should hold files of a kind holds none.
+    /// A folder holds no file of the expected kind.
     #[error("{}: no {kind} here: expected a file that ends in .toml, in this folder or below it", escape(&folder.display().to_string()))]
     NoFile {
-        /// The folder.
+        /// Folder in which files were looked for.
         folder: PathBuf,
-        /// The kind of file: `scene`.
+        /// Kind of the files, such as `scene`.
         kind: &'static str,
     },
 }
 
 impl FileError {
-    /// Whether a file could not be read, as opposed to one that says something wrong.
+    /// Returns whether a file could not be read, as opposed to a file with wrong content.
     #[must_use]
     pub const fn is_io(&self) -> bool {
         matches!(self, Self::Read { .. })
     }
 
-    /// The place in a text that is meant, if there is one.
+    /// Returns the fault with its place in a text, or `None` if the error has no place.
     #[must_use]
     pub fn diagnostic(&self) -> Option<&Diagnostic> {
         match self {
@@ -49,8 +49,8 @@ impl FileError {
         }
     }
 
-    /// The fault alone, without its place, and without anything that stands in a file which the document names: for a person who may name a file and not see
-    /// its content.
+    /// Returns the message of the fault without its place, and without any content of files named in the document. For answers to a person who may name a file
+    /// but must not see its content.
     #[must_use]
     pub fn bare_message(&self) -> String {
         match self.diagnostic() {
@@ -64,17 +64,18 @@ impl FileError {
     }
 }
 
+/// Returns the display form of [`FileError::Read`].
 fn unreadable(path: &Path, source: &io::Error, place: Option<&Diagnostic>) -> String {
     match place {
-        // The message of the diagnostic already holds both.
+        // The message of the diagnostic already contains path and system error.
         Some(place) => place.to_string(),
         None => format!("{}: cannot be read: {}", escape(&path.display().to_string()), escape(&source.to_string())),
     }
 }
 
-/// One fault: its place, the fault itself, the expected text, and the line it stands in.
+/// One fault: its place, the message with the expected text, and the line with the fault.
 ///
-/// Its display form spans several lines and holds no control characters:
+/// The display form spans several lines and holds no control characters:
 ///
 /// ```text
 /// two.toml:6:9: link.delay: unknown unit "parsecs" in "24 parsecs": expected a duration such as "8ms", "1.5s" or "250us" (units: ns, us, ms, s, min, h)
@@ -84,23 +85,28 @@ fn unreadable(path: &Path, source: &io::Error, place: Option<&Diagnostic>) -> St
 /// ```
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Diagnostic {
+    /// File or override that contains the fault.
     pub(crate) origin: Origin,
+    /// Line of the fault as shown, with line number and column.
     pub(crate) excerpt: Excerpt,
+    /// Dotted path of the key, or an empty text.
     pub(crate) key: String,
+    /// The fault and the expected text.
     pub(crate) message: String,
+    /// Where the document names the file with the fault. `None` for a fault in the document itself or in an override.
     pub(crate) note: Option<String>,
 }
 
-/// What the text comes from.
+/// Origin of a text.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Origin {
     File(PathBuf),
-    /// An override, as given.
+    /// An override `KEY=VALUE`, as given.
     Override(String),
 }
 
 impl Diagnostic {
-    /// The file in which the fault is; `None` if it is in an override.
+    /// Returns the path of the file with the fault, or `None` if the fault is in an override.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         match &self.origin {
@@ -109,7 +115,7 @@ impl Diagnostic {
         }
     }
 
-    /// The `KEY=VALUE` text in which the fault is; `None` if it is in a file.
+    /// Returns the `KEY=VALUE` text with the fault, or `None` if the fault is in a file.
     #[must_use]
     pub fn override_text(&self) -> Option<&str> {
         match &self.origin {
@@ -118,31 +124,31 @@ impl Diagnostic {
         }
     }
 
-    /// The line, from 1.
+    /// Returns the line of the fault, counted from 1.
     #[must_use]
     pub const fn line(&self) -> usize {
         self.excerpt.line
     }
 
-    /// The column, from 1, in characters.
+    /// Returns the column of the fault \[characters\], counted from 1.
     #[must_use]
     pub const fn column(&self) -> usize {
         self.excerpt.column
     }
 
-    /// The dotted path of the key, such as `peers.left.device.mass`; empty if the text could not be read that far.
+    /// Returns the dotted path of the key, such as `peers.left.device.mass`. Empty if the fault belongs to no key, or if the key could not be read.
     #[must_use]
     pub fn key(&self) -> &str {
         &self.key
     }
 
-    /// The fault, and what was expected.
+    /// Returns the message: the fault and the expected text.
     #[must_use]
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// The line as it is shown: control characters escaped, cut around the place if it is very long.
+    /// Returns the line with the fault as shown: control characters are escaped, and a very long line is cut around the fault.
     #[must_use]
     pub fn shown_line(&self) -> &str {
         &self.excerpt.shown
@@ -167,18 +173,18 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// A text as it is shown.
+/// Escapes the control characters of a text.
 pub(super) fn escape(text: &str) -> String {
     Visible(text).to_string()
 }
 
-/// A text of the document within a message: in quotes, and not longer than anyone wants to read.
+/// Quotes a text of the document for a message, cut to 80 characters.
 #[must_use]
 pub fn quote(text: &str) -> String {
     format!("\"{}\"", shorten(text))
 }
 
-/// The beginning of a text that is too long for a message.
+/// Cuts a text to 80 characters and an ellipsis. A shorter text stays as it is.
 #[must_use]
 pub fn shorten(text: &str) -> String {
     const LONGEST: usize = 80;

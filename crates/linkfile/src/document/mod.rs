@@ -1,4 +1,4 @@
-//! The text of a file as a tree of values, each with its place, and the faults that point at places.
+//! Document: the text of a file as a tree of values with places, and diagnostics that point at places.
 
 mod error;
 mod source;

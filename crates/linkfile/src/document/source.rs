@@ -1,4 +1,4 @@
-//! The texts that make a document, and places in them.
+//! Source texts of a document (the file and the overrides), and places in these texts.
 
 use core::ops::Range;
 use std::path::Path;
@@ -7,47 +7,47 @@ use cohaptic_units::Excerpt;
 
 use super::error::{Diagnostic, Origin, shorten};
 
-/// A span of bytes in one of the texts. The order is that in which they are read: the file from its beginning, then the overrides.
+/// Span of bytes in one source text. Places are ordered as the texts are read: the file from its beginning, then the overrides.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Place {
-    /// 0 for the file, i for the i-th override.
+    /// Source text: 0 for the file, i for the i-th override, counted from 1.
     pub source: usize,
-    /// The first byte.
+    /// Index of the first byte.
     pub start: usize,
-    /// The first byte behind it.
+    /// Index after the last byte.
     pub end: usize,
 }
 
 impl Place {
-    /// A span of bytes in the source with that number.
+    /// Returns the place of a span of bytes in the source with the number `source`.
     #[must_use]
     pub const fn new(source: usize, span: Range<usize>) -> Self {
         Self { source, start: span.start, end: span.end }
     }
 }
 
-/// The beginning of the file: where something is that is nowhere.
+/// Beginning of the file: the place of values and faults that are written nowhere, such as defaults.
 pub const BEGINNING: Place = Place::new(0, 0..0);
 
-/// The file and the overrides.
+/// Source texts of a document: the file and the overrides.
 #[derive(Clone, Copy, Debug)]
 pub struct Sources<'a> {
-    /// The path that stands in messages; files that the document names are looked for in its folder.
+    /// Path of the file for messages. The folder of the path is the base of files named in the document.
     pub file: &'a Path,
-    /// The text of the file.
+    /// Text of the file.
     pub text: &'a str,
-    /// Texts `KEY=VALUE`, in the order in which they are applied.
+    /// Override texts `KEY=VALUE`, in the order of application.
     pub overrides: &'a [String],
 }
 
 impl Sources<'_> {
-    /// The text in which a place lies.
+    /// Returns the source text that contains a place.
     #[must_use]
     pub fn text_of(&self, place: Place) -> &str {
         place.source.checked_sub(1).and_then(|index| self.overrides.get(index)).map_or(self.text, String::as_str)
     }
 
-    /// Says what is wrong at a place.
+    /// Returns a diagnostic for a place, with the dotted path of the key and the message.
     #[must_use]
     pub fn diagnostic(&self, place: Place, key: String, message: String) -> Diagnostic {
         let given = place.source.checked_sub(1).and_then(|index| self.overrides.get(index));
@@ -58,7 +58,7 @@ impl Sources<'_> {
         Diagnostic { origin, excerpt: Excerpt::new(text, place.start..place.end), key: shorten(&key), message, note: None }
     }
 
-    /// The place in words, for a note: `two.toml:6:9`.
+    /// Describes a place for a note: `two.toml:6:9` in the file, `--set KEY=VALUE` in an override.
     #[must_use]
     pub fn describe(&self, place: Place) -> String {
         let diagnostic = self.diagnostic(place, String::new(), String::new());

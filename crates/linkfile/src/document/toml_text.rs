@@ -4,7 +4,7 @@ use core::fmt::Write;
 
 use super::tree::{Node, Value};
 
-/// The value, such that reading it gives the same value.
+/// Writes a value as TOML on one line. Parsing the text gives the same value.
 #[must_use]
 pub fn value_text(node: &Node) -> String {
     let mut text = String::new();
@@ -12,7 +12,7 @@ pub fn value_text(node: &Node) -> String {
     text
 }
 
-/// A key: bare if it can be.
+/// Writes a key: bare if TOML allows a bare key, else quoted.
 #[must_use]
 pub fn key_text(key: &str) -> String {
     let is_bare = !key.is_empty() && key.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_'));
@@ -25,7 +25,7 @@ fn write_value(node: &Node, text: &mut String) {
         Value::Integer(Some(integer)) => text.push_str(&integer.to_string()),
         Value::Float(float) => text.push_str(float),
         Value::Boolean(boolean) => text.push_str(if *boolean { "true" } else { "false" }),
-        // No document that is taken has such a value; what stands here is refused as well.
+        // Every reader refuses such a value, so no accepted document contains one. The text "?" would be refused in the same places.
         Value::Integer(None) | Value::Date => text.push_str("\"?\""),
         Value::List(elements) => {
             text.push('[');
@@ -48,6 +48,7 @@ fn write_value(node: &Node, text: &mut String) {
     }
 }
 
+/// Writes a text as a basic string of TOML, with control characters escaped.
 fn quoted(value: &str) -> String {
     let mut text = String::from("\"");
     for c in value.chars() {

@@ -1,4 +1,4 @@
-//! The document as a tree of values, each with the place where it is written and the path of its key.
+//! Document as a tree of values. Each value has its place in the text and the dotted path of its key.
 
 use std::sync::Arc;
 
@@ -7,28 +7,28 @@ use toml::de::{DeTable, DeValue};
 use super::error::{quote, shorten};
 use super::source::{BEGINNING, Place};
 
-/// No file needs more; it keeps the walk over the tree from using up the stack.
+/// Maximum depth of a document in levels. The bound keeps the recursion over the tree from exhausting the stack.
 const DEEPEST: usize = 16;
 
-/// One value.
+/// Value with its place and the path of its key.
 #[derive(Clone, Debug)]
 pub struct Node {
-    /// The value itself.
+    /// Value without place and path.
     pub value: Value,
-    /// Where it is written; for a table its header.
+    /// Place of the value in the text; for a table with a header, the place of the header.
     pub place: Place,
-    /// The dotted path of its key.
+    /// Dotted path of the key.
     pub path: String,
 }
 
-/// A value. Numbers stay as they are written until it is known what they mean.
+/// Value of a document. Numbers stay texts or wide integers until a reader knows the type that the key takes.
 #[derive(Clone, Debug)]
 pub enum Value {
-    /// A text, without its quotes.
+    /// A text, without quotes and escapes.
     Text(String),
-    /// An integer; `None`: beyond 128 bits.
+    /// An integer, or `None` for an integer beyond 128 bits.
     Integer(Option<i128>),
-    /// A floating-point number.
+    /// A floating-point number as written.
     Float(String),
     /// `true` or `false`.
     Boolean(bool),
@@ -40,27 +40,27 @@ pub enum Value {
     Table(Table),
 }
 
-/// Keys and values, in the order in which they are written.
+/// Keys and values of a table, in the order in which they are written. Keys laid over another table come after the keys of that table.
 #[derive(Clone, Debug, Default)]
 pub struct Table(pub Vec<Entry>);
 
-/// A key and its value.
+/// Key and value of a table.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// The key.
+    /// Name of the key.
     pub name: String,
-    /// Where the key is written.
+    /// Place of the key in the text.
     pub key: Place,
-    /// The value.
+    /// Value of the key.
     pub node: Arc<Node>,
 }
 
-/// The document is nested too deeply at this place.
+/// Error: the document is nested too deeply at this place.
 #[derive(Clone, Copy, Debug)]
 pub struct TooDeep(pub Place);
 
 impl Node {
-    /// The root of a document.
+    /// Converts a parsed file into the root of a document.
     ///
     /// # Errors
     ///
@@ -70,7 +70,7 @@ impl Node {
         Ok(Self { value, place: BEGINNING, path: String::new() })
     }
 
-    /// A value in the source with that number, whose text begins at byte `offset` of it.
+    /// Converts a parsed value of the source text with the number `source`. The text of the value begins at byte `offset` of the source text.
     ///
     /// # Errors
     ///
@@ -103,7 +103,7 @@ impl Node {
         Ok(Self { value, place, path })
     }
 
-    /// The table, if it is one.
+    /// Returns the table, or `None` if the value is no table.
     #[must_use]
     pub fn as_table(&self) -> Option<&Table> {
         match &self.value {
@@ -112,7 +112,7 @@ impl Node {
         }
     }
 
-    /// The text, if it is one.
+    /// Returns the text, or `None` if the value is no text.
     #[must_use]
     pub fn as_text(&self) -> Option<&str> {
         match &self.value {
@@ -121,7 +121,7 @@ impl Node {
         }
     }
 
-    /// The value in words: `the text "8ms"`.
+    /// Describes the value for a message: `the text "8ms"`.
     #[must_use]
     pub fn describe(&self) -> String {
         match &self.value {
@@ -136,10 +136,12 @@ impl Node {
         }
     }
 
-    /// This table laid over another one, key by key; tables under the keys `nested` are laid over each other in the same way.
+    /// Lays this table over the table `base`, key by key. Tables under the keys `nested` are laid over each other in the same way. Returns a copy of this
+    /// value if one of both values is no table.
     #[must_use]
     pub fn over(&self, base: &Self, nested: &[&str]) -> Self {
         let (Some(own), Some(below)) = (self.as_table(), base.as_table()) else { return self.clone() };
+        // Own keys come last, because readers take the order of keys as the order in which they were laid over each other.
         let mut entries: Vec<Entry> = below.0.iter().filter(|entry| own.get(&entry.name).is_none()).cloned().collect();
         for entry in &own.0 {
             let mut entry = entry.clone();
@@ -153,7 +155,7 @@ impl Node {
         Self { value: Value::Table(Table(entries)), place: self.place, path: self.path.clone() }
     }
 
-    /// This table without those keys.
+    /// Returns a copy of this table without the keys `keys`.
     #[must_use]
     pub fn without(&self, keys: &[&str]) -> Self {
         let mut node = self.clone();
@@ -163,7 +165,7 @@ impl Node {
         node
     }
 
-    /// A table without keys.
+    /// Returns a table without keys.
     #[must_use]
     pub fn empty_table(place: Place, path: String) -> Self {
         Self { value: Value::Table(Table::default()), place, path }
@@ -179,17 +181,18 @@ impl Table {
             let key_place = Place::new(source, span.start + offset..span.end + offset);
             entries.push(Entry { name: key.get_ref().to_string(), key: key_place, node: Arc::new(node) });
         }
+        // The parser sorts keys by name. Messages and precedence need the order of the text.
         entries.sort_by_key(|entry| entry.key);
         Ok(Self(entries))
     }
 
-    /// The entry with that key.
+    /// Returns the entry with the key `name`.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Entry> {
         self.0.iter().find(|entry| entry.name == name)
     }
 
-    /// The value under a key, made if it is not there.
+    /// Returns the value under a key. A missing value is made by `make` and added last, with the key at the place `key`.
     pub fn get_or_insert(&mut self, name: &str, key: Place, make: impl FnOnce() -> Node) -> &mut Node {
         let index = self.0.iter().position(|entry| entry.name == name).unwrap_or_else(|| {
             self.0.push(Entry { name: name.to_owned(), key, node: Arc::new(make()) });
@@ -198,14 +201,15 @@ impl Table {
         Arc::make_mut(&mut self.0[index].node)
     }
 
-    /// Sets the value under a key.
+    /// Sets the value under a key. The key moves to the end of the table, because it is laid over all others.
     pub fn insert(&mut self, name: &str, key: Place, node: Node) {
         self.0.retain(|entry| entry.name != name);
         self.0.push(Entry { name: name.to_owned(), key, node: Arc::new(node) });
     }
 }
 
-/// How an element of a list is called in a path: peers, programs, modulators and their states by name, links by both ends, others by their place from 0.
+/// Returns the name of a list element in a path: peers, programs, modulators and their states by name, links by both ends, all other elements by their index
+/// from 0.
 fn element_name(list: &str, index: usize, element: &DeValue<'_>) -> String {
     let text = |key: &str| element.as_table().and_then(|table| table.get(key)).and_then(|value| value.get_ref().as_str());
     match list {
@@ -217,7 +221,7 @@ fn element_name(list: &str, index: usize, element: &DeValue<'_>) -> String {
     .unwrap_or_else(|| index.to_string())
 }
 
-/// The path of a key in a table.
+/// Joins the dotted path of a table and a key.
 #[must_use]
 pub fn join(path: &str, key: &str) -> String {
     if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
