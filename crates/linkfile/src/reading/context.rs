@@ -1,4 +1,4 @@
-//! The state of a reader: the texts, the names that are known so far, and the faults.
+//! Context of readers: the source texts, the names known so far, the files read so far, and the faults.
 
 use core::any::Any;
 use core::cell::RefCell;
@@ -16,12 +16,12 @@ use super::names::Names;
 use crate::document::{Diagnostic, FileError, Node, Place, Sources};
 use crate::fingerprint::Fingerprint;
 
-/// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier. Keys that are
-/// missing come last: of a file with `mas = 0.45` and without a `[coordination]` the wrong key is told first.
+/// First reported fault in the order of the texts. Readers go on after a fault, because a later reader can find a fault that stands earlier in the text.
+/// Missing keys come last: of a file with `mas = 0.45` and without a `[coordination]`, the wrong key is reported.
 #[derive(Debug, Default)]
 pub(crate) struct Faults(RefCell<Option<((Kind, Place), FileError)>>);
 
-/// The kind of a fault, in the order in which faults are told: something is wrong, or missing.
+/// Kind of a fault. Wrong values and keys are reported before missing keys.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Kind {
     Wrong,
@@ -29,7 +29,7 @@ enum Kind {
 }
 
 impl Faults {
-    /// Keeps the fault if none stands before it. Of several at one place the first one reported stays.
+    /// Keeps the fault unless a kept fault stands before it. Of several faults at one place, the first reported fault is kept.
     fn report(&self, place: Place, error: impl FnOnce() -> FileError) {
         self.report_kind((Kind::Wrong, place), error);
     }
@@ -41,23 +41,23 @@ impl Faults {
         }
     }
 
-    /// The fault that stands first, if there is one.
+    /// Returns the fault that stands first, or `None` if no fault was reported.
     pub(super) fn into_first(self) -> Option<FileError> {
         self.0.into_inner().map(|(_, error)| error)
     }
 }
 
-/// The modulators of a file by name, each with the names of its states.
+/// Modulators of a file by name, each with the names of its states.
 pub type Modulators = BTreeMap<String, (Modulator, Vec<String>)>;
 
-/// The way in which the files are read that a document names: a function from a path to the bytes of the file.
+/// Reader of the files named in a document: a function from a path to the bytes of the file.
 ///
-/// A program that takes documents from strangers decides here which of their files it opens, and how.
+/// A program that takes documents from strangers decides in this function which files may be opened, and how.
 #[derive(Clone, Copy)]
 pub struct FileReader<'a>(pub &'a dyn Fn(&Path) -> io::Result<Vec<u8>>);
 
 impl FileReader<'_> {
-    /// Opens any file, as a program does for its own user: [`cohaptic_files::read_bytes`].
+    /// Opens any file, for a program whose user wrote the document: [`cohaptic_files::read_bytes`].
     pub const ANY: Self = FileReader(&cohaptic_files::read_bytes);
 }
 
@@ -67,74 +67,74 @@ impl fmt::Debug for FileReader<'_> {
     }
 }
 
-/// The state of a reader, which the readers of parts are given.
+/// Context of a reader, passed on to the readers of the parts.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
-    /// The file and the overrides.
+    /// Source texts: the file and the overrides.
     pub sources: Sources<'a>,
-    /// Where faults are reported.
+    /// Collector of faults.
     pub(crate) faults: &'a Faults,
-    /// The contents of the files that the document names.
+    /// Files named in the document, as far as they have been read.
     pub(crate) files: &'a Files,
-    /// How these files are read.
+    /// Reader of the bytes of these files.
     pub(crate) reader: FileReader<'a>,
-    /// The names of the ends of links. `None`: not known, because the list was refused.
+    /// Names of the ends of links. `None` before the list is read, and if the list was refused.
     pub names: Option<&'a Names>,
-    /// `None`: not known, because the list was refused.
+    /// Modulators of the file. `None` before the list is read, and if the list was refused.
     pub modulators: Option<&'a Arc<Modulators>>,
-    /// Whether a table is read without the table below it: then no key is missing.
+    /// Whether a table is read without the table that it will be laid over. No key is reported as missing then.
     pub partial: bool,
-    /// Time from the start of the run to its end. `None`: not known, because the run ends when somebody ends it, or because the time was refused.
+    /// Time from the start of the run to its end. `None` if the run has no fixed end, or if the time was refused.
     pub ends: Option<Duration>,
 }
 
 impl<'a> Context<'a> {
-    /// This state with the names of the ends.
+    /// Returns this context with the names of the ends of links.
     #[must_use]
     pub const fn with_names(self, names: Option<&'a Names>) -> Self {
         Self { names, ..self }
     }
 
-    /// This state with the modulators of the file.
+    /// Returns this context with the modulators of the file.
     #[must_use]
     pub const fn with_modulators(self, modulators: Option<&'a Arc<Modulators>>) -> Self {
         Self { modulators, ..self }
     }
 
-    /// This state with the end of the run.
+    /// Returns this context with the time at which the run ends.
     #[must_use]
     pub const fn with_end(self, ends: Option<Duration>) -> Self {
         Self { ends, ..self }
     }
 
-    /// This state for a table that is read without the table below it.
+    /// Returns this context for a table that is read without the table that it will be laid over.
     #[must_use]
     pub const fn of_part(self) -> Self {
         Self { partial: true, ..self }
     }
 
-    /// Reports what is wrong at a place.
+    /// Reports a fault at a place, with the dotted path of the key.
     pub fn fault(&self, place: Place, key: &str, message: impl Into<String>) {
         self.faults.report(place, || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), message.into()))));
     }
 
-    /// Reports that something is missing at a place.
+    /// Reports a missing key in the table at a place.
     pub(super) fn missing(&self, place: Place, key: &str, message: String) {
         let error = || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), message)));
         self.faults.report_kind((Kind::Missing, place), error);
     }
 
-    /// Reports what is wrong with a value.
+    /// Reports a fault of a value.
     pub fn fault_at(&self, node: &Node, message: impl Into<String>) {
         self.fault(node.place, &node.path, message);
     }
 
-    /// Reports what is wrong with a value, with a message that is made only if it is kept: one that lists the names of all peers takes long.
+    /// Reports a fault of a value. The message is made only if the fault is kept, because a message with the names of all peers is long.
     pub fn fault_with(&self, node: &Node, message: impl FnOnce() -> String) {
         self.faults.report(node.place, || FileError::Invalid(Box::new(self.sources.diagnostic(node.place, node.path.clone(), message()))));
     }
 
-    /// Reports that the file which `node` names cannot be read.
+    /// Reports that the file named by `node` cannot be read.
     pub(super) fn unreadable(&self, node: &Node, path: PathBuf, source: io::Error) {
         let message = format!("cannot read {}: {source}: expected a file, relative to the folder of the scene", path.display());
         self.faults.report(node.place, || {
@@ -143,25 +143,26 @@ impl<'a> Context<'a> {
         });
     }
 
-    /// Reports a fault in the file that `node` names.
+    /// Reports a fault in the file named by `node`. A note gives the place of `node`.
     pub(super) fn fault_in_file(&self, node: &Node, diagnostic: Diagnostic) {
         let note = format!("this file is named at {}, by the key {}", self.sources.describe(node.place), node.path);
         self.faults.report(node.place, || FileError::Invalid(Box::new(Diagnostic { note: Some(note), ..diagnostic })));
     }
 }
 
-/// What has been learnt from files, by path and by what they were read as: each is read once. `None`: it was refused.
+/// Files named in a document. A file is read once for each form in which the document uses it.
 #[derive(Debug, Default)]
 pub(crate) struct Files {
+    /// Parsed content, by path and by form. `None` if the file was refused: the fault has been reported, and is not reported twice.
     pub(super) known: RefCell<BTreeMap<(PathBuf, String), Known>>,
-    /// What was in each file that could be read.
+    /// Fingerprint of the bytes of each readable file, by path.
     pub(super) held: RefCell<BTreeMap<PathBuf, Fingerprint>>,
 }
 
 pub(super) type Known = Option<Rc<dyn Any>>;
 
 impl Files {
-    /// What was in each file that could be read.
+    /// Returns the fingerprint of each readable file, by path.
     pub(super) fn into_held(self) -> BTreeMap<PathBuf, Fingerprint> {
         self.held.into_inner()
     }

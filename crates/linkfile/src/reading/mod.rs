@@ -1,7 +1,7 @@
-//! How a document is read: key by key, with every fault reported where it stands.
+//! Readers of documents: values are read key by key, and every fault is reported at its place.
 //!
-//! A reader is a function from a [`Node`](crate::document::Node) and a [`Context`] to an `Option`. It answers `None` exactly where it has reported a
-//! fault, and it goes on after a fault, so that of several faults the one that stands first in the text is found.
+//! A reader is a function from a [`Node`](crate::document::Node) and a [`Context`] to an `Option`. A reader returns `None` exactly if it has reported a
+//! fault, and goes on after a fault, so that of several faults the fault that stands first in the text is found.
 
 mod context;
 pub mod named_file;

@@ -1,4 +1,4 @@
-//! Files that a document names: found, read once, and refused with the line at fault.
+//! Files named in a document: a file is looked for beside the document, read once, and refused with the faulty line.
 
 use core::any::Any;
 use core::ops::Range;
@@ -12,17 +12,18 @@ use super::values;
 use crate::document::{Diagnostic, Node, Origin};
 use crate::fingerprint::Fingerprint;
 
-/// A fault in the text of a file, and its place.
+/// Fault in the text of a file, with its place.
 #[derive(Debug)]
 pub struct Fault {
-    /// The bytes of the text that are meant.
+    /// Faulty bytes of the text.
     pub span: Range<usize>,
-    /// The fault, and what was expected.
+    /// Message: the fault and the expected text.
     pub message: String,
 }
 
 impl Fault {
-    /// A fault in a line, counted from 1; without a line, at the beginning. What a message says of the line itself is taken away: it is shown.
+    /// Returns a fault in a line, counted from 1, or at the beginning of the text without a line. A prefix such as "line 2: " is removed from the message,
+    /// because the display form shows the line.
     #[must_use]
     pub fn in_line(text: &str, line: Option<usize>, error: &dyn core::fmt::Display) -> Self {
         let message = error.to_string();
@@ -35,17 +36,17 @@ impl Fault {
     }
 }
 
-/// The bytes of a line, counted from 1, without the space around its content.
+/// Returns the bytes of a line, counted from 1, without the space around the content. A line after the last one is the empty span at the end of the text.
 #[must_use]
 pub fn line_span(text: &str, line: usize) -> Range<usize> {
     let Some(found) = text.lines().nth(line.saturating_sub(1)) else { return text.len()..text.len() };
-    // The line borrows from the text: where it begins is how much of the text lies before it.
+    // `lines` leaves out line breaks of one or two bytes. `split_inclusive` keeps the breaks, so that its pieces sum up to the start of the line.
     let start = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum::<usize>();
     let indent = found.len() - found.trim_start().len();
     start + indent..start + indent + found.trim().len()
 }
 
-/// The path that `node` gives, relative to the folder of the document.
+/// Returns the path of the file named by `node`, joined to the folder of the document. An empty name is a fault.
 pub fn file_path(node: &Node, context: Context<'_>, expected: &str) -> Option<PathBuf> {
     let name = values::text(node, context, expected)?;
     if name.is_empty() {
@@ -55,13 +56,14 @@ pub fn file_path(node: &Node, context: Context<'_>, expected: &str) -> Option<Pa
     Some(beside_document(context, name))
 }
 
-/// A file in the folder of the document, or relative to it.
+/// Joins the name of a file to the folder of the document. An absolute name stays as it is.
 #[must_use]
 pub fn beside_document(context: Context<'_>, name: &str) -> PathBuf {
     context.sources.file.parent().unwrap_or_else(|| Path::new("")).join(name)
 }
 
-/// Reads a file that `node` names. `form`: what it is read as, with everything that `parse` depends on.
+/// Reads and parses the file named by `node`, or returns the result of an earlier call with the same path and form. `form` names the format and every value
+/// that `parse` depends on. Returns `None` if the file was refused.
 pub fn read_file<T: Clone + 'static>(
     node: &Node,
     context: Context<'_>,
@@ -73,6 +75,7 @@ pub fn read_file<T: Clone + 'static>(
     if let Some(known) = context.files.known.borrow().get(&key) {
         return known.as_ref().and_then(|known| known.downcast_ref()).cloned();
     }
+    // A refused file is remembered too, so that its fault is not made again for every link that names the file.
     let read = load(node, context, path).and_then(|text| {
         let refused = |Fault { span, message }: Fault| refuse(node, context, path, &text, span, message);
         parse(&text).map_err(refused).ok()
@@ -81,6 +84,7 @@ pub fn read_file<T: Clone + 'static>(
     read
 }
 
+/// Reads the bytes of a file as UTF-8, and records their fingerprint.
 fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
     let bytes = (context.reader.0)(path).map_err(|error| context.unreadable(node, path.to_path_buf(), error)).ok()?;
     context.files.held.borrow_mut().insert(path.to_path_buf(), Fingerprint::of_bytes(&bytes));
@@ -88,7 +92,7 @@ fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
         Ok(text) => Some(text),
         Err(error) => {
             let at = error.utf8_error().valid_up_to();
-            // Before the place, the text with replacements is the text itself.
+            // The lossy text equals the file up to the first faulty byte, so line and column of the fault are those of the file.
             let text = String::from_utf8_lossy(error.as_bytes());
             refuse(node, context, path, &text, at..at + 1, "not UTF-8: expected a text file".to_owned());
             None
@@ -96,6 +100,7 @@ fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
     }
 }
 
+/// Reports a fault in a named file. A message that names no expected text gets a general one.
 fn refuse(node: &Node, context: Context<'_>, path: &Path, text: &str, span: Range<usize>, message: String) {
     let message = if message.contains("expected") { message } else { format!("{message}: expected another value") };
     let origin = Origin::File(path.to_path_buf());

@@ -1,30 +1,32 @@
-//! The names of the ends of links, and help for names that are misspelt.
+//! Names of the ends of links, and suggestions for misspelt names.
 
 use std::collections::BTreeMap;
 
-/// The names of peers or programs, in the order of the file.
+/// Distinct names of peers or programs, in the order of the file.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
+    /// Names, indexed by peer or program.
     ordered: Vec<String>,
+    /// Index of each name in `ordered`.
     places: BTreeMap<String, usize>,
-    /// The noun for one of them; `None`: peer.
+    /// Noun for an end of a link in messages. `None` stands for "peer".
     noun: Option<&'static str>,
 }
 
 impl Names {
-    /// No names yet, of ends that messages call `noun`; [`Names::default`] is for peers.
+    /// Returns an empty list of names for ends that messages call `noun`. [`Names::default`] is an empty list for peers.
     #[must_use]
     pub fn of(noun: &'static str) -> Self {
         Self { noun: Some(noun), ..Self::default() }
     }
 
-    /// The noun for one of them in messages: `peer`.
+    /// Returns the noun for an end of a link in messages, such as `peer`.
     #[must_use]
     pub fn noun(&self) -> &'static str {
         self.noun.unwrap_or("peer")
     }
 
-    /// Takes one more; `false` if it is there already.
+    /// Adds a name. Returns `false`, and adds nothing, if the list contains the name.
     pub fn push(&mut self, name: &str) -> bool {
         if self.places.contains_key(name) {
             return false;
@@ -34,27 +36,27 @@ impl Names {
         true
     }
 
-    /// The number of names.
+    /// Returns the number of names.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "nothing asks for it")]
     pub fn len(&self) -> usize {
         self.ordered.len()
     }
 
-    /// The place of a name, from 0.
+    /// Returns the index of a name, counted from 0.
     #[must_use]
     pub fn index(&self, name: &str) -> Option<usize> {
         self.places.get(name).copied()
     }
 
-    /// The names in order.
+    /// Returns the names in the order of the file.
     #[must_use]
     pub fn as_slice(&self) -> &[String] {
         &self.ordered
     }
 }
 
-/// Says which words would have been right, and which one was perhaps meant: `one of delay, jitter; did you mean "delay"?`
+/// Lists the expected words for a message, at most 32 of them, and suggests the word nearest to `given`: `one of delay, jitter; did you mean "delay"?`
 #[must_use]
 pub fn one_of<'a>(words: impl IntoIterator<Item = &'a str>, given: &str) -> String {
     const MOST: usize = 32;
@@ -73,20 +75,22 @@ pub fn one_of<'a>(words: impl IntoIterator<Item = &'a str>, given: &str) -> Stri
     text
 }
 
-/// The word that few slips of the finger turn into `given`.
+/// Returns the word with the fewest typing errors to `given`, or `None` if no word is near or if `given` is longer than 40 characters.
 fn nearest<'a>(words: &[&'a str], given: &str) -> Option<&'a str> {
+    // At most 41 characters are read, because a long text is compared with no word.
     let given: Vec<char> = given.chars().take(41).collect();
     if given.len() > 40 {
         return None;
     }
     let slips = |word: &str| distance(&word.chars().collect::<Vec<_>>(), &given);
     let (least, word) = words.iter().map(|word| (slips(word), *word)).min_by_key(|(slips, _)| *slips)?;
-    // A third of the word may be wrong: "dlay" is near "delay", "xy" is near nothing.
+    // One to three errors, at most a third of the word: "dlay" is near "delay", "xy" is near nothing. Distance 0 means that the word itself was given.
     (least > 0 && least <= (given.len().max(word.chars().count()) / 3).clamp(1, 3) && least < given.len()).then_some(word)
 }
 
-/// How many letters must be put in, left out, replaced or swapped with their neighbour (optimal string alignment).
+/// Returns the edit distance: insertions, deletions, replacements and swaps of neighbouring letters (optimal string alignment).
 fn distance(a: &[char], b: &[char]) -> usize {
+    // Rows of the matrix of distances between prefixes. A swap looks two rows back, so three rows are kept.
     let mut before_last: Vec<usize> = Vec::new();
     let mut last: Vec<usize> = (0..=b.len()).collect();
     for i in 1..=a.len() {

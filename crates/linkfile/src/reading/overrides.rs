@@ -1,4 +1,4 @@
-//! `--set KEY=VALUE`: values put into the document before it is read.
+//! Overrides `--set KEY=VALUE`: values put into the document before the document is read.
 
 use core::ops::Range;
 use std::sync::Arc;
@@ -9,9 +9,10 @@ use super::context::Context;
 use super::names::one_of;
 use crate::document::{Entry, Node, Place, Table, Value, join, quote};
 
-/// Puts every override into the document, one after the other. One that cannot be put anywhere is a fault.
+/// Applies every override to the document in order. An override that fits nowhere is a fault.
 pub(super) fn apply(document: &mut Node, overrides: &[String], context: Context<'_>) {
     for (index, text) in overrides.iter().enumerate() {
+        // Source 0 is the file.
         let source = index + 1;
         if let Err(Refused { span, key, message }) = apply_one(document, text, source) {
             context.fault(Place::new(source, span), &key, message);
@@ -19,20 +20,21 @@ pub(super) fn apply(document: &mut Node, overrides: &[String], context: Context<
     }
 }
 
-/// Why an override cannot be put anywhere.
+/// Fault of an override: faulty bytes of its text, dotted path of the key, and message.
 struct Refused {
     span: Range<usize>,
     key: String,
     message: String,
 }
 
-/// One part of a dotted path.
+/// Part of a dotted path, with its place in the override.
 #[derive(Clone, Debug)]
 struct Segment<'a> {
     name: &'a str,
     place: Place,
 }
 
+/// Applies one override, whose text has the source number `source`.
 fn apply_one(document: &mut Node, text: &str, source: usize) -> Result<(), Refused> {
     let Some(equals) = text.find('=') else {
         return Err(Refused { span: 0..text.len(), key: String::new(), message: "no = in the override: expected KEY=VALUE".to_owned() });
@@ -44,8 +46,9 @@ fn apply_one(document: &mut Node, text: &str, source: usize) -> Result<(), Refus
     put(document, &segments, value, &Insertion { path: String::new(), counted })
 }
 
+/// Splits a dotted path at its dots. Quotes around a part are removed; a dot inside quotes still splits.
 fn split_path(text: &str, source: usize) -> Result<Vec<Segment<'_>>, Refused> {
-    // Deeper than any key, and shallow enough for a walk that calls itself.
+    // More parts than the path of any key has, and few enough for the recursion of `put`.
     const MOST: usize = 12;
     let mut segments = Vec::new();
     let mut start = 0;
@@ -63,7 +66,7 @@ fn split_path(text: &str, source: usize) -> Result<Vec<Segment<'_>>, Refused> {
     Ok(segments)
 }
 
-/// The value as TOML or, where it is none, as the text that it is: `8ms` needs no quotes.
+/// Reads the value after the equals sign as TOML. A value that is no TOML is taken as a text, so that `8ms` needs no quotes.
 fn read_value(text: &str, start: usize, path: &str, source: usize) -> Result<Node, Refused> {
     let written = &text[start..];
     let trimmed = written.trim();
@@ -79,19 +82,21 @@ fn read_value(text: &str, start: usize, path: &str, source: usize) -> Result<Nod
     }
 }
 
-/// Whether the scene makes its peers by number, so that one without an entry can be addressed.
+/// Returns whether the scene makes its peers by `count`. An override may then name a peer without an entry.
 fn has_count(document: &Node) -> bool {
     let scene = document.as_table().and_then(|table| table.get("scene"));
     scene.and_then(|entry| entry.node.as_table()).is_some_and(|table| table.get("count").is_some())
 }
 
-/// How far a value has been taken on its way down.
+/// State of the descent from the root to the key of an override.
 struct Insertion {
-    /// The path of the node that has been reached.
+    /// Dotted path of the current node.
     path: String,
+    /// Whether the scene makes its peers by `count`.
     counted: bool,
 }
 
+/// Puts a value under the path `segments` of a node. Missing tables and lists on the path are made.
 fn put(node: &mut Node, segments: &[Segment<'_>], value: Node, way: &Insertion) -> Result<(), Refused> {
     let [first, rest @ ..] = segments else {
         *node = value;
@@ -106,6 +111,7 @@ fn put(node: &mut Node, segments: &[Segment<'_>], value: Node, way: &Insertion) 
             Ok(())
         }
         Value::Table(table) => {
+            // These keys of the root hold lists of entries. A missing list becomes an empty list, so that the next part of the path addresses an entry.
             let list = way.path.is_empty() && matches!(first.name, "peers" | "links" | "modulators" | "timeline");
             let make = || {
                 let value = if list { Value::List(Vec::new()) } else { Value::Table(Table::default()) };
@@ -125,7 +131,7 @@ fn put(node: &mut Node, segments: &[Segment<'_>], value: Node, way: &Insertion) 
     }
 }
 
-/// `peers.left.…`: the entry of that name; with `count`, made if there is none.
+/// Puts a value under `peers.left.…`: into the entry with the name, or else with the index. With `count`, a missing entry is made.
 fn put_into_peer(peers: &mut Vec<Arc<Node>>, name: &Segment<'_>, rest: &[Segment<'_>], value: Node, counted: bool) -> Result<(), Refused> {
     let found = peers.iter().position(|entry| text_of(entry, "name") == Some(name.name));
     let by_index = || name.name.parse::<usize>().ok().filter(|index| *index < peers.len());
@@ -144,7 +150,7 @@ fn put_into_peer(peers: &mut Vec<Arc<Node>>, name: &Segment<'_>, rest: &[Segment
     put_into_entry(&mut peers[index], rest, value, &["name"])
 }
 
-/// `links.left.right.…`: the entry with these ends, made if there is none.
+/// Puts a value under `links.left.right.…`: into the entry with both ends, or else with the index in `links.0.…`. A missing entry is made.
 fn put_into_link(links: &mut Vec<Arc<Node>>, from: &Segment<'_>, rest: &[Segment<'_>], value: Node) -> Result<(), Refused> {
     let by_index = from.name.parse::<usize>().ok().filter(|index| *index < links.len());
     let Some((to, rest)) = rest.split_first() else {
@@ -154,6 +160,7 @@ fn put_into_link(links: &mut Vec<Arc<Node>>, from: &Segment<'_>, rest: &[Segment
     let found = links.iter().position(|entry| text_of(entry, "from") == Some(from.name) && text_of(entry, "to") == Some(to.name));
     match (found, by_index) {
         (Some(index), _) => put_into_entry(&mut links[index], rest, value, &["from", "to"]),
+        // `links.0.delay`: the second part of the path is a key of the entry, and not an end.
         (None, Some(index)) => {
             let way = Insertion { path: join("links", from.name), counted: false };
             let segments: Vec<Segment<'_>> = core::iter::once(to.clone()).chain(rest.iter().cloned()).collect();
@@ -168,7 +175,7 @@ fn put_into_link(links: &mut Vec<Arc<Node>>, from: &Segment<'_>, rest: &[Segment
     }
 }
 
-/// Puts a value under an entry. One that replaces the entry keeps what the entry is addressed by.
+/// Puts a value under an entry. A table that replaces the whole entry keeps the keys `address`, which identify the entry.
 fn put_into_entry(entry: &mut Arc<Node>, rest: &[Segment<'_>], mut value: Node, address: &[&str]) -> Result<(), Refused> {
     let entry = Arc::make_mut(entry);
     if rest.is_empty()
@@ -184,7 +191,7 @@ fn put_into_entry(entry: &mut Arc<Node>, rest: &[Segment<'_>], mut value: Node, 
     put(entry, rest, value, &way)
 }
 
-/// `timeline.0.…`, `modulators.cell.states.good.…`: an element by its place, or by its name if it has one.
+/// Returns the element of a list for `timeline.0.…` or `modulators.cell.states.good.…`, by its name or else by its index from 0.
 fn element<'a>(elements: &'a mut [Arc<Node>], index: &Segment<'_>, path: &str) -> Result<&'a mut Node, Refused> {
     let count = elements.len();
     let named = elements.iter().position(|entry| text_of(entry, "name") == Some(index.name));
@@ -195,7 +202,7 @@ fn element<'a>(elements: &'a mut [Arc<Node>], index: &Segment<'_>, path: &str) -
     })
 }
 
-/// A new entry that is addressed by those keys.
+/// Returns a new entry with the keys `address`, which identify the entry.
 fn entry_named(first: &Segment<'_>, list: &str, address: &[(&str, &Segment<'_>)]) -> Node {
     let path = address.iter().fold(list.to_owned(), |path, (_, segment)| join(&path, segment.name));
     let entries = address.iter().map(|(key, segment)| {
@@ -205,6 +212,7 @@ fn entry_named(first: &Segment<'_>, list: &str, address: &[(&str, &Segment<'_>)]
     Node { value: Value::Table(Table(entries.collect())), place: first.place, path: path.clone() }
 }
 
+/// Returns the text under a key of an entry.
 fn text_of<'a>(entry: &'a Node, key: &str) -> Option<&'a str> {
     entry.as_table().and_then(|table| table.get(key)).and_then(|entry| entry.node.as_text())
 }

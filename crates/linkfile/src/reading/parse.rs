@@ -1,4 +1,4 @@
-//! From files and texts to documents, and to what a reader makes of them.
+//! Parsing: from a file or a text to a document, and from the document to the answer of a reader.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -14,11 +14,11 @@ use crate::fingerprint::Fingerprint;
 
 const TOO_DEEP: &str = "nested too deeply: expected at most 16 levels";
 
-/// Reads the text of a file, and hands it to `read`.
+/// Reads the text of a file, and passes the text to `read`.
 ///
 /// # Errors
 ///
-/// As [`file_text`], and those of `read`.
+/// The errors of [`file_text`] and of `read`.
 pub fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, FileError>) -> Result<T, FileError> {
     let bytes = cohaptic_files::read_bytes_up_to(path, MOST_TOML_BYTES).map_err(|source| FileError::Read {
         path: path.to_path_buf(),
@@ -28,16 +28,16 @@ pub fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, FileError>
     text_of(path, &bytes).and_then(read)
 }
 
-/// The text of a file that is to be read as a scene, a relay file or a router file.
+/// Reads the text of a scene file, a relay file or a router file.
 ///
 /// # Errors
 ///
-/// [`FileError::Read`] if it cannot be read, [`FileError::Invalid`] if it is no text.
+/// [`FileError::Read`] if the file cannot be read or is too long, [`FileError::Invalid`] if the bytes are not UTF-8.
 pub fn file_text(path: &Path) -> Result<String, FileError> {
     with_text(path, |text| Ok(text.to_owned()))
 }
 
-/// The text that the content of a file is. `file` stands in messages.
+/// Returns the bytes of a file as a text. `file` is the path for messages.
 ///
 /// # Errors
 ///
@@ -45,33 +45,34 @@ pub fn file_text(path: &Path) -> Result<String, FileError> {
 pub fn text_of<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, FileError> {
     core::str::from_utf8(bytes).map_err(|error| {
         let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
-        // Up to the place, the text with replacements is the text itself.
+        // The lossy text equals the file up to the first faulty byte, so line and column of the fault are those of the file.
         let sources = Sources { file, text: &String::from_utf8_lossy(bytes), overrides: &[] };
         invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned()))
     })
 }
 
-/// A document that a reader has taken.
+/// Document accepted by a reader.
 #[derive(Debug)]
 pub struct Parsed<T> {
-    /// The reader's answer.
+    /// Answer of the reader.
     pub whole: T,
-    /// The tree of values, overrides included.
+    /// Tree of values with the overrides applied.
     pub document: Node,
-    /// A fingerprint of the content of each file that the document names.
+    /// Fingerprint of each file named in the document, by path.
     pub files: BTreeMap<PathBuf, Fingerprint>,
 }
 
-/// Parses a text, applies the overrides, and hands the tree to `read`, which answers `None` exactly if it has reported a fault.
+/// Parses a text, applies the overrides, and passes the tree to `read`, which must return `None` exactly if it has reported a fault.
 ///
 /// # Errors
 ///
-/// [`FileError`]: of several faults of the reader, the one that stands first in the text; faults in overrides come after those in the text.
+/// [`FileError`]. Of several faults of the reader, the fault that stands first in the text; faults in overrides come after faults in the text, and missing keys
+/// come last.
 pub fn parse<T>(sources: Sources<'_>, read: impl FnOnce(&Node, Context<'_>) -> Option<T>) -> Result<Parsed<T>, FileError> {
     parse_with(sources, FileReader::ANY, read)
 }
 
-/// [`parse`], with files that the document names read by `reader`.
+/// Like [`parse`], but `reader` reads the files named in the document.
 ///
 /// # Errors
 ///
@@ -90,12 +91,12 @@ pub fn parse_with<T>(
     match (faults.into_first(), whole) {
         (Some(error), _) => Err(error),
         (None, Some(whole)) => Ok(Parsed { whole, document, files: files.into_held() }),
-        // Not reached: a reader that answers nothing has reported why. An error all the same, because text must never be able to cause a panic.
+        // Not reached as long as every reader that returns `None` has reported a fault. An error instead of a panic, because no text may cause a panic.
         (None, None) => Err(invalid(sources.diagnostic(BEGINNING, String::new(), "the file is refused: expected another one".to_owned()))),
     }
 }
 
-/// What a reader makes of a table without keys: the declared default of each.
+/// Returns the answer of a reader to a table without keys, in which every key has its declared default.
 ///
 /// # Panics
 ///
@@ -104,7 +105,7 @@ pub fn defaults<T>(read: impl FnOnce(&Node, Context<'_>) -> Option<T>) -> T {
     parse(Sources { file: Path::new(""), text: "", overrides: &[] }, read).expect("every key has a default").whole
 }
 
-/// The name of the file without its ending.
+/// Returns the name of a file without its ending, or `scene` if the path has no name.
 #[must_use]
 pub fn default_title(file: &Path) -> String {
     file.file_stem().map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned())
@@ -114,9 +115,9 @@ fn invalid(diagnostic: Diagnostic) -> FileError {
     FileError::Invalid(Box::new(diagnostic))
 }
 
-/// The document as a tree. Of several faults of syntax, the first.
+/// Parses a text of TOML into a tree. Of several faults of syntax, the first is returned.
 fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, FileError> {
-    // A text that came from elsewhere than a file: before the parser, which takes fifty times its length of memory.
+    // `with_text` bounds the length of a file. A text from another source is checked here, before the parser uses many times its length in memory.
     if text.len() as u64 > MOST_TOML_BYTES {
         let message = format!("longer than {} MiB: expected a file of at most that", MOST_TOML_BYTES >> 20);
         return Err(invalid(sources.diagnostic(BEGINNING, String::new(), message)));
@@ -134,7 +135,7 @@ fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, FileError> {
     })
 }
 
-/// What the TOML parser says, with what was expected where it leaves that out.
+/// Returns the message of the TOML parser, with an expected text where the parser gives none.
 fn syntax_message(message: &str) -> String {
     match message {
         "duplicate key" => "this key or table is there already: expected it once".to_owned(),
@@ -144,10 +145,12 @@ fn syntax_message(message: &str) -> String {
     }
 }
 
-/// The key in whose line a fault of syntax stands, as far as it can be made out.
+/// Returns the dotted path of the key in the line with a fault of syntax: the latest table header and the text before the equals sign. Parts that cannot be
+/// recognised as keys are left out.
 fn key_at(text: &str, span: &Range<usize>) -> String {
     let is_key = |key: &&str| !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.'));
     let end = text.get(span.start..).and_then(|rest| rest.find('\n')).map_or(text.len(), |newline| span.start + newline);
+    // Backwards from the faulty line to the nearest header of a table.
     let mut lines = text.get(..end).unwrap_or(text).lines().rev().map(str::trim).peekable();
     let key = lines.peek().filter(|line| !line.starts_with('[')).and_then(|line| line.split_once('=')).map(|(key, _)| key.trim());
     let header = lines.find(|line| line.starts_with('['));

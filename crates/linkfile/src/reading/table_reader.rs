@@ -1,4 +1,4 @@
-//! Reads a table key by key as its declaration says, and notices keys that nobody asked for.
+//! Reader of tables: reads key by key as the declaration of the table says, and reports unknown and missing keys.
 
 use cohaptic_wan::ParameterValue;
 use cohaptic_wan::parameters::{Key, Need, Table as Declaration};
@@ -8,10 +8,10 @@ use super::names::one_of;
 use super::values;
 use crate::document::{BEGINNING, Entry, Node, Table, join};
 
-/// A table being read. [`TableReader::finish`] reports the keys that were not asked for and those that are missing.
+/// Table being read. [`TableReader::finish`] reports keys that no method was asked for, and missing keys.
 ///
-/// Names, forms, units, ranges and defaults stand in the [declaration](cohaptic_wan::parameters::Table) of the table, and nowhere else: [`value`](Self::value)
-/// reads a key as its form says, [`read`](Self::read) by a reader of its own. Both take the declared default where the key is not given.
+/// Names, forms, units, ranges and defaults stand only in the [declaration](cohaptic_wan::parameters::Table) of the table. [`value`](Self::value) reads a key
+/// by its declared form, [`read`](Self::read) by a given reader. Both read the declared default where the key is not given.
 ///
 /// Every method that takes a name panics if the declaration has no such key.
 #[derive(Debug)]
@@ -20,12 +20,14 @@ pub struct TableReader<'a> {
     table: &'a Table,
     declaration: &'static Declaration,
     context: Context<'a>,
+    /// Names of the keys that were asked for.
     known: Vec<&'static str>,
+    /// Names of missing keys, each with the expected text.
     missing: Vec<(&'static str, String)>,
 }
 
 impl<'a> TableReader<'a> {
-    /// Begins to read; `None`, and a fault, if the value is no table.
+    /// Begins to read a table. Reports a fault and returns `None` if the value is no table.
     pub fn new(node: &'a Node, context: Context<'a>, declaration: &'static Declaration, expected: &str) -> Option<Self> {
         let Some(table) = node.as_table() else {
             context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
@@ -34,18 +36,18 @@ impl<'a> TableReader<'a> {
         Some(Self { node, table, declaration, context, known: Vec::new(), missing: Vec::new() })
     }
 
-    /// The declaration of a key.
+    /// Returns the declaration of a key.
     ///
     /// # Panics
     ///
-    /// If there is none.
+    /// If the declaration of the table has no such key.
     #[must_use]
     #[track_caller]
     pub fn key(&self, name: &'static str) -> &'static Key {
         self.declaration.key(name).expect("a reader asks for keys that are declared")
     }
 
-    /// The key and the value under it, if it is there.
+    /// Returns the entry of a key (key and value), or `None` if the key is not given.
     #[track_caller]
     pub fn entry(&mut self, name: &'static str) -> Option<&'a Entry> {
         self.entry_of(self.key(name))
@@ -58,52 +60,52 @@ impl<'a> TableReader<'a> {
         self.table.get(key.name)
     }
 
-    /// The value under a key, if it is there.
+    /// Returns the value under a key without reading it, or `None` if the key is not given.
     #[track_caller]
     pub fn get(&mut self, name: &'static str) -> Option<&'a Node> {
         self.entry(name).map(|entry| &*entry.node)
     }
 
-    /// The names of all keys, in the order in which they were laid over each other.
+    /// Returns the names of all given keys, in the order in which they were laid over each other.
     pub fn names(&self) -> impl Iterator<Item = &'a str> {
         self.table.0.iter().map(|entry| entry.name.as_str())
     }
 
-    /// The value under a key, read as its form says: that of the file, or else the declared default. A key without either is missing.
+    /// Reads the value of a key by its declared form: the value of the file, or else the declared default. A key without both is missing.
     ///
     /// # Panics
     ///
-    /// If the form has other values.
+    /// If the form of the key has values of another type than `T`.
     #[track_caller]
     pub fn value<T: TryFrom<ParameterValue>>(&mut self, name: &'static str) -> Option<T> {
         let key = self.key(name);
         self.read_key(key, "", |node, context| values::of_key(key, node, context))
     }
 
-    /// The value under a key, read as its form says, or `Some(None)` if it is not there.
+    /// Reads the value of a key by its declared form. Returns `Some(None)` if the key is not given.
     ///
     /// # Panics
     ///
-    /// If the form has other values.
+    /// If the form of the key has values of another type than `T`.
     #[track_caller]
     pub fn maybe_value<T: TryFrom<ParameterValue>>(&mut self, name: &'static str) -> Option<Option<T>> {
         let key = self.key(name);
         self.maybe(name, |node, context| values::of_key(key, node, context))
     }
 
-    /// What the word under a key stands for: that of the file, or else the declared default.
+    /// Reads a word of the file, or else the declared default, and returns the value that `choices` gives for the word.
     #[track_caller]
     pub fn choice<T: Clone>(&mut self, name: &'static str, choices: &[(&'static str, T, &'static str)]) -> Option<T> {
         self.read(name, |node, context| values::word(node, context, choices))
     }
 
-    /// The value under a key: that of the file, or else the declared default. A key without either is missing.
+    /// Reads the value of a key with the reader `read`: the value of the file, or else the declared default. A key without both is missing.
     #[track_caller]
     pub fn read<T>(&mut self, name: &'static str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
         self.read_key(self.key(name), "", read)
     }
 
-    /// [`read`](Self::read), with what a message expects if the key is missing; empty: what the declaration says.
+    /// Like [`read`](Self::read), with another expected text for the message about a missing key. An empty text stands for the text of the declaration.
     #[track_caller]
     pub fn read_expecting<T>(&mut self, name: &'static str, expected: &str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
         self.read_key(self.key(name), expected, read)
@@ -120,7 +122,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The value under a key, or `Some(None)` if it is not there.
+    /// Reads the value of a key with the reader `read`. Returns `Some(None)` if the key is not given.
     #[track_caller]
     pub fn maybe<T>(&mut self, name: &'static str, read: impl FnOnce(&'a Node, Context<'a>) -> Option<T>) -> Option<Option<T>> {
         match self.get(name) {
@@ -129,7 +131,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The table under a key. One that is not there is read as a table without keys: each of its keys has its default.
+    /// Reads the table under a key with the reader `read`. If the key is not given, `read` gets a table without keys, in which every key has its default.
     #[track_caller]
     pub fn table<T>(&mut self, name: &'static str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
         match self.get(name) {
@@ -138,14 +140,14 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// Reports a key that is given although `condition`, on which its meaning depends, does not hold.
+    /// Reports a key that is given although the `condition` for its use does not hold. Returns `None` if so.
     #[track_caller]
     pub fn only_if(&mut self, condition: bool, name: &'static str, message: &str) -> Option<()> {
         let refused = self.get(name).filter(|_| !condition);
         refused.map(|node| self.context.fault_at(node, message)).is_none().then_some(())
     }
 
-    /// Notes that a key should be there if it is not.
+    /// Marks a key as missing if the key is not given.
     #[track_caller]
     pub fn require(&mut self, name: &'static str, expected: &str) {
         if self.get(name).is_none() {
@@ -153,24 +155,25 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// Notes that a key should be there.
+    /// Marks a key as missing, with the expected text for the message.
     #[track_caller]
     pub fn miss(&mut self, name: &'static str, expected: &str) {
         self.missing.push((name, expected.to_owned()));
     }
 
-    /// Takes all declared keys, which somebody else reads.
+    /// Marks all declared keys as known, for a table whose keys are read elsewhere.
     pub fn know_all(&mut self) {
         self.known.extend(self.declaration.keys().map(|key| key.name));
     }
 
-    /// Reports unknown keys; if there are none, missing ones. A key that is misspelt is both, and said once.
+    /// Reports unknown keys or, if all keys are known, missing keys.
     pub fn finish(self) {
         let unknown: Vec<&Entry> = self.table.0.iter().filter(|entry| !self.known.contains(&entry.name.as_str())).collect();
         for entry in &unknown {
             let expected = one_of(self.known.iter().copied(), &entry.name);
             self.context.fault(entry.key, &entry.node.path, format!("unknown key: expected {expected}"));
         }
+        // A misspelt key is unknown, and the right key is missing. Only the unknown key is reported, because that is where the user has to look.
         if unknown.is_empty() && !self.context.partial {
             for (key, expected) in &self.missing {
                 self.context.missing(self.node.place, &join(&self.node.path, key), format!("missing key: expected {expected}"));
@@ -179,7 +182,7 @@ impl<'a> TableReader<'a> {
     }
 }
 
-/// The one entry that is there. None, or more than one, is a fault.
+/// Returns the only given entry of `entries`. No given entry, or more than one, is a fault. `expected` lists the possible keys.
 pub fn only_one<'a>(node: &Node, context: Context<'_>, entries: &[Option<&'a Entry>], expected: &str) -> Option<&'a Entry> {
     let mut given: Vec<&Entry> = entries.iter().copied().flatten().collect();
     given.sort_by_key(|entry| entry.key);

@@ -1,4 +1,4 @@
-//! Readers of single values. Each answers `None` after it has reported what is wrong.
+//! Readers of single values. Each reader returns `None` after it has reported a fault.
 
 use core::time::Duration;
 
@@ -12,11 +12,11 @@ use super::context::Context;
 use super::names::one_of;
 use crate::document::{BEGINNING, Node, Value, quote, shorten};
 
-/// The value of a key as its form says.
+/// Reads the value of a key by its declared form.
 ///
 /// # Panics
 ///
-/// If the form of the key has no single value, or values of another type.
+/// If the form of the key has no single value, or has values of another type than `T`.
 #[track_caller]
 pub fn of_key<T: TryFrom<ParameterValue>>(key: &Key, node: &Node, context: Context<'_>) -> Option<T> {
     let value = match key.form {
@@ -45,9 +45,9 @@ pub fn of_key<T: TryFrom<ParameterValue>>(key: &Key, node: &Node, context: Conte
     Some(T::try_from(value).ok().expect("a key is read as its form says"))
 }
 
-/// The value that a declaration gives to a key which is not there: the same in TOML and in JSON.
+/// Returns the declared default of a key as a node. The text of a default means the same in TOML and in JSON.
 pub(super) fn default_of(default: &str) -> Node {
-    // A file with ten thousand links takes a dozen defaults for each: the parser of TOML would take longer than all readers together.
+    // The forms of most defaults are recognised without the parser of TOML, because every link of a file reads a dozen defaults.
     let text = default.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map(|text| Value::Text(text.to_owned()));
     let integer = || default.parse().ok().map(|integer| Value::Integer(Some(integer)));
     let boolean = || default.parse().ok().map(Value::Boolean);
@@ -59,9 +59,9 @@ pub(super) fn default_of(default: &str) -> Node {
     Node::value(&value, String::new(), 0, 0).expect("the default of a key is flat")
 }
 
-/// Reads a number in its range.
+/// Reading of a number within a range.
 pub trait ReadNumber {
-    /// The number; `None` after a fault.
+    /// Reads the number of a value. Returns `None` after it has reported a fault: no number, or a number outside the range.
     fn read(self, node: &Node, context: Context<'_>) -> Option<f64>;
 }
 
@@ -72,12 +72,12 @@ impl ReadNumber for Quantity {
             context.fault_at(node, format!("{} is out of range: expected {}", written(node), self.expected()));
             return None;
         }
-        // A negative zero becomes an ordinary one.
+        // Adding zero turns a negative zero into an ordinary zero.
         Some(value + 0.0)
     }
 }
 
-/// A finite number.
+/// Reads a finite number: a float, or an integer that a 64-bit float represents exactly.
 pub fn number(node: &Node, context: Context<'_>, expected: &str) -> Option<f64> {
     let value = match &node.value {
         Value::Integer(integer) => {
@@ -87,7 +87,7 @@ pub fn number(node: &Node, context: Context<'_>, expected: &str) -> Option<f64> 
             }
             exact?
         }
-        // The text of a TOML float is one that Rust reads; any other becomes a NaN, which is refused.
+        // Rust parses every float of TOML. An unexpected text becomes NaN, which is refused below.
         Value::Float(text) => text.parse().unwrap_or(f64::NAN),
         Value::Text(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => {
             context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
@@ -101,14 +101,15 @@ pub fn number(node: &Node, context: Context<'_>, expected: &str) -> Option<f64> 
     Some(value)
 }
 
-/// The number as a double, if it is one exactly.
+/// Converts an integer to a 64-bit float, or returns `None` if the conversion would round.
 fn exact_f64(integer: i128) -> Option<f64> {
+    // Compared as decimal texts, because a comparison as numbers would need another conversion that rounds.
     let decimal = integer.to_string();
     let value: f64 = decimal.parse().ok()?;
     (format!("{value:.0}") == decimal).then_some(value)
 }
 
-/// A number as it is written.
+/// Returns a number as written in the document, or the description of a value that is no number.
 #[must_use]
 pub fn written(node: &Node) -> String {
     match &node.value {
@@ -118,7 +119,7 @@ pub fn written(node: &Node) -> String {
     }
 }
 
-/// An integer in a range, both ends included.
+/// Reads an integer in a range, both ends included.
 pub fn integer(node: &Node, context: Context<'_>, range: core::ops::RangeInclusive<u64>, expected: &str) -> Option<u64> {
     let Value::Integer(integer) = &node.value else {
         context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
@@ -131,7 +132,7 @@ pub fn integer(node: &Node, context: Context<'_>, range: core::ops::RangeInclusi
     value
 }
 
-/// `true` or `false`.
+/// Reads `true` or `false`.
 pub fn boolean(node: &Node, context: Context<'_>) -> Option<bool> {
     let Value::Boolean(value) = node.value else {
         context.fault_at(node, format!("found {}: expected true or false", node.describe()));
@@ -140,7 +141,7 @@ pub fn boolean(node: &Node, context: Context<'_>) -> Option<bool> {
     Some(value)
 }
 
-/// A text.
+/// Reads a text.
 pub fn text<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<&'a str> {
     let text = node.as_text();
     if text.is_none() {
@@ -149,7 +150,7 @@ pub fn text<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<
     text
 }
 
-/// One of a few words: the value that it stands for.
+/// Reads one of a few words. Each choice is a word, its value, and the meaning of the word. Returns the value of the word.
 pub fn word<T: Clone>(node: &Node, context: Context<'_>, choices: &[(&str, T, &str)]) -> Option<T> {
     let words = || choices.iter().map(|(word, ..)| *word);
     let Some(given) = node.as_text() else {
@@ -163,7 +164,7 @@ pub fn word<T: Clone>(node: &Node, context: Context<'_>, choices: &[(&str, T, &s
     chosen
 }
 
-/// A list, as its elements.
+/// Reads a list. Returns its elements.
 pub fn list<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<Vec<&'a Node>> {
     let Value::List(elements) = &node.value else {
         context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
@@ -172,12 +173,12 @@ pub fn list<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<
     Some(elements.iter().map(|element| &**element).collect())
 }
 
-/// A duration such as "8ms".
+/// Reads a duration such as "8ms".
 pub fn duration(node: &Node, context: Context<'_>) -> Option<Duration> {
     quantity(node, context, parse::duration)
 }
 
-/// A duration above zero.
+/// Reads a duration above zero.
 pub fn positive_duration(node: &Node, context: Context<'_>) -> Option<Duration> {
     let value = duration(node, context)?;
     if value.is_zero() {
@@ -187,7 +188,7 @@ pub fn positive_duration(node: &Node, context: Context<'_>) -> Option<Duration> 
     Some(value)
 }
 
-/// An instant, as the time since the scene began.
+/// Reads an instant, written as the time since the start of the run.
 pub fn instant(node: &Node, context: Context<'_>) -> Option<Instant> {
     let since_beginning = duration(node, context)?;
     let instant = Instant::ZERO.checked_add(since_beginning);
@@ -197,17 +198,17 @@ pub fn instant(node: &Node, context: Context<'_>) -> Option<Instant> {
     instant
 }
 
-/// A rate such as "10Mbit".
+/// Reads a rate such as "10Mbit".
 pub fn rate(node: &Node, context: Context<'_>) -> Option<Rate> {
     quantity(node, context, parse::rate)
 }
 
-/// A size such as "1500B".
+/// Reads a size such as "1500B".
 pub fn size(node: &Node, context: Context<'_>) -> Option<Bytes> {
     quantity(node, context, parse::size)
 }
 
-/// A size that may be taken away, such as "28B" or "-14B".
+/// Reads a size in bytes that may be negative, such as "28B" or "-14B".
 pub fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
     const EXPECTED: &str = "a size such as \"28B\", or \"-14B\" for bytes that are not sent";
     let text = text(node, context, EXPECTED)?;
@@ -218,6 +219,7 @@ pub fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
     let size = match parse::size(plain) {
         Ok(size) => i64::try_from(size.get()).unwrap_or(i64::MAX),
         Err(error) => {
+            // The fault of the shortened text: a message quotes the text whole.
             let error = parse::size(&shorten(plain)).err().unwrap_or(error);
             context.fault_at(node, error.to_string());
             return None;
@@ -230,7 +232,7 @@ pub fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
     size
 }
 
-/// A number of packets such as "100 packets"; `None` if the text is none.
+/// Parses a number of packets such as "100 packets". Returns `None`, without a fault, for any other text.
 #[must_use]
 pub fn packets(text: &str) -> Option<u64> {
     let number = text.trim().strip_suffix("packets").or_else(|| text.trim().strip_suffix("packet"))?.trim();
@@ -238,7 +240,7 @@ pub fn packets(text: &str) -> Option<u64> {
     plain.then(|| number.parse().ok()).flatten()
 }
 
-/// Reports why the emulator refuses something, at the value that was written last of those that do not fit together.
+/// Reports why the emulator refuses the values `nodes` together, at the value that was written last, or at `fallback` if no value is given.
 pub fn refuse(context: Context<'_>, nodes: &[Option<&Node>], fallback: &Node, error: &dyn core::fmt::Display) {
     let last = nodes.iter().copied().flatten().max_by_key(|node| node.place);
     let error = error.to_string();
@@ -246,7 +248,7 @@ pub fn refuse(context: Context<'_>, nodes: &[Option<&Node>], fallback: &Node, er
     context.fault_at(last.unwrap_or(fallback), message);
 }
 
-/// A probability: a number from 0 to 1, or a text such as "1.5%".
+/// Reads a probability: a number from 0 to 1, or a text such as "1.5%".
 pub fn probability(node: &Node, context: Context<'_>) -> Option<Probability> {
     const EXPECTED: &str = "a probability: a number from 0 to 1 or a text such as \"1.5%\"";
     if node.as_text().is_some() {
@@ -260,9 +262,10 @@ pub fn probability(node: &Node, context: Context<'_>) -> Option<Probability> {
     probability
 }
 
-/// A text that one of the parsers of `cohaptic-units` reads.
+/// Reads a text with one of the parsers of `cohaptic-units`.
 fn quantity<T>(node: &Node, context: Context<'_>, parse: fn(&str) -> Result<T, ParseError>) -> Option<T> {
     let Some(text) = node.as_text() else {
+        // The error for an empty text carries the expected form.
         let expected = parse("").err().map_or("", |error| expected(&error));
         context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
         return None;
@@ -270,7 +273,7 @@ fn quantity<T>(node: &Node, context: Context<'_>, parse: fn(&str) -> Result<T, P
     match parse(text) {
         Ok(value) => Some(value),
         Err(error) => {
-            // The beginning of a text that is too long to be shown is wrong too: it ends in an ellipsis, which no unit does.
+            // The message quotes the text whole, so a long text is shortened first. The shortened text is faulty too, because no unit ends in an ellipsis.
             let error = parse(&shorten(text)).err().unwrap_or(error);
             context.fault_at(node, error.to_string());
             None
@@ -278,6 +281,7 @@ fn quantity<T>(node: &Node, context: Context<'_>, parse: fn(&str) -> Result<T, P
     }
 }
 
+/// Returns the expected form that a parser names in its error.
 fn expected(error: &ParseError) -> &'static str {
     match error {
         ParseError::Number { expected, .. } | ParseError::Unit { expected, .. } | ParseError::Range { expected, .. } => expected,
