@@ -1,4 +1,4 @@
-//! `rate`, `queue`, `overhead`, `cells` and `token-bucket`: the serialiser, the queue before it, and how much may leave in bursts.
+//! Readers of `rate`, `queue`, `overhead`, `cells` and `token-bucket`: the serialiser, the queue before the serialiser, and the shaper of bursts.
 
 use core::num::NonZeroU32;
 
@@ -10,7 +10,7 @@ use crate::document::Node;
 use crate::reading::{Context, TableReader, values};
 use crate::schema::link::LINK_TABLE;
 
-/// The bottleneck, whose line sends at a rate or at the instants of a recording.
+/// Reads the bottleneck, whose line sends at a rate or at the instants `recorded`. Returns `Some(None)` for a link without a bottleneck.
 pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<DeliveryTrace>, context: Context<'_>) -> Option<Option<Bottleneck>> {
     let (rate_entry, trace_entry) = (table.entry("rate"), table.entry("trace"));
     let parts = [table.entry("queue"), table.entry("overhead"), table.entry("cells")];
@@ -34,7 +34,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
                 );
                 return None;
             }
-            // The one that was laid over the other holds.
+            // One key was laid over the other, and the upper key applies. The order of names is the order of laying over.
             let trace_is_over = table.names().position(|name| name == "trace") > table.names().position(|name| name == "rate");
             Some(if trace_is_over { Service::Recorded(trace) } else { Service::Rate(rate) })
         }
@@ -44,7 +44,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
         return Some(Some(Bottleneck { service, framing: Framing { overhead, cells }, limit, discipline }));
     }
     for entry in parts.into_iter().flatten() {
-        // A queue that was inherited is taken away with the line before which it stands.
+        // A queue written beside a missing rate is a fault. An inherited queue disappears without a fault, together with the rate that was taken away.
         let beside = |line: Option<&crate::document::Entry>| line.is_none_or(|line| written_together(line, entry));
         if !context.partial && beside(rate_entry) && beside(trace_entry) {
             let message = format!("{} means nothing on a link without a rate: expected a key rate such as \"1Mbit\" beside it", entry.name);
@@ -55,6 +55,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
     Some(None)
 }
 
+/// Reads the cells of a link layer: payload and overhead per cell \[bytes\].
 fn read_cells(node: &Node, context: Context<'_>) -> Option<Cells> {
     const EXPECTED: &str = "a table such as { payload = \"48B\", overhead = \"5B\" }";
     let mut table = TableReader::new(node, context, LINK_TABLE.table("cells"), EXPECTED)?;
@@ -74,6 +75,7 @@ fn read_cells(node: &Node, context: Context<'_>) -> Option<Cells> {
     Some(Cells { payload: NonZeroU32::new(payload?)?, overhead: overhead? })
 }
 
+/// Reads a token bucket.
 pub(super) fn read_token_bucket(node: &Node, context: Context<'_>) -> Option<TokenBucket> {
     const EXPECTED: &str = "\"none\" or a table such as { rate = \"1Mbit\", burst = \"10kB\" }";
     let mut table = TableReader::new(node, context, LINK_TABLE.table("token-bucket"), EXPECTED)?;
@@ -86,6 +88,7 @@ pub(super) fn read_token_bucket(node: &Node, context: Context<'_>) -> Option<Tok
     Some(TokenBucket { rate: rate?, burst: burst?, peak: peak?, framing, limit: limit? })
 }
 
+/// Reads the peak rate of a token bucket.
 fn read_peak(node: &Node, context: Context<'_>) -> Option<Peak> {
     const EXPECTED: &str = "a table such as { rate = \"2Mbit\", burst = \"1500B\" }";
     let mut table = TableReader::new(node, context, LINK_TABLE.table("token-bucket.peak"), EXPECTED)?;

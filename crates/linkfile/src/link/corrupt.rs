@@ -1,4 +1,4 @@
-//! `corrupt`: bits that are flipped.
+//! Reader of `corrupt`: flipped bits.
 
 use cohaptic_wan::{Chance, Checksum, Corruption, Flips};
 
@@ -8,7 +8,8 @@ use crate::document::{Node, quote};
 use crate::reading::{Context, TableReader, values};
 use crate::schema::link::LINK_TABLE;
 
-/// `"1%"` (one bit of such a packet), `{ probability, correlation, bits }` or `{ bit-error-rate }`, the tables also with `bytes` and `checksum`.
+/// Reads `"1%"` (one flipped bit per corrupted packet), `{ probability, correlation, bits }` or `{ bit-error-rate }`; both tables also take `bytes` and
+/// `checksum`. Returns `Some(None)` if no bit is ever flipped.
 pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Option<Corruption>> {
     const EXPECTED: &str = "a probability or a table such as { probability = \"1%\", bits = 3 } or { bit-error-rate = 1e-6 }";
     if node.as_table().is_none() {
@@ -29,6 +30,7 @@ pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Optio
     let rate = table.maybe_value("bit-error-rate");
     let bits = match table.entry("bit-error-rate") {
         Some(rate_entry) => {
+            // Asked for before `finish`, so that they count as known and get the message below.
             let others = ["probability", "correlation", "bits"].map(|key| table.entry(key));
             table.finish();
             if let Some(other) = others.into_iter().flatten().next() {
@@ -51,7 +53,7 @@ pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Optio
     Some(corruption.map(|corruption| Corruption { within, checksum, ..corruption }))
 }
 
-/// `None` if no bit is ever flipped.
+/// Returns a corruption with the default range and checksum, or `None` if no bit is ever flipped.
 fn flipping(bits: Flips) -> Option<Corruption> {
     let never = match bits {
         Flips::Bits { packets, .. } => packets.is_never(),

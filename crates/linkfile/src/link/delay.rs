@@ -1,4 +1,4 @@
-//! `delay` and `jitter`.
+//! Readers of `delay` and `jitter`.
 
 use core::time::Duration;
 
@@ -9,14 +9,14 @@ use crate::document::Node;
 use crate::reading::{Context, TableReader, only_one, values};
 use crate::schema::link::LINK_TABLE;
 
-/// The delay of a link with its jitter.
+/// Reads the delay of a link with its jitter.
 pub(super) fn read_delay(table: &mut TableReader<'_>, keys: &Node, context: Context<'_>) -> Option<Delay> {
     let (delay_node, jitter_node) = (table.get("delay"), table.get("jitter"));
     let mean = table.maybe_value("delay");
     let jitter = table.maybe("jitter", read_jitter);
     let (mean, jitter) = (mean?, jitter?);
     let Some(Read { jitter, own_mean }) = jitter else { return Some(Delay::constant(mean.unwrap_or_default())) };
-    // Of a change alone it is not known which delay it will be laid over.
+    // A part without a delay will be laid over a delay that is not known here, so jitter and mean cannot be checked together.
     if context.partial && mean.is_none() {
         return Some(Delay::default());
     }
@@ -24,12 +24,14 @@ pub(super) fn read_delay(table: &mut TableReader<'_>, keys: &Node, context: Cont
     Delay::with_jitter(mean, jitter).map_err(|error| values::refuse(context, &[delay_node, jitter_node], keys, &error)).ok()
 }
 
+/// Jitter as read.
 struct Read {
     jitter: Jitter,
-    /// The mean of a file of delays, which holds where no other one is said.
+    /// Mean of a file of delays, used if the key `delay` is not given.
     own_mean: Option<Duration>,
 }
 
+/// Reads a jitter: a standard deviation, or a table.
 fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
     const EXPECTED: &str = "a duration or a table such as { sd = \"2ms\", distribution = \"gamma\" }";
     if node.as_table().is_none() {
@@ -44,6 +46,7 @@ fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
         Some(Distribution::Empirical(delays)) => Some((nanos(delays.mean()), nanos(delays.sd()))),
         Some(_) | None => None,
     };
+    // A file of delays has a standard deviation of its own, so `sd` may be missing only beside such a file.
     if distribution.is_some() && own.is_none() && sd == Some(None) {
         table.miss("sd", "the standard deviation, a duration such as \"2ms\"");
     }
@@ -53,7 +56,7 @@ fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
     Some(Read { jitter, own_mean: own.map(|(mean, _)| mean) })
 }
 
-/// `correlation` or `correlation-time`.
+/// Reads `correlation` (per packet) or `correlation-time`, of which at most one may be given.
 fn read_correlation(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Correlation> {
     let (per_packet, in_time) = (table.entry("correlation"), table.entry("correlation-time"));
     if per_packet.is_none() && in_time.is_none() {
@@ -67,7 +70,7 @@ fn read_correlation(table: &mut TableReader<'_>, node: &Node, context: Context<'
     values::of_key(table.key("correlation-time"), &chosen.node, context).map(Correlation::InTime)
 }
 
-/// Values of a file are nanoseconds from 0 to 9·10¹⁸.
+/// Rounds nanoseconds to a duration. The delays of a file lie between 0 and 9·10¹⁸ ns, and so do their mean and standard deviation.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "moments of numbers from 0 to 9e18")]
 fn nanos(value: f64) -> Duration {
     Duration::from_nanos(value.round() as u64)

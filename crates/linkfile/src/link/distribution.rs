@@ -1,4 +1,4 @@
-//! The law of jitter: by name, or from a file.
+//! Reader of the law of jitter, by name or from a file.
 
 use std::sync::Arc;
 
@@ -12,6 +12,7 @@ use crate::schema::link::LINK_TABLE;
 
 const EXPECTED: &str = "the name of a law, { table = \"file.dist\" } or { empirical = \"file.csv\" }";
 
+/// Reads a law: a name, a table of tc (`.dist`) or a file of measured delays.
 pub(super) fn read_distribution(node: &Node, context: Context<'_>) -> Option<Distribution> {
     if node.as_text().is_some() {
         return values::word(node, context, &Distribution::CHOICES);
@@ -28,11 +29,12 @@ pub(super) fn read_distribution(node: &Node, context: Context<'_>) -> Option<Dis
     read_file(&file.node, context, &path, "delays", empirical).map(Distribution::Empirical)
 }
 
-/// A `.dist` file.
+/// Parses the text of a `.dist` file.
 pub(super) fn dist_table(text: &str) -> Result<Arc<DistTable>, Fault> {
     DistTable::parse(text).map(Arc::new).map_err(|error| dist_fault(text, &error))
 }
 
+/// Returns the fault of a `.dist` file, with its line.
 pub(super) fn dist_fault(text: &str, error: &DistTableError) -> Fault {
     let line = match error {
         DistTableError::NotAnInteger { line, .. } | DistTableError::OutOfRange { line, .. } | DistTableError::TooMany { line, .. } => Some(*line),
@@ -41,7 +43,8 @@ pub(super) fn dist_fault(text: &str, error: &DistTableError) -> Fault {
     Fault::in_line(text, line, error)
 }
 
-/// Measured delays: a header `delay`, then one a line, in seconds. Blank lines and lines that begin with # are skipped.
+/// Parses a file of measured delays: a header `delay`, then one delay \[s\] per line. Blank lines and lines that begin with # are skipped. The law has
+/// nanoseconds.
 fn empirical(text: &str) -> Result<Arc<Empirical>, Fault> {
     const DELAY: &str = "expected a delay in seconds from 0 to 9e9";
     let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));

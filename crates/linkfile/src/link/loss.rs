@@ -1,4 +1,4 @@
-//! `loss`: which packets are lost.
+//! Reader of `loss`: the model of lost packets.
 
 use cohaptic_units::Probability;
 use cohaptic_wan::{Bursts, FourState, GilbertElliott, GilbertElliottInTime, Loss};
@@ -13,6 +13,7 @@ const EXPECTED: &str =
     "a probability such as \"1%\", or { gilbert-elliott = … }, { states = … }, { bursts = … }, { correlated = … }, { packets = … } or { times = … }";
 const CHAIN: &str = "a table such as { p = 0.01, r = 0.1 } or { mean-good = \"160ms\", mean-bad = \"40ms\" }";
 
+/// Reads a model of loss: a probability, or a table with one of the models.
 pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
     if node.as_table().is_none() {
         let probability = values::probability(node, context)?;
@@ -38,7 +39,7 @@ pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
     }
 }
 
-/// The chain of packets, or that in continuous time.
+/// Reads a chain of Gilbert and Elliott: per packet with `p` and `r`, or in continuous time with `mean-good` and `mean-bad`.
 fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("loss.gilbert-elliott"), CHAIN)?;
     let in_time = table.get("mean-good").is_some() || table.get("mean-bad").is_some();
@@ -58,6 +59,7 @@ fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
     let (p, r) = (table.value("p"), table.maybe_value("r"));
     table.finish();
     let p = p?;
+    // As in tc, a missing r is 1 − p.
     let r = match r? {
         Some(r) => r,
         None => complement(p)?,
@@ -65,13 +67,14 @@ fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
     Some(Loss::GilbertElliott(GilbertElliott { p, r, h: h?, k: k? }))
 }
 
-/// Salsano's four states, with the defaults of tc.
+/// Reads Salsano's chain of four states, with the defaults of tc.
 fn read_states(node: &Node, context: Context<'_>) -> Option<FourState> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("loss.states"), "a table such as { p13 = 0.01, p31 = 0.3 }")?;
     let (p13, p31) = (table.value("p13"), table.maybe_value("p31"));
     let (p32, p23, p14) = (table.value("p32"), table.value("p23"), table.value("p14"));
     table.finish();
     let p13 = p13?;
+    // As in tc, a missing p31 is 1 − p13.
     let p31 = match p31? {
         Some(p31) => p31,
         None => complement(p13)?,
@@ -79,7 +82,7 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<FourState> {
     FourState::new(p13, p31, p32?, p23?, p14?).map_err(|error| values::refuse(context, &[], node, &error)).ok()
 }
 
-/// The same in the words of a person.
+/// Reads a chain of four states from its observable quantities: mean loss, length of bursts, density in bursts, isolated losses and length of good runs.
 fn read_bursts(node: &Node, context: Context<'_>) -> Option<FourState> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("loss.bursts"), "a table such as { loss = \"2%\", length = 5 }")?;
     let (loss, length) = (table.value::<Probability>("loss"), table.value("length"));
@@ -90,6 +93,7 @@ fn read_bursts(node: &Node, context: Context<'_>) -> Option<FourState> {
     FourState::from_bursts(bursts).map_err(|error| values::refuse(context, &[], node, &error)).ok()
 }
 
+/// Returns 1 − p.
 fn complement(p: Probability) -> Option<Probability> {
     Probability::new(1.0 - p.get()).ok()
 }

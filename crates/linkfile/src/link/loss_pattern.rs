@@ -1,4 +1,4 @@
-//! Losses that are chosen: these packets, or whatever is sent at these times.
+//! Readers of chosen losses: packets by number, or packets by the time of sending.
 
 use core::ops::Range;
 
@@ -10,10 +10,11 @@ use crate::reading::{Context, values};
 
 const NUMBERS: &str = "a list of packets counted from 0, such as [3, \"10-19\"]";
 
-/// `packets = [3, "10-19"], every = 100`.
+/// Reads `packets = [3, "10-19"], every = 100`: lost packets, counted from 0, and the period in packets.
 pub(super) fn read_lost_packets(node: &Node, every: Option<&Node>, context: Context<'_>) -> Option<Pattern> {
     let elements = values::list(node, context, NUMBERS)?;
     let spans: Vec<Option<Range<u64>>> = elements.iter().map(|element| read_numbers(element, context)).collect();
+    // The period is read before the elements are judged, so that the fault that stands first in the text is found.
     let period = every.map(|every| values::integer(every, context, 1..=i64::MAX.unsigned_abs(), "a number of packets of at least 1"));
     let spans = spans.into_iter().collect::<Option<Vec<_>>>()?;
     let period = match period {
@@ -23,7 +24,7 @@ pub(super) fn read_lost_packets(node: &Node, every: Option<&Node>, context: Cont
     Pattern::of_packets(spans, period).map_err(|error| refuse(&error, node, &elements, every, context)).ok()
 }
 
-/// `times = [{ from = "1s", to = "2s" }], every = "5s"`.
+/// Reads `times = [{ from = "1s", to = "2s" }], every = "5s"`: spans of time with losses, and the period.
 pub(super) fn read_lost_times(node: &Node, every: Option<&Node>, context: Context<'_>) -> Option<Pattern> {
     let elements = values::list(node, context, "a list such as [{ from = \"1s\", to = \"2s\" }]")?;
     let spans: Vec<Option<Outage>> = elements.iter().map(|element| read_span(element, context)).collect();
@@ -36,7 +37,7 @@ pub(super) fn read_lost_times(node: &Node, every: Option<&Node>, context: Contex
     Pattern::in_time(&spans, period).map_err(|error| refuse(&error, node, &elements, every, context)).ok()
 }
 
-/// A packet, or the first and the last of several in a row.
+/// Reads the number of a packet, or the first and the last of a row of packets.
 fn read_numbers(node: &Node, context: Context<'_>) -> Option<Range<u64>> {
     const EXPECTED: &str = "the number of a packet such as 3, or the first and the last of a row such as \"10-19\"";
     if let Value::Text(text) = &node.value {
@@ -49,14 +50,16 @@ fn read_numbers(node: &Node, context: Context<'_>) -> Option<Range<u64>> {
     values::integer(node, context, 0..=i64::MAX.unsigned_abs(), EXPECTED).map(|number| number..number + 1)
 }
 
-/// `10-19`, both included, as a range; `None` if it is none or is the wrong way round.
+/// Parses `10-19`, both ends included, or `7` as a range of numbers. Returns `None` for any other text, and if the last number is below the first.
 pub(super) fn read_range(text: &str) -> Option<Range<u64>> {
+    // `parse` also takes a sign, so the digits are checked here.
     let number = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse::<u64>().ok()).flatten();
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let (first, last) = (number(first.trim())?, number(last.trim())?);
     (first <= last).then(|| Some(first..last.checked_add(1)?)).flatten()
 }
 
+/// Reports the refusal of a pattern, at the element or at the period that the error blames.
 fn refuse(error: &PatternError, node: &Node, elements: &[&Node], every: Option<&Node>, context: Context<'_>) {
     let at = match error {
         PatternError::Empty { index } | PatternError::Order { index } => elements.get(*index).copied(),

@@ -1,4 +1,4 @@
-//! The keys of a link: of `[link]`, of an entry of `[\[links\]]`, of an access line, and of a change in the timeline.
+//! Readers of the keys of a link: in `[link]`, in an entry of `[\[links\]]`, in an access line, and in a change of the timeline.
 
 mod bottleneck;
 mod corrupt;
@@ -26,14 +26,15 @@ use crate::schema::link::LINK_TABLE;
 
 pub use modulators::read_modulators;
 
-/// Reads the keys of a link.
+/// Reads the keys of a link. Returns `None` after it has reported a fault.
 pub fn read_link(node: &Node, context: Context<'_>) -> Option<LinkModel> {
     read_link_of(&LINK_TABLE, node, context)
 }
 
-/// Reads the keys of a link. `declaration` has the keys that may stand there; those that are none of a link somebody else reads.
+/// Reads the keys of a link in a table with the keys of `declaration`. Keys of the declaration that do not belong to a link are left to the caller.
 pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Context<'_>) -> Option<LinkModel> {
     let mut table = TableReader::new(node, context, declaration, "a table of link keys such as { delay = \"24ms\" }")?;
+    // A first pass over all declared keys reports the unknown ones. The second pass below reads only the keys of a link.
     table.know_all();
     table.finish();
     let keys = in_force(node, context)?;
@@ -50,7 +51,7 @@ pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Co
     }
 }
 
-/// Reads the keys that say what one configuration does.
+/// Reads the keys of one configuration of a link.
 fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
     let mut table = TableReader::new(keys, context, &LINK_TABLE, "a table of link keys")?;
     let delay = delay::read_delay(&mut table, keys, context);
@@ -73,6 +74,7 @@ fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
     let limit = table.read("limit", unless(UNLIMITED, queue::read_packets));
     let listed = listed::read_listed(&mut table, context);
     let outages = table.read("outage", outage::read_outages);
+    // A refused recording gives neither delivery nor path. The link would be read as one without a recording.
     trace?;
     Some(LinkConfig {
         mtu: mtu?,
@@ -94,55 +96,59 @@ fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
     })
 }
 
-/// The word that takes away what a key below says.
+/// Word that removes the value of a key in the table below.
 const NONE: &str = "none";
-/// The word that takes away a limit that a key below says.
+/// Word that removes the limit of a key in the table below.
 const UNLIMITED: &str = "unlimited";
 
+/// Returns whether a value is the word `none`.
 fn is_none(node: &Node) -> bool {
     node.as_text() == Some(NONE)
 }
 
-/// A reader of a value that a word takes away: the answer to the word is `None`.
+/// Returns a reader that returns `Some(None)` for `word`, and the answer of `read` for any other value.
 fn unless<T>(word: &'static str, read: fn(&Node, Context<'_>) -> Option<T>) -> impl FnOnce(&Node, Context<'_>) -> Option<Option<T>> {
     move |node: &Node, context: Context<'_>| if node.as_text() == Some(word) { Some(None) } else { read(node, context).map(Some) }
 }
 
-/// Whether two keys were written in the same table, as opposed to one being laid over the other.
+/// Returns whether two keys were written in the same table, as opposed to one being laid over the other.
 fn written_together(a: &Entry, b: &Entry) -> bool {
     let table = |entry: &Entry| entry.node.path.rsplit_once('.').map(|(table, _)| table.to_owned());
+    // Each override is a source of its own, so a key from an override always counts as laid over the keys of the file.
     a.key.source == b.key.source && table(a) == table(b)
 }
 
-/// Whether a table has no keys.
+/// Returns whether a value is a table without keys.
 #[must_use]
 pub fn is_empty(node: &Node) -> bool {
     matches!(&node.value, Value::Table(table) if table.0.is_empty())
 }
 
-/// `"1%"` or `{ probability, correlation }`.
+/// Reads a chance per packet: `"1%"` or `{ probability, correlation }`.
 fn read_chance(node: &Node, context: Context<'_>) -> Option<Chance> {
     const EXPECTED: &str = "a probability or a table such as { probability = \"1%\", correlation = 0.5 }";
     if node.as_table().is_none() {
         return values::probability(node, context).map(Chance::independent);
     }
+    // The table of `duplicate` stands for every chance, since its keys are the same.
     let mut table = TableReader::new(node, context, LINK_TABLE.table("duplicate"), EXPECTED)?;
     let chance = read_chance_in(&mut table, node, context);
     table.finish();
     chance
 }
 
-/// The keys `probability` and `correlation` of a table that has others too.
+/// Reads the keys `probability` and `correlation` of a table that may have other keys.
 fn read_chance_in(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Chance> {
     let nodes = [table.get("probability"), table.get("correlation")];
     let (probability, correlation) = (table.value("probability"), table.value("correlation"));
     Chance::correlated(probability?, correlation?).map_err(|error| values::refuse(context, &nodes, node, &error)).ok()
 }
 
-/// The keys that hold: one that says everything takes away whatever it is laid over. A key next to it, or laid over it, is a fault.
+/// Returns the keys that apply. A key that describes the whole link, `netem` or `replay`, removes the keys that it is laid over. A key in the same table, or
+/// laid over the whole description, is a fault.
 fn in_force<'a>(node: &'a Node, context: Context<'_>) -> Option<Cow<'a, Node>> {
     let table = node.as_table()?;
-    // Entries stand in the order in which they were laid over each other.
+    // Entries stand in the order in which they were laid over each other, so the last whole description applies.
     let whole = table.0.iter().enumerate().rfind(|(_, entry)| says_everything(entry));
     let Some((place, whole)) = whole else { return Some(Cow::Borrowed(node)) };
     let mut taken_away = Vec::new();
@@ -166,11 +172,12 @@ fn in_force<'a>(node: &'a Node, context: Context<'_>) -> Option<Cow<'a, Node>> {
     Some(Cow::Owned(node.without(&taken_away)))
 }
 
+/// Returns whether a key describes the whole link.
 fn says_everything(entry: &Entry) -> bool {
     matches!(entry.name.as_str(), "netem" | "replay") && !is_none(&entry.node)
 }
 
-/// `netem = "none"` beside `replay` says nothing that contradicts it.
+/// Returns whether a key of a link kind is `none`. `netem = "none"` beside `replay` contradicts nothing.
 fn is_none_of_whole(entry: &Entry) -> bool {
     matches!(entry.name.as_str(), "netem" | "replay" | "modulated") && is_none(&entry.node)
 }

@@ -1,4 +1,5 @@
-//! `[\[modulators\]]`: chains of states that links follow, named so that several links can follow the same one; and `modulated`: keys that hold while a modulator is in one of its states.
+//! Readers of `[\[modulators\]]` and `modulated`. A modulator is a chain of states with a name, so that several links can follow the same chain. The keys
+//! under `modulated` hold while the modulator is in one of its states.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use crate::reading::values::{self, ReadNumber as _, WEIGHT};
 use crate::reading::{Context, Modulators, TableReader, one_of};
 use crate::schema::link::LINK_TABLE;
 
-/// Reads the list. `None` where something was refused.
+/// Reads the list of modulators. Returns `None` if a modulator was refused. A missing list is an empty list.
 pub fn read_modulators(node: Option<&Node>, context: Context<'_>) -> Option<Arc<Modulators>> {
     let Some(node) = node else { return Some(Arc::default()) };
     let entries = values::list(node, context, "entries [[modulators]]")?;
@@ -30,8 +31,10 @@ pub fn read_modulators(node: Option<&Node>, context: Context<'_>) -> Option<Arc<
     complete.then(|| Arc::new(modulators))
 }
 
+/// Modulator, and the names of its states in the order of the states.
 type Read = (Modulator, Vec<String>);
 
+/// Reads one modulator: its name, the node of the name, the chain, and the names of its states.
 fn read_modulator<'a>(node: &'a Node, context: Context<'a>) -> Option<(String, &'a Node, Read)> {
     let mut table = TableReader::new(node, context, &MODULATOR, "a table with name and states")?;
     let (name_node, states_node) = (table.get("name"), table.get("states"));
@@ -48,7 +51,7 @@ fn read_modulator<'a>(node: &'a Node, context: Context<'a>) -> Option<(String, &
     }
 }
 
-/// The name of a modulator or of a state. `by` is a key beside the states of a link.
+/// Reads the name of a modulator or of a state. The name `by` is reserved, because the key `by` stands beside the states under `modulated`.
 fn read_name(node: &Node, context: Context<'_>) -> Option<String> {
     const EXPECTED: &str = "a name without space or dot, and not \"by\"";
     let name = values::text(node, context, EXPECTED)?;
@@ -59,6 +62,7 @@ fn read_name(node: &Node, context: Context<'_>) -> Option<String> {
     Some(name.to_owned())
 }
 
+/// Reads the states of a modulator: names, and sojourns with the weights of the next states.
 fn read_states(node: &Node, context: Context<'_>) -> Option<(Vec<String>, Vec<ModulatorState>)> {
     let entries = values::list(node, context, "a list of states such as [{ name = \"good\", sojourn = \"2s\" }]")?;
     let mut names: Vec<String> = Vec::new();
@@ -78,13 +82,15 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<(Vec<String>, Vec<Mo
         names.push(name);
         tables.push((entry, sojourn?, next));
     }
+    // A second pass, because `next` may name any state of the list.
     let mut states = Vec::with_capacity(tables.len());
     for (place, (entry, sojourn, next)) in tables.into_iter().enumerate() {
         let next = match next {
             Some(next) => read_next(next, context, &names)?,
-            // Each of the others is as likely.
+            // All other states are equally likely.
             None => (0..names.len()).map(|other| if other == place { 0.0 } else { 1.0 }).collect(),
         };
+        // Weights need not sum to 1. A single state without sojourn has no successor, and lasts forever.
         let weight_of_itself = next.get(place).copied().unwrap_or(0.0);
         if weight_of_itself != 0.0 || (sojourn.is_some() && next.iter().all(|weight| *weight == 0.0)) {
             let message =
@@ -101,7 +107,7 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<(Vec<String>, Vec<Mo
     Some((names, states))
 }
 
-/// How likely each state comes next: a name, or names with weights.
+/// Reads the weights of the next states, indexed by state: the name of one state, or names with weights.
 fn read_next(node: &Node, context: Context<'_>, names: &[String]) -> Option<Vec<f64>> {
     let mut weights = vec![0.0; names.len()];
     let place = |name: &str, at: &dyn Fn(String)| {
@@ -128,23 +134,23 @@ fn read_next(node: &Node, context: Context<'_>, names: &[String]) -> Option<Vec<
     Some(weights)
 }
 
-/// `{ by = "cell", good = { … }, bad = { … } }`: the keys of each state laid over `keys`, those of the link.
+/// Reads `{ by = "cell", good = { … }, bad = { … } }`. The keys of each state are laid over `keys`, the keys of the link.
 pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> Option<Modulated> {
     const EXPECTED: &str = "\"none\" or a table such as { by = \"cell\", good = { delay = \"20ms\" }, bad = { delay = \"80ms\" } }";
     let Value::Table(table) = &node.value else {
         context.fault_at(node, format!("found {}: expected {EXPECTED}", node.describe()));
         return None;
     };
-    // Keys that say which kind of link it is cannot change with a state.
+    // The keys of link kinds (such as `modulated` itself) do not belong to the configuration of a state.
     let base = keys.without(&LINK_KIND_PARAMETERS.each_ref().map(|key| key.name));
-    // On their own, so that a fault in a key that every state replaces is found too.
+    // The keys of the link are also read alone, so that a fault in a key that every state replaces is found.
     let sound = read_config(&base, context.of_part());
     let Some(by) = table.get("by") else {
         context.fault_at(node, "missing key by: expected the name of a modulator");
         return None;
     };
     let name = values::text(&by.node, context, "the name of a modulator")?;
-    // Without the list of modulators, the fault is there.
+    // Without a list of modulators, the fault of the list has been reported.
     let modulators = context.modulators?;
     let Some((modulator, states)) = modulators.get(name) else {
         let names = modulators.keys().map(String::as_str);
@@ -174,7 +180,7 @@ pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> 
     Modulated::new(modulator.clone(), configs).map_err(|error| values::refuse(context, &[], node, &error)).ok()
 }
 
-/// A state may say what a link says, but not which kind of link it is.
+/// Reports unknown keys of a state. A state takes all keys of a link but the keys of link kinds.
 fn check_keys(node: &Node, context: Context<'_>) -> Option<()> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("modulated.STATE"), "a table of link keys such as { delay = \"80ms\" }")?;
     table.know_all();

@@ -1,4 +1,4 @@
-//! `netem`: a link in the words of `tc`.
+//! Reader of `netem`: a link in the words of `tc`.
 
 use core::ops::Range;
 use std::sync::Arc;
@@ -13,12 +13,12 @@ use crate::document::{Node, Place};
 use crate::reading::named_file::{Fault, beside_document, read_file};
 use crate::reading::{Context, TableReader, values};
 
-/// The link, if there are words.
+/// Reads the link described by `netem` and `netem-profile`. Returns `Some(None)` if the table has no words of tc.
 pub(super) fn read_netem(table: &mut TableReader<'_>, context: Context<'_>) -> Option<Option<LinkModel>> {
     let profile_entry = table.entry("netem-profile");
     let profile: Option<&str> = table.value("netem-profile");
     let Some(node) = table.get("netem").filter(|node| !is_none(node)) else {
-        // A profile that was inherited means nothing without the words, and harms nobody; one beside no words is a slip.
+        // A profile beside `netem = "none"` may be inherited and is ignored. A profile without any key `netem` is a mistake.
         if let Some(entry) = profile_entry.filter(|_| !context.partial && table.get("netem").is_none()) {
             context.fault(entry.key, &entry.node.path, "netem-profile means nothing without words: expected a key netem beside it");
             return None;
@@ -37,10 +37,12 @@ pub(super) fn read_netem(table: &mut TableReader<'_>, context: Context<'_>) -> O
     if profile? == "exact" { read_exact(node, words, &netem, context) } else { read_kernel(node, netem, context) }.map(Some)
 }
 
-/// Where a word stands in the text of the scene; the whole value if it is written with escapes.
+/// Returns the place of a word of tc in the source text. `span` counts bytes within `words`. If the value is written with escapes, the place of the whole
+/// value is returned.
 fn place_of_word(node: &Node, words: &str, span: &Range<usize>, context: Context<'_>) -> Place {
     let source = context.sources.text_of(node.place);
     let written = source.get(node.place.start..node.place.end).unwrap_or_default();
+    // Without escapes the words stand literally between the quotes, so an offset in the words is an offset in the source.
     match written.find(words) {
         Some(offset) => {
             let start = node.place.start + offset;
@@ -50,6 +52,7 @@ fn place_of_word(node: &Node, words: &str, span: &Range<usize>, context: Context
     }
 }
 
+/// Reads the words with the profile `exact`: a link with the laws of the words, and without the rounding of the kernel.
 fn read_exact(node: &Node, words: &str, netem: &Netem, context: Context<'_>) -> Option<LinkModel> {
     let mut complete = true;
     let config = netem.to_link_config(&mut |name: &TableName| {
@@ -62,7 +65,7 @@ fn read_exact(node: &Node, words: &str, netem: &Netem, context: Context<'_>) -> 
         Err(error) => {
             let message = with_expectation(error.to_string());
             let place = option_span(words, error.option()).map_or(node.place, |span| place_of_word(node, words, &span, context));
-            // A table that is missing or wrong was named where it stands.
+            // The fault of a missing or wrong table has been reported, and the error only follows from that fault.
             if complete {
                 context.fault(place, &node.path, message);
             }
@@ -71,20 +74,23 @@ fn read_exact(node: &Node, words: &str, netem: &Netem, context: Context<'_>) -> 
     }
 }
 
-/// Where an option stands in the words, which may shorten it.
+/// Returns the bytes of an option in the words of tc, which may abbreviate the option.
 fn option_span(words: &str, option: &str) -> Option<Range<usize>> {
     let mut end = 0;
     words.split_whitespace().find_map(|word| {
+        // The search begins after the previous word, so that an earlier word that contains the same letters is not found.
         let start = end + words.get(end..)?.find(word)?;
         end = start + word.len();
         option.starts_with(word).then_some(start..end)
     })
 }
 
+/// Adds an expected text to a message without one.
 fn with_expectation(message: String) -> String {
     if message.contains("expected") { message } else { format!("{message}: expected words of tc-netem that can be meant together") }
 }
 
+/// Reads the words with the profile of the kernel: a link that repeats the arithmetic of the kernel.
 fn read_kernel(node: &Node, netem: Netem, context: Context<'_>) -> Option<LinkModel> {
     let delay = netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).and_then(|jitter| jitter.distribution.as_ref());
     let slot = netem.slot.as_ref().and_then(|slot| match &slot.gap {
@@ -101,7 +107,7 @@ fn read_kernel(node: &Node, netem: Netem, context: Context<'_>) -> Option<LinkMo
     KernelNetem::new(netem, tables).map(LinkModel::Kernel).map_err(|error| values::refuse(context, &[], node, &error)).ok()
 }
 
-/// The file `NAME.dist` in the folder of the scene.
+/// Reads the file `NAME.dist` in the folder of the document.
 fn read_table<T: Clone + 'static>(
     node: &Node,
     name: &TableName,

@@ -1,4 +1,4 @@
-//! `outage`: when a link is down; and the laws of how long something lasts.
+//! Reader of `outage`, the times at which a link is down, and of sojourns, the laws of durations.
 
 use cohaptic_wan::{IdleOutages, Outage, Outages, RandomOutages, Sojourn};
 
@@ -6,7 +6,7 @@ use crate::document::Node;
 use crate::reading::{Context, TableReader, only_one, values};
 use crate::schema::link::LINK_TABLE;
 
-/// A list of spans, or `{ scheduled, random, idle }`.
+/// Reads outages: a list of spans, or a table `{ scheduled, random, idle }`.
 pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages> {
     if node.as_table().is_none() {
         return read_scheduled(node, context);
@@ -27,6 +27,7 @@ pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages>
     Some(outages)
 }
 
+/// Reads random outages: the laws of the times up and down.
 fn read_random(node: &Node, context: Context<'_>) -> Option<RandomOutages> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.random"), "a table such as { up = \"30s\", down = \"1s\" }")?;
     let [up, down] = ["up", "down"].map(|key| table.read_expecting(key, SOJOURN, read_sojourn));
@@ -34,6 +35,7 @@ fn read_random(node: &Node, context: Context<'_>) -> Option<RandomOutages> {
     Some(RandomOutages { up: up?, down: down? })
 }
 
+/// Reads outages of an idle link: the idle time after which the link goes down, and the time that the link takes to come back.
 fn read_idle(node: &Node, context: Context<'_>) -> Option<IdleOutages> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.idle"), "a table such as { after = \"10s\", down = \"2s\" }")?;
     let (after, down) = (table.value("after"), table.value("down"));
@@ -41,6 +43,7 @@ fn read_idle(node: &Node, context: Context<'_>) -> Option<IdleOutages> {
     Some(IdleOutages { after: after?, down: down? })
 }
 
+/// Reads a list of spans in which the link is down.
 fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
     let elements = values::list(node, context, "a list such as [ { from = \"1s\", to = \"2s\" } ]")?;
     let read: Vec<Option<Outage>> = elements.iter().map(|element| read_span(element, context)).collect();
@@ -48,7 +51,7 @@ fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
     for outage in read {
         outages.push(outage?);
     }
-    // Grown one at a time, so that the first that does not fit is known without looking into the error.
+    // The shortest prefix of the list that is refused ends with the faulty outage.
     Outages::new(outages.clone())
         .map_err(|error| {
             let fits = |count: &usize| Outages::new(outages[..*count].to_vec()).is_ok();
@@ -59,7 +62,7 @@ fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
         .ok()
 }
 
-/// A span of time.
+/// Reads a span of time: `from` and `to`, counted from the start of the run.
 pub(super) fn read_span(node: &Node, context: Context<'_>) -> Option<Outage> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.0"), "a table such as { from = \"1s\", to = \"2s\" }")?;
     let (from, to) = (table.read("from", values::instant), table.read("to", values::instant));
@@ -67,11 +70,11 @@ pub(super) fn read_span(node: &Node, context: Context<'_>) -> Option<Outage> {
     Some(Outage { from: from?, to: to? })
 }
 
-/// What stands in place of a sojourn where something else was found.
+/// Expected text of a sojourn, for messages.
 pub(super) const SOJOURN: &str =
     "a mean such as \"2s\" (exponential), { fixed = \"2s\" }, { uniform = [\"1s\", \"3s\"] } or { erlang = { mean = \"2s\", stages = 4 } }";
 
-/// The law of a span of time, which comes to an end.
+/// Reads a sojourn: the law of a duration above zero.
 pub(super) fn read_sojourn(node: &Node, context: Context<'_>) -> Option<Sojourn> {
     let sojourn = if node.as_text().is_some() { Sojourn::Exponential(values::duration(node, context)?) } else { read_law(node, context)? };
     if !sojourn.is_sound() {
@@ -81,6 +84,7 @@ pub(super) fn read_sojourn(node: &Node, context: Context<'_>) -> Option<Sojourn>
     Some(sojourn)
 }
 
+/// Reads a sojourn given as a table with one law.
 fn read_law(node: &Node, context: Context<'_>) -> Option<Sojourn> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.random.up"), SOJOURN)?;
     let laws = [table.entry("fixed"), table.entry("uniform"), table.entry("erlang"), table.entry("exponential")];

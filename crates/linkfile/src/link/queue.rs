@@ -1,4 +1,4 @@
-//! `queue` and limits: how much may wait, and which packets are dropped.
+//! Readers of `queue` and of limits: the room for waiting packets, and the discipline that drops packets.
 
 use cohaptic_units::Bytes;
 use cohaptic_wan::{CoDel, Discipline, QueueLimit, Red};
@@ -8,16 +8,19 @@ use crate::document::{Node, quote};
 use crate::reading::{Context, TableReader, only_one, values};
 use crate::schema::link::LINK_TABLE;
 
-/// What a queue is, apart from what it stands before.
+/// Queue without the line that serves it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Queue {
+    /// Room for waiting packets. `None` for an unlimited queue.
     pub(super) limit: Option<QueueLimit>,
+    /// Discipline that drops or marks packets.
     pub(super) discipline: Discipline,
 }
 
 const DISCIPLINES: &str = "one of tail-drop, head-drop, codel, red, { codel = … } or { red = … }";
 const LIMIT: &str = "a limit such as \"100 packets\", \"64kB\" or \"50ms\"";
 
+/// Reads a queue: limit and discipline.
 pub(super) fn read_queue(node: &Node, context: Context<'_>) -> Option<Queue> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("queue"), "a table such as { limit = \"100 packets\" }")?;
     let limit = table.read_expecting("limit", LIMIT, unless(UNLIMITED, read_limit));
@@ -26,7 +29,7 @@ pub(super) fn read_queue(node: &Node, context: Context<'_>) -> Option<Queue> {
     Some(Queue { limit: limit?, discipline: discipline? })
 }
 
-/// How much may wait.
+/// Reads a limit of a queue: a number of packets, a size in bytes, or a time.
 pub(super) fn read_limit(node: &Node, context: Context<'_>) -> Option<QueueLimit> {
     let text = values::text(node, context, LIMIT)?;
     let packets = || values::packets(text).map(QueueLimit::Packets);
@@ -39,7 +42,7 @@ pub(super) fn read_limit(node: &Node, context: Context<'_>) -> Option<QueueLimit
     limit
 }
 
-/// A number of packets: `limit` of a link.
+/// Reads the key `limit` of a link: a number of packets.
 pub(super) fn read_packets(node: &Node, context: Context<'_>) -> Option<u64> {
     const EXPECTED: &str = "a number of packets such as \"1000 packets\"";
     let text = values::text(node, context, EXPECTED)?;
@@ -50,6 +53,7 @@ pub(super) fn read_packets(node: &Node, context: Context<'_>) -> Option<u64> {
     packets
 }
 
+/// Reads a discipline by name or as a table. `limit` is the limit of the queue, from which plain RED takes its thresholds.
 fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) -> Option<Discipline> {
     if let Some(name) = node.as_text() {
         return match name {
@@ -74,6 +78,7 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
     }
 }
 
+/// Reads the parameters of CoDel.
 fn read_codel(node: &Node, context: Context<'_>) -> Option<CoDel> {
     const EXPECTED: &str = "a table such as { target = \"5ms\", interval = \"100ms\" }";
     let mut table = TableReader::new(node, context, LINK_TABLE.table("queue.discipline.codel"), EXPECTED)?;
@@ -83,7 +88,8 @@ fn read_codel(node: &Node, context: Context<'_>) -> Option<CoDel> {
     Some(CoDel { target: target?, interval: interval?, mtu: mtu?, ecn: ecn? })
 }
 
-/// Floyd's advice: thresholds a factor of three apart, a tenth dropped at the upper one. The queue's limit is twice that, so that the limit is met seldom.
+/// Reads RED without parameters, with the advice of Floyd: the upper threshold is three times the lower one, and a tenth of the packets is dropped at the upper
+/// threshold. The upper threshold is half of the queue's limit, so that the queue rarely reaches the limit.
 fn read_plain_red(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) -> Option<Discipline> {
     const EXPECTED: &str = "a limit in bytes of at least 6B beside it, or { red = { min, max } }";
     let Some(QueueLimit::Bytes(limit)) = limit else {
@@ -93,12 +99,12 @@ fn read_plain_red(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) 
     read_red(&nothing(node), context, Some([Bytes::new(limit.get() / 6), Bytes::new(limit.get() / 2)])).map(Discipline::Red)
 }
 
-/// A table without keys in place of a word, for a discipline with its defaults.
+/// Returns a table without keys in place of a word, for a discipline with its defaults.
 fn nothing(word: &Node) -> Node {
     Node::empty_table(word.place, word.path.clone())
 }
 
-/// `thresholds`: the least and the greatest, if the table does not say them.
+/// Reads the parameters of RED. `thresholds` are the lower and the upper threshold, or `None` if the table has the keys `min` and `max`.
 fn read_red(node: &Node, context: Context<'_>, thresholds: Option<[Bytes; 2]>) -> Option<Red> {
     let declaration = LINK_TABLE.table("queue.discipline.red");
     let mut table = TableReader::new(node, context, declaration, "a table such as { min = \"5kB\", max = \"15kB\" }")?;

@@ -1,4 +1,4 @@
-//! `reorder`: packets that leave their place on purpose.
+//! Reader of `reorder`: packets that are moved out of order on purpose.
 
 use core::num::NonZeroU32;
 
@@ -9,7 +9,8 @@ use crate::document::{Entry, Node};
 use crate::reading::{Context, TableReader, only_one, values};
 use crate::schema::link::LINK_TABLE;
 
-/// `"25%"` (jumps ahead), or `{ probability, correlation }` with `gap`, with `behind` and `at-most`, or with `later`.
+/// Reads `"25%"` (such packets jump ahead), or `{ probability, correlation }` with `gap`, with `behind` and `at-most`, or with `later`. Returns `Some(None)` if
+/// no packet is ever moved.
 pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<Reorder>> {
     let any = Displacement::Jump { gap: NonZeroU32::MIN };
     if node.as_table().is_none() {
@@ -20,6 +21,7 @@ pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<R
     let mut table = TableReader::new(node, context, declaration, "a probability or a table such as { probability = \"25%\", gap = 5 }")?;
     let packets = read_chance_in(&mut table, node, context);
     let how = [table.entry("gap"), table.entry("behind"), table.entry("later")];
+    // Asked for before `finish`, so that the key counts as known and gets the message below.
     let at_most_entry = table.entry("at-most");
     let at_most = table.maybe_value("at-most");
     if how[1].is_some() && at_most_entry.is_none() {
@@ -41,7 +43,7 @@ pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<R
         Some(how) if how.name == "behind" => {
             let packets = count(how);
             let at_most = at_most?;
-            // A missing key was reported above, and in a part of a scene none is missing.
+            // `miss` has reported a missing key, except in a part, which may lack the key.
             let at_most = if context.partial { at_most.unwrap_or_default() } else { at_most? };
             Displacement::Behind { packets: packets?, at_most }
         }

@@ -1,4 +1,4 @@
-//! `slots`: a line that sends only now and then.
+//! Reader of `slots`: a line that releases packets only at certain instants.
 
 use core::num::NonZeroU64;
 
@@ -9,6 +9,7 @@ use crate::document::Node;
 use crate::reading::{Context, TableReader, values};
 use crate::schema::link::LINK_TABLE;
 
+/// Reads the law of the gaps between slots, and the packets and bytes that may leave in one slot.
 pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
     const EXPECTED: &str = "\"none\" or a table such as { min = \"10ms\", max = \"20ms\" }";
     let mut table = TableReader::new(node, context, LINK_TABLE.table("slots"), EXPECTED)?;
@@ -38,7 +39,7 @@ pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
     Some(slots)
 }
 
-/// Gaps that are uniform between two spans.
+/// Reads gaps that are uniform between `min` and `max`. Without `max`, every gap is `min`.
 fn read_ends(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Slots> {
     let nodes = [table.get("min"), table.get("max")];
     let (min, max) = (table.value("min"), table.maybe_value("max"));

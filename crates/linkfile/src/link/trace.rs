@@ -1,4 +1,4 @@
-//! Recordings: `trace`, a recorded line or a recorded path, and `replay`, a link that does what a log says.
+//! Readers of recordings: `trace`, a recorded line or a recorded path, and `replay`, a link that repeats the fates of a log.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,18 +14,18 @@ use crate::reading::named_file::{Fault, file_path, line_span, read_file};
 use crate::reading::{Context, TableReader, values};
 use crate::schema::link::LINK_TABLE;
 
-/// What a file has recorded.
+/// Content of a recording.
 #[derive(Clone, Debug)]
 pub(super) enum Trace {
-    /// When a line can deliver: mahimahi's format.
+    /// Instants at which a line can deliver, in the format of mahimahi.
     Delivery(DeliveryTrace),
-    /// Which delay and loss a path had: a CSV.
+    /// Delay and loss of a path over time, as a CSV.
     Path(PathTrace),
 }
 
 const FILE: &str = "the name of a recording, relative to the folder of the scene";
 
-/// `None` for "none".
+/// Reads a recording: the name of a file, or a table. Returns `Some(None)` for "none".
 pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Trace>> {
     if is_none(node) {
         return Some(None);
@@ -55,10 +55,11 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     table.finish();
     let form = Form { bytes: bytes?, between: between?, repeat: repeat?, start: start? };
     let Some(file) = file else {
-        // A missing key was reported above, and in a part of a scene none is missing.
+        // `miss` has reported the missing key, except in a part, which may lack the key.
         return context.partial.then_some(None);
     };
     let trace = load(file, context, form)?;
+    // Only the content of the file tells the kind of the recording, so keys of the other kind are refused after the file is read.
     let misplaced = match &trace {
         Trace::Delivery(_) => of_path.into_iter().flatten().next(),
         Trace::Path(_) => bytes_entry,
@@ -74,29 +75,35 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     Some(Some(trace))
 }
 
-/// The way in which a recording is read.
+/// Parameters for reading a recording.
 #[derive(Clone, Copy, Debug)]
 struct Form {
+    /// Bytes that a line can deliver per instant.
     bytes: Bytes,
+    /// Values of a path between two rows.
     between: Between,
+    /// Whether the recording of a path begins again after its end.
     repeat: bool,
+    /// Origin of the times of a recorded path.
     start: Start,
 }
 
-/// Origin of the times of a recorded path.
+/// Origin of the times of a recorded path: the start of the run, or the first row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Start {
     Zero,
     First,
 }
 
-/// A run whose end is not known lasts less than this: ten years. Times since 1970 are later.
+/// Assumed end of a run without a known end: ten years. Recordings with times since 1970 begin later, and are refused.
 const LONGEST_RUN: Duration = Duration::from_secs(10 * 365 * 86_400);
 
+/// Reads and parses the file of a recording.
 fn load(node: &Node, context: Context<'_>, form: Form) -> Option<Trace> {
     let path = file_path(node, context, FILE)?;
     let Form { bytes, between, repeat, start } = form;
     let ends = context.ends;
+    // The end of the run belongs to the form, because it decides whether the recording is refused.
     let read_as = format!("trace {bytes} {between:?} {repeat} {start:?} {ends:?}");
     read_file(node, context, &path, &read_as, |text| match parse(text, bytes, between, repeat)? {
         Trace::Path(path) if start == Start::First => path.from_first().map(Trace::Path).map_err(|error| Fault::in_line(text, None, &error)),
@@ -108,7 +115,8 @@ fn load(node: &Node, context: Context<'_>, form: Form) -> Option<Trace> {
     })
 }
 
-/// The fault of a recording that begins after the end of the run, of which the run would see the first row alone.
+/// Returns the message of a recording that begins at or after the end of the run, or `None` for a recording that begins earlier. A run would see only the
+/// first row of a recording that begins too late.
 fn outside(path: &PathTrace, ends: Option<Duration>) -> Option<String> {
     let first = path.first().saturating_duration_since(Instant::ZERO);
     let end = ends.unwrap_or(LONGEST_RUN);
@@ -121,7 +129,7 @@ fn outside(path: &PathTrace, ends: Option<Duration>) -> Option<String> {
     })
 }
 
-/// A file whose first line is a number has instants of delivery; any other one is a CSV.
+/// Parses a recording. A file whose first line is a number has instants of delivery; any other file is a CSV.
 fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Trace, Fault> {
     let content = text.strip_prefix('\u{feff}').unwrap_or(text);
     let first = content.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
@@ -148,18 +156,20 @@ fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Tra
     })
 }
 
-/// The line below the columns: the second one that says anything.
+/// Returns the bytes of the first row of a CSV: the second line that is neither blank nor a comment.
 fn first_row_span(text: &str) -> core::ops::Range<usize> {
     let content = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
     let line = text.lines().enumerate().filter(|(_, line)| content(line)).nth(1).map_or(1, |(place, _)| place + 1);
     line_span(text, line)
 }
 
+/// Reads a log of fates, whose path is relative to the folder of the document.
 pub(super) fn read_replay(node: &Node, context: Context<'_>) -> Option<Arc<FateLog>> {
     let path = file_path(node, context, "the name of a log of fates, relative to the folder of the scene")?;
     read_file(node, context, &path, "fates", |text| FateLog::parse(text).map(Arc::new).map_err(|error| fault(text, &error)))
 }
 
+/// Returns the fault of a log of fates, with its line if the error has one.
 fn fault(text: &str, error: &FateLogError) -> Fault {
     let line = match error {
         FateLogError::Header { .. } => Some(1),

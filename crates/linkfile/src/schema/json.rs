@@ -1,16 +1,16 @@
-//! The catalogue as a JSON Schema.
+//! Catalogue of keys as a JSON Schema.
 //!
-//! It is of draft 7, the newest that all editors for TOML take, and written out in full: Taplo (Even Better TOML) shows no description beside a `$ref`
-//! and ends at an `allOf`, and Tombi does not follow every `$ref`.
+//! The schema follows draft 7, the newest draft that all editors for TOML support. No part refers to another part: Taplo (Even Better TOML) shows no
+//! description beside a `$ref` and stops at an `allOf`, and Tombi does not follow every `$ref`.
 
 use serde_json::{Map, Value, json};
 
 use cohaptic_wan::parameters::{Form, Key, Need, Quantity, Table, Words};
 
-/// A number, space or none, and the letters of a unit. Which units there are the reader says, in a message that names them.
+/// Pattern of a quantity: a number, optional space, and the letters of a unit. The units themselves are left to the readers, whose messages name the units.
 const WITH_UNIT: &str = r"^\s*[0-9.]+\s*[A-Za-zµμ]+\s*$";
 
-/// The schema of a kind of file, by the table at its top and a title: a JSON Schema of draft 7.
+/// Returns the JSON Schema (draft 7) of a kind of file, made from the table at the top of the file and a title.
 #[must_use]
 pub fn json_schema(root: &Table, title: &str) -> Value {
     let mut schema = table(root);
@@ -21,17 +21,20 @@ pub fn json_schema(root: &Table, title: &str) -> Value {
     schema
 }
 
+/// Returns the schema of a table: an object with one property per key.
 fn table(table: &Table) -> Value {
     let properties: Map<String, Value> = table.keys().map(|key| (key.name.to_owned(), property(key, table.is_laid_over))).collect();
     let required: Vec<&str> = table.keys().filter(|key| key.need == Need::Required).map(|key| key.name).collect();
     let mut schema = json!({ "type": "object", "properties": properties, "additionalProperties": table.others.map_or(json!(false), form) });
-    // Draft 4 takes no empty list there, and an editor for it may read this.
+    // Draft 4 forbids an empty list of required keys, and an editor may read the schema as draft 4.
     if let (Some(members), false) = (schema.as_object_mut(), required.is_empty()) {
         members.insert("required".to_owned(), json!(required));
     }
     schema
 }
 
+/// Returns the schema of a key, described by meaning, unit, and default. `is_laid_over`: whether the table is laid over another table, so that a missing key
+/// has the value of the other table.
 fn property(key: &Key, is_laid_over: bool) -> Value {
     let mut schema = form(&key.form);
     let mut about = key.about.to_owned();
@@ -60,6 +63,7 @@ fn property(key: &Key, is_laid_over: bool) -> Value {
     schema
 }
 
+/// Returns the schema of the values of a form.
 fn form(form_of: &Form) -> Value {
     match form_of {
         Form::Text | Form::File => json!({ "type": "string" }),
@@ -86,6 +90,7 @@ fn form(form_of: &Form) -> Value {
     }
 }
 
+/// Returns the schema of a number with its bounds.
 fn number(amount: Quantity) -> Value {
     let mut schema = json!({ "type": "number" });
     if let Some(members) = schema.as_object_mut() {
@@ -94,11 +99,12 @@ fn number(amount: Quantity) -> Value {
     schema
 }
 
+/// Returns the schema of a text that consists of a number and a unit.
 fn with_unit(examples: &[&str]) -> Value {
     json!({ "type": "string", "pattern": WITH_UNIT, "examples": examples })
 }
 
-/// `x-taplo` is where Taplo looks for what each word means.
+/// Returns the schema of a choice of words. Taplo reads the meanings of the words under `x-taplo`.
 fn words(choices: Words) -> Value {
     let (names, meanings): (Vec<&str>, Vec<&str>) = choices.iter().copied().unzip();
     json!({ "type": "string", "enum": names, "x-taplo": { "docs": { "enumValues": meanings } } })

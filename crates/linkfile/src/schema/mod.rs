@@ -1,10 +1,10 @@
-//! The catalogue of keys: every key with its meaning, unit, default and form, for editors and for authors of files.
+//! Catalogue of keys: every key with its meaning, unit, default and form, for editors and for authors of files.
 //!
-//! Each table is declared once, beside its reader, which takes names, forms, ranges, units and defaults from the declaration. The catalogue is these
-//! declarations, from the table at the top of a file down.
+//! Each table is declared once, beside its reader, which takes names, forms, ranges, units and defaults from the declaration. The catalogue consists of
+//! these declarations, from the table at the top of a file down.
 //!
-//! [`json_schema`] is the catalogue as a JSON Schema. It is coarser than the readers: what depends on another key, such as a unit that fits, a peer that
-//! exists, or two keys that exclude each other, is left to them.
+//! [`json_schema`] returns the catalogue as a JSON Schema. The schema is coarser than the readers: conditions between keys, such as a peer that exists or
+//! two keys that exclude each other, and the choice of the unit are left to the readers.
 
 mod json;
 pub mod link;
