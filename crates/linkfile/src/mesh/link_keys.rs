@@ -1,4 +1,4 @@
-//! Links by their keys: one by itself, and those of a file, to be shown and changed.
+//! Links by their keys: a single link from texts, and the keys of the links of a file, to be shown and changed.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -12,10 +12,11 @@ use crate::document::{BEGINNING, FileError, Node, Sources, Table, Value, key_tex
 use crate::link::read_link;
 use crate::reading::{Context, FileReader, Modulators, parse_with, values};
 
-/// The link of these keys: texts `KEY=VALUE`, such as `delay=24ms` and `loss={ gilbert-elliott = { p = 0.01, r = 0.1 } }`, as in `[link]` of a scene.
-/// Files that they name are looked for in the current folder.
+/// Returns the link with the given keys. The keys are texts `KEY=VALUE`, such as `delay=24ms` and `loss={ gilbert-elliott = { p = 0.01, r = 0.1 } }`, with the
+/// meaning of `[link]` in a scene. Files named by the keys are looked for in the current folder.
 ///
-/// Unlike in a scene, `loss=1` is refused: these texts stand where words of `tc` may stand too, and there `loss 1` is 1 %. `loss=100%` and `loss=0` are read.
+/// Unlike in a scene, `loss=1` is refused. Words of `tc` can stand in place of these texts, and in `tc` the words `loss 1` mean 1 %. `loss=100%` and `loss=0`
+/// are accepted.
 ///
 /// # Errors
 ///
@@ -25,7 +26,7 @@ pub fn link_from_keys(keys: &[String]) -> Result<LinkModel, FileError> {
     read_overrides(&overrides, Path::new("link.toml"), &Arc::default(), FileReader::ANY, refuse_fractions)
 }
 
-/// Refuses the number of a chance, where a word of `tc` of the same name takes a number for hundredths.
+/// Refuses a chance without unit under a key whose word in `tc` takes percent.
 fn refuse_fractions(link: &Node, context: Context<'_>) {
     let entries = link.as_table().map_or(&[][..], |table| &table.0);
     for entry in entries.iter().filter(|entry| ["loss", "duplicate", "corrupt", "reorder"].contains(&entry.name.as_str())) {
@@ -33,7 +34,7 @@ fn refuse_fractions(link: &Node, context: Context<'_>) {
         let (Value::Integer(_) | Value::Float(_)) = node.value else { continue };
         let Some(probability) = values::probability(node, context).filter(|probability| probability.get() != 0.0) else { continue };
         let number = values::written(node);
-        // The digits of the product beyond the twelfth come from rounding to binary.
+        // Rounded to ten decimals of a percent, because digits after those come from the binary form of the number.
         let percent = (probability.get() * 1e12).round() / 1e10;
         let name = &entry.name;
         context.fault_at(
@@ -43,7 +44,7 @@ fn refuse_fractions(link: &Node, context: Context<'_>) {
     }
 }
 
-/// The link that overrides of the keys of `link` make, of which `check` has reported what it refuses.
+/// Reads a link from overrides of the keys under `link`. `check` can report further faults. `file` gives the folder of the files named by the keys.
 fn read_overrides(
     overrides: &[String],
     file: &Path,
@@ -61,36 +62,38 @@ fn read_overrides(
     Ok(parsed.whole)
 }
 
-/// The keys of one directed link and their values as TOML, in the order in which they were laid over each other: of two that exclude each other the later
-/// one holds. Keys that are not there have their defaults.
+/// Keys of one directed link and their values as TOML, in the order in which they were laid over each other. Of two keys that exclude each other, the later key
+/// applies. Missing keys have their defaults.
 ///
-/// Its display form is an inline table, `{ delay = "24ms", loss = 0.01 }`, which [`LinkKeys::read`] takes.
+/// The display form is an inline table, `{ delay = "24ms", loss = 0.01 }`, which [`LinkKeys::read`] parses.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct LinkKeys {
+    /// Keys with their values. A value is TOML, or a text without quotes set by [`LinkKeys::with`].
     keys: Vec<(String, String)>,
+    /// Modulators of the file, to which the key `modulated` refers.
     modulators: Arc<Modulators>,
 }
 
 impl LinkKeys {
-    /// The keys of a table, in a file with these modulators.
+    /// Returns the keys of a table, in a file with the given modulators.
     #[must_use]
     pub fn of_table(table: &Table, modulators: &Arc<Modulators>) -> Self {
         Self { keys: keys_of(table), modulators: Arc::clone(modulators) }
     }
 
-    /// Each key with its value as TOML.
+    /// Returns each key with its value as TOML.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
         self.keys.iter().map(|(key, value)| (key.as_str(), value.as_str()))
     }
 
-    /// The value of a key, as TOML; `None` if it is not there.
+    /// Returns the value of a key as TOML, or `None` if the key is not given.
     #[must_use]
     pub fn get(&self, key: &str) -> Option<&str> {
         self.iter().find(|(name, _)| *name == key).map(|(_, value)| value)
     }
 
-    /// These keys with one laid over them. A value that is not TOML is taken as text, as in `--set`: `8ms` needs no quotes. [`LinkKeys::model`] tells whether
-    /// key and value make sense.
+    /// Returns a copy of these keys with one more key laid over them. A value that is not TOML is taken as a text, as in `--set`: `8ms` needs no quotes. Key
+    /// and value are checked only by [`LinkKeys::model`].
     #[must_use]
     pub fn with(&self, key: &str, value: &str) -> Self {
         let mut keys: Vec<_> = self.keys.iter().filter(|(name, _)| name != key).cloned().collect();
@@ -98,7 +101,7 @@ impl LinkKeys {
         Self { keys, modulators: Arc::clone(&self.modulators) }
     }
 
-    /// The link that these keys make. `folder` is where files that they name are looked for: that of the file with the keys.
+    /// Returns the link with these keys. `folder` is the folder of the file with the keys, in which files named by the keys are looked for.
     ///
     /// # Errors
     ///
@@ -107,22 +110,23 @@ impl LinkKeys {
         self.model_with(folder, FileReader::ANY)
     }
 
-    /// [`model`](Self::model), with the files that the keys name read by `reader`, for keys that somebody else may have written.
+    /// Like [`model`](Self::model), but `reader` reads the files named by the keys. For keys that may come from a stranger.
     ///
     /// # Errors
     ///
-    /// As [`model`](Self::model). [`FileError::bare_message`] of an error quotes nothing of these files.
+    /// As [`model`](Self::model). [`FileError::bare_message`] of an error quotes no content of these files.
     pub fn model_with(&self, folder: &Path, reader: FileReader<'_>) -> Result<LinkModel, FileError> {
         let overrides: Vec<String> = self.iter().map(|(key, value)| format!("link.{key}={value}")).collect();
         read_overrides(&overrides, &folder.join("link.toml"), &self.modulators, reader, |_, _| ())
     }
 
-    /// The keys in the display form of others, in the scene of these. `None` if the text is no table of keys and values; whether they make sense is told
-    /// by [`LinkKeys::model`].
+    /// Parses the display form of keys. The result has the modulators of these keys. Returns `None` if the text is no table of keys and values. Keys and values
+    /// are checked only by [`LinkKeys::model`].
     #[must_use]
     pub fn read(&self, table: &str) -> Option<Self> {
         let text = format!("link = {table}");
         let document = Node::document(DeTable::parse(&text).ok()?.get_ref()).ok()?;
+        // A text such as "{}\nscene = 3" would add a second key to the document.
         let [only] = document.as_table()?.0.as_slice() else { return None };
         Some(Self { keys: keys_of(only.node.as_table()?), modulators: Arc::clone(&self.modulators) })
     }
@@ -135,7 +139,7 @@ impl fmt::Display for LinkKeys {
         }
         let mut before = "{";
         for (key, value) in &self.keys {
-            // A text without quotes is given them: the display form is TOML.
+            // A text without quotes gets quotes, because the display form is TOML.
             let value = if is_toml(value) { value.clone() } else { value_text(&text_node(value)) };
             write!(f, "{before} {} = {value}", key_text(key))?;
             before = ",";
@@ -144,9 +148,10 @@ impl fmt::Display for LinkKeys {
     }
 }
 
-/// The keys of directed links, by the places of sender and receiver.
+/// Keys of directed links, by the indices of sender and receiver.
 pub type KeysOfLinks = BTreeMap<(usize, usize), LinkKeys>;
 
+/// Returns the keys of a table with their values as TOML.
 fn keys_of(table: &Table) -> Vec<(String, String)> {
     table.0.iter().map(|entry| (entry.name.clone(), value_text(&entry.node))).collect()
 }

@@ -1,7 +1,7 @@
-//! `[link]` and `[\[links\]]`: what lies between the peers.
+//! Readers of `[link]` and `[\[links\]]`: the links between the peers.
 //!
-//! A full mesh of N peers has N·(N−1) links, nearly all of them alike. Links are therefore sorted into *classes*: one for `[link]` and one for each
-//! entry that says something else. Only classes are read, and only links that have an entry are written down; a change in the timeline makes new classes.
+//! A full mesh of N peers has N·(N−1) links, nearly all of them alike. Links are therefore sorted into *classes*: one class for `[link]`, and one for each
+//! entry with other keys. Only classes are read, and only links with an entry are stored. A change in the timeline makes new classes.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,30 +18,32 @@ use crate::link::{is_empty, read_link, read_link_of};
 use crate::reading::{Context, Modulators, TableReader, values};
 use crate::schema::link::LINK_ENTRY;
 
-/// The classes of links as they stand at some time.
+/// Classes of links at some instant of the timeline.
 #[derive(Clone, Debug)]
 pub struct LinkClasses {
+    /// All classes made so far. Classes that no link uses any more stay, so that indices stay valid.
     classes: Vec<Class>,
+    /// Number of peers.
     peers: usize,
-    /// The class of the links that have none of their own.
+    /// Index in `classes` of the links without an entry.
     usual: usize,
-    /// The classes of the others, by sender and receiver.
+    /// Indices in `classes` of the links with an entry or a change of their own, by sender and receiver.
     own: BTreeMap<(usize, usize), usize>,
-    /// Those of the file, which go with the keys.
+    /// Modulators of the file, to which the keys refer.
     modulators: Arc<Modulators>,
 }
 
-/// Is told the links of a file: once as the file begins, and then after each change of its timeline, with the links that change.
+/// Observer of the links of a file. Called once with the links at the start, and after each change of the timeline with the instant and the changed links.
 pub type OnLinks<'a> = &'a mut dyn FnMut(Instant, LinkSelector, &LinkClasses);
 
-/// The keys of a class as written, and what they say.
+/// Class of links: keys as written, and the configuration read from the keys.
 #[derive(Clone, Debug)]
 struct Class {
     keys: Node,
     config: Arc<LinkModel>,
 }
 
-/// Reads `[link]` and `[\[links\]]`. `None` where something was refused.
+/// Reads `[link]` and `[\[links\]]`. Returns `None` if `[link]` or an entry was refused.
 pub fn read_links(defaults: Option<&Node>, entries: Option<&Node>, context: Context<'_>) -> Option<LinkClasses> {
     let nothing = Node::empty_table(BEGINNING, "link".to_owned());
     let defaults = defaults.unwrap_or(&nothing);
@@ -50,10 +52,12 @@ pub fn read_links(defaults: Option<&Node>, entries: Option<&Node>, context: Cont
         Some(node) => values::list(node, context, "entries [[links]]")?,
         None => Vec::new(),
     };
+    // A `[link]` that is no table has been refused. The entries are still read, over an empty table.
     let below = if defaults.as_table().is_some() { defaults } else { &nothing };
     let mut seen = BTreeSet::new();
     let own: Vec<_> = entries.iter().map(|entry| read_entry(entry, below, &mut seen, context)).collect();
 
+    // Answers are used only from here on, so that every entry was read and the first fault of the text is found.
     let base = Class { keys: defaults.clone(), config: Arc::new(base?) };
     let mut links = LinkClasses {
         classes: vec![base],
@@ -72,8 +76,8 @@ pub fn read_links(defaults: Option<&Node>, entries: Option<&Node>, context: Cont
     Some(links)
 }
 
-/// Checks the keys that a change of links sets, without the link that they are laid over, so that a fault is found even where it is not known which links
-/// are meant. `None` only if there are none.
+/// Checks the keys of a change without the link that the keys will be laid over, so that a fault is found even if the changed links are not known. Returns
+/// `None` only if the change has no keys.
 pub fn read_key_changes(set: &Node, context: Context<'_>) -> Option<()> {
     read_link(set, context.of_part());
     if is_empty(set) {
@@ -83,7 +87,7 @@ pub fn read_key_changes(set: &Node, context: Context<'_>) -> Option<()> {
     Some(())
 }
 
-/// The ends of an entry and, if it says anything else, its keys laid over those of `[link]`.
+/// Reads the ends of an entry and, if the entry has other keys, the keys laid over `below`, the keys of `[link]`.
 #[expect(clippy::type_complexity, reason = "used once, above")]
 fn read_entry(
     entry: &Node,
@@ -94,7 +98,7 @@ fn read_entry(
     let mut table = TableReader::new(entry, context, &LINK_ENTRY, "a table with from, to and link keys")?;
     let ends = read_ends(&mut table, context);
     let to = table.get("to");
-    // Its other keys, known and unknown, are looked at below; a missing key is reported here.
+    // `read_link_of` below reports unknown keys of the entry. Only a missing end is reported here, and only if no key is unknown.
     let lacks_an_end = ["from", "to"].iter().any(|end| table.get(end).is_none());
     if lacks_an_end && entry.as_table().is_some_and(|keys| keys.0.iter().all(|entry| LINK_ENTRY.key(&entry.name).is_some())) {
         table.know_all();
@@ -116,13 +120,13 @@ fn read_entry(
 }
 
 impl LinkClasses {
-    /// The table of configurations. `None` for fewer than two peers, which have no links; that is refused elsewhere.
+    /// Returns the table of configurations, or `None` for fewer than two peers, which have no links and are refused elsewhere.
     pub fn table(&self) -> Option<LinkTable> {
         let config = |class: usize| Arc::clone(&self.classes[class].config);
         (self.peers >= 2).then(|| LinkTable::new(self.peers, config(self.usual), self.own.iter().map(|(ends, class)| (*ends, config(*class)))))
     }
 
-    /// The keys of the links that `selector` means, as they were laid over each other. Access lines have none here.
+    /// Returns the keys of the links that `selector` selects, in the order in which the keys were laid over each other. For an access line the answer is empty.
     #[must_use]
     pub fn keys(&self, selector: LinkSelector) -> KeysOfLinks {
         let keys =
@@ -138,7 +142,7 @@ impl LinkClasses {
         }
     }
 
-    /// Lays keys over those of one link, and answers what it is now. `None` where something was refused.
+    /// Lays keys over the keys of one link, and returns the changed link. Returns `None` if the keys were refused.
     pub fn change(&mut self, (from, to): (usize, usize), keys: &Node, context: Context<'_>) -> Option<LinkChange> {
         let old = self.own.get(&(from, to)).copied().unwrap_or(self.usual);
         let class = self.lay_over(old, keys, context)?;
@@ -146,8 +150,9 @@ impl LinkClasses {
         Some(LinkChange { from, to, config: Arc::clone(&self.classes[class].config) })
     }
 
-    /// Lays keys over those of all links, and answers what they are now. `None` where something was refused.
+    /// Lays keys over the keys of all links, and returns the new table. Returns `None` if the keys were refused.
     pub fn change_all(&mut self, keys: &Node, context: Context<'_>) -> Option<LinkTable> {
+        // One new class for each old class in use: links that shared a class share the new one.
         let mut new_class = BTreeMap::new();
         for old in self.in_order_of_use() {
             if let Entry::Vacant(place) = new_class.entry(old) {
@@ -160,8 +165,10 @@ impl LinkClasses {
         self.table()
     }
 
-    /// The classes that links have, by sender and then by receiver, so that of several faults the same one is found first. Some come more than once.
+    /// Returns the classes in use, by sender and then by receiver of their links, so that the first of several faults does not depend on the order of classes.
+    /// A class can occur more than once.
     fn in_order_of_use(&self) -> Vec<usize> {
+        // `first` is the first link without an entry. At its position the usual class is used for the first time.
         let first = first_left(self.peers, self.own.keys().copied());
         let before = self.own.iter().take_while(|(ends, _)| first.is_none_or(|first| **ends < first));
         let after = self.own.iter().skip_while(|(ends, _)| first.is_none_or(|first| **ends < first));
@@ -169,13 +176,14 @@ impl LinkClasses {
         before.map(class).chain(first.map(|_| self.usual)).chain(after.map(class)).collect()
     }
 
-    /// The class of links of an old class over which keys are laid.
+    /// Returns the index of a new class: the keys of the class `old` with `keys` laid over them. Returns `None` if the keys were refused.
     fn lay_over(&mut self, old: usize, keys: &Node, context: Context<'_>) -> Option<usize> {
         let merged = keys.over(&self.classes.get(old)?.keys, &[]);
         let config = read_link(&merged, context)?;
         Some(self.add(merged, config))
     }
 
+    /// Adds a class, and returns its index.
     fn add(&mut self, keys: Node, config: LinkModel) -> usize {
         self.classes.push(Class { keys, config: Arc::new(config) });
         self.classes.len() - 1

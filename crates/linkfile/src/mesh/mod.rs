@@ -1,4 +1,4 @@
-//! The links between named ends, peers or programs: what a file says of all of them, of single ones, and of each after a change.
+//! Links between named ends (peers or programs): keys for all links, keys for single links, and the links after each change.
 
 mod link_keys;
 mod link_table;

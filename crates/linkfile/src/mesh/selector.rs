@@ -1,32 +1,32 @@
-//! Which peer, and which links: references from one part of a file to another.
+//! Readers of references from one part of a file to peers and links in another part.
 
 use crate::document::{Node, quote};
 use crate::reading::{Context, Names, TableReader, one_of, only_one, values};
 use crate::schema::link::{ENDS_TABLE, LINK_OR_LINE};
 
-/// Which links are meant, by the places of peers in the file.
+/// Selected links or access lines, by the indices of peers in the file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LinkSelector {
     /// All links between peers.
     All,
     /// One directed link.
     Between {
-        /// The sender.
+        /// Index of the sender.
         from: usize,
-        /// The receiver.
+        /// Index of the receiver.
         to: usize,
     },
-    /// The line that a peer sends through.
+    /// The access line through which a peer sends.
     Uplink(usize),
-    /// The line that a peer receives through.
+    /// The access line through which a peer receives.
     Downlink(usize),
 }
 
-/// The peer of that name, by its place.
+/// Reads the name of a peer or program, and returns its index.
 pub fn read_peer_name(node: &Node, context: Context<'_>) -> Option<usize> {
     let expected = format!("the name of a {}", context.names.map_or("peer", Names::noun));
     let name = values::text(node, context, &expected)?;
-    // Without the list of names, the fault is there.
+    // Without a list of names, the fault of the list has been reported.
     let names = context.names?;
     let index = names.index(name);
     if index.is_none() {
@@ -38,7 +38,7 @@ pub fn read_peer_name(node: &Node, context: Context<'_>) -> Option<usize> {
     index
 }
 
-/// The two ends of a link, which differ: `from` and `to` of a table that may have other keys.
+/// Reads the keys `from` and `to` of a table that may have other keys. Two equal ends are a fault.
 pub fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(usize, usize)> {
     let to_node = table.get("to");
     let noun = context.names.map_or("peer", Names::noun);
@@ -52,7 +52,7 @@ pub fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(u
     Some((from, to))
 }
 
-/// Links between peers: "all", or one of them.
+/// Reads a selection of links between peers: "all", or the ends of one link.
 pub fn read_links_between(node: &Node, context: Context<'_>) -> Option<LinkSelector> {
     const EXPECTED: &str = "\"all\" or a table such as { from = \"left\", to = \"right\" }";
     if is_all(node, context, EXPECTED)? {
@@ -64,7 +64,7 @@ pub fn read_links_between(node: &Node, context: Context<'_>) -> Option<LinkSelec
     ends.map(|(from, to)| LinkSelector::Between { from, to })
 }
 
-/// Links between peers, or an access line.
+/// Reads a selection of links between peers, or of an access line.
 pub fn read_link_or_line(node: &Node, context: Context<'_>) -> Option<LinkSelector> {
     const EXPECTED: &str = "\"all\", { from = …, to = … }, { uplink = … } or { downlink = … }";
     if is_all(node, context, EXPECTED)? {
@@ -77,6 +77,7 @@ pub fn read_link_or_line(node: &Node, context: Context<'_>) -> Option<LinkSelect
         table.finish();
         return ends.map(|(from, to)| LinkSelector::Between { from, to });
     }
+    // Asked for only to refuse both kinds of keys together in `only_one`.
     let (from, to) = (table.entry("from"), table.entry("to"));
     table.finish();
     let chosen = only_one(node, context, &[uplink, downlink, from, to], EXPECTED)?;
@@ -84,7 +85,7 @@ pub fn read_link_or_line(node: &Node, context: Context<'_>) -> Option<LinkSelect
     Some(if uplink.is_some() { LinkSelector::Uplink(peer) } else { LinkSelector::Downlink(peer) })
 }
 
-/// Whether the value is "all"; any other text is a fault.
+/// Returns whether the value is "all". Any other text is a fault.
 fn is_all(node: &Node, context: Context<'_>, expected: &str) -> Option<bool> {
     match node.as_text() {
         None => Some(false),

@@ -1,4 +1,4 @@
-//! Relay files: which programs talk to each other in real time, through which links and ports.
+//! Relay files: programs that talk to each other in real time, with their links and ports.
 
 mod programs;
 
@@ -15,7 +15,7 @@ use crate::mesh::{KeysOfLinks, LinkChange, LinkClasses, LinkSelector, LinkTable,
 use crate::reading::{Context, TableReader, default_title, defaults, parse, values, with_text};
 use crate::schema::link::{LINK_CHANGE, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR};
 
-/// What `cohaptic relay FILE` does. Every number in it has been checked.
+/// Checked content of a relay file, which `cohaptic relay FILE` runs.
 ///
 /// ```
 /// use std::path::Path;
@@ -39,63 +39,63 @@ use crate::schema::link::{LINK_CHANGE, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MO
 /// ```
 #[derive(Clone, PartialEq, Debug)]
 pub struct RelayFile {
-    /// The file it was read from, for messages.
+    /// Path of the relay file, for messages.
     pub file: PathBuf,
-    /// A line for people.
+    /// Title for people.
     pub title: String,
-    /// The seed of every random stream.
+    /// Seed of every random stream.
     pub seed: u64,
-    /// The programs, at least two, in the order of the file. Their names and ports differ.
+    /// Programs, at least two, in the order of the file. Names and ports are distinct, except that port 0 may occur more than once.
     pub programs: Vec<RelayProgram>,
-    /// The directed links between the programs.
+    /// Directed links between the programs.
     pub links: LinkTable,
-    /// Changes of links, in order of time; equal instants in the order of the file.
+    /// Changes of links, in order of time. Changes at the same instant are in the order of the file.
     pub timeline: Vec<RelayChange>,
-    /// What it may take, and how late it may be.
+    /// Limits on memory, silence and lateness.
     pub limits: RelayLimits,
 }
 
-/// A program that takes part.
+/// Program that takes part in a relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RelayProgram {
-    /// Its name, which names its links too.
+    /// Name of the program, which is part of the names of its links.
     pub name: String,
-    /// The port that stands for it: a program that sends there speaks to it. Port 0 is a free one.
+    /// Address that stands for the program: datagrams sent to this address reach the program. Port 0 lets the system choose a free port.
     pub port: SocketAddr,
-    /// Where it sends from and listens; `None`: learnt from the first datagram that it sends.
+    /// Address from which the program sends and at which it listens. `None`: learnt from the first datagram of the program.
     pub address: Option<SocketAddr>,
 }
 
-/// A link that becomes another one while the relay runs.
+/// Change of a link while the relay runs.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RelayChange {
-    /// When, counted from the beginning.
+    /// Instant of the change, since the start of the relay.
     pub at: Instant,
-    /// Which, by the places of programs in [`RelayFile::programs`], and into what.
+    /// Changed link and its new configuration. Sender and receiver are indices in [`RelayFile::programs`].
     pub link: LinkChange,
 }
 
-/// What a relay may take, and how late it may be.
+/// Limits of a relay on memory, silence and lateness.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RelayLimits {
-    /// The most datagrams in flight at once; those beyond are dropped.
+    /// Maximum number of datagrams in flight. Further datagrams are dropped.
     pub packets: u64,
-    /// The most bytes of them.
+    /// Maximum number of bytes in flight. Further datagrams are dropped.
     pub bytes: Bytes,
-    /// An address that was learnt, or a client, is forgotten when it has been silent for so long.
+    /// Silence after which a learnt address or a client is forgotten.
     pub forget_after: Duration,
-    /// Later than this is late: more than one late in a thousand, and the run was not valid.
+    /// Lateness above which a datagram is late. A run with more than one late datagram in a thousand is not valid.
     pub tolerance: Duration,
 }
 
 impl Default for RelayLimits {
-    /// Those of a file that does not say them: 262,144 datagrams, 64 MB, 30 s, 1 ms.
+    /// Returns the limits of a file without limits: 262,144 datagrams, 64 MB, 30 s and 1 ms.
     fn default() -> Self {
         defaults(|node, context| read_header(node, context)?.limits)
     }
 }
 
-/// The top of a relay file.
+/// Table at the top of a relay file.
 pub static ROOT: Table = Table::of(&[&[
     optional("relay", Form::Table(&RELAY), "Seed and limits"),
     required("programs", Form::List(&Form::Table(&programs::PROGRAM)), "The programs, at least two")
@@ -109,7 +109,7 @@ static RELAY: Table = Table::of(&[&[
     optional("title", Form::Text, "A line for people; without it the name of the file"),
     usual("seed", Form::Integer(0, i64::MAX.unsigned_abs()), "0", "Seed of all random numbers"),
     usual("allow-remote", Form::Boolean, "false", "Whether ports and addresses may be on other machines"),
-    // Each takes at least a hundred bytes.
+    // Each datagram in flight takes at least a hundred bytes of memory, so the largest value stands for 1.7 GB.
     usual("most-packets", Form::Integer(1, 1 << 24), "262144", "The most datagrams in flight at once").expecting("a number of datagrams, {}"),
     usual("most-bytes", Form::Size, "\"64MB\"", "The most bytes of datagrams in flight at once"),
     usual("forget-after", Form::PositiveDuration, "\"30s\"", "A learnt address that is silent for so long may be replaced"),
@@ -123,26 +123,26 @@ static TIMELINE: Table = Table::of(&[&[
 ]]);
 
 impl RelayFile {
-    /// Reads a relay file. `overrides` are texts `KEY=VALUE` that replace values of the file, in this order.
+    /// Reads a relay file. `overrides` are texts `KEY=VALUE` that replace values of the file, in the order of application.
     ///
     /// # Errors
     ///
-    /// [`FileError::Read`] if the file, or one that it names, cannot be read; [`FileError::Invalid`] for anything else.
+    /// [`FileError::Read`] if the file, or a file named in it, cannot be read; [`FileError::Invalid`] for any other fault.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, FileError> {
         with_text(path, |text| Self::parse(text, path, overrides))
     }
 
-    /// Reads a text. `file` stands in messages, and its folder is where files that it names are looked for.
+    /// Reads the text of a relay file. `file` is the path for messages, and its folder is the base of files named in the text.
     ///
     /// # Errors
     ///
-    /// As [`RelayFile::read`]. Of several faults, the one that stands first in the text; faults in overrides come after those in the text.
+    /// As [`RelayFile::read`]. Of several faults, the fault that stands first in the text; faults in overrides come after faults in the text.
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, FileError> {
         parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole.0)
     }
 }
 
-/// The keys of every directed link of a relay file as it begins, by the places of its programs: an entry `[[links]]` is laid over `[link]`.
+/// Returns the keys of every directed link at the start of a relay, by the indices of its programs. An entry `[[links]]` is laid over `[link]`.
 ///
 /// # Errors
 ///
@@ -151,7 +151,7 @@ pub fn relay_link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks,
     with_text(path, |text| relay_link_keys_of_text(text, path, overrides))
 }
 
-/// [`relay_link_keys`] of a relay file that is a text.
+/// Like [`relay_link_keys`], for the text of a relay file.
 ///
 /// # Errors
 ///
@@ -160,16 +160,17 @@ pub fn relay_link_keys_of_text(text: &str, file: &Path, overrides: &[String]) ->
     parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole.1.keys(LinkSelector::All))
 }
 
-/// `[relay]`. A field is `None` where it was refused.
+/// Content of `[relay]`. A field is `None` if its key was refused.
 #[derive(Debug, Default)]
 struct Header {
-    /// `Some(None)`: not given.
+    /// Title, or `Some(None)` if the key is not given.
     title: Option<Option<String>>,
     seed: Option<u64>,
     allow_remote: Option<bool>,
     limits: Option<RelayLimits>,
 }
 
+/// Reads a relay file. Every part is read, also after a refused part, so that the first fault of the text is found.
 fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, LinkClasses)> {
     let mut root = TableReader::new(document, context, &ROOT, "a table")?;
     root.know_all();
@@ -177,6 +178,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, Li
     let programs_node = root.get("programs");
     let programs = root.read("programs", |node, context| programs::read_programs(node, header.allow_remote, context));
     let (names, programs) = programs.unzip();
+    // Links and timeline refer to programs and modulators, so those are read first, whatever the order in the file.
     let context = context.with_names(names.as_ref());
     let modulators = read_modulators(root.get("modulators"), context);
     let context = context.with_modulators(modulators.as_ref());
@@ -199,6 +201,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, Li
     Some((relay, links))
 }
 
+/// Reads `[relay]`.
 fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
     let mut table = TableReader::new(node, context, &RELAY, "a table such as [relay]")?;
     let title = table.maybe("title", |node, context| values::text(node, context, "a text").map(str::to_owned));
@@ -218,15 +221,17 @@ fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
     Some(Header { title, seed, allow_remote, limits })
 }
 
+/// Minimum of `most-bytes` \[bytes\]: the largest UDP datagram must fit.
 const LEAST_BYTES: u64 = 65_535;
 
-/// Reads `[\[timeline\]]`, the links that become other ones while the relay runs, and puts the changes in order of time. `links`: how things stand at the beginning; `None` if they were refused.
+/// Reads `[\[timeline\]]`, the changes of links while the relay runs, and sorts the changes by time. `links` are the links at the start, or `None` if they were
+/// refused.
 fn read_timeline(node: Option<&Node>, links: Option<&LinkClasses>, context: Context<'_>) -> Option<Vec<RelayChange>> {
     let Some(node) = node else { return Some(Vec::new()) };
     let entries = values::list(node, context, "entries [[timeline]]")?;
     let planned: Vec<_> = entries.iter().map(|entry| read_entry(entry, context)).collect();
     let mut planned: Vec<(Instant, LinkSelector, &Node)> = planned.into_iter().collect::<Option<_>>()?;
-    // Stable: equal instants stay in the order of the file.
+    // A stable sort keeps changes at the same instant in the order of the file.
     planned.sort_by_key(|(at, ..)| *at);
     let mut links = links?.clone();
     let mut changes = Vec::new();
@@ -242,6 +247,7 @@ fn read_timeline(node: Option<&Node>, links: Option<&LinkClasses>, context: Cont
     Some(changes)
 }
 
+/// Reads an entry of the timeline: instant, selected links, and the node with the changed keys.
 fn read_entry<'a>(entry: &'a Node, context: Context<'a>) -> Option<(Instant, LinkSelector, &'a Node)> {
     let mut table = TableReader::new(entry, context, &TIMELINE, "a table with at, link and set")?;
     let at = table.read("at", values::instant);

@@ -1,4 +1,4 @@
-//! `[\[programs\]]`: the programs, and their addresses.
+//! Reader of `[\[programs\]]`: the programs of a relay, and their addresses.
 
 use std::net::SocketAddr;
 
@@ -9,9 +9,10 @@ use super::RelayProgram;
 use crate::document::{Node, quote};
 use crate::reading::{Context, Names, TableReader, values};
 
-/// Each has a socket, and each pair two links.
+/// Maximum number of programs. The relay opens a socket for each program, and has two links for each pair.
 const MOST_PROGRAMS: usize = 256;
 
+/// Table of an entry `[\[programs\]]`.
 pub(super) static PROGRAM: Table = Table::of(&[&[
     required("name", Form::Text, "Its name, which names its links: unique, not all, without space and without . > / , and quotes")
         .expecting("the name of the program"),
@@ -20,7 +21,7 @@ pub(super) static PROGRAM: Table = Table::of(&[&[
     optional("address", Form::Like(&["127.0.0.1:9001"]), "Where it sends from and listens; without it learnt from the first datagram that it sends"),
 ]]);
 
-/// The entry of a program, with the nodes that faults point at.
+/// Entry of a program, with the nodes at which faults are reported.
 #[derive(Debug)]
 struct Written<'a> {
     program: RelayProgram,
@@ -28,7 +29,7 @@ struct Written<'a> {
     address: Option<&'a Node>,
 }
 
-/// The programs and their names, in the order of the file. `None` where something was refused.
+/// Reads the programs and their names, in the order of the file. Returns `None` if an entry was refused.
 pub(super) fn read_programs(node: &Node, allow_remote: Option<bool>, context: Context<'_>) -> Option<(Names, Vec<RelayProgram>)> {
     let entries = values::list(node, context, "entries [[programs]]")?;
     if entries.len() > MOST_PROGRAMS {
@@ -38,6 +39,7 @@ pub(super) fn read_programs(node: &Node, allow_remote: Option<bool>, context: Co
     let mut names = Names::of("program");
     let written: Vec<Option<Written<'_>>> = entries.iter().map(|entry| read_program(entry, allow_remote, &mut names, context)).collect();
     let written: Vec<Written<'_>> = written.into_iter().collect::<Option<_>>()?;
+    // Both checks run, so that the first fault of the text is found.
     let distinct = check_distinct(&written, context);
     let families = check_families(&written, context);
     (distinct && families).then(|| (names, written.into_iter().map(|written| written.program).collect()))
@@ -50,6 +52,7 @@ pub(super) fn check_enough(names: &Names, node: &Node, context: Context<'_>) {
     }
 }
 
+/// Reads one entry, and adds its name to `names`. `allow_remote` is `None` if that key was refused.
 fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Names, context: Context<'a>) -> Option<Written<'a>> {
     let mut table = TableReader::new(entry, context, &PROGRAM, "a table with name and port")?;
     let (port_node, address_node) = (table.get("port"), table.get("address"));
@@ -70,7 +73,7 @@ fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Nam
     Some(Written { program: RelayProgram { name: name?, port: port?, address: address? }, port: port_node?, address: address_node })
 }
 
-/// The rule for names is that of peers, so that links of both are named alike.
+/// Reads the name of a program. Programs follow the rule for names of peers, so that links of both are named alike.
 fn read_name(node: &Node, names: &mut Names, context: Context<'_>) -> Option<String> {
     const EXPECTED: &str = "a name, without space and none of . > / , \" and not \"all\"";
     let text = values::text(node, context, EXPECTED)?;
@@ -86,6 +89,7 @@ fn read_name(node: &Node, names: &mut Names, context: Context<'_>) -> Option<Str
     Some(text.to_owned())
 }
 
+/// Reads a socket address, which must be a loopback address unless remote addresses are allowed.
 fn read_address(node: &Node, expected: &str, allow_remote: Option<bool>, context: Context<'_>) -> Option<SocketAddr> {
     let text = values::text(node, context, expected)?;
     let address = match crate::address(text) {
@@ -104,7 +108,7 @@ fn read_address(node: &Node, expected: &str, allow_remote: Option<bool>, context
     Some(address)
 }
 
-/// No two ports and no two addresses are the same; a port of 0 is always another one.
+/// Checks that all ports differ and all addresses differ. Port 0 differs from every port, because the system chooses a free port for each.
 fn check_distinct(written: &[Written<'_>], context: Context<'_>) -> bool {
     let mut distinct = true;
     for (place, one) in written.iter().enumerate() {
@@ -126,7 +130,8 @@ fn check_distinct(written: &[Written<'_>], context: Context<'_>) -> bool {
     distinct
 }
 
-/// What reaches a program leaves from the ports of the others: an IPv4 socket reaches no IPv6 address.
+/// Checks that the address of each program has the family of the ports of all other programs: datagrams to a program leave from these ports, and an IPv4
+/// socket reaches no IPv6 address.
 fn check_families(written: &[Written<'_>], context: Context<'_>) -> bool {
     let mut fit = true;
     for (place, one) in written.iter().enumerate() {

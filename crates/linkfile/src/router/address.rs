@@ -1,28 +1,30 @@
-//! Addresses with the length of a prefix: `10.1.0.1/24`, `fd00::/64`.
+//! Networks: addresses with the length of a prefix, such as `10.1.0.1/24` and `fd00::/64`.
 
 use core::fmt;
 use core::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use core::str::FromStr;
 
-/// An address and how many of its first bits say which network it is in.
+/// Address with the length of its prefix. The leading bits up to that length identify the network.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct Network {
+    /// Address as given, including the bits after the prefix.
     address: IpAddr,
+    /// Length of the prefix \[bits\], at most the length of the address.
     prefix: u8,
 }
 
-/// The prefix has more bits than the address.
+/// Error: the prefix has more bits than the address.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("a prefix of {prefix} bits is longer than an address of {bits}")]
 pub struct PrefixTooLong {
-    /// What was asked for.
+    /// Length of the prefix \[bits\].
     pub prefix: u8,
-    /// What an address of this family has.
+    /// Length of an address of this family \[bits\].
     pub bits: u8,
 }
 
 impl Network {
-    /// The network of an address.
+    /// Returns the network of an address, with the length of the prefix in bits.
     ///
     /// # Errors
     ///
@@ -32,23 +34,24 @@ impl Network {
         if prefix > bits { Err(PrefixTooLong { prefix, bits }) } else { Ok(Self { address, prefix }) }
     }
 
-    /// The address as it was given.
+    /// Returns the address as given, including the bits after the prefix.
     #[must_use]
     pub const fn address(self) -> IpAddr {
         self.address
     }
 
-    /// The number of bits of the prefix.
+    /// Returns the length of the prefix \[bits\].
     #[must_use]
     pub const fn prefix(self) -> u8 {
         self.prefix
     }
 
-    /// Whether the address lies in this network. One of the other family never does.
+    /// Returns whether an address lies in this network. An address of the other family never does.
     #[must_use]
     pub fn contains(self, address: IpAddr) -> bool {
         match (self.address, address) {
             (IpAddr::V4(own), IpAddr::V4(other)) => {
+                // A prefix of 0 bits shifts by the whole width. `checked_shl` returns `None` then, and the mask is 0.
                 let mask = u32::MAX.checked_shl(32 - u32::from(self.prefix)).unwrap_or(0);
                 (Ipv4Addr::to_bits(own) ^ Ipv4Addr::to_bits(other)) & mask == 0
             }
@@ -67,7 +70,7 @@ impl fmt::Display for Network {
     }
 }
 
-/// The text is no address, or its prefix makes no sense.
+/// Error: a text is no address, or its prefix is no number or too long.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("no address: expected one with a prefix such as \"10.1.0.1/24\" or \"fd00::1/64\"")]
 pub struct NoNetwork;
@@ -75,7 +78,7 @@ pub struct NoNetwork;
 impl FromStr for Network {
     type Err = NoNetwork;
 
-    /// An address alone has all its bits for a prefix.
+    /// Parses an address with or without a prefix. Without a prefix, all bits of the address are the prefix.
     fn from_str(text: &str) -> Result<Self, NoNetwork> {
         let (address, prefix) = match text.split_once('/') {
             Some((address, prefix)) => (address, Some(prefix)),
@@ -83,7 +86,7 @@ impl FromStr for Network {
         };
         let address: IpAddr = address.parse().map_err(|_| NoNetwork)?;
         let prefix = match prefix {
-            // A sign would be read as part of the number.
+            // `parse` also takes a sign, so the digits are checked here.
             Some(digits) if digits.bytes().all(|byte| byte.is_ascii_digit()) => digits.parse().map_err(|_| NoNetwork)?,
             Some(_) => return Err(NoNetwork),
             None if address.is_ipv4() => 32,

@@ -1,7 +1,7 @@
-//! The file of a router: what lies between two network interfaces.
+//! Router files: the links between two network interfaces.
 //!
-//! A router has two sides, links with names, and rules that say which packets go through which link. The keys of a link are those of a scene, and so is
-//! the care with which a fault is shown.
+//! A router has two sides, links with names, and rules that decide which packets go through which link. The keys of a link are the same as in a scene, and
+//! faults are shown in the same way.
 //!
 //! ```
 //! use std::path::Path;

@@ -1,4 +1,4 @@
-//! A checked router file.
+//! Checked content of a router file.
 
 use std::path::PathBuf;
 
@@ -8,61 +8,61 @@ use cohaptic_wan::LinkModel;
 use super::Network;
 use crate::mesh::LinkKeys;
 
-/// A router, ready to be run: every link that a rule names is there.
+/// Checked content of a router file. Every target of a rule refers to a link in `links`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RouterFile {
-    /// The file it was read from, for messages.
+    /// Path of the router file, for messages.
     pub file: PathBuf,
-    /// The seed of every random stream.
+    /// Seed of every random stream.
     pub seed: u64,
-    /// How much may be inside all links together.
+    /// Bound on packets and bytes inside all links together.
     pub memory: Memory,
-    /// The left side.
+    /// Attachment of the left side.
     pub left: Attachment,
-    /// The right side: of the same kind as the left one.
+    /// Attachment of the right side, of the same kind as the left side.
     pub right: Attachment,
-    /// The links, by the places that targets have. Their names differ.
+    /// Links with distinct names, indexed by [`Target::Link`].
     pub links: Vec<NamedLink>,
-    /// The rules, in the order in which they are asked.
+    /// Rules, in the order in which they are tried.
     pub rules: Vec<RuleSpec>,
-    /// Where packets go to which no rule applies, by the side they come from: left, right.
+    /// Targets of packets to which no rule applies, indexed by the side from which the packet comes: left, right.
     pub default: [Target; 2],
 }
 
-/// How much may be inside all links together. A packet beyond it is dropped.
+/// Bound on packets and bytes inside all links together. A packet beyond the bound is dropped.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Memory {
-    /// Packets, copies included.
+    /// Maximum number of packets, copies included.
     pub packets: u64,
-    /// Their bytes, copies included.
+    /// Maximum number of bytes in packets, copies included.
     pub bytes: Bytes,
 }
 
-/// A link and what it is called.
+/// Link with its name.
 #[derive(Clone, PartialEq, Debug)]
 pub struct NamedLink {
-    /// Its name.
+    /// Name of the link.
     pub name: String,
-    /// Its keys, to be shown and changed.
+    /// Keys of the link, to be shown and changed.
     pub keys: LinkKeys,
-    /// What it does, in either direction. Each direction has a queue, a state and random numbers of its own.
+    /// Model of the link for both directions. Each direction has a queue, a state and random numbers of its own.
     pub model: LinkModel,
 }
 
-/// One of the two ends of a router.
+/// Side of a router.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum Side {
-    /// The left one.
+    /// Left side.
     Left,
-    /// The right one.
+    /// Right side.
     Right,
 }
 
 impl Side {
-    /// Both, in the order of arrays that have a place for each.
+    /// Both sides, in the order of arrays indexed by side.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
-    /// `left` or `right`.
+    /// Returns the name of the side: `left` or `right`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -71,7 +71,7 @@ impl Side {
         }
     }
 
-    /// The other one: where packets go that come from this one.
+    /// Returns the other side, to which packets from this side go.
     #[must_use]
     pub const fn opposite(self) -> Self {
         match self {
@@ -80,24 +80,24 @@ impl Side {
         }
     }
 
-    /// Its place in [`Side::BOTH`].
+    /// Returns the index of the side in [`Side::BOTH`].
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
     }
 }
 
-/// What a side is attached to.
+/// Network device to which a side is attached.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Attachment {
-    /// A TUN device: the host that has it is the end of the network on this side.
+    /// A TUN device. The host of the device is the end of the network on this side.
     Tun(TunSpec),
-    /// An interface that is there: what lies behind it is the network on this side.
+    /// An existing interface. The network behind the interface is the network on this side.
     Interface(InterfaceSpec),
 }
 
 impl Attachment {
-    /// The name of the device.
+    /// Returns the name of the device.
     #[must_use]
     pub fn device(&self) -> &str {
         match self {
@@ -106,7 +106,7 @@ impl Attachment {
         }
     }
 
-    /// The network namespace in which the device is; `None`: that of the program.
+    /// Returns the network namespace of the device, or `None` for the namespace of the program.
     #[must_use]
     pub fn namespace(&self) -> Option<&str> {
         match self {
@@ -116,82 +116,82 @@ impl Attachment {
     }
 }
 
-/// A TUN device.
+/// TUN device of a side.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct TunSpec {
-    /// Its name.
+    /// Name of the device.
     pub name: String,
-    /// Whether it is there already, with its addresses: then it is left as it is.
+    /// Whether the device exists already. An existing device keeps its addresses and its MTU.
     pub existing: bool,
-    /// The addresses it is given.
+    /// Addresses that the device gets.
     pub addresses: Vec<Network>,
-    /// The largest packet it takes \[bytes\]; `None`: what the system chooses, 1500.
+    /// Largest packet of the device \[bytes\], or `None` for the default of the system, 1500.
     pub mtu: Option<u16>,
-    /// Whether the kernel leaves cutting of large segments and checksums to the router, and takes such segments: fewer system calls for the same packets.
+    /// Whether the kernel passes large segments without checksums to the router, and takes such segments back: fewer system calls for the same packets.
     pub offloads: bool,
-    /// The network namespace in which it is made: a name as `ip netns` gives it, or a path; `None`: that of the program.
+    /// Network namespace of the device: a name as in `ip netns`, or a path. `None` for the namespace of the program.
     pub namespace: Option<String>,
 }
 
-/// An interface that is there.
+/// Existing interface of a side.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct InterfaceSpec {
-    /// Its name.
+    /// Name of the interface.
     pub name: String,
-    /// The network namespace in which it is: a name as `ip netns` gives it, or a path; `None`: that of the program.
+    /// Network namespace of the interface: a name as in `ip netns`, or a path. `None` for the namespace of the program.
     pub namespace: Option<String>,
 }
 
-/// Where a packet goes.
+/// Target of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Target {
-    /// Through the link in this place.
+    /// Through the link with this index in [`RouterFile::links`].
     Link(usize),
-    /// To the other side at once.
+    /// Directly to the other side, without a link.
     Pass,
-    /// Nowhere.
+    /// The packet is dropped.
     Drop,
 }
 
-/// Which packets go where. A condition that is `None` holds for every packet.
+/// Rule: conditions on a packet, and the target of packets that meet all conditions. A condition `None` holds for every packet.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RuleSpec {
-    /// The side from which the packet comes.
+    /// Side from which the packet comes.
     pub from: Option<Side>,
-    /// The network of its source.
+    /// Network that contains the source address.
     pub source: Option<Network>,
-    /// The network of its destination.
+    /// Network that contains the destination address.
     pub destination: Option<Network>,
-    /// Its protocol.
+    /// Transport protocol of the packet.
     pub protocol: Option<Protocol>,
-    /// The port of its source. A packet without ports has none that could match.
+    /// Ports that contain the source port. A packet without ports never matches.
     pub source_port: Option<Ports>,
-    /// The port of its destination.
+    /// Ports that contain the destination port. A packet without ports never matches.
     pub destination_port: Option<Ports>,
-    /// The port of its source or that of its destination.
+    /// Ports that contain the source port or the destination port. A packet without ports never matches.
     pub port: Option<Ports>,
-    /// Where it goes.
+    /// Target of matching packets.
     pub target: Target,
 }
 
-/// A range of ports, both ends included; the first is not above the last.
+/// Range of ports, both ends included. `first` is at most `last`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Ports {
-    /// The lowest.
+    /// Lowest port.
     pub first: u16,
-    /// The highest.
+    /// Highest port.
     pub last: u16,
 }
 
 impl Ports {
-    /// Whether the port is one of them.
+    /// Returns whether the range contains a port.
     #[must_use]
     pub const fn contain(self, port: u16) -> bool {
         self.first <= port && port <= self.last
     }
 }
 
-/// The number of a transport protocol, as in the header of IPv4.
+/// Number of a transport protocol, as in the header of IPv4.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct Protocol(pub u8);
 
@@ -205,10 +205,10 @@ impl Protocol {
     /// ICMP for IPv6.
     pub const ICMPV6: Self = Self(58);
 
-    /// Those with a name, and the name.
+    /// Protocols that have a name in router files, with the name.
     pub const NAMED: [(&'static str, Self); 4] = [("tcp", Self::TCP), ("udp", Self::UDP), ("icmp", Self::ICMP), ("icmpv6", Self::ICMPV6)];
 
-    /// Whether it is known where its packets say their ports.
+    /// Returns whether the router can read the ports of packets of this protocol: TCP and UDP.
     #[must_use]
     pub const fn has_ports(self) -> bool {
         matches!(self, Self::TCP | Self::UDP)

@@ -1,4 +1,4 @@
-//! From texts to router files.
+//! Reader of router files.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::mesh::LinkKeys;
 use crate::reading::{Context, TableReader, defaults, parse, values, with_text};
 use crate::schema::link::{LINK_TABLE, MODULATOR};
 
-/// The top of a router file.
+/// Table at the top of a router file.
 pub static ROOT: Table = Table::of(&[&[
     required("router", Form::Table(&ROUTER), "Seed, memory, and where packets go to which no rule applies")
         .expecting("a table such as [router] with a default"),
@@ -45,44 +45,45 @@ static MEMORY: Table = Table::of(&[&[
 static LINKS: Table = Table::with_others(&[], &Form::Table(&LINK_TABLE));
 
 impl Default for Memory {
-    /// That of a file which does not say it: 262,144 packets, which is one second of 250,000 packets/s, and 256 MB.
+    /// Returns the bound of a file without `memory`: 262,144 packets, about one second at 250,000 packets/s, and 256 MB.
     fn default() -> Self {
         defaults(read_memory)
     }
 }
 
 impl RouterFile {
-    /// Reads the file of a router. `overrides` are texts `KEY=VALUE` that replace values of the file, such as `links.wan.delay=8ms`.
+    /// Reads a router file. `overrides` are texts `KEY=VALUE` that replace values of the file, such as `links.wan.delay=8ms`.
     ///
     /// # Errors
     ///
-    /// [`FileError::Read`] if the file, or one that it names, cannot be read; [`FileError::Invalid`] for anything else.
+    /// [`FileError::Read`] if the file, or a file named in it, cannot be read; [`FileError::Invalid`] for any other fault.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, FileError> {
         with_text(path, |text| Self::parse(text, path, overrides))
     }
 
-    /// Reads it from a text. `file` stands in messages, and its folder is where files that it names are looked for.
+    /// Reads the text of a router file. `file` is the path for messages, and its folder is the base of files named in the text.
     ///
     /// # Errors
     ///
-    /// As [`RouterFile::read`]. Of several faults, the one that stands first in the text.
+    /// As [`RouterFile::read`]. Of several faults, the fault that stands first in the text.
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, FileError> {
         parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole)
     }
 
-    /// The place of a link in [`RouterFile::links`], by its name.
+    /// Returns the index in [`RouterFile::links`] of the link with a name, or `None` if no link has the name.
     #[must_use]
     pub fn link_index(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|link| link.name == name)
     }
 }
 
-/// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
+/// Reads a router file. Every part is read, also after a refused part, so that the first fault of the text is found.
 fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
     let mut root = TableReader::new(document, context, &ROOT, "a table")?;
     root.know_all();
     let modulators = read_modulators(root.get("modulators"), context);
     let context = context.with_modulators(modulators.as_ref());
+    // Default and rules refer to links by name, so the links are read first, whatever the order in the file.
     let links = root.maybe("links", |node, _| read_links(node, context)).map(Option::unwrap_or_default);
     let router = root.read("router", |node, _| read_router(node, links.as_deref(), context));
     let left = root.read("left", read_side);
@@ -96,7 +97,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
     Some(RouterFile { file: context.sources.file.to_path_buf(), seed, memory, left, right, links: links?, rules: rules?, default })
 }
 
-/// `[links]`: a table for each link. `None` where something was refused.
+/// Reads `[links]`, a table for each link. Returns `None` if a link was refused.
 fn read_links(node: &Node, context: Context<'_>) -> Option<Vec<NamedLink>> {
     let Some(table) = node.as_table() else {
         context.fault_at(node, format!("found {}: expected a table for each link, such as [links.wan]", node.describe()));
@@ -113,17 +114,18 @@ fn read_links(node: &Node, context: Context<'_>) -> Option<Vec<NamedLink>> {
         let keys = LinkKeys::of_table(entry.node.as_table()?, context.modulators?);
         Some(NamedLink { name: is_name.then(|| entry.name.clone())?, keys, model: model? })
     });
-    // Each is read, also after one that was refused.
+    // The answers are collected twice, so that each link is read also after a refused link.
     read.collect::<Vec<_>>().into_iter().collect()
 }
 
+/// Returns whether a text can be the name of a link: 1 to 64 letters, digits, `-` and `_`, and neither `pass` nor `drop`, which are targets.
 fn is_link_name(name: &str) -> bool {
     const LONGEST: usize = 64;
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
     (1..=LONGEST).contains(&name.len()) && name.chars().all(is_plain) && !matches!(name, "pass" | "drop")
 }
 
-/// `[router]`: the seed, the memory and the defaults.
+/// Reads `[router]`: the seed, the memory and the default targets, indexed by side. `links` is `None` if the links were refused.
 fn read_router(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<(u64, Memory, [Target; 2])> {
     let mut table = TableReader::new(node, context, &ROUTER, "a table such as [router]")?;
     let seed = table.value("seed");
@@ -134,6 +136,7 @@ fn read_router(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -
     Some((seed?, memory?, default?))
 }
 
+/// Reads `default`: one target for both directions, or a table with a target per direction. The answer is indexed by the side from which packets come.
 fn read_default(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<[Target; 2]> {
     if !matches!(node.value, Value::Table(_)) {
         return read_target(node, links, context).map(|target| [target; 2]);
@@ -144,7 +147,7 @@ fn read_default(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) 
     Some([left?, right?])
 }
 
-/// `memory = { packets = 10000, bytes = "64MB" }`.
+/// Reads `memory = { packets = 10000, bytes = "64MB" }`.
 fn read_memory(node: &Node, context: Context<'_>) -> Option<Memory> {
     let mut table = TableReader::new(node, context, &MEMORY, "a table such as { packets = 10000, bytes = \"64MB\" }")?;
     let packets = table.value("packets");

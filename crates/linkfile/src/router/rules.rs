@@ -1,4 +1,4 @@
-//! `[\[rules\]]`: which packets go where.
+//! Reader of `[\[rules\]]`: conditions on packets, and the target of matching packets.
 
 use cohaptic_wan::parameters::{Choices, Form, Table, optional, required, words};
 
@@ -7,10 +7,12 @@ use super::{NamedLink, Network, Ports, Protocol, RuleSpec, Side, Target};
 use crate::document::{Node, Value, quote};
 use crate::reading::{Context, TableReader, one_of, values};
 
-/// What a target may be.
+/// Expected text of a target, for messages.
 pub(super) const TARGET: &str = "the name of a link, \"pass\" or \"drop\"";
 
+/// Form of a target.
 pub(super) const TARGET_FORM: Form = Form::Like(&["pass", "drop", "wan"]);
+/// Table of an entry `[\[rules\]]`.
 pub(super) static RULE: Table = Table::of(&[&[
     optional("from", Form::Words(const { &words(&SIDES) }), "On which side the packet comes in"),
     optional("source", Form::Like(&["10.1.0.0/16"]), "An address or a network that it comes from"),
@@ -31,14 +33,15 @@ const PORTS_FORM: Form = Form::AnyOf(&[Form::Integer(0, 65_535), Form::Like(&["5
 const PORTS: &str = "a port from 0 to 65535, or a range such as \"5000-5999\"";
 const PROTOCOL: &str = "tcp, udp, icmp, icmpv6 or a number from 0 to 255";
 
-/// All rules. `None` where something was refused.
+/// Reads all rules. Returns `None` if a rule was refused. `links` is `None` if the links were refused.
 pub(super) fn read_rules(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<Vec<RuleSpec>> {
     let entries = values::list(node, context, "entries [[rules]]")?;
-    // Each is read, also after one that was refused.
+    // Collected twice, so that each rule is read also after a refused rule.
     let rules: Vec<_> = entries.into_iter().map(|entry| read_rule(entry, links, context)).collect();
     rules.into_iter().collect()
 }
 
+/// Reads one rule, and refuses a rule that no packet matches.
 fn read_rule(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<RuleSpec> {
     let mut table = TableReader::new(node, context, &RULE, "a table such as { protocol = \"tcp\", port = 80, link = \"wan\" }")?;
     let network = |node, context| read_network(node, context, "an address or a network such as \"10.1.0.0/16\" or \"fd00::/64\"");
@@ -54,6 +57,7 @@ fn read_rule(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> 
     let port = table.maybe("port", read_ports);
     let target = table.read("link", |node, context| read_target(node, links, context));
     table.finish();
+    // A condition that was refused ends the reading here: the checks below compare conditions with each other.
     let (source, destination, protocol) = (source?, destination?, protocol?);
     if let (Some(source), Some(destination)) = (source, destination)
         && source.address().is_ipv4() != destination.address().is_ipv4()
@@ -77,7 +81,7 @@ fn read_rule(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> 
     })
 }
 
-/// Refuses rules that no packet matches.
+/// Refuses a protocol that contradicts the ports or the networks of the rule, so that no packet matches. `port` is the node of any given key of ports.
 fn check_protocol(
     protocol: Option<Protocol>,
     networks: [Option<Network>; 2],
@@ -108,7 +112,7 @@ fn check_protocol(
     Some(())
 }
 
-/// A target: a link, or an action without one.
+/// Reads a target: the name of a link, `pass` or `drop`.
 pub(super) fn read_target(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<Target> {
     let name = values::text(node, context, TARGET)?;
     match name {
@@ -116,7 +120,7 @@ pub(super) fn read_target(node: &Node, links: Option<&[NamedLink]>, context: Con
         "drop" => return Some(Target::Drop),
         _ => {}
     }
-    // Without the list of links nothing can be said; why there is none was said.
+    // Without the list of links the name cannot be checked. The fault of the list has been reported.
     let links = links?;
     let place = links.iter().position(|link| link.name == name);
     if place.is_none() {
@@ -126,6 +130,7 @@ pub(super) fn read_target(node: &Node, links: Option<&[NamedLink]>, context: Con
     place.map(Target::Link)
 }
 
+/// Reads a protocol by name or number.
 fn read_protocol(node: &Node, context: Context<'_>) -> Option<Protocol> {
     if let Value::Integer(_) = node.value {
         let number = values::integer(node, context, 0..=255, PROTOCOL)?;
@@ -142,13 +147,14 @@ fn read_protocol(node: &Node, context: Context<'_>) -> Option<Protocol> {
     named
 }
 
-/// A port or a range of ports.
+/// Reads a port, or a range of ports with both ends included.
 fn read_ports(node: &Node, context: Context<'_>) -> Option<Ports> {
     if let Value::Integer(_) = node.value {
         let port = u16::try_from(values::integer(node, context, 0..=65_535, PORTS)?).ok()?;
         return Some(Ports { first: port, last: port });
     }
     let text = values::text(node, context, PORTS)?;
+    // `parse` also takes a sign, so the digits are checked here.
     let port = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse::<u16>().ok()).flatten();
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let range = port(first.trim()).zip(port(last.trim())).filter(|(first, last)| first <= last);

@@ -1,4 +1,4 @@
-//! `left` and `right`: what the router stands between.
+//! Reader of `left` and `right`: the network devices of the router.
 
 use cohaptic_wan::parameters::{Form, Table, optional, usual};
 
@@ -6,6 +6,7 @@ use super::{Attachment, InterfaceSpec, Network, TunSpec};
 use crate::document::{Node, quote};
 use crate::reading::{Context, TableReader, values};
 
+/// Table of a side.
 pub(super) static SIDE: Table = Table::of(&[&[
     optional("tun", Form::Text, "Name of a TUN device, which is made and is gone with the router")
         .expecting("tun = \"NAME\" for a device of the router, or interface = \"NAME\" for one that is there"),
@@ -22,6 +23,7 @@ pub(super) static SIDE: Table = Table::of(&[&[
     usual("offloads", Form::Boolean, "true", "Packets cross the TUN device in large segments, which the router cuts and joins"),
 ]]);
 
+/// Reads a side: a TUN device, or an interface with its namespace.
 pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment> {
     let mut table = TableReader::new(node, context, &SIDE, "a table with a tun or an interface")?;
     let interface = table.get("interface");
@@ -31,6 +33,7 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
             values::refuse(context, &[Some(tun), Some(interface)], node, &"a side is a tun or an interface: expected only one of them");
             return None;
         }
+        // `finish` reports the keys of a TUN device here, because they were not asked for.
         let name = read_device(interface, context);
         table.finish();
         return Some(Attachment::Interface(InterfaceSpec { name: name?, namespace: namespace? }));
@@ -52,7 +55,7 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
     Some(Attachment::Tun(TunSpec { name: name?, existing: existing?, addresses: addresses?, mtu, offloads: offloads?, namespace: namespace? }))
 }
 
-/// What cannot be said of one side alone.
+/// Checks both sides together: they are of the same kind, and not the same device.
 pub(super) fn check_sides(left: &Attachment, right: &Attachment, right_node: &Node, context: Context<'_>) -> Option<()> {
     let message = match (left, right) {
         (Attachment::Tun(_), Attachment::Interface(_)) | (Attachment::Interface(_), Attachment::Tun(_)) => {
@@ -65,11 +68,11 @@ pub(super) fn check_sides(left: &Attachment, right: &Attachment, right_node: &No
     None
 }
 
-/// The name of a network device: Linux allows 15 bytes, and neither slash, colon nor space.
+/// Reads the name of a network device. Linux allows 15 bytes, and neither slash, colon nor space.
 fn read_device(node: &Node, context: Context<'_>) -> Option<String> {
     const EXPECTED: &str = "the name of a network device, 1 to 15 letters, digits and other signs, but no /, : and space";
     let name = values::text(node, context, EXPECTED)?;
-    // A percent sign would let the kernel choose a number.
+    // In the name of a new device, the kernel replaces a percent sign and a letter by a number.
     let is_sign = |byte: u8| byte.is_ascii_graphic() && !matches!(byte, b'/' | b':' | b'%');
     if !(1..=15).contains(&name.len()) || !name.bytes().all(is_sign) || matches!(name, "." | "..") {
         context.fault_at(node, format!("{} cannot be this name: expected {EXPECTED}", quote(name)));
@@ -78,6 +81,7 @@ fn read_device(node: &Node, context: Context<'_>) -> Option<String> {
     Some(name.to_owned())
 }
 
+/// Reads the name or the path of a network namespace.
 fn read_namespace(node: &Node, context: Context<'_>) -> Option<String> {
     const EXPECTED: &str = "a network namespace: its name, or a path such as \"/proc/4711/ns/net\"";
     let name = values::text(node, context, EXPECTED)?;
@@ -88,6 +92,7 @@ fn read_namespace(node: &Node, context: Context<'_>) -> Option<String> {
     Some(name.to_owned())
 }
 
+/// Reads a list of addresses with prefixes. Each element is read, also after a refused element.
 fn read_addresses(node: &Node, context: Context<'_>) -> Option<Vec<Network>> {
     let elements = values::list(node, context, "a list of addresses such as [\"10.1.0.1/24\", \"fd00::1/64\"]")?;
     let read =
@@ -95,7 +100,7 @@ fn read_addresses(node: &Node, context: Context<'_>) -> Option<Vec<Network>> {
     read.collect::<Vec<_>>().into_iter().collect()
 }
 
-/// An address, alone or with the length of a prefix.
+/// Reads an address, alone or with the length of a prefix.
 pub(super) fn read_network(node: &Node, context: Context<'_>, expected: &str) -> Option<Network> {
     let text = values::text(node, context, expected)?;
     let network = text.parse().ok();
