@@ -1,64 +1,65 @@
-//! Parameters as data: each with its key, form, unit, default and documentation.
+//! Declarations of parameters as data: key, form, unit, default and documentation.
 //!
-//! The file of a stage declares its parameters in these words, each once. This crate reads no files: readers, schemas, editors and pages of documentation take
-//! names, forms, units, ranges and defaults from the declaration.
+//! The source file of a stage declares each parameter of the stage once, with the types of this module. This crate reads no files: readers, schemas, editors
+//! and pages of documentation take names, forms, units, ranges and defaults from the declaration.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// A table: its keys, and what may stand under names that the file makes up.
+/// Declaration of a table: its keys, and the form of values under names chosen by the file.
 #[derive(Debug)]
 pub struct Table {
-    /// The keys, in the order in which they are explained. Several tables share a group.
+    /// Groups of keys, in the order of the reference. Several tables can share a group.
     pub groups: &'static [&'static [Key]],
-    /// Keys after those of the groups, if a registry makes them when the program runs.
+    /// Function that returns further keys, made by a registry while the program runs. These keys come after the keys of the groups.
     pub made: Option<fn() -> &'static [Key]>,
-    /// What stands under any other name; `None`: nothing.
+    /// Form of the value under any other name, or `None` if other names are unknown keys.
     pub others: Option<&'static Form>,
-    /// Whether it is laid over another table: without a key, what that one says holds, and the default only where that says nothing.
+    /// Whether the table is laid over another table. A missing key then has the value of the other table, and the default only if that table lacks the key too.
     pub is_laid_over: bool,
 }
 
 impl Table {
-    /// A table of one group of keys.
+    /// Declares a table with groups of keys.
     #[must_use]
     pub const fn of(groups: &'static [&'static [Key]]) -> Self {
         Self { groups, made: None, others: None, is_laid_over: false }
     }
 
-    /// A table of groups of keys that is laid over another one.
+    /// Declares a table with groups of keys that is laid over another table.
     #[must_use]
     pub const fn over(groups: &'static [&'static [Key]]) -> Self {
         Self { is_laid_over: true, ..Self::of(groups) }
     }
 
-    /// A table of keys and of names that the file makes up.
+    /// Declares a table with groups of keys and with names chosen by the file, whose values have the form `others`.
     #[must_use]
     pub const fn with_others(groups: &'static [&'static [Key]], others: &'static Form) -> Self {
         Self { others: Some(others), ..Self::of(groups) }
     }
 
-    /// The table with the keys that a registry makes, after its own.
+    /// Adds the keys made by a registry, after the keys of the table.
     #[must_use]
     pub const fn and(self, made: fn() -> &'static [Key]) -> Self {
         Self { made: Some(made), ..self }
     }
 
-    /// All keys.
+    /// Returns all keys in order.
     pub fn keys(&self) -> impl Iterator<Item = &'static Key> {
         let made: &[Key] = self.made.map_or(&[], |made| made());
         self.groups.iter().copied().flatten().chain(made)
     }
 
-    /// The key of that name.
+    /// Returns the key with a name, or `None` if the table declares no such key.
     #[must_use]
     pub fn key(&self, name: &str) -> Option<&'static Key> {
         self.keys().find(|key| key.name == name)
     }
 
-    /// The form of the value at a dotted path below the table, such as `loss.bursts.length`. An entry of a list stands in the path by its name or its place.
+    /// Returns the form of the value at a dotted path below the table, such as `loss.bursts.length`. In the path, an entry of a list is given by name or
+    /// index. Returns `None` if nothing is declared at the path.
     #[must_use]
     pub fn form(&self, path: &str) -> Option<&'static Form> {
         let mut names = path.split('.');
@@ -66,15 +67,16 @@ impl Table {
         names.try_fold(first, Form::within)
     }
 
+    /// Returns the form of the value under a name of this table.
     fn form_of(&self, name: &str) -> Option<&'static Form> {
         self.key(name).map(|key| &key.form).or(self.others)
     }
 
-    /// The table at a dotted path below this one.
+    /// Returns the table at a dotted path below this table.
     ///
     /// # Panics
     ///
-    /// If no table is declared there.
+    /// If no table is declared at the path.
     #[must_use]
     #[track_caller]
     pub fn table(&self, path: &str) -> &'static Self {
@@ -82,13 +84,14 @@ impl Table {
     }
 }
 
-/// Groups of keys one behind the other.
+/// Concatenates lists of groups of keys.
 ///
 /// # Panics
 ///
 /// If `M` is not the number of all groups; in a constant, that fails to compile.
 #[must_use]
 pub const fn joined<const M: usize>(parts: &[&[&'static [Key]]]) -> [&'static [Key]; M] {
+    // Loops instead of iterators, because iterators cannot run in a constant.
     let mut all: [&'static [Key]; M] = [&[]; M];
     let (mut count, mut part) = (0, 0);
     while part < parts.len() {
@@ -104,35 +107,35 @@ pub const fn joined<const M: usize>(parts: &[&[&'static [Key]]]) -> [&'static [K
     all
 }
 
-/// A key and what may stand under it.
+/// Declaration of a key and of its value.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
-    /// Its name.
+    /// Name of the key.
     pub name: &'static str,
-    /// What it means, in one or two sentences without the last full stop.
+    /// Meaning of the key, in one or two sentences without the last full stop.
     pub about: &'static str,
-    /// Whether it must be given.
+    /// Whether the key must be given, and the default.
     pub need: Need,
-    /// What may stand there.
+    /// Form of the value.
     pub form: Form,
-    /// What a message expects where the key is missing or an integer is wrong, with `{}` for what the form expects. Empty: that alone.
+    /// Expected text in messages about a missing key or a wrong integer. `{}` stands for the expected text of the form; an empty text stands for `{}`.
     expected: &'static str,
 }
 
 impl Key {
-    /// The key with other words for what a message expects; `{}` in them stands for what the form expects.
+    /// Sets the expected text of messages. `{}` in the text stands for the expected text of the form.
     #[must_use]
     pub const fn expecting(self, expected: &'static str) -> Self {
         Self { expected, ..self }
     }
 
-    /// What a message expects: `a number of peers, an integer from 2 to 1000000`.
+    /// Returns the expected text of messages: `a number of peers, an integer from 2 to 1000000`.
     #[must_use]
     pub fn expected(&self) -> String {
         if self.expected.is_empty() { self.form.expected() } else { self.expected.replace("{}", &self.form.expected()) }
     }
 
-    /// The range and the unit of the numbers that may stand there.
+    /// Returns range and unit of the numbers under the key.
     ///
     /// # Panics
     ///
@@ -147,17 +150,17 @@ impl Key {
 /// Whether a key must be given.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Need {
-    /// It must.
+    /// The key must be given.
     Required,
-    /// It must, there or in a table that holds for all, such as `[peer]`.
+    /// The key must be given in this table, or in a table for all such tables, such as `[peer]`.
     RequiredSomewhere,
-    /// Without it, it is this: a value that is the same in TOML and in JSON.
+    /// The key may be left out and then has this value, written such that TOML and JSON read the same value.
     Default(&'static str),
-    /// Without it, what it says is not there, or what `about` says.
+    /// The key may be left out. The feature is then absent, unless `about` gives another meaning.
     Optional,
 }
 
-/// What may stand under a key.
+/// Form of a value.
 #[derive(Clone, Copy, Debug)]
 pub enum Form {
     /// Any text.
@@ -166,7 +169,7 @@ pub enum Form {
     File,
     /// `true` or `false`.
     Boolean,
-    /// A whole number between these, both included.
+    /// A whole number between two bounds, both included.
     Integer(u64, u64),
     /// A number.
     Number(Quantity),
@@ -176,7 +179,7 @@ pub enum Form {
     Triple(Quantity),
     /// A number and a unit of time, as text.
     Duration,
-    /// Such a duration above zero.
+    /// A number and a unit of time above zero, as text.
     PositiveDuration,
     /// A number and a unit of a rate, as text.
     Rate,
@@ -194,17 +197,17 @@ pub enum Form {
     List(&'static Self),
     /// A list of exactly two.
     Pair(&'static Self),
-    /// Any of these.
+    /// A value of any of several forms.
     AnyOf(&'static [Self]),
 }
 
-/// A few words, each with its meaning.
+/// Words of a choice, each with its meaning.
 pub type Words = &'static [(&'static str, &'static str)];
 
-/// Words with what each stands for and its meaning: the declaration of a [`Form::Words`] from which a reader takes the values too.
+/// Words of a choice, each with its value and its meaning: the declaration of a [`Form::Words`] from which a reader takes the values too.
 pub type Choices<T, const N: usize> = [(&'static str, T, &'static str); N];
 
-/// The words of choices with their meanings.
+/// Returns the words of choices with their meanings, without the values.
 #[must_use]
 pub const fn words<T, const N: usize>(choices: &Choices<T, N>) -> [(&'static str, &'static str); N] {
     let mut words = [("", ""); N];
@@ -217,19 +220,20 @@ pub const fn words<T, const N: usize>(choices: &Choices<T, N>) -> [(&'static str
 }
 
 impl Form {
-    /// The unit of what stands there, if it is always the same.
+    /// Returns the unit of the numbers of this form, or an empty text for a plain number and for a form without a fixed unit.
     #[must_use]
     pub const fn unit(&self) -> &'static str {
         if let Some(quantity) = self.quantity() { quantity.unit() } else { "" }
     }
 
+    /// Returns range and unit of the numbers of this form.
     const fn quantity(&self) -> Option<Quantity> {
         if let Self::Number(quantity) | Self::Vector(quantity) | Self::Triple(quantity) = self { Some(*quantity) } else { None }
     }
 }
 
 impl Form {
-    /// What a message expects: `an integer from 2 to 1000000`.
+    /// Returns the expected text of messages: `an integer from 2 to 1000000`.
     #[must_use]
     pub fn expected(&self) -> String {
         match self {
@@ -248,12 +252,12 @@ impl Form {
         }
     }
 
-    /// The form of the value under a name within the value: a key of a table, or an entry of a list.
+    /// Returns the form of the value under a name within a value of this form: a key of a table, or an entry of a list.
     fn within(&'static self, name: &str) -> Option<&'static Self> {
         if let Self::List(element) = self {
             Some(element)
         } else if let Self::AnyOf(forms) = self {
-            // A key of a table that may stand there is no entry of a list that may.
+            // A key of an allowed table comes before an entry of an allowed list, because a list matches every name.
             let key = forms.iter().find_map(|form| form.table()?.key(name));
             key.map(|key| &key.form).or_else(|| forms.iter().find_map(|form| form.within(name)))
         } else {
@@ -261,7 +265,7 @@ impl Form {
         }
     }
 
-    /// The table that may stand there, if one may.
+    /// Returns the first table among the forms of the value, or `None` if the value is never a table.
     #[must_use]
     pub fn table(&self) -> Option<&'static Table> {
         if let Self::Table(table) = self {
@@ -274,78 +278,83 @@ impl Form {
     }
 }
 
-/// A key that must be given.
+/// Declares a key that must be given.
 #[must_use]
 pub const fn required(name: &'static str, form: Form, about: &'static str) -> Key {
     Key { name, about, need: Need::Required, form, expected: "" }
 }
 
-/// A key that must be given there or in a table that holds for all.
+/// Declares a key that must be given in the table, or in a table for all such tables.
 #[must_use]
 pub const fn somewhere(name: &'static str, form: Form, about: &'static str) -> Key {
     Key { name, about, need: Need::RequiredSomewhere, form, expected: "" }
 }
 
-/// A key with a default.
+/// Declares a key with a default.
 #[must_use]
 pub const fn usual(name: &'static str, form: Form, default: &'static str, about: &'static str) -> Key {
     Key { name, about, need: Need::Default(default), form, expected: "" }
 }
 
-/// A key that may be left out.
+/// Declares a key that may be left out.
 #[must_use]
 pub const fn optional(name: &'static str, form: Form, about: &'static str) -> Key {
     Key { name, about, need: Need::Optional, form, expected: "" }
 }
 
-/// A number with the unit and range of the reader.
+/// Returns the form of a number with the given range and unit.
 #[must_use]
 pub const fn number(quantity: Quantity) -> Form {
     Form::Number(quantity)
 }
 
-/// A number or a vector with the unit and range of the reader.
+/// Returns the form of a number or a vector with the given range and unit.
 #[must_use]
 pub const fn vector(quantity: Quantity) -> Form {
     Form::Vector(quantity)
 }
 
-/// The range and the unit of a number.
+/// Range and unit of a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Quantity {
     range: Range,
+    /// Unit as in messages. Empty for a plain number.
     unit: &'static str,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Range {
     Any,
+    /// At least 0.
     NotNegative,
+    /// Above 0.
     Positive,
+    /// From 0 to 1, both included.
     Fraction,
+    /// From −1, included, to 1, excluded.
     Correlation,
 }
 
 impl Quantity {
-    /// Any number [unit].
+    /// Returns the range of all numbers [unit].
     #[must_use]
     pub const fn any(unit: &'static str) -> Self {
         Self { range: Range::Any, unit }
     }
 
-    /// At least zero [unit].
+    /// Returns the range of numbers from zero on [unit].
     #[must_use]
     pub const fn not_negative(unit: &'static str) -> Self {
         Self { range: Range::NotNegative, unit }
     }
 
-    /// Above zero [unit].
+    /// Returns the range of numbers above zero [unit].
     #[must_use]
     pub const fn positive(unit: &'static str) -> Self {
         Self { range: Range::Positive, unit }
     }
 
-    /// In words: `a number above zero \[kg\]`.
+    /// Returns the expected text of messages: `a number above zero \[kg\]`.
     #[must_use]
     pub fn expected(self) -> String {
         let range = match self.range {
@@ -358,13 +367,13 @@ impl Quantity {
         if self.unit.is_empty() { range.to_owned() } else { format!("{range} [{}]", self.unit) }
     }
 
-    /// The unit, as in messages; empty for a plain number.
+    /// Returns the unit as in messages. Empty for a plain number.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         self.unit
     }
 
-    /// The range as JSON Schema says it: keywords and bounds.
+    /// Returns the range as keywords of JSON Schema with their bounds.
     #[must_use]
     pub const fn bounds(self) -> &'static [(&'static str, i8)] {
         match self.range {
@@ -376,7 +385,7 @@ impl Quantity {
         }
     }
 
-    /// Whether a number is in the range.
+    /// Returns whether a number is in the range.
     #[must_use]
     pub fn contains(self, value: f64) -> bool {
         match self.range {
@@ -389,20 +398,20 @@ impl Quantity {
     }
 }
 
-/// At least zero, together with others.
+/// Weight of one of several alternatives, at least 0.
 pub const WEIGHT: Quantity = Quantity::not_negative("");
-/// At least zero \[packet\].
+/// Number of packets, at least 0, not necessarily whole \[packet\].
 pub const PACKETS: Quantity = Quantity::not_negative("packets");
-/// From 0 to 1.
+/// Fraction from 0 to 1.
 pub const FRACTION: Quantity = Quantity { range: Range::Fraction, unit: "" };
-/// From −1 to below 1.
+/// Correlation from −1 to below 1.
 pub const CORRELATION: Quantity = Quantity { range: Range::Correlation, unit: "" };
 
-/// The word that takes away a table below.
+/// Word that removes the table that the key is laid over.
 pub(crate) const NONE: Form = Form::Words(&[("none", "takes away what it is laid over")]);
-/// The word that takes away a limit below.
+/// Word that removes the limit that the key is laid over.
 pub(crate) const UNLIMITED: Form = Form::Words(&[("unlimited", "takes away the limit that it is laid over")]);
-/// The largest integer of TOML.
+/// Largest integer of TOML.
 pub(crate) const MOST: u64 = i64::MAX.unsigned_abs();
-/// The largest integer of 32 bits.
+/// Largest integer of 32 bits.
 pub(crate) const MOST_OF_32_BITS: u64 = u32::MAX as u64;

@@ -1,50 +1,51 @@
-//! Random numbers with an address.
+//! Random numbers by address: counter-based draws without generator state.
 //!
-//! A draw is a pure function of (seed, link, packet, copy, purpose): there is no generator whose state one impairment could advance under another. So
-//! adding a link, a peer or an impairment, or changing one parameter, leaves every other draw as it was, and two runs that differ in one thing
-//! share all their other randomness (common random numbers).
+//! A draw is a pure function of (seed, link, packet, copy, purpose). No impairment can advance the generator of another impairment, because no generator
+//! state exists. Adding a link, a peer or an impairment, or changing one parameter, leaves all other draws the same. Two runs that differ in one parameter
+//! share all other randomness (common random numbers).
 //!
 //! The function is Philox-2×64 with 7 rounds (Salmon, Moraes, Dror & Shaw, *Parallel Random Numbers: As Easy as 1, 2, 3*, SC11, 2011): the key comes from
-//! (seed, link), the counter from (packet, copy, purpose, block). The authors found 6 rounds enough for every test of BigCrush; golden vectors below.
+//! (seed, link), the counter from (packet, copy, purpose, block). The authors found 6 rounds enough for every test of BigCrush. The tests of this module
+//! compare with the published vectors.
 //!
-//! A block has two words. The first words of two purposes share a block, loss with jitter, duplication with corruption, since a link that needs one
-//! often needs the other: with loss and jitter that took 4 % off a packet. What a purpose needs beyond its first word lies in blocks of its own.
+//! A block has two words. The first words of two purposes share a block (loss with jitter, duplication with corruption), because a link that needs one of
+//! the two words often needs the other word too, and then computes one block only. Further words of a purpose lie in blocks of that purpose alone.
 
 use core::convert::Infallible;
 
 use rand::TryRng;
 
-/// What a random number is drawn for.
+/// Purpose of a random number: part of the address of a draw.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Purpose {
-    /// Whether a packet is lost.
+    /// Loss of a packet.
     Loss,
-    /// How far a packet's delay is from the mean.
+    /// Deviation of a packet's delay from the mean.
     Jitter,
-    /// Whether a packet is duplicated.
+    /// Duplication of a packet.
     Duplication,
-    /// Whether a packet is corrupted, and which of its bits.
+    /// Corruption of a packet, and the choice of its bits.
     Corruption,
-    /// Whether a packet is reordered.
+    /// Reordering of a packet.
     Reordering,
-    /// What an active queue does with a packet.
+    /// Decision of an active queue about a packet.
     Queue,
-    /// The state in which a chain with memory begins: its draws are those of packet 0.
+    /// Initial state of a chain with memory. The draws have the address of packet 0.
     InitialState,
-    /// Whether a recorded path loses a packet.
+    /// Loss of a packet on a recorded path.
     TraceLoss,
-    /// How long a link is up and down in turn: the draws of "packet" n are those of the n-th span.
+    /// Durations for which a link is up and down in turn. The n-th span has the draws of packet n.
     Outage,
-    /// When a modulator changes state, and to which: the draws of "packet" n are those of its n-th change.
+    /// Instants and next states of a modulator. The n-th change has the draws of packet n.
     Modulation,
-    /// When a slot opens: the draws of "packet" n are those of the n-th slot.
+    /// Instants at which slots open. The n-th slot has the draws of packet n.
     Slot,
-    /// The process of an impairment of [the list](crate::Impairments), by its code: the draws of "packet" n are those of its n-th event.
+    /// Process of an impairment of [the list](crate::Impairments), by its code. The n-th event has the draws of packet n.
     Listed(u8),
 }
 
 impl Purpose {
-    /// Part of the address, so these numbers must never change.
+    /// Returns the number of the purpose in addresses. These numbers must never change, because a change would change the draws of all recorded results.
     const fn code(self) -> u64 {
         match self {
             Self::Loss => 0,
@@ -63,17 +64,19 @@ impl Purpose {
     }
 }
 
-/// The random numbers of one link.
+/// Random numbers of one link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Stream {
+    /// Key of Philox, derived from seed and label.
     key: u64,
 }
 
 impl Stream {
-    /// The stream with that address. `label` names the link; equal labels have equal streams.
+    /// Returns the stream of a link. `label` names the link. Equal seeds and labels give equal streams.
     #[must_use]
     pub fn new(seed: u64, label: &[u8]) -> Self {
-        // The address is absorbed word by word, each with its position, by the same function that makes the draws.
+        // Seed, length and words of the label are absorbed one by one, each with its position, by the function that makes the draws. The length tells
+        // labels apart that differ only in zeros at the end of the last word.
         let mut key = philox(seed, 0, 0)[0];
         let mut position = 1;
         let mut absorb = |word: u64| {
@@ -89,14 +92,14 @@ impl Stream {
         Self { key }
     }
 
-    /// The draws of one packet.
+    /// Returns the draws of a packet, by the number of the packet on the link.
     #[must_use]
     #[inline]
     pub const fn packet(self, number: u64) -> PacketDraws {
         self.copy(number, 0)
     }
 
-    /// The draws of a copy of a packet; copy 0 is the packet itself.
+    /// Returns the draws of a copy of a packet. Copy 0 is the packet itself.
     #[must_use]
     #[inline]
     pub const fn copy(self, number: u64, copy: u8) -> PacketDraws {
@@ -104,23 +107,26 @@ impl Stream {
     }
 }
 
-/// The random numbers of one packet, or of one copy of it, for all purposes.
+/// Random numbers of one packet, or of one copy of a packet, for all purposes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PacketDraws {
+    /// Key of the stream.
     key: u64,
+    /// Number of the packet on its link.
     number: u64,
+    /// Copy of the packet. 0 is the packet itself.
     copy: u8,
 }
 
 impl PacketDraws {
-    /// The first words for [`Purpose::Loss`] and [`Purpose::Jitter`].
+    /// Returns the first words for [`Purpose::Loss`] and [`Purpose::Jitter`], which share a block.
     #[must_use]
     #[inline]
     pub const fn loss_and_jitter(self) -> [u64; 2] {
         self.block(0, 0)
     }
 
-    /// The first word for a purpose: 64 uniform bits.
+    /// Returns the first word for a purpose: 64 uniform bits.
     #[must_use]
     #[inline]
     pub const fn first(self, purpose: Purpose) -> u64 {
@@ -128,40 +134,43 @@ impl PacketDraws {
         self.block(0, code / 2)[(code % 2) as usize]
     }
 
-    /// The words for a purpose from the first one on.
+    /// Returns the words for a purpose, beginning with the first word.
     #[must_use]
     #[inline]
     pub const fn draws(self, purpose: Purpose) -> Draws {
         Draws { packet: self, purpose, block: 0, spare: None }
     }
 
-    /// The words for a purpose from the second one on.
+    /// Returns the words for a purpose, beginning with the second word.
     #[must_use]
     #[inline]
     pub const fn more(self, purpose: Purpose) -> Draws {
         Draws { packet: self, purpose, block: 1, spare: None }
     }
 
-    /// Block 0 belongs to a pair of purposes, later ones to one.
+    /// Computes a block. In block 0, `whose` is the number of a pair of purposes; in all later blocks, `whose` is the code of one purpose. Codes and copies
+    /// are below 256, so that the parts of the counter do not overlap.
     #[inline]
     const fn block(self, block: u64, whose: u64) -> [u64; 2] {
         philox(self.number, block << 16 | (self.copy as u64) << 8 | whose, self.key)
     }
 }
 
-/// The random numbers of one packet for one purpose: as many as are wanted.
+/// Unlimited sequence of random numbers of one packet for one purpose.
 ///
-/// It is a generator for `rand_distr`.
+/// Implements the generator trait that `rand_distr` takes.
 #[derive(Clone, Copy, Debug)]
 pub struct Draws {
     packet: PacketDraws,
     purpose: Purpose,
+    /// Next block to compute.
     block: u64,
+    /// Second word of the latest block, if not yet returned. Never a word of block 0, whose second word belongs to another purpose.
     spare: Option<u64>,
 }
 
 impl Draws {
-    /// 64 uniform bits.
+    /// Returns the next 64 uniform bits.
     #[inline]
     pub fn next_word(&mut self) -> u64 {
         if let Some(word) = self.spare.take() {
@@ -177,14 +186,14 @@ impl Draws {
         word
     }
 
-    /// A uniform number in [0, 1), a multiple of 2⁻⁵³.
+    /// Returns the next uniform number in [0, 1), a multiple of 2⁻⁵³.
     #[inline]
     pub fn next_unit(&mut self) -> f64 {
         unit(self.next_word())
     }
 }
 
-/// The top 53 bits of a word as a number in [0, 1).
+/// Converts the top 53 bits of a word to a number in [0, 1).
 #[must_use]
 #[inline]
 #[expect(clippy::cast_precision_loss, reason = "53 bits are exact in an f64")]
@@ -214,7 +223,8 @@ impl TryRng for Draws {
     }
 }
 
-/// Philox-2×64-7: two words of counter and one of key to two words.
+/// Computes Philox-2×64-7: two words of output from two words of counter and one word of key.
+/// Computes Philox-2×64 with a number of rounds. The tests also check the published vectors of 10 rounds.
 #[inline]
 const fn philox(counter: u64, high: u64, key: u64) -> [u64; 2] {
     philox_rounds(counter, high, key, 7)

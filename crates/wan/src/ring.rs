@@ -1,11 +1,11 @@
-//! A queue whose values are written where they stay.
+//! Ring buffer whose values are constructed in their place.
 
 use alloc::vec::Vec;
 
-/// Values in the order in which they came, in memory that is used again.
+/// First-in, first-out queue in a ring buffer, which grows by doubling and never shrinks.
 ///
-/// Other than with [`VecDeque`](alloc::collections::VecDeque), a value is made in its place, and can be taken apart there: one that is made elsewhere is written in parts
-/// and moved as a whole, for which a processor waits. Where packets are small that was a tenth of their time.
+/// Unlike [`VecDeque`](alloc::collections::VecDeque), the ring constructs a value in its place, and can drop a value or take it apart in its place. A large
+/// value is then not written to the stack first and moved as a whole afterwards.
 ///
 /// ```
 /// use cohaptic_wan::Ring;
@@ -18,9 +18,11 @@ use alloc::vec::Vec;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Ring<T> {
-    /// None, or a power of two. Those behind the last value are `None`.
+    /// Slots of the ring: none, or a power of two, so that a mask wraps an index. Exactly the `len` slots from `first` on, wrapped, are `Some`.
     places: Vec<Option<T>>,
+    /// Index of the slot of the first value.
     first: usize,
+    /// Number of values.
     len: usize,
 }
 
@@ -31,49 +33,50 @@ impl<T> Default for Ring<T> {
 }
 
 impl<T> Ring<T> {
-    /// An empty ring, which takes no memory.
+    /// Returns an empty ring without allocated memory.
     #[must_use]
     pub const fn new() -> Self {
         Self { places: Vec::new(), first: 0, len: 0 }
     }
 
-    /// How many values there are.
+    /// Returns the number of values.
     #[must_use]
     #[inline]
     pub const fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether there are none.
+    /// Returns whether the ring has no values.
     #[must_use]
     #[inline]
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// The first value.
+    /// Returns the first value.
     #[must_use]
     #[inline(always)]
     pub fn front(&self) -> Option<&T> {
         self.places.get(self.first)?.as_ref()
     }
 
-    /// The first value, to be changed.
+    /// Returns the first value for changes.
     #[must_use]
     #[inline(always)]
     pub fn front_mut(&mut self) -> Option<&mut T> {
         self.places.get_mut(self.first)?.as_mut()
     }
 
-    /// The last value.
+    /// Returns the last value.
     #[must_use]
     #[inline(always)]
     pub fn back(&self) -> Option<&T> {
         let last = self.len.checked_sub(1)?;
+        // `len` is above zero, so there are slots, and the mask does not underflow.
         self.places[(self.first + last) & (self.places.len() - 1)].as_ref()
     }
 
-    /// Makes a value behind the last.
+    /// Adds a value after the last one. `make` constructs the value.
     #[inline(always)]
     pub fn push(&mut self, make: impl FnOnce() -> T) {
         if self.len == self.places.len() {
@@ -81,17 +84,18 @@ impl<T> Ring<T> {
         }
         let place = (self.first + self.len) & (self.places.len() - 1);
         let place = &mut self.places[place];
-        // It always is: where it is known, nothing is dropped there, and the value is not made elsewhere first.
+        // Always true: after `grow` the slot after the last value is free. The test tells the compiler that the assignment drops no old value, so that the
+        // value can be constructed in the slot.
         if place.is_none() {
             *place = Some(make());
             self.len += 1;
         }
     }
 
-    /// Takes the first value out.
+    /// Removes and returns the first value.
     #[inline(always)]
     pub fn pop(&mut self) -> Option<T> {
-        // An empty place need not be looked at.
+        // The length is at hand, while the slot of an empty ring may have to be fetched from memory.
         if self.len == 0 {
             return None;
         }
@@ -102,7 +106,7 @@ impl<T> Ring<T> {
         value
     }
 
-    /// Drops the first value where it lies, if there is one.
+    /// Drops the first value in its place. Does nothing on an empty ring.
     #[inline(always)]
     pub fn drop_front(&mut self) {
         if self.len > 0 {
@@ -111,9 +115,10 @@ impl<T> Ring<T> {
         }
     }
 
-    /// Passes the first value, which is to be taken out of the place where it lies.
+    /// Removes the first value from the ring, and returns its slot. The caller must take the value out of the slot, because `push` needs a free slot.
     #[inline(always)]
     pub(crate) fn pass_front(&mut self) -> Option<&mut Option<T>> {
+        // `pass` moves `first`, so the index of the slot is kept.
         let first = self.first;
         if self.len == 0 {
             return None;
@@ -122,24 +127,25 @@ impl<T> Ring<T> {
         self.places.get_mut(first)
     }
 
-    /// Drops all values, and keeps the memory.
+    /// Drops all values and keeps the memory.
     pub fn clear(&mut self) {
         while self.len > 0 {
             self.drop_front();
         }
     }
 
-    /// The first place is empty.
+    /// Moves the beginning of the ring past the first slot, whose value was or will be taken. The ring must not be empty.
     #[inline(always)]
     fn pass(&mut self) {
         self.first = (self.first + 1) & (self.places.len() - 1);
         self.len -= 1;
     }
 
+    /// Doubles the number of slots, at least to four. Every slot must hold a value.
     #[cold]
     #[inline(never)]
     fn grow(&mut self) {
-        // All places are taken: the first value comes to the first place.
+        // The values are rotated to begin at slot 0, so that the new slots lie after the last value.
         self.places.rotate_left(self.first);
         self.first = 0;
         let places = (2 * self.places.len()).max(4);
@@ -156,7 +162,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Numbers below 6 are values, others what else can be done.
+        /// A number below 6 is a value to push; each of the other numbers stands for another operation.
         #[test]
         fn it_does_what_a_deque_does(acts in prop::collection::vec(0_u8..10, 0..200)) {
             let (mut ring, mut deque) = (Ring::new(), VecDeque::new());

@@ -1,15 +1,15 @@
-//! Times that keep all digits of a text.
+//! Times in whole attoseconds, which keep all digits of a text.
 
-/// Attoseconds in a second, as a power of ten.
+/// Attoseconds in a second, as an exponent of ten.
 const DIGITS: i32 = 18;
 
-/// A time or a span as a whole number of attoseconds, 10⁻¹⁸ s. It reaches to 1.7·10²⁰ s.
+/// Time or span as a whole number of attoseconds, 10⁻¹⁸ s. The range is ±1.7·10²⁰ s.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Attoseconds(i128);
 
 impl Attoseconds {
-    /// Reads a decimal number, with or without sign, fraction and exponent, of the unit 10^`unit` s. Digits below 10⁻¹⁸ s are cut. `None` if it is no
-    /// number (NaN and infinities are none) or too large.
+    /// Parses a decimal number, with or without sign, fraction and exponent, in the unit 10^`unit` s. Digits below 10⁻¹⁸ s are cut. Returns `None` if the text
+    /// is no number (NaN and infinities are not numbers) or if the number is out of range.
     #[must_use]
     pub fn parse(text: &str, unit: i32) -> Option<Self> {
         let (number, exponent) = match text.split_once(['e', 'E']) {
@@ -24,12 +24,13 @@ impl Attoseconds {
         if whole.len() + fraction.len() == 0 || !whole.bytes().chain(fraction.bytes()).all(|byte| byte.is_ascii_digit()) {
             return None;
         }
-        // The place of the last digit of `whole`, in powers of ten of an attosecond.
+        // Exponent of the digit before `whole`, with the attosecond as unit. The loop lowers it by one before each digit.
         let mut place = exponent.checked_add(unit + DIGITS)?.checked_add(i32::try_from(whole.len()).ok()?)?;
         let mut value: i128 = 0;
         for digit in whole.bytes().chain(fraction.bytes()) {
             place -= 1;
             let digit = i128::from(digit - b'0');
+            // Zeros are skipped, because the weight of a leading zero may be out of range although the number is not.
             if digit != 0 && place >= 0 {
                 let weight = 10_i128.checked_pow(u32::try_from(place).ok()?)?;
                 value = value.checked_add(digit.checked_mul(weight)?)?;
@@ -38,7 +39,7 @@ impl Attoseconds {
         Some(Self(if negative { -value } else { value }))
     }
 
-    /// The time of this number of nanoseconds; `None` if the number is too large.
+    /// Converts nanoseconds, or returns `None` if the time is out of range.
     #[must_use]
     pub const fn from_nanos(nanos: i128) -> Option<Self> {
         match nanos.checked_mul(1_000_000_000) {
@@ -47,21 +48,21 @@ impl Attoseconds {
         }
     }
 
-    /// The difference in seconds, rounded once; `None` if it is too large.
+    /// Returns the difference in seconds, rounded once to the precision of a double, or `None` if the difference is out of range.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "rounded once, on purpose")]
     pub fn seconds_since(self, earlier: Self) -> Option<f64> {
         Some(self.0.checked_sub(earlier.0)? as f64 / 1e18)
     }
 
-    /// In seconds, rounded once.
+    /// Returns the time in seconds, rounded to the precision of a double.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "rounded once, on purpose")]
     pub const fn seconds(self) -> f64 {
         self.0 as f64 / 1e18
     }
 
-    /// The difference; `None` if it is too large.
+    /// Returns the exact difference, or `None` if the difference is out of range.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Option<Self> {
         match self.0.checked_sub(earlier.0) {
@@ -70,11 +71,12 @@ impl Attoseconds {
         }
     }
 
-    /// In nanoseconds, rounded to the nearest whole number, halves to the even one. `None` below zero and from 2⁶⁴ on.
+    /// Returns the time in nanoseconds, rounded to the nearest whole number, halves to the even number. Returns `None` below zero and from 2⁶⁴ on.
     #[must_use]
     pub fn nanos(self) -> Option<u64> {
         let (whole, rest) = (self.0.div_euclid(NANO), self.0.rem_euclid(NANO));
         let up = rest > NANO / 2 || (rest == NANO / 2 && whole % 2 != 0);
+        // The sign is tested before rounding: −0.1 ns would round to 0.
         u64::try_from(whole + i128::from(up)).ok().filter(|_| self.0 >= 0)
     }
 }

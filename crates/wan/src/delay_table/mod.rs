@@ -1,17 +1,17 @@
-//! Delays over time as a CSV file: what `cohaptic fit` estimates a link from, and what the key `trace` replays.
+//! Table of delays over time, read from a CSV file. `cohaptic fit` estimates a link from such a table, and the key `trace` replays the table.
 //!
-//! The first line names the columns, in any order and in capitals or small letters; columns of other names are passed over:
+//! The first line names the columns, in any order and in capitals or small letters. Columns with other names are skipped:
 //!
 //! | column | is |
 //! | --- | --- |
-//! | `t` or `sent` | when the packet was sent |
-//! | `delay` | its one-way delay |
-//! | `arrived` | instead of `delay`: when it arrived, by the same clock |
-//! | `lost` | may be there too: 1 if the packet was lost, 0 or empty if not |
+//! | `t` or `sent` | time at which the packet was sent |
+//! | `delay` | one-way delay of the packet |
+//! | `arrived` | instead of `delay`: time at which the packet arrived, by the same clock |
+//! | `lost` | optional: 1 if the packet was lost, 0 or empty if not |
 //!
-//! Times are in seconds, or in the unit that the name ends in: `_s`, `_ms`, `_us`, `_ns`. A packet whose delay or arrival is empty, `NaN`, `NA` or −1 was lost. Digits
-//! are kept exactly up to 10⁻¹⁸ s, so that instants may be counted from 1970. Rows stand in the order of sending; equal times are allowed. A byte order mark, blank
-//! lines and lines that begin with # are skipped. Cells may stand in double quotes.
+//! Times are in seconds, or in the unit at the end of the column's name: `_s`, `_ms`, `_us`, `_ns`. A packet whose delay or arrival is empty, `NaN`, `NA` or −1
+//! was lost. Digits down to 10⁻¹⁸ s are exact, so that times may be counted from 1970. Rows must be in the order of sending; equal times are allowed. A byte
+//! order mark, blank lines and lines that begin with # are skipped. Cells may be in double quotes. The column `loss` is passed on as text.
 
 mod attoseconds;
 
@@ -22,51 +22,51 @@ use core::fmt;
 
 pub use attoseconds::Attoseconds;
 
-/// A row: a packet, or what the path did from that time on.
+/// Row of the table: a packet or, for a replay, the delay and loss of the path from a time on.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct DelayRow {
-    /// The line of the file, from 1.
+    /// Line of the file, counted from 1.
     pub line: usize,
-    /// The time of sending.
+    /// Time of sending.
     pub sent: Attoseconds,
-    /// The delay, which is negative if clocks are offset; `None`: lost.
+    /// Delay, or `None` for a lost packet. Can be negative if the clocks of both ends are offset.
     pub delay: Option<Attoseconds>,
-    /// The cell of the column `loss`, which a replay takes as a probability; empty if there is none.
+    /// Text in the column `loss`, which a replay reads as a probability. Empty without such a column.
     pub loss: String,
 }
 
-/// The reason why a file is no table of delays. Lines count from 1.
+/// Reason for refusing a table of delays. Lines are counted from 1.
 #[derive(Clone, PartialEq, Debug)]
 pub enum DelayTableError {
-    /// A column is missing, twice there, or excluded by another.
+    /// A column is missing, occurs twice, or is excluded by another column.
     Columns {
-        /// The line of the header.
+        /// Line of the header.
         line: usize,
-        /// The header.
+        /// Text of the header.
         found: String,
     },
     /// A cell cannot be read.
     Cell {
-        /// The line.
+        /// Line of the cell.
         line: usize,
-        /// The name of the column.
+        /// Name of the column.
         column: String,
-        /// The text of the cell.
+        /// Text of the cell.
         found: String,
-        /// The expected content.
+        /// Expected content of the cell.
         expected: &'static str,
     },
-    /// A time is before that of the row above.
+    /// A packet was sent before the packet of the row above.
     TimeGoesBack {
-        /// The line.
+        /// Line of the packet.
         line: usize,
-        /// By how much \[s\].
+        /// Time of sending of the row above minus the time of this row, above zero \[s\].
         back_s: f64,
     },
 }
 
 impl DelayTableError {
-    /// The line at fault, from 1.
+    /// Returns the faulty line, counted from 1.
     #[must_use]
     pub const fn line(&self) -> usize {
         match self {
@@ -101,9 +101,9 @@ const A_FLAG: &str = "0 or 1";
 ///
 /// # Errors
 ///
-/// [`DelayTableError`] with line, column and what was expected. Never panics.
+/// [`DelayTableError`] with line, column and expected content. Never panics.
 pub fn read(text: &str) -> Result<Vec<DelayRow>, DelayTableError> {
-    // Spreadsheets put a byte order mark before the first name.
+    // Spreadsheets write a byte order mark before the first name.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let content = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
     let mut lines = (1..).zip(text.lines()).filter(|(_, line)| content(line));
@@ -118,6 +118,7 @@ pub fn read(text: &str) -> Result<Vec<DelayRow>, DelayTableError> {
             return Err(DelayTableError::TimeGoesBack { line, back_s });
         }
         let is_lost = columns.lost.as_ref().map_or(Ok(false), |column| row.flag(column))?;
+        // The end of a lost packet is read too, so that a faulty cell is found in any row.
         let end = row.end(&columns.end)?;
         let delay = match end {
             Some(end) if columns.end_is_instant => Some(end.since(sent).ok_or_else(|| row.cell(&columns.end, "a time within 10^20 s of the other"))?),
@@ -129,13 +130,13 @@ pub fn read(text: &str) -> Result<Vec<DelayRow>, DelayTableError> {
     Ok(rows)
 }
 
-/// The cells of a line, without the space around them and without quotes.
+/// Splits a line into cells, without quotes and without the space around each cell.
 fn cells(line: &str) -> Vec<String> {
     let (mut cells, mut cell, mut quoted) = (Vec::new(), String::new(), false);
     let mut rest = line.chars().peekable();
     while let Some(next) = rest.next() {
         match next {
-            // A quote that is written twice within quotes is one.
+            // Two quotes in a row within quotes stand for one quote.
             '"' if quoted && rest.peek() == Some(&'"') => cell.extend(rest.next()),
             '"' => quoted = !quoted,
             ',' if !quoted => cells.push(core::mem::take(&mut cell)),
@@ -146,22 +147,29 @@ fn cells(line: &str) -> Vec<String> {
     cells.into_iter().map(|cell| cell.trim().to_owned()).collect()
 }
 
-/// The place of a column, and its unit as a power of ten of a second.
+/// Column of the table.
 struct Column {
+    /// Name in small letters, with the suffix of the unit.
     name: String,
+    /// Index of the column, counted from 0.
     place: usize,
+    /// Unit of times, as an exponent of ten of a second.
     unit: i32,
 }
 
+/// Columns that are read.
 struct Columns {
     sent: Column,
+    /// Column `delay` or `arrived`.
     end: Column,
+    /// Whether `end` has times of arrival instead of delays.
     end_is_instant: bool,
     lost: Option<Column>,
     loss: Option<Column>,
 }
 
 impl Columns {
+    /// Finds the columns in the header, which stands in the line `line`.
     fn find(line: usize, header: &[String]) -> Result<Self, DelayTableError> {
         let refused = || DelayTableError::Columns { line, found: header.join(",") };
         let only = |names: &[&str]| {
@@ -175,39 +183,45 @@ impl Columns {
     }
 }
 
+/// Returns the column with the index `place` if its name without the suffix of the unit is one of `wanted`.
 fn column(place: usize, name: &str, wanted: &[&str]) -> Option<Column> {
     let name = name.to_ascii_lowercase();
+    // The empty suffix is last and matches every name: a name without a suffix is in seconds.
     let (base, unit) = [("_ms", -3), ("_us", -6), ("_ns", -9), ("_s", 0), ("", 0)]
         .into_iter()
         .find_map(|(suffix, unit)| Some((name.strip_suffix(suffix)?, unit)))?;
     wanted.contains(&base).then(|| Column { name: name.clone(), place, unit })
 }
 
+/// Line of the file, split into cells.
 struct Row {
     line: usize,
     cells: Vec<String>,
 }
 
 impl Row {
+    /// Returns the text of a cell. A short line has empty cells at its end.
     fn text(&self, column: &Column) -> &str {
         self.cells.get(column.place).map_or("", String::as_str)
     }
 
+    /// Reads a cell as a time.
     fn time(&self, column: &Column, expected: &'static str) -> Result<Attoseconds, DelayTableError> {
         Attoseconds::parse(self.text(column), column.unit).ok_or_else(|| self.cell(column, expected))
     }
 
-    /// The delay or the arrival; `None` if the packet was lost.
+    /// Reads the delay or the time of arrival, or `None` if the packet was lost.
     fn end(&self, column: &Column) -> Result<Option<Attoseconds>, DelayTableError> {
         let text = self.text(column);
         if ["", "nan", "na"].iter().any(|word| text.eq_ignore_ascii_case(word)) {
             return Ok(None);
         }
         let time = self.time(column, A_DELAY)?;
-        // Programs write -1 in whatever unit their column has. Other negative delays are those of clocks that are apart.
+        // Programs write -1 for a lost packet in any unit of the column. Other negative delays come from clocks with an offset.
         Ok(Some(time).filter(|time| Some(*time) != Attoseconds::parse("-1", column.unit)))
     }
 
+    /// Reads a cell as a flag. An empty cell is false.
     fn flag(&self, column: &Column) -> Result<bool, DelayTableError> {
         match self.text(column) {
             "1" => Ok(true),
@@ -216,6 +230,7 @@ impl Row {
         }
     }
 
+    /// Returns the error for a faulty cell.
     fn cell(&self, column: &Column, expected: &'static str) -> DelayTableError {
         DelayTableError::Cell { line: self.line, column: column.name.clone(), found: self.text(column).to_string(), expected }
     }

@@ -1,20 +1,21 @@
-//! The damage to a packet.
+//! Damage to a packet: flipped bits.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// The bits of a packet that were flipped.
+/// Flipped bits of a packet.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Damage(Arc<[u64]>);
 
 impl Damage {
-    /// The bits, ascending: 0 is the lowest bit of the first byte. None if a log is replayed that says only that there was damage.
+    /// Returns the indices of the flipped bits in ascending order. Bit 0 is the lowest bit of the first byte. Empty if the bits are unknown, as in the replay
+    /// of a log, which records only that a packet was damaged.
     #[must_use]
     pub fn bits(&self) -> &[u64] {
         &self.0
     }
 
-    /// Flips them. Bits beyond the end are left out.
+    /// Flips the bits in `bytes`. Bits beyond the end are left out.
     pub fn apply(&self, bytes: &mut [u8]) {
         for bit in &*self.0 {
             if let Some(byte) = usize::try_from(bit / 8).ok().and_then(|place| bytes.get_mut(place)) {
@@ -23,18 +24,19 @@ impl Damage {
         }
     }
 
-    /// Damage of which nobody knows where it is.
+    /// Returns damage with unknown bits, stored as an empty list.
     pub(crate) fn unknown() -> Self {
         Self(Arc::from([]))
     }
 
-    /// These bits, if there are any.
+    /// Returns the damage of flipped bits in any order, or `None` for an empty list.
     pub(crate) fn of(mut bits: Vec<u64>) -> Option<Self> {
         bits.sort_unstable();
         (!bits.is_empty()).then(|| Self(bits.into()))
     }
 
-    /// Both: a bit that is flipped twice is whole again. Where nobody knows which bits they were, there is damage still.
+    /// Returns the damage of two flips in turn, or `None` if all bits are whole again: a bit flipped twice is whole. If the bits of one damage are unknown,
+    /// the bits of the result are unknown too.
     pub(crate) fn and(self, other: &Self) -> Option<Self> {
         if self.0.is_empty() || other.0.is_empty() {
             return Some(Self::unknown());

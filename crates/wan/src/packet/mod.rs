@@ -1,4 +1,4 @@
-//! What a link knows of a packet, and what it hands from stage to stage.
+//! Packets inside a link: the facts that a link needs, the packet between two stages, and the outputs of the stages.
 
 pub(crate) mod damage;
 
@@ -11,12 +11,12 @@ use damage::Damage;
 
 use crate::fates::fate::DropCause;
 
-/// What a link needs to know of a packet. A [`Bytes`] is a packet of that size without ECN.
+/// Facts about a packet that a link needs. A [`Bytes`] converts to a packet of that size without ECN.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub struct PacketInfo {
-    /// Its size.
+    /// Size of the packet.
     pub size: Bytes,
-    /// Whether its ends understand explicit congestion notification (RFC 3168): then an active queue marks it where it would drop another.
+    /// Whether both ends understand explicit congestion notification (RFC 3168). An active queue marks such a packet where it would drop any other packet.
     pub ecn_capable: bool,
 }
 
@@ -26,63 +26,64 @@ impl From<Bytes> for PacketInfo {
     }
 }
 
-/// A packet that is led from stage to stage. It stays where it lies and is handed on as its address: handing on its hundred bytes at every step took a fifth
-/// of the time of a link with any stage at all, which is more than the allocation does.
+/// Packet on its way from stage to stage. Boxed, so that each stage passes an address on and does not copy the hundred bytes of the packet.
 pub(crate) type Carried<T> = Box<Packet<T>>;
 
-/// A packet between two stages of one link, with whatever its owner put around it.
+/// Packet between two stages of one link.
 #[derive(Clone, Debug)]
 pub(crate) struct Packet<T> {
-    /// The number of the packet on this link: the address of its draws.
+    /// Number of the packet on this link, part of the address of its random draws.
     pub(crate) number: u64,
     /// 0 for the packet itself, 1 for the copy that this link made.
     pub(crate) copy: u8,
     pub(crate) info: PacketInfo,
-    /// Whether a line before this one marked it.
+    /// Whether an earlier line on the path marked the packet.
     pub(crate) was_marked: bool,
-    /// Whether a line before this one flipped bits of it.
+    /// Whether an earlier line on the path flipped bits of the packet.
     pub(crate) was_damaged: bool,
+    /// Marks of this line and of earlier lines together.
     pub(crate) marks: Marks,
+    /// Data of the owner, for example the payload.
     pub(crate) item: T,
 }
 
 impl<T> Packet<T> {
-    /// A packet that enters a link, or comes from another line with these marks.
+    /// Returns a packet that enters a line. `marks` are the marks of earlier lines on the path.
     pub(crate) fn new(number: u64, info: PacketInfo, marks: Marks, item: T) -> Carried<T> {
         Box::new(Self { number, copy: 0, info, was_marked: marks.congestion, was_damaged: marks.damage.is_some(), marks, item })
     }
 
-    /// As that copy.
+    /// Returns the packet as the copy with the number `copy`.
     pub(crate) fn as_copy(mut self: Box<Self>, copy: u8) -> Carried<T> {
         self.copy = copy;
         self
     }
 }
 
-/// What a link did to a packet besides delaying it.
+/// Marks and damage of a packet: all effects of a link besides delay and loss.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Marks {
-    /// An active queue marked it: congestion experienced.
+    /// Whether an active queue marked the packet ("congestion experienced").
     pub(crate) congestion: bool,
-    /// Bits that were flipped.
+    /// Flipped bits.
     pub(crate) damage: Option<Damage>,
-    /// The receiver's checksum will find the damage.
+    /// Whether the checksum of the receiver will find the damage, so that the packet is dropped on arrival.
     pub(crate) discarded_on_arrival: bool,
 }
 
 impl Marks {
-    /// More bits were flipped, of a packet that a line before may have damaged already; `is_discarded`: a checksum will find it.
+    /// Adds damage to a packet that an earlier line may have damaged already. `is_discarded` tells whether a checksum will find the damage.
     pub(crate) fn damage(&mut self, damage: Option<Damage>, is_discarded: bool) {
         self.damage = match (self.damage.take(), damage) {
             (Some(before), Some(damage)) => before.and(&damage),
             (before, damage) => before.or(damage),
         };
-        // Two flips of one bit leave nothing to find.
+        // Two flips of one bit cancel out, and a packet without damage passes the checksum.
         self.discarded_on_arrival = self.damage.is_some() && (self.discarded_on_arrival || is_discarded);
     }
 }
 
-/// What comes out of the stages.
+/// Output of the stages: a packet and its exit.
 #[derive(Clone, Debug)]
 pub(crate) struct Output<T> {
     pub(crate) packet: Carried<T>,
@@ -91,11 +92,11 @@ pub(crate) struct Output<T> {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Exit {
-    /// It will come out of the far end then.
+    /// The packet arrives at the far end at this instant.
     Arrives(Instant),
-    /// It was dropped then.
+    /// The packet was dropped at this instant.
     Dropped(Instant, DropCause),
-    /// It is a copy that was made then, and goes on.
+    /// The packet is a copy made at this instant. Not final: the copy goes on through the stages.
     Copied(Instant),
 }
 
