@@ -1,7 +1,7 @@
-//! The event queue: a ring while events come in order, and a calendar of buckets, each sorted when its time comes, as soon as they do not.
+//! Event queue: a first-in, first-out ring while events are pushed in order, and a calendar of buckets otherwise. A bucket is sorted when its time comes.
 //!
-//! Where all links have one constant delay, events are pushed in the order in which they are taken. Then the queue is a ring: a push, a pop and one
-//! comparison an event. The first event out of order turns the ring into a calendar; an empty queue is a ring again.
+//! If all links have one constant delay, events are pushed in the order in which they are taken. The queue is then a ring, with one push, one pop and one
+//! comparison per event. The first event out of order turns the ring into a calendar. An empty calendar becomes a ring again.
 //!
 //! ```text
 //!   front          ring of 8192 buckets of 2^w ns each                  far
@@ -10,15 +10,15 @@
 //!   taken from
 //! ```
 //!
-//! Events of a network come in bursts (all peers sample at a tick) whose arrivals lie close together, often already in order. Pushing to a bucket
-//! and sorting it once is cheaper than a heap's sifting of every event. Which bucket an event is in, or whether the
-//! queue is a ring, never changes the order: that is by key alone.
+//! Events of a network come in bursts (all peers sample at a tick), whose arrivals lie close together and are often in order already. Each bucket is sorted
+//! only once, while a heap would sift every event. Neither the bucket of an event nor the form of the queue changes the order of events, which depends on
+//! the keys alone.
 //!
-//! In the calendar an event stays where it was stored first, in a slab. The sorted key is one word an event: how far into its bucket it happens, and
-//! where it is. Events themselves, of 48 bytes, are moved only in and out.
+//! In the calendar an event stays in the slab where it was first stored. Buckets sort one word per event: the time since the beginning of the bucket, and the
+//! index in the slab. The events, of some 48 bytes, are moved only into and out of the slab.
 //!
-//! The width of a bucket follows the events, so that a bucket holds about eight: fewer cost a search for the next bucket each, more a longer sort.
-//! With 10 peers and jitter this took 6 % off the instructions of a packet, against a fixed width that suits 50.
+//! The width of the buckets adapts to the events, so that a bucket holds 4 to 16 events on average. With fewer events per bucket, searches for the next bucket
+//! cost more; with more events, sorting costs more.
 
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::vec::Vec;
@@ -28,57 +28,64 @@ use cohaptic_units::Instant;
 
 use crate::ring::Ring;
 
-/// What an event is ordered by.
+/// Event of a queue, with its instant and its key.
 pub trait Event {
-    /// Compares first by instant, then by the fixed rule that breaks ties.
+    /// Key that orders events: first by instant, then by a fixed rule that breaks ties.
     type Key: Ord;
 
-    /// When it happens.
+    /// Returns the instant of the event.
     fn at(&self) -> Instant;
 
-    /// The key. Events with equal keys come out in no stated order: make keys differ.
+    /// Returns the key of the event. The order of events with equal keys is not specified, so keys should be distinct.
     fn key(&self) -> Self::Key;
 }
 
-/// Events in order of their keys.
+/// Queue of events, taken in the order of their keys.
 #[derive(Clone, Debug)]
 pub struct EventQueue<E> {
-    /// All events, while they come in order.
+    /// All events while `in_order` is true, else empty.
     ordered: Ring<E>,
+    /// Whether the queue is a ring (all events in `ordered`) or a calendar (all events in `slab`).
     in_order: bool,
-    /// The events of the calendar, each in its place until it is taken.
+    /// Events of the calendar. Each event keeps its index until it is taken.
     slab: Slab<E>,
-    /// The bucket being taken from, in order, and whatever was pushed that is not later than it.
+    /// Events in order, from which the next events are taken: the events of the current bucket, and events pushed later into this bucket or an earlier one.
     front: VecDeque<Entry>,
-    /// The number of the front's bucket. Every event in the ring is in a later one.
+    /// Number of the current bucket: its instant divided by the width. Every event in `ring` and in `far` lies in a later bucket.
     current: u64,
+    /// Unsorted buckets after the current one, indexed by [`slot`]. Fewer than `RING` consecutive buckets are in use, so that no two share a slot.
     ring: Vec<Vec<Packed>>,
-    /// A bit for each bucket that is not empty.
+    /// Bits of the slots in `ring` that are not empty: slot i is bit i mod 64 of word i / 64.
     occupied: [u64; RING / 64],
-    /// Memory of emptied buckets, to be used again: so the queue touches memory in proportion to its events, not to the ring.
+    /// Memory of emptied buckets for reuse. The queue then touches memory in proportion to its events, and not to the number of slots.
     spare: Vec<Vec<Packed>>,
+    /// Events at least `RING` buckets after the current one.
     far: BinaryHeap<Reverse<Entry>>,
-    /// Nothing in the ring or beyond happens before this instant, so that the quiet ticks of a few peers search no bucket: it took 3 % of the instructions of three peers with jitter off.
+    /// Lower bound of the instants of all events in `ring` and `far`. Ticks before this instant need no search for the next bucket.
     quiet_until: Instant,
+    /// Number of pending events.
     len: usize,
-    /// Buckets are 2 to this power ns wide.
+    /// Width of a bucket as an exponent: a bucket spans 2^`width` ns.
     width: u32,
-    /// Buckets brought to the front since the width was last looked at, and the events in them.
+    /// Number of buckets brought to the front since the latest check of the width, and number of events in these buckets.
     brought: (u32, u64),
 }
 
-/// An event outside the ring: its instant and its place in the slab.
+/// Event outside `ring`: its instant, and its index in the slab.
 type Entry = (Instant, u32);
 
-/// An event in a bucket: how long after the bucket's begin it happens \[ns\] in the upper half, its place in the slab in the lower.
+/// Event in a bucket. The upper 32 bits are the time since the beginning of the bucket \[ns\], the lower 32 bits the index in the slab.
 type Packed = u64;
 
-/// How many buckets there are, each 2 to the power of one of these widths ns wide: the ring reaches from 134 ms to 34 s.
+/// Number of slots, a power of two. With the widths below, the slots span 134 ms to 34 s.
 const RING: usize = 8192;
+/// Allowed exponents of the width. At most 32, so that a time within a bucket fits into half a word.
 const WIDTHS: core::ops::RangeInclusive<u32> = 14..=22;
+/// Initial exponent of the width: buckets of 131 µs.
 const FIRST_WIDTH: u32 = 17;
-/// Number of buckets after which the width is checked; it is right if they held between these numbers of events on the average.
+/// Number of buckets brought to the front between two checks of the width.
 const LOOK_EVERY: u32 = 1024;
+/// Average number of events per bucket for which the width stays the same.
 const RIGHT_FILL: core::ops::RangeInclusive<u64> = 4..=16;
 
 impl<E: Event> Default for EventQueue<E> {
@@ -88,7 +95,7 @@ impl<E: Event> Default for EventQueue<E> {
 }
 
 impl<E: Event> EventQueue<E> {
-    /// An empty queue.
+    /// Returns an empty queue.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -108,19 +115,19 @@ impl<E: Event> EventQueue<E> {
         }
     }
 
-    /// How many events are pending.
+    /// Returns the number of pending events.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether no event is pending.
+    /// Returns whether no event is pending.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Adds an event. It may lie before events already taken; it then comes next.
+    /// Adds an event. An event may lie before events already taken, and is then taken before all later events.
     #[inline(always)]
     pub fn push(&mut self, event: E) {
         self.len += 1;
@@ -134,15 +141,15 @@ impl<E: Event> EventQueue<E> {
         self.push_calendar(event);
     }
 
-    /// The event that was pushed last, while all come in order.
+    /// Returns the event pushed last, or `None` if the queue is empty or a calendar.
     #[inline(always)]
     pub(crate) fn last_in_order(&self) -> Option<&E> {
-        // In a calendar the ring is empty.
+        // `ordered` is empty in a calendar.
         self.ordered.back()
     }
 
-    /// Adds the event of that instant that is made. `follows` says whether its key is not below that of [`EventQueue::last_in_order`]. It is made where it is stored: one that
-    /// is handed on is written in parts and read as a whole, for which a processor waits.
+    /// Adds an event at the instant `at`. `make` constructs the event in its final place, so that no large value is moved. `follows` tells whether the key of
+    /// the event is at least the key of [`EventQueue::last_in_order`].
     #[inline(always)]
     pub(crate) fn push_made(&mut self, at: Instant, follows: bool, make: impl FnOnce() -> E) {
         self.len += 1;
@@ -156,7 +163,7 @@ impl<E: Event> EventQueue<E> {
         self.push_entry((at, place));
     }
 
-    /// Takes the first event if it is not later than `now`.
+    /// Removes and returns the first event if its instant is at most `now`.
     #[inline(always)]
     pub fn pop_due(&mut self, now: Instant) -> Option<E> {
         if self.in_order {
@@ -171,12 +178,13 @@ impl<E: Event> EventQueue<E> {
         }
         let (_, place) = self.front.pop_front()?;
         self.len -= 1;
+        // An empty calendar becomes a ring again.
         self.in_order = self.len == 0;
         self.slab.take(place)
     }
 
-    /// Takes the first event if it is not later than `now`, and hands it on. That is asked for in one place for both kinds of queue, so that it is compiled into the loop of
-    /// its caller, and only the fields of an event that it asks for are read: it took 60 instructions off an arrival.
+    /// Removes the first event if its instant is at most `now`, and returns the answer of `take` for the event. `take` is called at one place for both forms of
+    /// the queue, so that the compiler inlines `take` and reads only the fields of the event that `take` uses.
     #[inline(always)]
     pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(E) -> T) -> Option<T> {
         let place = if self.in_order {
@@ -195,16 +203,17 @@ impl<E: Event> EventQueue<E> {
         place.take().map(take)
     }
 
-    /// Whether an event may be due at `now`. `false` is certain, `true` is where it takes no search to know.
+    /// Returns whether an event may be due at `now`, without a search. `false` is certain. After `true`, no event need be due.
     #[inline(always)]
     pub(crate) fn may_be_due(&self, now: Instant) -> bool {
         if self.in_order {
             return self.ordered.front().is_some_and(|first| first.at() <= now);
         }
+        // Events in `ring` and `far` come after every event of the front, so the front decides unless it is empty.
         self.front.front().map_or(self.quiet_until <= now && self.len > 0, |first| first.0 <= now)
     }
 
-    /// The instant of the first event.
+    /// Returns the instant of the first event, or `None` for an empty queue.
     #[must_use]
     pub fn next_at(&self) -> Option<Instant> {
         if self.in_order {
@@ -219,12 +228,13 @@ impl<E: Event> EventQueue<E> {
         self.ring[slot(bucket)].iter().min().map(|first| self.unpack(bucket, *first).0)
     }
 
-    /// Puts the events of the ring that the queue was into buckets, from the first one on.
+    /// Turns the ring into a calendar: moves all events of `ordered` into buckets.
     #[cold]
     fn become_calendar(&mut self) {
         self.in_order = false;
         self.quiet_until = Instant::MAX;
         self.ring.resize_with(RING, Vec::new);
+        // Events are in order, so no event lies before the bucket of the first event.
         self.current = self.ordered.front().map_or(0, |first| self.bucket_of(first.at()));
         let mut ordered = core::mem::take(&mut self.ordered);
         while let Some(event) = ordered.pop() {
@@ -241,6 +251,7 @@ impl<E: Event> EventQueue<E> {
 
     #[inline]
     fn push_entry(&mut self, entry: Entry) {
+        // Past events and events of the current bucket go to the front, which is sorted. Later buckets stay unsorted until their time comes.
         let bucket = self.bucket_of(entry.0);
         if bucket <= self.current {
             return self.push_front(entry);
@@ -253,22 +264,26 @@ impl<E: Event> EventQueue<E> {
         }
     }
 
+    /// Returns the number of the bucket of an instant.
     fn bucket_of(&self, at: Instant) -> u64 {
         at.as_nanos() >> self.width
     }
 
+    /// Packs an entry into the word of its bucket.
     fn pack(&self, (at, place): Entry) -> Packed {
         (at.as_nanos() & ((1 << self.width) - 1)) << 32 | u64::from(place)
     }
 
+    /// Returns the entry of a word in the bucket with the number `bucket`.
     fn unpack(&self, bucket: u64, packed: Packed) -> Entry {
         (Instant::from_nanos((bucket << self.width) + (packed >> 32)), place_of(packed))
     }
 
-    /// Brings the next bucket that is due to the front; says whether the front now begins with an event that is due.
+    /// Brings the next bucket to the front if the front is empty and the bucket has begun at `now`. Returns whether the front begins with an event that is due.
     fn advance(&mut self, now: Instant) -> bool {
         let present = self.bucket_of(now);
         while self.front.is_empty() && self.len > 0 {
+            // All events of `ring` come before all events of `far`.
             let next = self.next_occupied().or_else(|| self.far.peek().map(|Reverse(first)| self.bucket_of(first.0)));
             let Some(next) = next else { break };
             if next > present {
@@ -278,12 +293,14 @@ impl<E: Event> EventQueue<E> {
             self.bring_to_front(next);
         }
         if self.front.is_empty() {
-            // Nothing lies before the present: later events may use the whole ring from here on.
+            // No event lies in the present bucket or before it, so the ring may begin here. Events pushed next then find all slots free for the time ahead.
             self.move_to(self.current.max(present));
         }
         self.front.front().is_some_and(|first| first.0 <= now)
     }
 
+    /// Sorts a bucket into the front, which must be empty, and makes the bucket the current one. If the first event is in `far`, the slot is empty, and
+    /// `move_to` pulls the events out of `far`.
     fn bring_to_front(&mut self, bucket: u64) {
         let place = slot(bucket);
         self.occupied[place / 64] &= !(1 << (place % 64));
@@ -292,7 +309,7 @@ impl<E: Event> EventQueue<E> {
         let mut few = [0; FEW];
         let sorted = sort(&mut events, &mut few);
         if sorted.windows(2).any(|pair| pair[0] >> 32 == pair[1] >> 32) {
-            // Instants decide most often, so that the events themselves are looked at only where two are equal.
+            // Words sort by instant and then by index in the slab. Keys are read from the slab only if two instants are equal, which is rare.
             sorted.sort_unstable_by_key(|packed| self.slab.key(place_of(*packed)));
         }
         let start = bucket << self.width;
@@ -307,7 +324,7 @@ impl<E: Event> EventQueue<E> {
         }
     }
 
-    /// Widens buckets that hold too few events and narrows those that hold too many, and puts everything in its new place.
+    /// Doubles the width if buckets hold too few events, halves the width if buckets hold too many, and then stores all events anew.
     #[cold]
     fn adapt_width(&mut self) {
         let fill = self.brought.1 / u64::from(self.brought.0);
@@ -331,13 +348,14 @@ impl<E: Event> EventQueue<E> {
         }
         entries.extend(core::mem::take(&mut self.far).into_iter().map(|Reverse(entry)| entry));
         self.width = width;
+        // The earliest bucket becomes the current one, so that `push_entry` sorts its events into the front.
         self.current = entries.iter().map(|entry| self.bucket_of(entry.0)).min().unwrap_or(0);
         for entry in entries {
             self.push_entry(entry);
         }
     }
 
-    /// Makes a bucket the current one, and pulls in from afar what the ring now reaches.
+    /// Makes a bucket the current one, and moves events from `far` that are now within reach to the ring or to the front.
     fn move_to(&mut self, bucket: u64) {
         self.current = bucket;
         while let Some(Reverse(first)) = self.far.peek() {
@@ -349,10 +367,11 @@ impl<E: Event> EventQueue<E> {
         }
     }
 
+    /// Inserts an entry into the front by instant and key.
     fn push_front(&mut self, entry: Entry) {
         let key = |(at, place): Entry| (at, self.slab.key(place));
         let wanted = key(entry);
-        // Bursts come in order: most often the event belongs at the end.
+        // Events of a burst are mostly pushed in order, so the end is tried before a binary search.
         if self.front.back().is_none_or(|last| key(*last) <= wanted) {
             self.front.push_back(entry);
         } else {
@@ -366,6 +385,7 @@ impl<E: Event> EventQueue<E> {
         let packed = self.pack(entry);
         let place = slot(bucket);
         let events = &mut self.ring[place];
+        // The first event of a bucket marks its slot, and reuses the memory of an emptied bucket.
         if events.is_empty() {
             self.occupied[place / 64] |= 1 << (place % 64);
             if let Some(spare) = self.spare.pop() {
@@ -375,12 +395,12 @@ impl<E: Event> EventQueue<E> {
         events.push(packed);
     }
 
-    /// The first bucket after the current one that is not empty.
+    /// Returns the number of the first bucket after the current one that is not empty, or `None` if all slots are empty.
     fn next_occupied(&self) -> Option<u64> {
         let start = self.current + 1;
         let (word, bit) = (slot(start) / 64, slot(start) % 64);
         let words = self.occupied.len();
-        // The first word is looked at twice: its upper bits first, and its lower ones, which belong to the far end of the ring, last.
+        // The first word is tested twice: first its upper bits, and last its lower bits, which belong to the latest buckets of the ring.
         for step in 0..=words {
             let index = (word + step) % words;
             let mask = match step {
@@ -391,6 +411,7 @@ impl<E: Event> EventQueue<E> {
             let found = self.occupied[index] & mask;
             if found != 0 {
                 let place = index as u64 * 64 + u64::from(found.trailing_zeros());
+                // The distance from `start` to the slot, modulo the number of slots, turns the slot back into a bucket number.
                 return Some(start + (place.wrapping_sub(start) & (RING as u64 - 1)));
             }
         }
@@ -398,18 +419,20 @@ impl<E: Event> EventQueue<E> {
     }
 }
 
+/// Returns the slot of a bucket: its number modulo the number of slots.
 #[expect(clippy::cast_possible_truncation, reason = "masked to the size of the ring")]
 fn slot(bucket: u64) -> usize {
     (bucket & (RING as u64 - 1)) as usize
 }
 
+/// Returns the index in the slab of a packed event.
 #[expect(clippy::cast_possible_truncation, reason = "the lower half is the place")]
 fn place_of(packed: Packed) -> u32 {
     packed as u32
 }
 
-/// Sorts words that are all different, into `few` where there are few. Then each is put behind as many as are smaller: no branch depends on the order,
-/// which a processor could not foresee. It took 4 % off a packet with jitter.
+/// Sorts distinct words. At most [`FEW`] words are sorted into `few` by counting: the number of smaller words is the index of a word. No branch then depends on
+/// the order of the words, which a processor cannot predict.
 fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Packed] {
     if words.len() > FEW {
         words.sort_unstable();
@@ -422,28 +445,33 @@ fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Pac
     &mut few[..words.len()]
 }
 
-/// Largest number of words that is sorted by counting.
+/// Largest number of words sorted by counting.
 const FEW: usize = 24;
 
-/// Events in places of their own, which are used again.
+/// Storage of events with stable indices. Indices of removed events are reused.
 #[derive(Clone, Debug)]
 struct Slab<E> {
+    /// Events by index. `None` for a free index.
     places: Vec<Option<E>>,
+    /// Free indices.
     free: Vec<u32>,
 }
 
 impl<E: Event> Slab<E> {
+    /// Stores an event constructed by `make`, and returns its index.
     #[inline(always)]
     fn store(&mut self, make: impl FnOnce() -> E) -> u32 {
         let place = self.free.pop().unwrap_or_else(|| self.grow());
         let stored = &mut self.places[place as usize];
-        // It always is: where it is known, nothing is dropped there, and the event is not made elsewhere first.
+        // Always true: only free indices are handed out. The test tells the compiler that the assignment drops no old event, so that the event can be
+        // constructed in its place.
         if stored.is_none() {
             *stored = Some(make());
         }
         place
     }
 
+    /// Adds an index without an event, and returns the index.
     #[cold]
     #[inline(never)]
     fn grow(&mut self) -> u32 {
@@ -452,20 +480,21 @@ impl<E: Event> Slab<E> {
         place
     }
 
-    /// Frees a place, out of which the event is to be taken.
+    /// Frees an index, and returns its place. The caller must take the event out of the place before the next call of `store`.
     #[inline(always)]
     fn pass(&mut self, place: u32) -> &mut Option<E> {
         self.free.push(place);
         &mut self.places[place as usize]
     }
 
+    /// Removes and returns the event at an index.
     #[inline]
     fn take(&mut self, place: u32) -> Option<E> {
         self.free.push(place);
         self.places[place as usize].take()
     }
 
-    /// The key of a stored event; `None` only for a place that is free.
+    /// Returns the key of a stored event, or `None` for a free index.
     fn key(&self, place: u32) -> Option<E::Key> {
         self.places[place as usize].as_ref().map(Event::key)
     }
@@ -502,7 +531,8 @@ mod tests {
         assert_eq!(order, [0, 1, 2, 3]);
     }
 
-    /// Over a ring, buckets and what lies beyond them: whatever is due may be due, and what was searched in vain is not searched again at the same instant.
+    /// For events in the ring, in buckets and beyond the buckets: `may_be_due` is true if an event is due, and false after a search at the same instant that
+    /// found no event.
     #[test]
     fn what_is_due_may_be_due() {
         let (mut queue, mut pending, mut number) = (EventQueue::new(), alloc::collections::BTreeSet::new(), 2015_u64);

@@ -1,4 +1,4 @@
-//! One link and the packets on the way through it.
+//! One directed link, with the packets inside the link.
 
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;
@@ -18,33 +18,38 @@ use crate::line::pipeline::{Outcome, TimeWentBack, check_time};
 use crate::line::{Line, Sink};
 use crate::packet::{Marks, Outputs, PacketInfo};
 
-/// A directed link as a state machine: packets in with [`Link::handle_packet`], packets and their fates out with [`Link::poll_event`].
+/// State machine of a directed link. Packets enter with [`Link::handle_packet`]; packets and their fates come out with [`Link::poll_event`].
 ///
-/// The driver hands packets in, asks with [`Link::poll_timeout`] when to come back, calls [`Link::handle_timeout`] then, and drains
-/// [`Link::poll_event`] until it gives `None`. Being late costs nothing but lateness: every event carries the instant at which it happened. The
-/// answer of `poll_timeout` may change after `handle_packet`, `handle_timeout` and `set_model`.
+/// The driver passes packets in, asks [`Link::poll_timeout`] for the next deadline, calls [`Link::handle_timeout`] at that instant, and drains
+/// [`Link::poll_event`] until it returns `None`. A late driver changes no fate, because every event carries the instant at which it happened. The answer of
+/// `poll_timeout` can change after `handle_packet`, `handle_timeout` and `set_model`.
 ///
-/// At equal instants a packet leaves a queue before another is offered to it, and events come in the order of (instant, sequence, copy).
+/// At equal instants a packet leaves a queue before the next packet is offered to the queue, and events come in the order of (instant, sequence, copy).
 #[derive(Clone)]
 pub struct Link<P> {
+    /// Seed of the random numbers, needed when the model changes.
     seed: u64,
     name: LinkName,
+    /// Latest instant given by the driver.
     now: Instant,
+    /// Stages and counters of the link.
     line: Line<P, InLink<P>>,
     traffic: Traffic<P>,
+    /// Buffer for the outputs of stages, empty between calls. A field, so that its memory is reused.
     outputs: Outputs<InLink<P>>,
 }
 
-/// The packets behind the line.
+/// Packets that have left the stages.
 #[derive(Clone)]
 struct Traffic<P> {
+    /// Packets in propagation, in the order of arrival.
     pending: EventQueue<Pending<P>>,
-    /// Events that have happened and were not polled yet.
+    /// Events that have happened and have not been polled yet, in the order in which they happened.
     happened: VecDeque<PacketEvent<P>>,
 }
 
 impl<P: Clone> Link<P> {
-    /// An empty link. The seed and the name are the address of its random numbers.
+    /// Returns an empty link. Seed and name are the address of its random numbers.
     #[must_use]
     pub fn new(seed: u64, name: &LinkName, model: impl Into<LinkModel>) -> Self {
         Self {
@@ -57,21 +62,22 @@ impl<P: Clone> Link<P> {
         }
     }
 
-    /// Drops every packet of which the filter says so, before anything else happens to it. The filter sees the packet and its payload.
+    /// Sets the filter of the link. A packet for which `drops` returns true is dropped before all stages. The filter sees the packet and its payload.
     #[must_use]
     pub fn with_filter(mut self, drops: impl Fn(&Offered<'_, P>) -> bool + Send + Sync + 'static) -> Self {
         self.line.set_filter(Filter::new(drops));
         self
     }
 
-    /// Takes a packet in. A size alone is a packet without ECN.
+    /// Offers a packet to the link. A size alone stands for a packet without ECN.
     ///
     /// # Errors
     ///
-    /// [`TimeWentBack`] if an earlier call had a later instant; nothing was changed.
+    /// [`TimeWentBack`] if an earlier call had a later instant. The link is then unchanged.
     #[inline]
     pub fn handle_packet(&mut self, now: Instant, info: impl Into<PacketInfo>, payload: P) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
+        // Stages with queues must be up to date before the offer: at equal instants a packet leaves a queue first.
         if self.line.has_engine() {
             self.let_happen(now);
         }
@@ -91,11 +97,11 @@ impl<P: Clone> Link<P> {
         Ok(())
     }
 
-    /// Lets time pass until `now`.
+    /// Lets time pass inside the link until `now`.
     ///
     /// # Errors
     ///
-    /// [`TimeWentBack`] if an earlier call had a later instant; nothing was changed.
+    /// [`TimeWentBack`] if an earlier call had a later instant. The link is then unchanged.
     #[inline]
     pub fn handle_timeout(&mut self, now: Instant) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
@@ -103,49 +109,51 @@ impl<P: Clone> Link<P> {
         Ok(())
     }
 
-    /// When [`Link::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given. After a live change it may name an instant at which nothing happens.
+    /// Returns the instant of the next necessary call of [`Link::handle_timeout`], or `None` if no packet is inside the link. Never before the latest instant
+    /// given. After a live change, nothing need happen at the returned instant.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let next = self.line.next_wake().into_iter().chain(self.traffic.pending.next_at()).min()?;
-        // What has arrived and was not polled yet is there now.
+        // Arrivals that are due and not polled yet can lie before `now`.
         Some(next.max(self.now))
     }
 
-    /// The next packet that has arrived or was dropped, or a copy that was made; `None` when all have been polled.
+    /// Returns the next event: a packet that arrived or was dropped, or a copy that was made. Returns `None` when all events up to now have been polled.
     #[must_use]
     #[inline]
     pub fn poll_event(&mut self) -> Option<PacketEvent<P>> {
         if let Some(event) = self.traffic.happened.pop_front() {
             return Some(event);
         }
-        // Without an engine arrivals wait here: nothing that comes meanwhile depends on them.
+        // Without an engine, arrivals stay in `pending` until they are polled, because no later packet depends on them.
         let Pending { at, packet, copy, marks } = self.traffic.pending.pop_due(self.now)?;
         Some(self.arrive(at, packet, copy, marks))
     }
 
-    /// Changes the model from `now` on. Packets that propagate keep their delay; one that is being serialised keeps the bits already sent; those that wait
-    /// are served at the new rate, or go on at once if what they wait for is gone. Chains and correlations go on from the state they are in.
+    /// Changes the model from `now` on. Packets in propagation keep their delay. A packet in serialisation keeps the bits already sent. Waiting packets are
+    /// served at the new rate, or go on at once if the new model lacks the stage that holds them. Chains and correlations continue from their present state.
     ///
     /// # Errors
     ///
-    /// [`TimeWentBack`] if an earlier call had a later instant; nothing was changed.
+    /// [`TimeWentBack`] if an earlier call had a later instant. The link is then unchanged.
     pub fn set_model(&mut self, now: Instant, model: impl Into<LinkModel>) -> Result<(), TimeWentBack> {
+        // The old model applies up to `now`.
         self.handle_timeout(now)?;
         self.line.reconfigure(now, self.seed, &self.name, model.into(), &mut self.outputs, &mut self.traffic);
         Ok(())
     }
 
-    /// What the link did so far. A packet counts as delivered when its arrival is polled, or when time is let pass beyond it.
+    /// Returns the counters of the link. A packet counts as delivered when its arrival is polled, or when time passes beyond its arrival.
     #[must_use]
     pub fn stats(&self) -> LinkStats {
         self.line.stats()
     }
 
-    /// Lets all that is due happen, and keeps the events until they are polled.
+    /// Processes all wakes and arrivals up to `now` in order, and keeps the events until they are polled.
     #[inline(always)]
     fn let_happen(&mut self, now: Instant) {
         loop {
-            // The engine is woken before anything arrives at the same instant.
+            // At equal instants the engine is woken before packets arrive.
             if let Some(wake) = self.line.next_wake().filter(|wake| *wake <= now)
                 && self.traffic.pending.next_at().is_none_or(|arrival| wake <= arrival)
             {
@@ -158,6 +166,7 @@ impl<P: Clone> Link<P> {
         }
     }
 
+    /// Counts the arrival of a packet, and returns its event: a delivery, or a drop if the checksum of the receiver finds damage.
     #[inline(always)]
     fn arrive(&mut self, at: Instant, packet: InLink<P>, copy: u8, marks: Option<Box<Marks>>) -> PacketEvent<P> {
         let marks = marks.map_or_else(Marks::default, |marks| *marks);
@@ -169,12 +178,12 @@ impl<P: Clone> Link<P> {
         packet.event(at, Fate::Delivered(at), copy, marks)
     }
 
-    /// The packet was dropped when it was offered.
+    /// Records the drop of a packet at its offer.
     #[inline(never)]
     fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>) {
         self.line.drop(cause);
         if !self.line.has_engine() {
-            // Arrivals that wait to be polled came before this drop.
+            // Arrivals in `pending` that are due happened before this drop, and must be polled before it.
             self.let_happen(now);
         }
         self.traffic.happened(now, Fate::Dropped(cause), packet, 0, Marks::default());
@@ -194,16 +203,19 @@ impl<P> Sink<InLink<P>> for Traffic<P> {
     }
 }
 
-/// A packet in the link.
+/// Packet inside the link, with its payload.
 #[derive(Clone, Debug)]
 struct InLink<P> {
+    /// Number of the packet on this link, counted from 0.
     sequence: u64,
+    /// Instant of the offer.
     offered: Instant,
     size: Bytes,
     payload: P,
 }
 
 impl<P> InLink<P> {
+    /// Returns the event of a fate of this packet at the instant `at`.
     #[inline]
     fn event(self, at: Instant, fate: Fate, copy: u8, marks: Marks) -> PacketEvent<P> {
         let Self { sequence, offered, size, payload } = self;
@@ -213,13 +225,15 @@ impl<P> InLink<P> {
     }
 }
 
-/// A packet that propagates, until it arrives.
+/// Packet in propagation.
 #[derive(Clone, Debug)]
 struct Pending<P> {
+    /// Instant of arrival.
     at: Instant,
     packet: InLink<P>,
+    /// Number of the copy. 0 is the packet itself.
     copy: u8,
-    /// In a box, since few packets have any.
+    /// Marks and damage, or `None` without any. Boxed, because few packets have marks and an unboxed value would enlarge every event.
     marks: Option<Box<Marks>>,
 }
 
