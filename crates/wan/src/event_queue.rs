@@ -1,7 +1,7 @@
 //! Event queue: a first-in, first-out ring while events are pushed in order, and a calendar of buckets otherwise. A bucket is sorted when its time comes.
 //!
-//! If all links have one constant delay, events are pushed in the order in which they are taken. The queue is then a ring, with one push, one pop and one
-//! comparison per event. The first event out of order turns the ring into a calendar. An empty calendar becomes a ring again.
+//! If all links have the same constant delay, events are pushed in the order of taking. The queue is then a ring, with a push, a pop and a comparison per
+//! event. The first event out of order turns the ring into a calendar. An empty calendar becomes a ring again.
 //!
 //! ```text
 //!   front          ring of 8192 buckets of 2^w ns each                  far
@@ -136,6 +136,7 @@ impl<E: Event> EventQueue<E> {
                 self.ordered.push(|| event);
                 return;
             }
+            // The event comes before the last one in the ring.
             self.become_calendar();
         }
         self.push_calendar(event);
@@ -287,6 +288,7 @@ impl<E: Event> EventQueue<E> {
             let next = self.next_occupied().or_else(|| self.far.peek().map(|Reverse(first)| self.bucket_of(first.0)));
             let Some(next) = next else { break };
             if next > present {
+                // The first event of a later bucket may lie at its beginning, and not earlier.
                 self.quiet_until = Instant::from_nanos(next << self.width);
                 break;
             }
@@ -314,6 +316,7 @@ impl<E: Event> EventQueue<E> {
         }
         let start = bucket << self.width;
         self.front.extend(sorted.iter().map(|&packed| (Instant::from_nanos(start + (packed >> 32)), place_of(packed))));
+        // Buckets that never held an event have no memory to keep.
         events.clear();
         if events.capacity() > 0 {
             self.spare.push(events);
@@ -348,7 +351,7 @@ impl<E: Event> EventQueue<E> {
         }
         entries.extend(core::mem::take(&mut self.far).into_iter().map(|Reverse(entry)| entry));
         self.width = width;
-        // The earliest bucket becomes the current one, so that `push_entry` sorts its events into the front.
+        // The earliest bucket becomes the current bucket, so that `push_entry` sorts the events of the bucket into the front.
         self.current = entries.iter().map(|entry| self.bucket_of(entry.0)).min().unwrap_or(0);
         for entry in entries {
             self.push_entry(entry);
@@ -395,7 +398,7 @@ impl<E: Event> EventQueue<E> {
         events.push(packed);
     }
 
-    /// Returns the number of the first bucket after the current one that is not empty, or `None` if all slots are empty.
+    /// Returns the number of the first occupied bucket after the current bucket, or `None` if all slots are empty.
     fn next_occupied(&self) -> Option<u64> {
         let start = self.current + 1;
         let (word, bit) = (slot(start) / 64, slot(start) % 64);

@@ -82,6 +82,7 @@ impl<P: Clone> Link<P> {
             self.let_happen(now);
         }
         let info = info.into();
+        // `filters` counts a filtered packet as offered, so a filter does not change the numbers and the draws of later packets.
         let sequence = self.line.offered();
         let is_filtered = self.line.has_filter() && self.line.filters(&Offered { sequence, now, info, payload: &payload });
         let packet = InLink { sequence, offered: now, size: info.size, payload };
@@ -89,6 +90,7 @@ impl<P: Clone> Link<P> {
             self.drop(now, DropCause::Filter, packet);
             return Ok(());
         }
+        // Without an engine the fate is known at the offer. Only a packet that enters the engine is boxed.
         match self.line.offer(now, None) {
             Outcome::Arrives(at) => self.traffic.pending.push(Pending { at, packet, copy: 0, marks: None }),
             Outcome::Dropped(cause) => self.drop(now, cause, packet),

@@ -239,8 +239,10 @@ const fn philox_rounds(counter: u64, high: u64, key: u64, rounds: u32) -> [u64; 
     let mut round = 0;
     while round < rounds {
         let product = left as u128 * MULTIPLIER as u128;
+        // The upper half of the product is mixed with the key and the other word, and the lower half becomes the other word.
         left = (product >> 64) as u64 ^ key ^ right;
         right = product as u64;
+        // A Weyl sequence gives each round another key.
         key = key.wrapping_add(WEYL);
         round += 1;
     }

@@ -40,7 +40,7 @@ pub enum Value {
     Table(Table),
 }
 
-/// Keys and values of a table, in the order in which they are written. Keys laid over another table come after the keys of that table.
+/// Keys and values of a table, in the order of writing. Keys laid over another table come after the keys of the other table.
 #[derive(Clone, Debug, Default)]
 pub struct Table(pub Vec<Entry>);
 
@@ -136,12 +136,12 @@ impl Node {
         }
     }
 
-    /// Lays this table over the table `base`, key by key. Tables under the keys `nested` are laid over each other in the same way. Returns a copy of this
-    /// value if one of both values is no table.
+    /// Lays this table over the table `base`, key by key. Tables under the keys `nested` are laid over each other in the same way. If this value or `base` is
+    /// no table, returns a copy of this value.
     #[must_use]
     pub fn over(&self, base: &Self, nested: &[&str]) -> Self {
         let (Some(own), Some(below)) = (self.as_table(), base.as_table()) else { return self.clone() };
-        // Own keys come last, because readers take the order of keys as the order in which they were laid over each other.
+        // Own keys come last, because readers take the order of keys as the order of laying over.
         let mut entries: Vec<Entry> = below.0.iter().filter(|entry| own.get(&entry.name).is_none()).cloned().collect();
         for entry in &own.0 {
             let mut entry = entry.clone();

@@ -18,7 +18,7 @@ pub(super) fn read_listed(table: &mut TableReader<'_>, context: Context<'_>) -> 
     complete.then_some(impairments)
 }
 
-/// Reads one impairment and sets it in `impairments`. `"none"` and forms without parameters set no values.
+/// Reads an impairment, and sets the impairment in `impairments`. `"none"` and forms without parameters set no values.
 fn read_impairment(impairments: &mut Impairments, key: &Key, node: &Node, context: Context<'_>) -> Option<()> {
     let parameters = key.form.table().filter(|_| !is_none(node));
     let values = match parameters {

@@ -106,7 +106,7 @@ fn is_none(node: &Node) -> bool {
     node.as_text() == Some(NONE)
 }
 
-/// Returns a reader that returns `Some(None)` for `word`, and the answer of `read` for any other value.
+/// Wraps the reader `read`: the wrapped reader returns `Some(None)` for `word`, and the answer of `read` for any other value.
 fn unless<T>(word: &'static str, read: fn(&Node, Context<'_>) -> Option<T>) -> impl FnOnce(&Node, Context<'_>) -> Option<Option<T>> {
     move |node: &Node, context: Context<'_>| if node.as_text() == Some(word) { Some(None) } else { read(node, context).map(Some) }
 }
@@ -144,11 +144,11 @@ fn read_chance_in(table: &mut TableReader<'_>, node: &Node, context: Context<'_>
     Chance::correlated(probability?, correlation?).map_err(|error| values::refuse(context, &nodes, node, &error)).ok()
 }
 
-/// Returns the keys that apply. A key that describes the whole link, `netem` or `replay`, removes the keys that it is laid over. A key in the same table, or
-/// laid over the whole description, is a fault.
+/// Returns the keys that apply. `netem` and `replay` describe the whole link, and remove all keys below. Another key in the same table as such a
+/// description, or laid over the description, is a fault.
 fn in_force<'a>(node: &'a Node, context: Context<'_>) -> Option<Cow<'a, Node>> {
     let table = node.as_table()?;
-    // Entries stand in the order in which they were laid over each other, so the last whole description applies.
+    // Entries stand in the order of laying over, so the last whole description applies.
     let whole = table.0.iter().enumerate().rfind(|(_, entry)| says_everything(entry));
     let Some((place, whole)) = whole else { return Some(Cow::Borrowed(node)) };
     let mut taken_away = Vec::new();

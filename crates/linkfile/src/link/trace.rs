@@ -115,8 +115,7 @@ fn load(node: &Node, context: Context<'_>, form: Form) -> Option<Trace> {
     })
 }
 
-/// Returns the message of a recording that begins at or after the end of the run, or `None` for a recording that begins earlier. A run would see only the
-/// first row of a recording that begins too late.
+/// Returns a message if the recording begins at or after the end of the run. A run would see only the first row of such a recording.
 fn outside(path: &PathTrace, ends: Option<Duration>) -> Option<String> {
     let first = path.first().saturating_duration_since(Instant::ZERO);
     let end = ends.unwrap_or(LONGEST_RUN);

@@ -62,8 +62,8 @@ fn read_overrides(
     Ok(parsed.whole)
 }
 
-/// Keys of one directed link and their values as TOML, in the order in which they were laid over each other. Of two keys that exclude each other, the later key
-/// applies. Missing keys have their defaults.
+/// Keys of one directed link with values in TOML, in the order of laying over. Of two conflicting keys, the later key applies. Missing keys have the declared
+/// defaults.
 ///
 /// The display form is an inline table, `{ delay = "24ms", loss = 0.01 }`, which [`LinkKeys::read`] parses.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -92,8 +92,8 @@ impl LinkKeys {
         self.iter().find(|(name, _)| *name == key).map(|(_, value)| value)
     }
 
-    /// Returns a copy of these keys with one more key laid over them. A value that is not TOML is taken as a text, as in `--set`: `8ms` needs no quotes. Key
-    /// and value are checked only by [`LinkKeys::model`].
+    /// Returns a copy of the keys with a further key laid over the others. A value with faulty TOML is taken as a text, as in `--set`: `8ms` needs no quotes.
+    /// Key and value are checked only by [`LinkKeys::model`].
     #[must_use]
     pub fn with(&self, key: &str, value: &str) -> Self {
         let mut keys: Vec<_> = self.keys.iter().filter(|(name, _)| name != key).cloned().collect();

@@ -37,7 +37,7 @@ impl LinkTable {
         let own: BTreeMap<(usize, usize), Arc<LinkModel>> = exceptions.into_iter().filter(|(pair, _)| is_link(*pair)).collect();
         let mut configs = Configs::default();
         let mut exceptions = BTreeMap::new();
-        // The order of configurations is that of first use, so the usual one is placed just before the first exception behind the first usual link.
+        // Configurations are in the order of first use, so the usual configuration is placed just before the first exception after the first usual link.
         let first_usual = first_left(peers, own.keys().copied());
         let mut usual_place = None;
         for (pair, config) in &own {

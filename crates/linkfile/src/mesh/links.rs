@@ -126,7 +126,7 @@ impl LinkClasses {
         (self.peers >= 2).then(|| LinkTable::new(self.peers, config(self.usual), self.own.iter().map(|(ends, class)| (*ends, config(*class)))))
     }
 
-    /// Returns the keys of the links that `selector` selects, in the order in which the keys were laid over each other. For an access line the answer is empty.
+    /// Returns the keys of the links of `selector`, in the order of laying over. For an access line the answer is empty.
     #[must_use]
     pub fn keys(&self, selector: LinkSelector) -> KeysOfLinks {
         let keys =
@@ -152,7 +152,7 @@ impl LinkClasses {
 
     /// Lays keys over the keys of all links, and returns the new table. Returns `None` if the keys were refused.
     pub fn change_all(&mut self, keys: &Node, context: Context<'_>) -> Option<LinkTable> {
-        // One new class for each old class in use: links that shared a class share the new one.
+        // Each old class in use gets a single new class: links of the same old class share the new class.
         let mut new_class = BTreeMap::new();
         for old in self.in_order_of_use() {
             if let Entry::Vacant(place) = new_class.entry(old) {

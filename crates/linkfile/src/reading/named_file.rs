@@ -75,7 +75,7 @@ pub fn read_file<T: Clone + 'static>(
     if let Some(known) = context.files.known.borrow().get(&key) {
         return known.as_ref().and_then(|known| known.downcast_ref()).cloned();
     }
-    // A refused file is remembered too, so that its fault is not made again for every link that names the file.
+    // A refused file is remembered too, so that the fault is not made again for every link with the file.
     let read = load(node, context, path).and_then(|text| {
         let refused = |Fault { span, message }: Fault| refuse(node, context, path, &text, span, message);
         parse(&text).map_err(refused).ok()

@@ -66,7 +66,7 @@ impl<'a> TableReader<'a> {
         self.entry(name).map(|entry| &*entry.node)
     }
 
-    /// Returns the names of all given keys, in the order in which they were laid over each other.
+    /// Returns the names of all given keys, in the order of laying over.
     pub fn names(&self) -> impl Iterator<Item = &'a str> {
         self.table.0.iter().map(|entry| entry.name.as_str())
     }
@@ -140,7 +140,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// Reports a key that is given although the `condition` for its use does not hold. Returns `None` if so.
+    /// Reports a given key if the `condition` for the key does not hold, and returns `None` then.
     #[track_caller]
     pub fn only_if(&mut self, condition: bool, name: &'static str, message: &str) -> Option<()> {
         let refused = self.get(name).filter(|_| !condition);

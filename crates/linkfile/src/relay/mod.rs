@@ -1,4 +1,4 @@
-//! Relay files: programs that talk to each other in real time, with their links and ports.
+//! Relay files: programs talking to each other in real time, with links and ports.
 
 mod programs;
 
@@ -62,7 +62,7 @@ pub struct RelayProgram {
     pub name: String,
     /// Address that stands for the program: datagrams sent to this address reach the program. Port 0 lets the system choose a free port.
     pub port: SocketAddr,
-    /// Address from which the program sends and at which it listens. `None`: learnt from the first datagram of the program.
+    /// Address for sending and listening of the program. `None`: learnt from the first datagram of the program.
     pub address: Option<SocketAddr>,
 }
 

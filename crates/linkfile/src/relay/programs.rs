@@ -52,7 +52,7 @@ pub(super) fn check_enough(names: &Names, node: &Node, context: Context<'_>) {
     }
 }
 
-/// Reads one entry, and adds its name to `names`. `allow_remote` is `None` if that key was refused.
+/// Reads an entry, and adds the program's name to `names`. `allow_remote` is `None` if the key `allow-remote` was refused.
 fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Names, context: Context<'a>) -> Option<Written<'a>> {
     let mut table = TableReader::new(entry, context, &PROGRAM, "a table with name and port")?;
     let (port_node, address_node) = (table.get("port"), table.get("address"));

@@ -1,7 +1,7 @@
 //! Router files: the links between two network interfaces.
 //!
-//! A router has two sides, links with names, and rules that decide which packets go through which link. The keys of a link are the same as in a scene, and
-//! faults are shown in the same way.
+//! A router has two sides, links with names, and rules that choose the link of each packet. The keys of a link are the same as in a scene, and faults are
+//! shown in the same way.
 //!
 //! ```
 //! use std::path::Path;

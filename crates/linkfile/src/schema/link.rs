@@ -22,10 +22,10 @@ pub static LINK_ENTRY: Table = Table::over(&joined::<16>(&[&[&ENDS], &LINK]));
 pub const ALL_LINKS: Words = &[("all", "every link")];
 /// Table that names a link by its ends.
 pub(crate) static ENDS_TABLE: Table = Table::of(&[&ENDS]);
-/// Form of the links that a change refers to: `"all"`, or one link by its ends.
+/// Form of the links of a change: `"all"`, or a link by both ends.
 pub const LINKS_BETWEEN: Form = Form::AnyOf(&[Form::Words(ALL_LINKS), Form::Table(&ENDS_TABLE)]);
 
-/// Table that names a link by its ends, or an access line by its peer.
+/// Table that names a link by both ends, or an access line by the peer.
 pub static LINK_OR_LINE: Table = Table::of(&[&[
     optional("from", Form::Text, "The name of the peer that sends"),
     optional("to", Form::Text, "The name of the peer that receives"),

@@ -113,6 +113,7 @@ pub fn read(text: &str) -> Result<Vec<DelayRow>, DelayTableError> {
     for (line, text) in lines {
         let row = Row { line, cells: cells(text) };
         let sent = row.time(&columns.sent, A_TIME)?;
+        // Equal times are allowed, so only a difference above zero is refused.
         let back = rows.last().and_then(|before| before.sent.seconds_since(sent)).filter(|back_s| *back_s > 0.0);
         if let Some(back_s) = back {
             return Err(DelayTableError::TimeGoesBack { line, back_s });
