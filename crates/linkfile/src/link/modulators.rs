@@ -90,7 +90,7 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<(Vec<String>, Vec<Mo
             // All other states are equally likely.
             None => (0..names.len()).map(|other| if other == place { 0.0 } else { 1.0 }).collect(),
         };
-        // Weights need not sum to 1. A single state without sojourn has no successor, and lasts forever.
+        // A state without a sojourn lasts forever and needs no next state. Any other state needs a next state other than itself.
         let weight_of_itself = next.get(place).copied().unwrap_or(0.0);
         if weight_of_itself != 0.0 || (sojourn.is_some() && next.iter().all(|weight| *weight == 0.0)) {
             let message =
