@@ -1,4 +1,4 @@
-//! What the parts of a peer are made from, with every scaling applied: how masses and gains depend on the number of peers.
+//! Configurations of a peer's parts with every scaling applied. Masses of copies and gains are scaled by the number of peers here.
 
 use cohaptic_peer::coordination::Pull;
 use cohaptic_peer::{CopyConfig, Gains, PeerConfig, Plant, State};
@@ -6,11 +6,11 @@ use cohaptic_peer::{CopyConfig, Gains, PeerConfig, Plant, State};
 use crate::{Scaling, Scene};
 
 impl Scene {
-    /// The peer in that place, apart from its device, copy and strategy.
+    /// Returns the configuration of a peer without device, copy and strategy. `place` is the index in [`Scene::peers`].
     ///
     /// # Panics
     ///
-    /// If there is no such peer, or its place is beyond 2^32.
+    /// If there is no such peer, or `place` exceeds 2^32 − 1.
     #[must_use]
     pub fn peer_config(&self, place: usize) -> PeerConfig {
         let spec = &self.peers[place];
@@ -27,7 +27,7 @@ impl Scene {
         }
     }
 
-    /// KC and BC between the device and the copy of the peer in that place.
+    /// Returns KC [N/m] and BC [N·s/m] between device and copy of a peer, scaled. `place` is the index in [`Scene::peers`].
     ///
     /// # Panics
     ///
@@ -38,7 +38,8 @@ impl Scene {
         spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.number()))
     }
 
-    /// KT and BT of a peer: `gains`, those of the scene or those that the timeline sets, times [`Scene::coordination_factor`].
+    /// Returns KT [N/m] and BT [N·s/m] of a peer: `gains` times [`Scene::coordination_factor`]. `gains` are the gains of the scene or gains that the timeline
+    /// sets.
     ///
     /// # Panics
     ///
@@ -48,8 +49,8 @@ impl Scene {
         gains.scaled(self.coordination_factor(peer))
     }
 
-    /// What KT and BT of a peer are multiplied by for the number of peers, and of those that it hears. A law that sums over the others counts N − 1 of them itself
-    /// where the scene has no topology.
+    /// Returns the factor of KT and BT of a peer, from the number of peers and the number of peers that this peer hears. A law that sums over the other peers
+    /// counts the N − 1 others itself where the scene has no topology, so that the factor does not contain N − 1 for such a law.
     ///
     /// # Panics
     ///
@@ -61,13 +62,14 @@ impl Scene {
             Pull::Mean => scaling,
             Pull::Sum => scaling * self.heard_by(peer),
         };
+        // The law counts N − 1 peers. On a topology the law is made for two peers instead, N − 1 = 1, and the peers that are heard count here.
         match self.coordination.strategy.pull() {
             Pull::Sum if self.topology.is_some() => summed * self.heard_by(peer),
             Pull::Sum | Pull::Mean => summed,
         }
     }
 
-    /// The device of the peer in that place along one axis, with the arm that holds it.
+    /// Returns the device of a peer along one axis, with the arm that holds the device. `place` is the index in [`Scene::peers`].
     ///
     /// # Panics
     ///
@@ -78,7 +80,7 @@ impl Scene {
         spec.device.plant(spec.hand.as_ref())
     }
 
-    /// The copy of the object of the peer in that place, with the damping that the coordination law adds.
+    /// Returns the copy of the object of a peer, with the damping that the coordination law adds. `place` is the index in [`Scene::peers`].
     ///
     /// # Panics
     ///
@@ -88,7 +90,7 @@ impl Scene {
         CopyConfig { mass: self.copy_mass(), damping: self.object.damping + self.own_damping(place) }
     }
 
-    /// Where the copy and the device of that peer begin.
+    /// Returns the initial state of a peer's copy on the first A axes. Axes beyond three are zero. `place` is the index in [`Scene::peers`].
     ///
     /// # Panics
     ///
@@ -102,10 +104,10 @@ impl Scene {
 }
 
 impl Scaling {
-    /// What the coordination gains are multiplied by among this number of peers: 4(N−1)/N² for [`Scaling::InverseN`].
+    /// Returns the factor of the coordination gains for this number of peers: 4(N−1)/N² for [`Scaling::InverseN`].
     ///
-    /// Over an ideal network the difference modes of average-position coordination with split mass have the squared frequency (N/mO)·KT·N/(N−1)
-    /// (Rakhsha & Constantinescu 2015, equation 6); scaled, it is 4·KT/mO for every N.
+    /// Over an ideal network the difference modes of average-position coordination with split mass have the squared frequency (N/mO)·KT·N/(N−1) (Rakhsha &
+    /// Constantinescu 2015, equation 6). With the scaled gain the squared frequency is 4·KT/mO for every N.
     #[must_use]
     pub fn coordination_factor(self, peers: usize) -> f64 {
         let n = count(peers);
@@ -115,7 +117,7 @@ impl Scaling {
         }
     }
 
-    /// What the coupling gains are multiplied by among this number of peers: 2/N for [`Scaling::InverseN`].
+    /// Returns the factor of the coupling gains for this number of peers: 2/N for [`Scaling::InverseN`].
     #[must_use]
     pub fn coupling_factor(self, peers: usize) -> f64 {
         match self {
@@ -126,7 +128,7 @@ impl Scaling {
 }
 
 impl Scene {
-    /// The mass of each copy of the object \[kg\]; the whole mass where one peer alone has the object.
+    /// Returns the mass of each copy of the object \[kg\]. A server that alone has the object has the whole mass, also with `split-mass`.
     #[must_use]
     pub fn copy_mass(&self) -> f64 {
         if self.object.split_mass && self.server().is_none() { self.object.mass / count(self.number()) } else { self.object.mass }
@@ -150,7 +152,7 @@ mod tests {
         }
     }
 
-    /// (N/m)·factor·N/(N−1) = 4/m: the coordination mode of every N has the frequency of N = 2.
+    /// (N/m)·factor·N/(N−1) = 4/m: the coordination mode for every N has the frequency for N = 2.
     #[test]
     fn scaled_modes_have_one_frequency() {
         for peers in [2, 3, 5, 8, 50] {

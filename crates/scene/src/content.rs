@@ -1,4 +1,4 @@
-//! What a scene says: as one number, and key by key, so that a record can tell whether it belongs to a scene and, if it does not, what differs.
+//! Content of a scene: as a fingerprint, and key by key. A record compares the content to find whether it belongs to a scene and, if not, which keys differ.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,8 +11,8 @@ use crate::model::Scene;
 use crate::read::parse_scene;
 
 impl Scene {
-    /// That of all that the scene says, and that the files say which it names. The same scene under another name, in another folder, with other words for the
-    /// same values has the same one; a title that is written counts as nothing.
+    /// Returns the fingerprint of everything that the scene and the files named by the scene contain. Path, folder, title and notation of values do not
+    /// count: `"1s"` and `"1000ms"` give the same fingerprint.
     #[must_use]
     pub fn fingerprint(mut self) -> Fingerprint {
         self.file = PathBuf::new();
@@ -21,17 +21,18 @@ impl Scene {
     }
 }
 
-/// The keys of a scene as they are written, overrides included, and the files that it names.
+/// Keys of a scene as written, overrides included, and the files that the scene names.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct SceneContent {
-    /// Each value as TOML, by its dotted path: `link.delay` is `"24ms"`. Entries of lists are called as in overrides; `peers` and `modulators`, whose order
-    /// counts, have their names besides. Title, measures and expectations, which change nothing that happens, are left out.
+    /// Values as TOML, indexed by dotted path: the value of `link.delay` is `"24ms"`. Entries of lists have the paths of overrides. The order of entries of
+    /// `peers` and `modulators` counts, so that these two paths also have a value, the list of names. Title, measures and expectations are left out, because
+    /// these keys do not change a run.
     pub keys: BTreeMap<String, String>,
-    /// What each file holds, by its path relative to the folder of the scene.
+    /// Fingerprints of the files' contents, indexed by path relative to the folder of the scene.
     pub files: BTreeMap<String, Fingerprint>,
 }
 
-/// The keys of a scene file, read as for a live session, and the files that it names.
+/// Returns the keys of a scene file, read as for a live session, and the fingerprints of the files that the scene names.
 ///
 /// # Errors
 ///
@@ -40,7 +41,7 @@ pub fn scene_content(path: &Path, overrides: &[String]) -> Result<SceneContent, 
     with_text(path, |text| scene_content_of_text(text, path, overrides))
 }
 
-/// [`scene_content`] of a scene that is a text; `file` as in [`Scene::parse`].
+/// Like [`scene_content`], for a scene in a text; `file` as in [`Scene::parse`].
 ///
 /// # Errors
 ///
@@ -51,12 +52,13 @@ pub fn scene_content_of_text(text: &str, file: &Path, overrides: &[String]) -> R
     collect(&document, "", &mut keys);
     let is_of = |key: &str, table: &str| key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
     keys.retain(|key, _| key != "scene.title" && !is_of(key, "expect") && !is_of(key, "measure"));
+    // Paths relative to the scene's folder: a scene that moves together with its files keeps its content.
     let folder = file.parent().unwrap_or_else(|| Path::new(""));
     let name = |path: PathBuf| path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
     Ok(SceneContent { keys, files: files.into_iter().map(|(path, bytes)| (name(path), bytes)).collect() })
 }
 
-/// A scene as one text with its overrides in it: a line for each key at the top. `text` and `file` as in [`Scene::parse`].
+/// Returns a scene as one text that contains the overrides, a line for each key at the top level. `text` and `file` as in [`Scene::parse`].
 ///
 /// # Errors
 ///
@@ -67,7 +69,7 @@ pub fn scene_text(text: &str, file: &Path, overrides: &[String]) -> Result<Strin
     Ok(entries.iter().map(|entry| format!("{} = {}\n", key_text(&entry.name), value_text(&entry.node))).collect())
 }
 
-/// Every value below a node that is no table.
+/// Inserts into `keys` every value below `node` that is not a table. `path` is the path of `node`.
 fn collect(node: &Node, path: &str, keys: &mut BTreeMap<String, String>) {
     match &node.value {
         Value::Table(table) => {
@@ -75,9 +77,12 @@ fn collect(node: &Node, path: &str, keys: &mut BTreeMap<String, String>) {
                 collect(&entry.node, &join(path, &entry.name), keys);
             }
         }
+        // A list of tables, such as `peers`: each entry has its own path, by name where the entry has a name.
         Value::List(elements) if !elements.is_empty() && elements.iter().all(|element| element.as_table().is_some()) => {
             let name = |element: &Node| element.as_table()?.get("name").map(|entry| value_text(&entry.node));
             let names: Option<Vec<String>> = elements.iter().map(|element| name(element)).collect();
+            // The paths of named entries do not show their order, so that the list of names is a value too. Entries without names have their place in their
+            // path.
             if let Some(names) = names {
                 keys.insert(path.to_owned(), format!("[{}]", names.join(", ")));
             }
@@ -92,13 +97,13 @@ fn collect(node: &Node, path: &str, keys: &mut BTreeMap<String, String>) {
 }
 
 impl SceneContent {
-    /// A key or the name of a file and what it is, as one line of TOML: `"link.delay" = "24ms"`. [`SceneContent::read_line`] takes it.
+    /// Returns one line of TOML for the name of a key or of a file and its value: `"link.delay" = "24ms"`. [`SceneContent::read_line`] reads the line.
     #[must_use]
     pub fn line(name: &str, value: &str) -> String {
         format!("{} = {value}", key_text(name))
     }
 
-    /// The name and the value of a line, the value as TOML. `None` for anything else.
+    /// Returns name and value of a line, the value as TOML. `None` if the text is not exactly one key with a value.
     #[must_use]
     pub fn read_line(line: &str) -> Option<(String, String)> {
         let document = Node::document(toml::de::DeTable::parse(line).ok()?.get_ref()).ok()?;

@@ -1,4 +1,4 @@
-//! The state of the readers of a scene.
+//! Context that is passed to the readers of a scene's parts.
 
 use core::ops::Deref;
 
@@ -8,20 +8,20 @@ use cohaptic_linkfile::schema::{Choices, Form, words};
 
 use crate::model::Axes;
 
-/// The state of a reader of a file, and the facts of a scene that the readers of its parts depend on.
+/// Context of a reader of a file, with the facts of the scene on which readers of its parts depend.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SceneContext<'a> {
     pub(crate) file: Context<'a>,
-    /// `None`: not known, because the number itself was refused.
+    /// Number of axes; `None` if the number was refused. Readers then skip checks that depend on the number.
     pub(crate) axes: Option<Axes>,
-    /// Whether the scene is for a live session, where peers that live elsewhere need no model.
+    /// True for a live session, in which a peer of kind `udp` needs neither device nor coupling.
     pub(crate) live: bool,
-    /// Whether the object has an inertia.
+    /// True if the object has an inertia.
     pub(crate) turns: bool,
 }
 
 impl<'a> SceneContext<'a> {
-    /// This state for a table that is read without the table below it.
+    /// Returns the context for a table that is read on its own, without the table over which it is laid.
     pub(crate) fn of_part(self) -> Self {
         Self { file: self.file.of_part(), ..self }
     }
@@ -38,13 +38,13 @@ impl<'a> Deref for SceneContext<'a> {
 pub(crate) const AXIS: Form = Form::Words(const { &words(&AXES) });
 const AXES: Choices<usize, 3> = [("x", 0, "the first"), ("y", 1, "the second"), ("z", 2, "the third")];
 
-/// An axis that the scene has, from 0.
+/// Reads the name of an axis. Returns the axis, 0 for x; `None` if the word is unknown or the scene has fewer axes.
 pub(crate) fn read_axis(node: &Node, context: SceneContext<'_>) -> Option<usize> {
     let axis = values::word(node, *context, &AXES)?;
     check_axis(node, context, axis)
 }
 
-/// Reports an axis that the scene does not have.
+/// Returns the axis if the scene has it, and reports a fault otherwise. `None` without a fault if the number of axes is not known.
 pub(crate) fn check_axis(node: &Node, context: SceneContext<'_>, axis: usize) -> Option<usize> {
     let count = context.axes?.count();
     if axis >= count {

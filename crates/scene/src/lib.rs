@@ -2,14 +2,14 @@
 //!
 //! Use this crate if your program reads scene files.
 //!
-//! A scene file says who takes part, what they hold, how the copies of the shared object are kept together, and what lies between them on the network.
-//! This crate reads it, fills in every default, and refuses whatever makes no sense: a [`Scene`] that exists can be run. Every refusal is a
-//! [`SceneError`] that names file, line, column and key, shows the line, and says what was expected.
+//! A scene file names the peers, the shared object, the coordination that keeps the copies of the object together, and the network between the peers.
+//! This crate reads the file, fills in every default and refuses contradictions: a [`Scene`] that exists can be run. Every refusal is a [`SceneError`] that
+//! names file, line, column and key, shows the line, and says what was expected.
 //!
-//! It does not run a scene. The fields of a [`Scene`] have gains as written; [`Scene::peer_config`] gives the parts of a peer with every scaling applied. Nothing
-//! here is printed.
+//! The crate does not run a scene and prints nothing. The fields of a [`Scene`] hold gains as written; [`Scene::peer_config`] returns the parts of a peer
+//! with every scaling applied.
 //!
-//! Read [`Scene::parse`] first, then [`Scene`]. The document, its faults and the links are those of `cohaptic-linkfile`.
+//! Read [`Scene::parse`] first, then [`Scene`]. The document, its faults and the links are types of `cohaptic-linkfile`.
 //!
 //! ```
 //! use std::path::Path;

@@ -1,4 +1,4 @@
-//! The keys of the links of a scene, to be shown and changed.
+//! Keys of the links of a scene, for programs that show and change the keys.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use cohaptic_units::Instant;
 
 use crate::read::parse_scene;
 
-/// The keys of every directed link of a scene file as it begins: an entry `[[links]]` is laid over `[link]`.
+/// Returns the keys of every directed link at the beginning of a scene file. The keys of an entry `[[links]]` are laid over the keys of `[link]`.
 ///
 /// # Errors
 ///
@@ -19,7 +19,7 @@ pub fn link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks, FileE
     with_text(path, |text| link_keys_of_text(text, path, overrides))
 }
 
-/// [`link_keys`] of a scene that is a text; `file` as in [`Scene::parse`](crate::Scene::parse).
+/// Like [`link_keys`], for a scene in a text; `file` as in [`Scene::parse`](crate::Scene::parse).
 ///
 /// # Errors
 ///
@@ -28,6 +28,7 @@ pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Resul
     let mut keys = KeysOfLinks::new();
     let mut beginning = true;
     parse_scene(Sources { file, text, overrides }, true, &mut |_, selector, links: &LinkClasses| {
+        // The first call has the links of the beginning. Later calls are changes of the timeline.
         if core::mem::take(&mut beginning) {
             keys = links.keys(selector);
         }
@@ -35,8 +36,8 @@ pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Resul
     Ok(keys)
 }
 
-/// The changes that the timeline of a scene makes to the keys of links: the instant, and all keys of each link that changes then. In order of time, as in
-/// [`Scene::timeline`](crate::Scene::timeline). A change by hand in between does not count: the timeline says what a link is.
+/// Returns the changes of links in the timeline of a scene: the instant of each change, and all keys of each link that changes. In order of time, as in
+/// [`Scene::timeline`](crate::Scene::timeline). A change of a live session between two changes of the timeline has no influence on these keys.
 ///
 /// # Errors
 ///
@@ -45,6 +46,7 @@ pub fn link_key_changes_of_text(text: &str, file: &Path, overrides: &[String]) -
     let mut changes = Vec::new();
     let mut beginning = true;
     parse_scene(Sources { file, text, overrides }, true, &mut |at, selector: LinkSelector, links: &LinkClasses| {
+        // The first call has the links of the beginning, which are no change.
         if !core::mem::take(&mut beginning) {
             changes.push((at, links.keys(selector)));
         }
@@ -58,12 +60,12 @@ mod tests {
     use super::*;
     use crate::Scene;
 
-    /// The least scene that has a link.
+    /// A scene with as few keys as possible, to which a test adds links.
     const AROUND: &str = "scene = { duration = \"1s\", count = 2 }\nobject = { mass = 1.0 }\n\
         coordination = { strategy = \"average-position\", stiffness = 1.0, damping = 1.0, update = \"1ms\" }\n\
         peer = { device = { mass = 1.0, damping = 1.0 }, coupling = { stiffness = 1.0, damping = 1.0 } }\n";
 
-    /// Links of every sort: each link of the scene is the link of its keys, also after its keys were written down and read back.
+    /// The keys of each link make the model of the link in the scene, also after the keys were printed and read back. The scene has links of every kind.
     #[test]
     fn the_keys_of_a_scene_make_its_links() {
         let text = format!(
@@ -107,7 +109,7 @@ mod tests {
         assert_eq!(keys[&(1, 2)].iter().map(|(key, _)| key).collect::<Vec<_>>(), ["delay", "jitter", "loss", "rate"]);
     }
 
-    /// The timeline's keys make the links that it makes, one change after the other, also where the file is not in order of time.
+    /// The keys of the timeline make the links that the timeline makes, change after change, also if the file is not in order of time.
     #[test]
     fn the_keys_of_a_timeline_make_its_links() {
         let text = format!(

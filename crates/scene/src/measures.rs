@@ -1,20 +1,21 @@
-//! The measures of a run: their names, units and words. `[measure]`, `[expect]`, the catalogue of keys, columns and documents follow from this list.
+//! Registry of the measures of a run: names, units and descriptions. `[measure]`, `[expect]`, the catalogue of keys, columns and documents are made from this
+//! list.
 
 use crate::Scene;
 
 macro_rules! registry {
     ($($measure:ident: $scope:ident, $name:literal, $unit:literal, $about:literal;)+) => {
-        /// A measure: one number that sums a run up.
+        /// A measure: a number that summarises a run.
         #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
         pub enum Measure {
             $(#[doc = concat!($about, ".")] $measure,)+
         }
 
         impl Measure {
-            /// Every measure, in the order in which they are shown.
+            /// Every measure, in the order in which measures are shown.
             pub const ALL: &'static [Self] = &[$(Self::$measure,)+];
 
-            /// The name, which ends in the unit. A measure of each peer stands behind the name of the peer: see [`MeasureName::text`].
+            /// Returns the name, which ends in the unit. The full name of a measure of a peer begins with the peer's name: see [`MeasureName::text`].
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
@@ -22,7 +23,7 @@ macro_rules! registry {
                 }
             }
 
-            /// The name as a list of names shows it: with `peers.NAME.` in front where each peer has one.
+            /// Returns the name as a list of names shows it: with `peers.NAME.` in front if each peer has a value.
             #[must_use]
             pub const fn pattern(self) -> &'static str {
                 match self {
@@ -30,7 +31,7 @@ macro_rules! registry {
                 }
             }
 
-            /// The unit.
+            /// Returns the unit.
             #[must_use]
             pub const fn unit(self) -> &'static str {
                 match self {
@@ -38,7 +39,7 @@ macro_rules! registry {
                 }
             }
 
-            /// Its meaning, without the last full stop.
+            /// Returns the description, without the final full stop.
             #[must_use]
             pub const fn about(self) -> &'static str {
                 match self {
@@ -46,7 +47,7 @@ macro_rules! registry {
                 }
             }
 
-            /// Whether each peer has one, or the run as a whole.
+            /// Returns the scope: the run as a whole, or each peer.
             #[must_use]
             pub const fn scope(self) -> Scope {
                 match self {
@@ -66,12 +67,12 @@ macro_rules! pattern {
     };
 }
 
-/// What a measure is about.
+/// Scope of a measure.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Scope {
-    /// The run as a whole.
+    /// The run as a whole has a value.
     Run,
-    /// One peer.
+    /// Each peer has a value.
     Peer,
 }
 
@@ -99,17 +100,17 @@ registry! {
     AgeP99: Run, "age_p99_s", "s", "Quantile of 99 % of that age";
 }
 
-/// A measure of a scene: of the run, or of one of its peers.
+/// A measure together with its peer, if it is a measure of a peer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct MeasureName {
     /// The measure.
     pub measure: Measure,
-    /// The peer, by its place in [`Scene::peers`]; `None` for a measure of the run.
+    /// Index in [`Scene::peers`]; `None` for a measure of the run.
     pub peer: Option<usize>,
 }
 
 impl MeasureName {
-    /// Every measure of a scene with this number of peers, in order.
+    /// Returns every measure of a scene with this number of peers, in the order in which measures are shown.
     #[must_use]
     pub fn all(peers: usize) -> Vec<Self> {
         let mut names = Vec::new();
@@ -122,7 +123,7 @@ impl MeasureName {
         names
     }
 
-    /// As documents and columns have it: `energy_j`, `peers.left.energy_j`.
+    /// Returns the name in documents and columns: `energy_j`, `peers.left.energy_j`.
     ///
     /// # Panics
     ///
@@ -137,7 +138,7 @@ impl MeasureName {
 }
 
 impl Measure {
-    /// The name of a measure of that peer.
+    /// Returns the name of this measure for the peer with this name.
     #[must_use]
     pub fn of_peer(self, peer: &str) -> String {
         format!("peers.{peer}.{}", self.name())

@@ -1,4 +1,5 @@
-//! A checked scene: what a file says once every default is filled in and every value is known to make sense.
+//! The model of a checked scene: [`Scene`] and the types of its fields. Every default is filled in and every value lies in its range. The types hold numbers
+//! as written; scaling by the number of peers is applied elsewhere, by the methods of [`Scene`] that make the parts of a peer.
 
 use core::fmt;
 use core::time::Duration;
@@ -16,48 +17,51 @@ use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 use crate::measures::MeasureName;
 use crate::{RotationSpec, Topology};
 
-/// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
+/// A scene that is ready to run. Every number is checked, and every peer that the scene names exists.
 #[derive(Clone, PartialEq)]
 pub struct Scene {
-    /// The file it was read from, for messages; empty for a text.
+    /// Path of the scene file, for messages: the argument `file` of [`Scene::parse`].
     pub file: PathBuf,
-    /// A line for people.
+    /// Title for people; the name of the file if the scene gives no title.
     pub title: String,
-    /// How long it lasts; above zero.
+    /// Duration of the scene; above zero.
     pub duration: Duration,
-    /// The seed of every random stream.
+    /// Seed of all random streams.
     pub seed: u64,
-    /// The number of translational axes.
+    /// Number of translational axes.
     pub axes: Axes,
     /// The shared virtual object.
     pub object: ObjectSpec,
-    /// How the object turns; `None`: it does not.
+    /// Rotation of the object; `None` if the object does not turn.
     pub rotation: Option<Box<RotationSpec>>,
-    /// How the copies are held together.
+    /// Coordination controller that keeps the copies together.
     pub coordination: CoordinationSpec,
-    /// How motion between ticks is computed.
+    /// Method that computes the motion between two ticks.
     pub integrator: Integrator,
-    /// The peers, at least two, in the order of the file. Their names differ.
+    /// Peers in the order of the file, at least two. Names are unique.
     pub peers: Vec<PeerSpec>,
-    /// The peers to which each peer sends; `None`: all others.
+    /// Neighbours to which each peer sends; `None` if every peer sends to every other peer.
     pub topology: Option<Arc<Topology>>,
-    /// Whether a relay stands between the uplinks of peers and the links: a sample passes an uplink once, and the relay hands it on to each receiver.
+    /// True if a relay stands between the uplinks of peers and the links. A sample then passes its sender's uplink once, and the relay sends a copy to each
+    /// receiver.
     pub relay: bool,
-    /// The directed links between the peers; of no meaning between peers that are no neighbours in the topology.
+    /// Directed links between the peers. An entry between two peers that are not neighbours in the topology has no effect.
     pub links: LinkTable,
-    /// Changes while the scene runs, in order of time; equal instants in the order of the file.
+    /// Changes during the run, in order of time; changes at the same instant are in the order of the file.
     pub timeline: Vec<Change>,
-    /// What a run is summed up by, if anything is measured.
+    /// Measures that a run computes; `None` if the scene has no table `[measure]`.
     pub measure: Option<MeasureSpec>,
-    /// What must come out, if the scene is a test.
+    /// Expected results of a run; `None` if the scene is not a test.
     pub expect: Option<Expect>,
-    /// For how many peers masses and gains are scaled; `None`: for those that are listed. See [`Scene::scaled_for`](fn@Scene::scaled_for).
+    /// Number of peers by which masses and gains are scaled; `None` for the number of listed peers. See [`Scene::scaled_for`](fn@Scene::scaled_for).
     pub scaled_for: Option<usize>,
 }
 
 impl fmt::Debug for Scene {
-    /// Turns, topologies and measures are shown only where there are any: fingerprints of records are made of this text.
+    /// Writes rotation, topology, relay, measure and `scaled_for` only where the scene has them. Fingerprints of records are made of this text, so that a
+    /// scene without such a part must print as it did before the part existed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Destructured without `..`: a new field does not compile until this function decides how to show the field.
         let Self {
             file,
             title,
@@ -101,71 +105,73 @@ impl fmt::Debug for Scene {
 }
 
 impl Scene {
-    /// The scene with the masses of copies, and all gains, of that number of peers; those that it lists, its links and all else stay. The motions of equal peers are the same for any number of
-    /// them but for these and the weights with which they hear each other, so that an analysis needs no more peers than two.
+    /// Returns the scene with masses of copies and all gains scaled for `peers` peers. Listed peers, links and everything else stay as they are. Equal peers
+    /// move alike for any number of peers, apart from these masses and gains and the weights with which the peers hear each other, so that an analysis needs
+    /// only two of the peers.
     #[must_use]
     pub fn scaled_for(&self, peers: usize) -> Self {
         Self { scaled_for: Some(peers), ..self.clone() }
     }
 
-    /// For how many peers masses and gains are scaled: those that the scene lists, but for [`Scene::scaled_for`].
+    /// Returns the number of peers by which masses and gains are scaled: the number given to [`Scene::scaled_for`], otherwise the number of listed peers.
     #[must_use]
     pub fn number(&self) -> usize {
         self.scaled_for.unwrap_or(self.peers.len())
     }
 
-    /// The settings of measures: those of `[measure]`, or the usual ones.
+    /// Returns the settings of the measures: the settings of `[measure]`, or the defaults if the scene has no such table.
     #[must_use]
     pub fn measure_settings(&self) -> MeasureSettings {
         self.measure.as_ref().map(|measure| measure.settings.clone()).unwrap_or_default()
     }
 }
 
-/// What a run is summed up by.
+/// Measures of a run, as `[measure]` asks for them.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeasureSpec {
-    /// The measures, at least one, in their order and each once.
+    /// Measures, at least one, without duplicates, in the order in which they are shown.
     pub names: Vec<MeasureName>,
-    /// What they are about.
+    /// Settings that some measures depend on.
     pub settings: MeasureSettings,
 }
 
-/// What measures are about.
+/// Settings that some measures depend on: a distance, a threshold and a probe.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeasureSettings {
-    /// Of [`Measure::Travel`](crate::Measure::Travel).
+    /// Distance whose first crossing [`Measure::Travel`](crate::Measure::Travel) reports.
     pub travel: MeasureTravel,
-    /// The discrepancy at which [`Measure::Settling`](crate::Measure::Settling) is not settled yet is above this \[m\]; above zero.
+    /// Discrepancy above which copies are not settled, for [`Measure::Settling`](crate::Measure::Settling) \[m\]; above zero.
     pub band: f64,
-    /// The peer whose hand meets the impedance, by its place in [`Scene::peers`]: one that pushes with the same sine all the time.
+    /// Index into [`Scene::peers`] of the peer at whose hand the impedance is measured. The hand of this peer pushes with the same sine during the whole
+    /// scene. `None`: no impedance is measured.
     pub probe: Option<usize>,
 }
 
-/// A distance that a copy travels.
+/// Distance that a copy travels along an axis.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MeasureTravel {
-    /// The peer whose copy is meant, by its place in [`Scene::peers`].
+    /// Index into [`Scene::peers`] of the peer whose copy is observed.
     pub peer: usize,
-    /// 0 for x, 1 for y, 2 for z.
+    /// Axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// The distance from where the copy began, either way \[m\]; above zero.
+    /// Distance from the initial position of the copy, in either direction \[m\]; above zero.
     pub distance: f64,
 }
 
-/// How many translational axes a scene has.
+/// Number of translational axes of a scene.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Axes {
-    /// x.
+    /// Axis x.
     #[default]
     One,
-    /// x and y.
+    /// Axes x and y.
     Two,
-    /// x, y and z.
+    /// Axes x, y and z.
     Three,
 }
 
 impl Axes {
-    /// 1, 2 or 3.
+    /// Returns the number of axes: 1, 2 or 3.
     #[must_use]
     pub const fn count(self) -> usize {
         match self {
@@ -183,47 +189,48 @@ pub struct ObjectSpec {
     pub mass: f64,
     /// Viscous damping of each copy [N·s/m].
     pub damping: f64,
-    /// Whether each of N copies has mass/N, or the whole mass.
+    /// True if each of N copies has the mass divided by N, false if each copy has the whole mass.
     pub split_mass: bool,
-    /// Where every copy and every device begins \[m\].
+    /// Initial position of every copy and of every device \[m\], unless a peer has its own.
     pub position: [f64; 3],
-    /// With which velocity every copy and every device begins [m/s].
+    /// Initial velocity of every copy and of every device [m/s], unless a peer has its own.
     pub velocity: [f64; 3],
-    /// The walls that limit its travel, if there are any.
+    /// Walls that limit the travel of every copy; `None` for unlimited travel.
     pub enclosure: Option<Enclosure>,
 }
 
-/// How gains are scaled with the number of peers N.
+/// Rule by which gains follow the number of peers N.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Scaling {
-    /// As they are written.
+    /// Gains as written.
     #[default]
     None,
     /// Coordination gains times 4(N−1)/N², coupling gains times 2/N. Both leave N = 2 unchanged.
     InverseN,
 }
 
-/// The coordination controller, the same at every peer.
+/// Coordination controller, the same at every peer.
 #[derive(Clone, Copy, PartialEq)]
 pub struct CoordinationSpec {
-    /// The strategy.
+    /// Coordination strategy.
     pub strategy: Coordination,
-    /// How its gains are scaled with the number of peers.
+    /// Rule by which KT and BT follow the number of peers.
     pub scaling: Scaling,
-    /// Whether KT and BT count once, or once for each other peer.
+    /// Whether KT and BT count once ([`Pull::Mean`]) or once for each peer that is heard ([`Pull::Sum`]).
     pub pull: Pull,
-    /// KT and BT as written, before scaling.
+    /// KT [N/m] and BT [N·s/m] as written, before scaling.
     pub gains: Gains,
-    /// The parameters that strategies have of their own, of every strategy.
+    /// Own parameters of all strategies, also of strategies that this scene does not use.
     pub settings: LawSettings,
-    /// The period of sending, Tn; a whole multiple of every peer's tick, on its own clock.
+    /// Period Tn between two samples of a peer; a whole multiple of the tick of every peer, measured on the peer's own clock.
     pub update: Duration,
-    /// Which of these samples are sent; `None`: all.
+    /// Dead bands that select the samples to send; `None` if every sample is sent.
     pub send_when: Option<SendWhen>,
 }
 
 impl fmt::Debug for CoordinationSpec {
-    /// The pull, parameters of strategies and the dead bands are shown only where they are not at their defaults: fingerprints of records are made of this text.
+    /// Writes the pull, the parameters of strategies and the dead bands only where they differ from the defaults: fingerprints of records are made of this
+    /// text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { strategy, scaling, pull, gains, settings, update, send_when } = self;
         let mut shown = f.debug_struct("CoordinationSpec");
@@ -241,46 +248,46 @@ impl fmt::Debug for CoordinationSpec {
     }
 }
 
-/// One peer.
+/// A peer of a scene.
 #[derive(Clone, PartialEq)]
 pub struct PeerSpec {
-    /// Its name, unique in the scene.
+    /// Name, unique in the scene.
     pub name: String,
-    /// Where it lives.
+    /// Place where the peer runs in a live session.
     pub kind: PeerKind,
-    /// When it ticks: tick period Tc, offset and drift.
+    /// Clock: tick period Tc, offset and drift.
     pub clock: Clock,
-    /// It sends at ticks k with (k − phase) a multiple of update/tick; below update/tick.
+    /// Phase of sending, in ticks: the peer sends at ticks k for which k − phase is a multiple of update/tick. Below update/tick.
     pub phase: u64,
-    /// Whether forces are applied one tick after they were computed.
+    /// True if a force is applied one tick after the tick that computed the force.
     pub compute_delay: bool,
-    /// How it touches the object.
+    /// Contact between the device and the object.
     pub contact: Contact,
-    /// Its device, mH and bH. For a peer of kind `udp` that was given none, which only [`Scene::read_live`] lets pass, one that stands still: such a
-    /// peer touches nothing, and a live session never moves its device.
+    /// Mass mH and damping bH of the device. A peer of kind `udp` may have been given no device, which only [`Scene::read_live`] accepts. The field then
+    /// holds a device at rest: such a peer touches nothing, and a live session never moves the device.
     pub device: DeviceConfig,
-    /// Its virtual coupling, KC and BC as written, before scaling.
+    /// KC [N/m] and BC [N·s/m] of the virtual coupling as written, before scaling.
     pub coupling: Gains,
-    /// How the coupling is scaled with the number of peers.
+    /// Rule by which KC and BC follow the number of peers.
     pub coupling_scaling: Scaling,
-    /// What its hand does; `None`: nothing.
+    /// Force or arm of the hand; `None` if the hand does nothing.
     pub hand: Option<Hand>,
-    /// Where its copy and its device begin \[m\].
+    /// Initial position of the copy, and of the device unless `device_position` is given \[m\].
     pub position: [f64; 3],
-    /// With which velocity its copy and its device begin [m/s].
+    /// Initial velocity of the copy, and of the device unless `device_velocity` is given [m/s].
     pub velocity: [f64; 3],
-    /// Where its device begins \[m\]; `None`: with the copy.
+    /// Initial position of the device \[m\]; `None` if the device begins with the copy.
     pub device_position: Option<[f64; 3]>,
-    /// With which velocity its device begins [m/s]; `None`: with that of the copy.
+    /// Initial velocity of the device [m/s]; `None` if the device begins with the velocity of the copy.
     pub device_velocity: Option<[f64; 3]>,
-    /// The line that all it sends passes before the links, if it has one.
+    /// Access line that all samples of this peer pass before the links; `None` for no such line.
     pub uplink: Option<Arc<LinkModel>>,
-    /// The line that all it receives passes after the links, if it has one.
+    /// Access line that all samples to this peer pass after the links; `None` for no such line.
     pub downlink: Option<Arc<LinkModel>>,
 }
 
 impl fmt::Debug for PeerSpec {
-    /// Where the device begins is shown only where it is said: fingerprints of records are made of this text.
+    /// Writes the initial state of the device only where the scene gives one: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, kind, clock, phase, compute_delay, contact, device, coupling, coupling_scaling, hand, .. } = self;
         let Self { position, velocity, device_position, device_velocity, uplink, downlink, .. } = self;
@@ -297,22 +304,22 @@ impl fmt::Debug for PeerSpec {
     }
 }
 
-/// Where a peer lives. In virtual time every peer is simulated, whatever its kind; a live session (`cohaptic live`) goes by it.
+/// Place where a peer runs in a live session (`cohaptic live`). In virtual time every peer is simulated, whatever its kind.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub enum PeerKind {
-    /// In this program: device, hand and copy are simulated.
+    /// Device, hand and copy are simulated in this program.
     #[default]
     Simulated,
-    /// In another process, which sends and receives samples.
+    /// The peer is another process, which sends and receives samples.
     Udp(Silence),
-    /// The copy in this program, the device in somebody's hand: a Novint Falcon.
+    /// The copy is simulated in this program; the device is a Novint Falcon in a person's hand.
     Falcon(Silence, FalconSpec),
-    /// Copy and device in this program; a mouse, a pen, a finger or a stick pulls the device through an arm.
+    /// Copy and device are simulated in this program; a mouse, a pen, a finger or a stick pulls the device through an arm.
     Pointer(Silence, PointerSpec),
 }
 
 impl PeerKind {
-    /// The name in a scene file.
+    /// Returns the name of the kind in a scene file.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -323,7 +330,7 @@ impl PeerKind {
         }
     }
 
-    /// When its silence is noticed; `None` for a peer that is never silent.
+    /// Returns the limits of silence of the peer; `None` for a simulated peer, which is never silent.
     #[must_use]
     pub const fn silence(&self) -> Option<Silence> {
         match self {
@@ -332,132 +339,133 @@ impl PeerKind {
         }
     }
 
-    /// Whether somebody's hand is read at each tick in a live session.
+    /// Returns true if a live session reads a person's hand at each tick.
     #[must_use]
     pub const fn is_in_hand(&self) -> bool {
         matches!(self, Self::Falcon(..) | Self::Pointer(..))
     }
 }
 
-/// What becomes of the pull of a peer from which nothing is heard any more.
+/// Limits after which the pull of a peer fades, because nothing is heard from the peer any more.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Silence {
-    /// After so long a silence its pull begins to fade; above zero.
+    /// Silence after which the pull begins to fade; above zero.
     pub after: Duration,
-    /// So long it takes to fade from all to nothing, and to come back; above zero.
+    /// Duration of the fade from the whole pull to zero, and of the way back; above zero.
     pub fade: Duration,
 }
 
-/// The arm through which a pointer pulls the device of a peer.
+/// Arm through which a pointer pulls the device of a peer.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PointerSpec {
-    /// The stiffness of the arm [N/m]; at least zero.
+    /// Stiffness of the arm [N/m]; at least zero.
     pub stiffness: f64,
-    /// Its damping [N·s/m]; at least zero.
+    /// Damping of the arm [N·s/m]; at least zero.
     pub damping: f64,
-    /// It pulls with no greater force \[N\]; above zero.
+    /// Largest force of the arm \[N\]; above zero.
     pub force_limit: f64,
-    /// Whether it holds the device from the beginning; otherwise it takes hold little by little, as after a silence.
+    /// True if the arm holds the device from the beginning. Otherwise the pull grows gradually, as after a silence.
     pub held: bool,
 }
 
-/// Which Falcon a peer has, and how its counts become metres and newtons.
+/// Falcon of a peer, and the conversion of its counts into metres and newtons.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FalconSpec {
-    /// Which one.
+    /// Selects the device.
     pub device: FalconDevice,
-    /// Motor counts for a newton metre at an arm's joint; above zero.
+    /// Motor counts per newton metre at the joint of an arm; above zero.
     pub counts_per_newton_metre: f64,
-    /// No greater force is sent to the motors \[N\]; above zero.
+    /// Largest force that is sent to the motors \[N\]; above zero.
     pub force_limit: f64,
-    /// The place in the coordinates of the device that is the origin of the scene \[m\]. The first axes of both are the same.
+    /// Origin of the scene in the coordinates of the device \[m\]. The first axis of the scene is the first axis of the device, and so on.
     pub origin: [f64; 3],
 }
 
-/// Which Falcon is meant.
+/// Selection of a Falcon.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub enum FalconDevice {
-    /// The first that is found and that no other peer has.
+    /// The first device that is found and that no other peer has.
     #[default]
     First,
-    /// One that is simulated down to its bytes.
+    /// A device that is simulated down to the bytes of its protocol.
     Simulated,
-    /// The one with this serial number.
+    /// The device with this serial number.
     Serial(String),
 }
 
-/// Something that changes at an instant, before anything else happens at that instant.
+/// A change during the run. It takes effect before anything else happens at its instant.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Change {
-    /// When.
+    /// Instant of the change, since the beginning of the scene.
     pub at: Instant,
-    /// What.
+    /// Part of the scene that changes, with its new value.
     pub what: ChangeKind,
 }
 
-/// What changes.
+/// Part of the scene that changes, with its new value.
 #[derive(Clone, PartialEq, Debug)]
 pub enum ChangeKind {
-    /// A link takes a new configuration; packets in flight keep their delays.
+    /// A link takes a new configuration. Packets in flight keep their delays.
     Link(LinkChange),
-    /// All links take the configurations of this table; packets in flight keep their delays.
+    /// All links take the configurations of this table. Packets in flight keep their delays.
     AllLinks(LinkTable),
-    /// A peer's contact changes.
+    /// The contact of a peer changes.
     Contact {
-        /// Its place in [`Scene::peers`].
+        /// Index of the peer in [`Scene::peers`].
         peer: usize,
-        /// From now on.
+        /// New contact.
         contact: Contact,
     },
-    /// A peer's hand force or wanted motion changes. An arm stays the same arm; a hand without an arm does not grow one.
+    /// The force or the wanted motion of a peer's hand changes. An arm stays the same arm, and a hand without an arm does not get one.
     Hand {
-        /// Its place in [`Scene::peers`].
+        /// Index of the peer in [`Scene::peers`].
         peer: usize,
-        /// From now on.
+        /// New hand; `None` for a hand that does nothing.
         hand: Option<Hand>,
     },
-    /// The torque of a peer's hand changes. Only where the object turns, and after each change of a hand.
+    /// The torque of a peer's hand changes. Occurs only in scenes whose object turns, directly after each change of the hand.
     HandTorque {
-        /// Its place in [`Scene::peers`].
+        /// Index of the peer in [`Scene::peers`].
         peer: usize,
-        /// In world axes from now on \[N·m\]; `None`: none.
+        /// New torque in world axes \[N·m\]; `None` for no torque.
         torque: Option<Signal>,
     },
-    /// The coordination gains change, at every peer. As written, before scaling.
+    /// KT [N/m] and BT [N·s/m] change at every peer. Values as written, before scaling.
     Coordination(Gains),
-    /// KR [N·m/rad] and BR [N·m·s/rad] change, at every peer. As written, before scaling; `None`: as it was. Only where the object turns.
+    /// KR [N·m/rad] and BR [N·m·s/rad] change at every peer. Values as written, before scaling; a gain that is `None` stays as it was. Occurs only in scenes
+    /// whose object turns.
     RotationalGains(Gains<Option<Triple>>),
-    /// Parameters that strategies have of their own change, at every peer: those of all strategies, from now on.
+    /// Own parameters of strategies change at every peer. Holds the new parameters of all strategies, changed or not.
     Parameters(Box<LawSettings>),
-    /// Which samples are sent changes, at every peer.
+    /// The dead bands that select the samples to send change at every peer.
     SendWhen(SendWhen),
 }
 
-/// What must come out of a run for `cohaptic check` to pass. Absent entries are not looked at.
+/// Results of a run that `cohaptic check` requires. An absent entry is not checked.
 #[derive(Clone, PartialEq, Default)]
 pub struct Expect {
-    /// Whether a small disturbance of the relative motion dies out (`true`) or grows (`false`).
+    /// Stability of the relative motion: `true` if a small disturbance must die out, `false` if it must grow.
     pub stable: Option<bool>,
-    /// The largest distance along an axis between two copies, over the whole run \[m\].
+    /// Bounds of the largest distance along an axis between two copies, over the whole run \[m\].
     pub discrepancy: Option<Bounds>,
-    /// Where a copy is at an instant.
+    /// Positions of copies at given instants.
     pub positions: Vec<ExpectPosition>,
-    /// When a copy has first moved a distance from where it began.
+    /// Times at which copies have first moved a given distance from their initial positions.
     pub travel: Vec<ExpectTravel>,
-    /// Which fraction of the packets offered to links was dropped.
+    /// Fractions of the packets offered to links that were dropped.
     pub loss: Vec<ExpectLoss>,
-    /// The mean delay of the packets that links delivered.
+    /// Mean delays of the packets that links delivered.
     pub delay: Vec<ExpectDelay>,
-    /// The values of measures.
+    /// Values of measures.
     pub measures: Vec<ExpectMeasure>,
-    /// The largest angle between two copies, over the whole run \[rad\].
+    /// Bounds of the largest angle between two copies, over the whole run \[rad\].
     pub rotation_discrepancy: Option<Bounds>,
-    /// How a copy is turned at an instant.
+    /// Orientations of copies at given instants.
     pub orientations: Vec<ExpectOrientation>,
 }
 
 impl fmt::Debug for Expect {
-    /// Measures are shown only where there are any: fingerprints of records are made of this text.
+    /// Writes measures, the angle and orientations only where the scene expects any: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { stable, discrepancy, positions, travel, loss, delay, measures, rotation_discrepancy, orientations } = self;
         let mut shown = f.debug_struct("Expect");
@@ -476,91 +484,92 @@ impl fmt::Debug for Expect {
     }
 }
 
-/// A closed interval; at least one end is given.
+/// A closed interval with at least one end, in the unit of the bounded value.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bounds {
-    /// At least this.
+    /// Lower end; `None` for no lower end.
     pub min: Option<f64>,
-    /// At most this.
+    /// Upper end; `None` for no upper end.
     pub max: Option<f64>,
 }
 
 impl Bounds {
-    /// Whether the value lies within; a NaN does not.
+    /// Returns true if the value lies in the interval; false for a NaN.
     #[must_use]
     pub fn contain(&self, value: f64) -> bool {
         self.min.is_none_or(|min| value >= min) && self.max.is_none_or(|max| value <= max) && !value.is_nan()
     }
 }
 
-/// An expected orientation.
+/// An expected orientation of a copy.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectOrientation {
-    /// The place of the peer in [`Scene::peers`].
+    /// Index of the peer in [`Scene::peers`].
     pub peer: usize,
-    /// When.
+    /// Instant of the check, since the beginning of the scene.
     pub at: Instant,
-    /// The unit quaternion (w, x, y, z) that is expected.
+    /// Expected unit quaternion (w, x, y, z).
     pub of: [f64; 4],
-    /// The largest angle between the two \[rad\].
+    /// Largest angle between the expected orientation and the orientation of the copy \[rad\].
     pub max: f64,
 }
 
-/// An expected position.
+/// An expected position of a copy along an axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectPosition {
-    /// The peer whose copy is meant, by its place in [`Scene::peers`].
+    /// Index into [`Scene::peers`] of the peer whose copy is checked.
     pub peer: usize,
-    /// 0 for x, 1 for y, 2 for z.
+    /// Axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// At the peer's last tick at or before this instant; at the end of the scene, where its last tick leads to.
+    /// Instant of the check. The position is that of the peer's last tick at or before this instant; at the end of the scene, it is the position to which the
+    /// last tick leads.
     pub at: Instant,
-    /// Where \[m\].
+    /// Bounds of the position \[m\].
     pub bounds: Bounds,
 }
 
-/// An expected time of travel.
+/// An expected time of travel of a copy along an axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectTravel {
-    /// The peer whose copy is meant, by its place in [`Scene::peers`].
+    /// Index into [`Scene::peers`] of the peer whose copy is checked.
     pub peer: usize,
-    /// 0 for x, 1 for y, 2 for z.
+    /// Axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// The distance from where the copy began, either way \[m\]; above zero.
+    /// Distance from the initial position of the copy, in either direction \[m\]; above zero.
     pub distance: f64,
-    /// The time from the scene's beginning at which it is first reached \[s\].
+    /// Bounds of the time from the beginning of the scene at which the copy first reaches the distance \[s\].
     pub bounds: Bounds,
 }
 
 /// An expected fraction of dropped packets.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectLoss {
-    /// Over which links.
+    /// Links over which packets are counted.
     pub link: LinkSelector,
-    /// Dropped for which reason; `None`: any.
+    /// Cause of the drops to count; `None` for every cause.
     pub cause: Option<DropCause>,
-    /// The fraction of the packets offered, from 0 to 1.
+    /// Least fraction of the offered packets, from 0 to 1; `None` for no lower end.
     pub min: Option<Probability>,
-    /// See `min`.
+    /// Largest fraction of the offered packets, from 0 to 1; `None` for no upper end.
     pub max: Option<Probability>,
 }
 
 /// An expected value of a measure.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectMeasure {
-    /// The measure.
+    /// Measure to check.
     pub name: MeasureName,
-    /// Its value, in its unit. A measure without a value is not within.
+    /// Bounds of the value, in the unit of the measure. A measure without a value fails the check.
     pub bounds: Bounds,
 }
 
-/// An expected mean delay.
+/// An expected mean delay of delivered packets.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectDelay {
-    /// Over which links.
+    /// Links over which the delay is averaged.
     pub link: LinkSelector,
-    /// At least this.
+    /// Least mean delay; `None` for no lower end.
     pub min: Option<Duration>,
-    /// At most this.
+    /// Largest mean delay; `None` for no upper end.
     pub max: Option<Duration>,
 }

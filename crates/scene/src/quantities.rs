@@ -1,4 +1,4 @@
-//! The quantities of mechanics: their ranges and units, and vectors of them.
+//! Quantities of mechanics with their ranges and units, and readers of vectors.
 
 use cohaptic_linkfile::document::{Node, Value};
 use cohaptic_linkfile::reading::TableReader;
@@ -8,74 +8,77 @@ use cohaptic_units::print::Counted;
 use crate::context::SceneContext;
 use crate::model::Axes;
 
-/// Above zero \[kg\].
+/// Mass \[kg\], above zero.
 pub(crate) const MASS: Quantity = Quantity::positive("kg");
-/// At least zero \[kg\].
+/// Mass that may be absent \[kg\], at least zero.
 pub(crate) const ADDED_MASS: Quantity = Quantity::not_negative("kg");
-/// At least zero [N·s/m].
+/// Damping [N·s/m], at least zero.
 pub(crate) const DAMPING: Quantity = Quantity::not_negative("N·s/m");
-/// Above zero [N·s/m].
+/// Wave impedance [N·s/m], above zero.
 pub(crate) const IMPEDANCE: Quantity = Quantity::positive("N·s/m");
-/// At least zero \[J\].
+/// Energy \[J\], at least zero.
 pub(crate) const ENERGY: Quantity = Quantity::not_negative("J");
-/// At least zero [N/m].
+/// Stiffness [N/m], at least zero.
 pub(crate) const STIFFNESS: Quantity = Quantity::not_negative("N/m");
-/// Above zero [N/m].
+/// Stiffness of a wall [N/m], above zero.
 pub(crate) const WALL_STIFFNESS: Quantity = Quantity::positive("N/m");
-/// Any \[m\].
+/// Position \[m\], any finite number.
 pub(crate) const POSITION: Quantity = Quantity::any("m");
-/// Above zero \[m\].
+/// Distance \[m\], above zero.
 pub(crate) const DISTANCE: Quantity = Quantity::positive("m");
-/// Any [m/s].
+/// Velocity [m/s], any finite number.
 pub(crate) const VELOCITY: Quantity = Quantity::any("m/s");
-/// Any \[N\].
+/// Force \[N\], any finite number.
 pub(crate) const FORCE: Quantity = Quantity::any("N");
-/// Above zero \[N\].
+/// Limit of a force \[N\], above zero.
 pub(crate) const POSITIVE_FORCE: Quantity = Quantity::positive("N");
-/// Above zero [counts/(N·m)].
+/// Motor counts per torque [counts/(N·m)], above zero.
 pub(crate) const POSITIVE_COUNTS: Quantity = Quantity::positive("counts/(N·m)");
-/// At least zero \[Hz\].
+/// Frequency \[Hz\], at least zero.
 pub(crate) const FREQUENCY: Quantity = Quantity::not_negative("Hz");
-/// Above zero [kg·m²].
+/// Moment of inertia [kg·m²], above zero.
 pub(crate) const INERTIA: Quantity = Quantity::positive("kg·m²");
-/// At least zero [N·m·s/rad].
+/// Rotational damping [N·m·s/rad], at least zero.
 pub(crate) const ROTATIONAL_DAMPING: Quantity = Quantity::not_negative("N·m·s/rad");
-/// At least zero [N·m/rad].
+/// Rotational stiffness [N·m/rad], at least zero.
 pub(crate) const ROTATIONAL_STIFFNESS: Quantity = Quantity::not_negative("N·m/rad");
-/// Any [rad/s].
+/// Angular velocity [rad/s], any finite number.
 pub(crate) const RATE: Quantity = Quantity::any("rad/s");
-/// Any [N·m].
+/// Torque [N·m], any finite number.
 pub(crate) const TORQUE: Quantity = Quantity::any("N·m");
-/// Any, of a quaternion.
+/// Component of a quaternion, without a unit, any finite number.
 pub(crate) const COMPONENT: Quantity = Quantity::any("");
-/// At least zero \[rad\].
+/// Largest angle \[rad\], at least zero.
 pub(crate) const ANGLE_BOUND: Quantity = Quantity::not_negative("rad");
-/// Any \[rad\].
+/// Angle \[rad\], any finite number.
 pub(crate) const ANGLE: Quantity = Quantity::any("rad");
 
-/// Reads the vector under a key, or the declared default: see [`read_vector`].
+/// Reads the vector under a key, or the declared default. See [`read_vector`].
 pub(crate) fn vector_of(table: &mut TableReader<'_>, key: &'static str, context: SceneContext<'_>, spread: Spread) -> Option<[f64; 3]> {
     let quantity = table.key(key).quantity();
     table.read(key, |node, _| read_vector(quantity, node, context, spread))
 }
 
-/// Reads the vector under a key that may be left out.
+/// Reads the vector under an optional key; `Some(None)` if the key is absent.
 pub(crate) fn maybe_vector_of(table: &mut TableReader<'_>, key: &'static str, context: SceneContext<'_>, spread: Spread) -> Option<Option<[f64; 3]>> {
     let quantity = table.key(key).quantity();
     table.maybe(key, |node, _| read_vector(quantity, node, context, spread))
 }
 
-/// Reads one number for each axis. A plain number stands for a list of one or, where `spread` allows it, for the same number on every axis.
+/// Reads a number for each axis; components beyond the axes are zero. A single number stands for a list of one number or, with [`Spread::EveryAxis`], for the
+/// same number on every axis. `None` after a fault.
 pub(crate) fn read_vector(quantity: Quantity, node: &Node, context: SceneContext<'_>, spread: Spread) -> Option<[f64; 3]> {
     let count = context.axes.map(Axes::count);
     let mut vector = [0.0; 3];
     if let Value::List(elements) = &node.value {
+        // A list may have up to three numbers even if the number of axes was refused, so that only one fault is reported. `vector` has room for three.
         if elements.len() > 3 || elements.is_empty() || count.is_some_and(|count| count != elements.len()) {
             let expected = count.map_or_else(|| "1, 2 or 3".to_owned(), |count| count.to_string());
             let message = format!("found a list of {}: expected as many as the scene has axes, {expected}", Counted(elements.len(), "number"));
             context.fault_at(node, message);
             return None;
         }
+        // Every element is read before the first `?`, so that each wrong element is reported.
         let numbers: Vec<Option<f64>> = elements.iter().map(|element| quantity.read(element, *context)).collect();
         for (component, number) in vector.iter_mut().zip(numbers) {
             *component = number?;
@@ -97,10 +100,10 @@ pub(crate) fn read_vector(quantity: Quantity, node: &Node, context: SceneContext
     }
 }
 
-/// What a plain number means where there is more than one axis.
+/// Meaning of a single number in a scene with more than one axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Spread {
-    /// Nothing: a list must be written.
+    /// A fault: a list is expected.
     Refused,
     /// The same number on every axis.
     EveryAxis,

@@ -1,4 +1,5 @@
-//! From files and texts to scenes.
+//! Reader of whole scenes: from files and texts to [`Scene`]. Each part of the document is read by a function of `sections`; this module orders the calls and
+//! checks what concerns several parts.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,7 +21,7 @@ use crate::sections::{
     refuse_rotational_keys, refuse_unlinked, rotation,
 };
 
-/// The top of a scene.
+/// Keys at the top level of a scene.
 pub(crate) static ROOT: Table = Table::of(&[&[
     required("scene", Form::Table(&SCENE), "How long the scene lasts, its seed and its axes").expecting("a table [scene] with a duration"),
     required("object", Form::Table(&OBJECT), "The shared virtual object, of which every peer has a copy").expecting("a table [object] with a mass"),
@@ -38,16 +39,16 @@ pub(crate) static ROOT: Table = Table::of(&[&[
 ]]);
 
 impl Scene {
-    /// Reads a scene from a file. `overrides` are texts `KEY=VALUE` that replace values of the file, in this order.
+    /// Reads a scene from a file. `overrides` are texts `KEY=VALUE` that replace values of the file, applied in this order.
     ///
     /// # Errors
     ///
-    /// [`FileError::Read`] if the file, or one that it names, cannot be read; [`FileError::Invalid`] for anything else.
+    /// [`FileError::Read`] if the file, or a file that the scene names, cannot be read; [`FileError::Invalid`] for every fault of the content.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, FileError> {
         with_text(path, |text| Self::parse(text, path, overrides))
     }
 
-    /// Reads a scene for a live session: as [`Scene::read`], but a peer of kind `udp`, which is another process, needs neither device nor coupling.
+    /// Reads a scene for a live session. Like [`Scene::read`], but a peer of kind `udp`, which is another process, needs neither device nor coupling.
     ///
     /// # Errors
     ///
@@ -56,16 +57,16 @@ impl Scene {
         with_text(path, |text| Self::parse_live(text, path, overrides))
     }
 
-    /// Reads a scene from a text. `file` stands in messages, and its folder is where files that the scene names are looked for.
+    /// Reads a scene from a text. `file` appears in messages, and files that the scene names are relative to the folder of `file`.
     ///
     /// # Errors
     ///
-    /// As [`Scene::read`]. Of several faults, the one that stands first in the text; faults in overrides come after those in the text.
+    /// As [`Scene::read`]. Of several faults, the first in the order of the text; faults in overrides come after faults in the text.
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, FileError> {
         parse_scene(Sources { file, text, overrides }, false, &mut |_, _, _| ()).map(|parsed| parsed.whole)
     }
 
-    /// [`Scene::parse`] for a live session, as [`Scene::read_live`].
+    /// Like [`Scene::parse`], for a live session as in [`Scene::read_live`].
     ///
     /// # Errors
     ///
@@ -74,14 +75,14 @@ impl Scene {
         parse_scene(Sources { file, text, overrides }, true, &mut |_, _, _| ()).map(|parsed| parsed.whole)
     }
 
-    /// The place of a peer in [`Scene::peers`], by its name.
+    /// Returns the index in [`Scene::peers`] of the peer with this name; `None` if there is no such peer.
     #[must_use]
     pub fn peer_index(&self, name: &str) -> Option<usize> {
         self.peers.iter().position(|peer| peer.name == name)
     }
 }
 
-/// A fault of a scene that can be read, at the place where its `peer`-th peer is made, counted from 0: its entry `[[peers]]`, or `scene.count`.
+/// Returns a fault at the place where the peer with index `peer` is made: its entry `[[peers]]`, or `scene.count`. For faults of a scene that could be read.
 #[must_use]
 pub fn at_peer(text: &str, file: &Path, overrides: &[String], peer: usize, message: &str) -> FileError {
     let sources = Sources { file, text, overrides };
@@ -100,21 +101,22 @@ pub fn at_peer(text: &str, file: &Path, overrides: &[String], peer: usize, messa
         context.fault(place, &key, message);
         Some(())
     });
-    // Not reached: there is a fault in every case.
+    // Not reached: the closure reports a fault in every case, so that `parse` fails.
     refused.err().unwrap_or_else(|| FileError::NoFile { folder: file.to_path_buf(), kind: "scene" })
 }
 
-/// The scene that a text is. `on_links` is told its links.
+/// Reads the scene in a text. Calls `on_links` with the links of the beginning, then with the links that each change of the timeline makes.
 pub(crate) fn parse_scene(sources: Sources<'_>, live: bool, on_links: OnLinks<'_>) -> Result<Parsed<Scene>, FileError> {
     parse(sources, |document, context| read_document(document, context, live, on_links))
 }
 
-/// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
+/// Reads every part, also after a refused part, so that the reported fault is the first in the order of the text. `None` if any part was refused.
 fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLinks<'_>) -> Option<Scene> {
     let mut root = TableReader::new(document, file, &ROOT, "a table")?;
     root.know_all();
     let header_node = root.get("scene");
     let header = root.read("scene", read_header).unwrap_or_default();
+    // Names before the parts below, whose readers look up peers by name.
     let Header { title, duration, seed, axes, count } = header;
     let peers_node = root.get("peers");
     let names = count.and_then(|count| read_names(peers_node, count, file));
@@ -128,7 +130,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let file = file.with_modulators(modulators.as_ref());
     let turns = root.get("object").and_then(Node::as_table).is_some_and(|object| object.get("inertia").is_some());
     let context = SceneContext { file, axes, live, turns };
-    // From here on the readers know axes, names and modulators.
+    // From here on the context holds axes, names and modulators, on which the readers below depend.
     let object = root.read("object", |node, _| read_object(node, context));
     let (object, object_rotation) = object.unzip();
     let coordination_node = root.get("coordination");
@@ -139,6 +141,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         refuse_rotational_keys(document, file);
     }
     let defaults = root.get("peer");
+    // The tick of each peer is checked against the period of sending, so that coordination is read before the peers. The node is where a fault is shown.
     let update = coordination.as_ref().zip(coordination_node).map(|(coordination, node)| {
         let written = node.as_table().and_then(|table| table.get("update"));
         (coordination.update, written.map_or(node, |entry| &*entry.node))
@@ -151,6 +154,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     };
     let peers: Option<Vec<_>> = peers.map(|peers| peers.into_iter().map(|peer| peer.spec).collect());
     let (link, links) = (root.get("link"), root.get("links"));
+    // Changes of links in the timeline are laid over the links of the beginning, so that links are read before the timeline.
     let links = read_links(link, links, file);
     if let Some(links) = &links {
         on_links(Instant::ZERO, LinkSelector::All, links);
@@ -158,6 +162,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let timeline_node = root.get("timeline");
     let timeline =
         read_timeline(timeline_node, duration, links.as_ref(), peers.as_deref(), coordination.as_ref(), on_links, context).map(|mut changes| {
+            // Each change of a hand also plans a torque, which means nothing if the object does not turn.
             changes.retain(|change| turns || !matches!(change.what, ChangeKind::HandTorque { .. }));
             changes
         });
@@ -166,7 +171,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         Some(node) => read_measure(node, of, context).map(Some),
         None => Some(None),
     };
-    // A probe that was refused is a fault already.
+    // A refused probe is a fault already: measures that need a probe must not be refused for a second reason.
     let has_probe = measure.as_ref().is_none_or(|measure| measure.as_ref().is_some_and(|measure| measure.settings.probe.is_some()));
     let expect = match root.get("expect") {
         Some(node) => read_expect(node, duration, has_probe, peers.as_deref(), context).map(Some),
@@ -175,6 +180,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     if let Some(topology) = topology.as_ref().and_then(|ways| ways.neighbours.as_ref()) {
         refuse_unlinked(root.get("links"), None, topology, file);
         refuse_unlinked(timeline_node, Some("link"), topology, file);
+        // Every list that names links: no entry may name a link that the topology does not have.
         let mut expected = |key: &str| Some(&*root.get("expect")?.as_table()?.get(key)?.node);
         for key in ["loss", "delay"] {
             refuse_unlinked(expected(key), Some("link"), topology, file);
@@ -184,6 +190,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     if let Some(names) = &names {
         check_enough(names, peers_node, file);
     }
+    // From here on `?` ends the reading without a fault of its own: whatever is `None` was reported where it was read.
     let scene = Scene {
         file: context.sources.file.to_path_buf(),
         title: title?.unwrap_or_else(|| default_title(context.sources.file)),
@@ -203,6 +210,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         expect: expect?,
         scaled_for: None,
     };
+    // Checks that compare several parts come last, when every part was read.
     if let Some(refused) = scene.refused_topology() {
         file.fault_at(topology_node.unwrap_or(document), refused);
         return None;
@@ -218,9 +226,9 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     Some(scene)
 }
 
-/// The scenes that a path means: a file means itself, a folder every file below it that ends in `.toml`, in order of their paths.
+/// Returns the scene files that a path means: a file means itself, a folder means every file below the folder that ends in `.toml`, in order of their paths.
 ///
-/// Links to folders are not followed.
+/// Symbolic links to folders are not followed.
 ///
 /// # Errors
 ///
