@@ -1,4 +1,4 @@
-//! How old the samples in use are, where the links of a scene determine it.
+//! Ages of the samples in use, where the links of a scene determine these ages.
 
 use core::time::Duration;
 
@@ -8,18 +8,19 @@ use cohaptic_wan::{Counts, Layout, LinkConfig, LinkModel, Loss, Order};
 
 use crate::{ChangeKind, Scene};
 
-/// How many ticks a law looks back at most: a slip of the finger must not take all memory.
+/// Largest number of ticks that a law may look back. Bounds the memory, so that a mistyped lag does not exhaust it.
 const MOST_LAG: usize = 10_000;
 
 impl Scene {
-    /// How many ticks old a sample in use is at most: ⌈delay/Tc⌉ + M − 1 + M·(longest run of lost packets), of the slowest link and the worst pattern, with M
-    /// ticks from sample to sample.
+    /// Returns the largest age of a sample in use, in ticks: ⌈delay/Tc⌉ + M − 1 + M·(longest run of lost packets), for the slowest link and the worst
+    /// pattern, with M ticks from sample to sample.
     ///
-    /// `None` where the links bound no such age or do not keep it: anything but constant delays and patterns of lost packets, changes of links in the
-    /// timeline, peers whose clocks differ, dead bands.
+    /// `None` where the links do not bound the age, or where the bound may change: for links with anything but constant delays and patterns of lost packets,
+    /// access lines that lose packets, changes of links in the timeline, peers whose clocks differ, and dead bands.
     #[must_use]
     pub fn oldest_sample(&self) -> Option<u64> {
         let clock = self.lasting_clock()?;
+        // An access line may delay but not lose packets: the formula below counts the longest run of a single line.
         let line = |model: Option<&LinkModel>| {
             model.map_or(Some(Duration::ZERO), |model| bounded(model).filter(|(_, run)| *run == 0).map(|(delay, _)| delay))
         };
@@ -37,11 +38,11 @@ impl Scene {
         ticks.checked_add(update.checked_mul(longest.checked_add(1)?)?)?.checked_sub(1)
     }
 
-    /// How many ticks old a sample is in the middle of its use: ⌈delay/Tc⌉ + ⌊(M − 1)/2⌋, with M ticks from sample to sample. Of ticks in which an older
-    /// sample is in use there are then as many as of those in which a younger one is, or one more.
+    /// Returns the age of a sample in the middle of its use, in ticks: ⌈delay/Tc⌉ + ⌊(M − 1)/2⌋, with M ticks from sample to sample. The ticks in which the
+    /// sample in use is older are then as many as the ticks in which it is younger, or one more.
     ///
-    /// `None` where that is not the same for all samples: links that do anything but delay, all alike, lines of peers, samples that are not sent, changes of links in the
-    /// timeline, peers whose clocks differ.
+    /// `None` where the age is not the same for all samples: for links that do more than delay or whose delays differ, access lines, dead bands, changes of
+    /// links in the timeline, and peers whose clocks differ.
     #[must_use]
     pub fn middle_age(&self) -> Option<u64> {
         let clock = self.lasting_clock()?;
@@ -57,24 +58,24 @@ impl Scene {
         ticks.checked_add(update.saturating_sub(1) / 2)
     }
 
-    /// The clock of all peers, if they have one, send every sample, and the timeline does not change links.
+    /// Returns the common clock of all peers; `None` if clocks differ, if dead bands leave out samples, or if the timeline changes links.
     fn lasting_clock(&self) -> Option<Clock> {
         let clock = self.peers[0].clock;
         let is_link_change = |what: &ChangeKind| matches!(what, ChangeKind::Link(_) | ChangeKind::AllLinks(_));
-        // A sample that is not sent leaves the one before it in use.
+        // Where a sample is left out, the sample before it stays in use and gets older.
         let thinned = self.leaves_out_samples();
         let differs = self.peers.iter().any(|peer| peer.clock != clock);
         (!thinned && !differs && !self.timeline.iter().any(|change| is_link_change(&change.what))).then_some(clock)
     }
 
-    /// After how many ticks a sample is in use that is on its way for `delay`, and how many ticks there are from sample to sample.
+    /// Returns two numbers of ticks: from sending to the use of a sample that travels for `delay`, rounded up, and from sample to sample.
     fn ticks_of(&self, delay: Duration, clock: Clock) -> Option<(u64, u64)> {
         let tick = clock.tick.as_nanos();
         let ticks = u64::try_from(delay.as_nanos().div_ceil(tick)).ok()?;
         Some((ticks, u64::try_from(self.coordination.update.as_nanos() / tick).ok()?))
     }
 
-    /// Why the coordination law cannot look back as far as its lag says; `None` if it can.
+    /// Returns why the coordination law cannot look back as far as its lag; `None` if it can.
     pub(crate) fn refused_lag(&self) -> Option<&'static str> {
         let is_automatic = self.coordination.settings.of(self.coordination.strategy).any_automatic();
         if self.coordination.strategy == Coordination::LocalLag && is_automatic && self.middle_age().is_none() {
@@ -82,12 +83,13 @@ impl Scene {
                 "a lag of \"auto\" needs links that all have one constant delay and do nothing else, and peers whose clocks are alike: expected a lag such as \"16ms\"",
             );
         }
+        // The peer with the shortest tick needs the most ticks for the same lag.
         let (_, place) = self.peers.iter().enumerate().map(|(place, peer)| (peer.clock.tick, place)).min()?;
         (Law::<f64>::lag(&self.law(place)?) > MOST_LAG)
             .then_some("the lag is more than 10000 ticks of a peer, which it does not remember: expected at most 10000 ticks")
     }
 
-    /// Why a parameter of the coordination law cannot be `"auto"` in this scene; `None` if none is, or all can.
+    /// Returns why a parameter of the coordination law cannot be `"auto"` in this scene; `None` if no parameter is, or if all can be.
     pub(crate) fn refused_automatic(&self) -> Option<&'static str> {
         let values = self.coordination.settings.of(self.coordination.strategy);
         let parameters = self.coordination.strategy.parameters();
@@ -105,9 +107,11 @@ impl Scene {
     }
 }
 
-/// The delay of a link and the longest run of packets that it loses, if it leaves nothing to chance and does nothing else.
+/// Returns the delay of a link and its longest run of lost packets. `None` if the link does anything at random, or anything but delay and lose packets by a
+/// pattern.
 fn bounded(model: &LinkModel) -> Option<(Duration, u64)> {
     let config = model.as_fixed()?;
+    // With constant delays, and without changes of the link, order policy and layout have no influence. The loss is looked at below.
     let plain = LinkConfig { loss: Loss::None, order: Order::default(), layout: Layout::default(), ..config.clone() };
     if !plain.is_constant_delay() {
         return None;

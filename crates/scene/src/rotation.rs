@@ -1,4 +1,4 @@
-//! An object that turns: its inertia, and all that follows from it.
+//! Rotation of the object: its inertia, and the gains, damping and initial states that follow from the inertia.
 
 use cohaptic_peer::coordination::{Pull, UsedGains};
 use cohaptic_peer::rotation::{Attitude, DeviceRotation, HeldAttitudes, Rotation, RotationConfig, Spin, Triple};
@@ -6,45 +6,45 @@ use cohaptic_peer::{Coordination, Gains, Signal, State};
 
 use crate::{Change, ChangeKind, Scene};
 
-/// How the object of a scene turns.
+/// Rotation of the object of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RotationSpec {
-    /// The principal moments of inertia of the whole object [kg·m²], each above zero and none above the sum of the others. Body axes are the principal axes.
+    /// Principal moments of inertia of the whole object [kg·m²], each above zero and none above the sum of the two others. Body axes are the principal axes.
     pub inertia: Triple,
-    /// Viscous damping of the turn of each copy about the body axes [N·m·s/rad]; `None`: the damping of the object times inertia over mass.
+    /// Viscous damping of the rotation of each copy about the body axes [N·m·s/rad]; `None`: the damping of the object times inertia over mass.
     pub damping: Option<Triple>,
     /// KR [N·m/rad] and BR [N·m·s/rad] about the body axes, before scaling; `None`: KT and BT times inertia over mass.
     pub gains: Gains<Option<Triple>>,
-    /// Steps of the turn in a tick, at least 1.
+    /// Integration steps of the rotation per tick, at least 1.
     pub steps: u32,
-    /// The turning part of each peer, in the order of [`Scene::peers`].
+    /// Rotational part of each peer, in the order of [`Scene::peers`].
     pub peers: Vec<PeerRotation>,
 }
 
-/// How a peer takes part in the turn of the object.
+/// Rotational part of a peer.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PeerRotation {
-    /// Where its device grasps the copy, from the centre of mass in body axes \[m\].
+    /// Point at which the device grasps the copy, from the centre of mass in body axes \[m\].
     pub grasp: Triple,
-    /// The attitude with which its copy begins, and its device if that turns.
+    /// Initial attitude of the copy, and of the device if the device turns.
     pub attitude: Attitude,
-    /// Its device, if that turns.
+    /// Rotational part of the device; `None` if the device does not turn.
     pub device: Option<DeviceRotationSpec>,
 }
 
-/// A device with six degrees of freedom.
+/// Rotational part of a device with six degrees of freedom.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DeviceRotationSpec {
-    /// Its inertia and damping, in handle axes.
+    /// Inertia and damping of the handle, in handle axes.
     pub handle: Spin,
-    /// KCR [N·m/rad] and BCR [N·m·s/rad], before scaling.
+    /// KCR [N·m/rad] and BCR [N·m·s/rad] between the attitudes of device and copy, before scaling.
     pub coupling: Gains,
-    /// The torque of the hand in world axes \[N·m\]; `None`: none.
+    /// Torque of the hand in world axes \[N·m\]; `None` for no torque.
     pub torque: Option<Signal>,
 }
 
 impl Scene {
-    /// The turning part of a peer, with every scaling applied; `None` if the object does not turn.
+    /// Returns the rotational part of a peer with every scaling applied; `None` if the object does not turn. `place` is the index in [`Scene::peers`].
     ///
     /// # Panics
     ///
@@ -58,7 +58,8 @@ impl Scene {
         Some(turning.with_law(&self.turn_law(place)?, self.own_rotational_damping(place)))
     }
 
-    /// What the turning part of a peer is made from, with every scaling applied; `None` if the object does not turn.
+    /// Returns the configuration of a peer's rotational part with every scaling applied; `None` if the object does not turn. `place` is the index in
+    /// [`Scene::peers`].
     ///
     /// # Panics
     ///
@@ -83,7 +84,7 @@ impl Scene {
         })
     }
 
-    /// [`Scene::copy_spin`] with the damping of the strategy.
+    /// Returns [`Scene::copy_spin`] plus the rotational damping of the strategy at a peer; `None` if the object does not turn.
     ///
     /// # Panics
     ///
@@ -94,7 +95,8 @@ impl Scene {
         Some(Spin { inertia, damping: std::array::from_fn(|axis| damping[axis] + own[axis]) })
     }
 
-    /// Inertia and damping of the turn of each copy, without the damping of the strategy; `None` if the object does not turn. Inertia is split as mass is.
+    /// Returns inertia and damping of the rotation of each copy, without the damping of the strategy; `None` if the object does not turn. The inertia is
+    /// split as the mass is.
     #[must_use]
     pub fn copy_spin(&self) -> Option<Spin> {
         let rotation = self.rotation.as_ref()?;
@@ -103,25 +105,26 @@ impl Scene {
         Some(Spin { inertia: rotation.inertia.map(|moment| moment * share), damping })
     }
 
-    /// √(tr J/3m), the radius of gyration over √(3/2): angles times this are lengths of the motion of the object \[m\]; `None` if the object does not turn.
+    /// Returns √(tr J/3m), the radius of gyration over √(3/2) \[m\]; `None` if the object does not turn. An angle times this length is comparable with a
+    /// displacement of the object.
     #[must_use]
     pub fn gyration(&self) -> Option<f64> {
         let rotation = self.rotation.as_ref()?;
         Some((rotation.inertia.iter().sum::<f64>() / (3.0 * self.object.mass)).sqrt())
     }
 
-    /// The edges of the box of even density that has the mass and the inertia of the object, along the body axes \[m\]: a = √(6·(Jy + Jz − Jx)/m), b and c
-    /// likewise. The object is drawn as this box. `None` if the object does not turn.
+    /// Returns the edges of the box of even density that has the mass and the inertia of the object, along the body axes \[m\]: a = √(6·(Jy + Jz − Jx)/m), b
+    /// and c likewise. The object is drawn as this box. `None` if the object does not turn.
     #[must_use]
     pub fn even_box(&self) -> Option<Triple> {
         let inertia = self.rotation.as_ref()?.inertia;
         let twice: f64 = inertia.iter().sum();
-        // Rounding may leave a plate less than no thickness.
+        // A plate has an edge of 0. Rounding may make the sum below the root slightly negative.
         Some(inertia.map(|moment| (6.0 * (twice - 2.0 * moment).max(0.0) / self.object.mass).sqrt()))
     }
 
-    /// KR and BR on the mean of the others about the body axes, scaled by the number of peers; `None` if the object does not turn. `gains`: KT and BT, `given`: KR
-    /// and BR as written, both those of the scene or those that the timeline sets.
+    /// Returns KR and BR about the body axes on the mean of the other peers, scaled by the number of peers; `None` if the object does not turn. `gains` are
+    /// KT and BT, `given` are KR and BR as written; both of the scene or as the timeline sets them.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub fn rotation_gains(&self, gains: Gains, given: &Gains<Option<Triple>>) -> Option<Gains<Triple>> {
@@ -130,8 +133,10 @@ impl Scene {
             Pull::Mean => 1.0,
             Pull::Sum => (self.number() - 1) as f64,
         };
+        // Peer 0 stands for all peers: an object that turns has no topology, so that the factor is the same at every peer.
         let factor = pull * self.coordination_factor(0);
         let of = |own: Option<Triple>, gain: f64| own.unwrap_or_else(|| rotation.over_mass(self.object.mass, gain)).map(|gain| gain * factor);
+        // A strategy that does not use BT does not use BR either.
         let damping = match self.coordination.strategy.gains() {
             UsedGains::Both => of(given.damping, gains.damping),
             UsedGains::Stiffness | UsedGains::Neither => [0.0; 3],
@@ -139,10 +144,11 @@ impl Scene {
         Some(Gains { stiffness: of(given.stiffness, gains.stiffness), damping })
     }
 
-    /// [`Scene::rotation_gains`] at the beginning and after each change of KT and BT or of KR and BR in the timeline; nothing if the object does not turn.
+    /// Iterates over [`Scene::rotation_gains`] at the beginning and after each change of KT and BT or of KR and BR in the timeline. Empty if the object does
+    /// not turn.
     ///
-    /// Default gains follow KT and BT. A gain that the timeline sets is a given one from then on. Of each KR, given as a whole or J times a number, no component is
-    /// above the sum of the others.
+    /// Default gains follow KT and BT. A gain that the timeline sets is a given gain from then on. No component of KR is above the sum of the two others,
+    /// whether KR is given or is J times a number.
     pub fn rotation_gains_in_time(&self) -> impl Iterator<Item = Gains<Triple>> {
         let begins = self.rotation.as_ref().map(|rotation| (self.coordination.gains, rotation.gains));
         let changes = begins.into_iter().flat_map(|begins| {
@@ -170,7 +176,7 @@ impl Scene {
         begins.into_iter().chain(changes.flatten()).filter_map(|(gains, given)| self.rotation_gains(gains, &given))
     }
 
-    /// Where the device of a peer begins: at the grasp point of its copy.
+    /// Returns the initial state of a peer's device: at the grasp point of the copy, unless the peer has its own initial position or velocity of the device.
     ///
     /// # Panics
     ///
@@ -189,7 +195,7 @@ impl Scene {
         State { position: said(spec.device_position, with_copy.position), velocity: said(spec.device_velocity, with_copy.velocity) }
     }
 
-    /// Why the object cannot turn in this scene; `None` if it can, or if it does not turn.
+    /// Returns why the object cannot turn in this scene; `None` if it can, or if it does not turn.
     pub(crate) fn refused_rotation(&self) -> Option<String> {
         let rotation = self.rotation.as_ref()?;
         let strategy = self.coordination.strategy;
@@ -212,7 +218,7 @@ impl Scene {
     }
 }
 
-/// Why a strategy has no torque; `None` if it has one.
+/// Returns why a strategy has no torque; `None` if the strategy has one.
 const fn why_no_torque(strategy: Coordination) -> Option<&'static str> {
     match strategy {
         Coordination::AveragePosition
@@ -230,7 +236,8 @@ const fn why_no_torque(strategy: Coordination) -> Option<&'static str> {
 }
 
 impl RotationSpec {
-    /// A number that belongs to a mass, for the inertia of it: as if each element of the mass had it alone.
+    /// Returns `number` times inertia over mass. A gain or damping of translations becomes the gain or damping of rotations that results if each element of
+    /// the mass has its share of `number`.
     pub(crate) fn over_mass(&self, mass: f64, number: f64) -> Triple {
         self.inertia.map(|moment| number * moment / mass)
     }
@@ -260,16 +267,16 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
     fn each_element_of_the_mass_is_coordinated_and_damped_as_if_alone() {
         let scene = scene(&[]).unwrap();
         let config = scene.rotation_config(0).unwrap();
-        // Inertia is split as mass; damping is that of each copy; KT and BT count once for each other peer.
+        // Inertia is split as the mass is. Damping is the damping of each copy. KT and BT count once for each other peer.
         assert_eq!(config.copy, Spin { inertia: [0.1 / 4.0, 0.05, 0.3 / 4.0], damping: [0.2, 0.4, 0.3 * 4.0 / 2.0] });
         assert_eq!(config.gains, Gains { stiffness: [15.0, 30.0, 45.0], damping: [3.0, 6.0, 9.0] });
         let scaled = self::scene(&["coordination.scaling=inverse-n", "coordination.rotational-stiffness=8"]).unwrap();
-        // 4·3/16 times three others.
+        // 4·3/16 for the scaling, times three other peers.
         assert_eq!(scaled.rotation_gains_in_time().next().map(|gains| gains.stiffness), Some([18.0; 3]));
         assert_eq!(scene.sample_kind(), SampleKind::Attitude);
     }
 
-    /// A box of 0.3 × 0.2 × 0.1 m with 2 kg has J = m/12·(b² + c²), …
+    /// A box of 0.3 m × 0.2 m × 0.1 m with 2 kg has Jx = m/12·(b² + c²), and Jy and Jz likewise.
     #[test]
     fn a_box_has_the_inertia_of_the_object() {
         let edges: [f64; 3] = [0.3, 0.2, 0.1];
@@ -292,7 +299,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
             assert_eq!((config.gains, config.copy), (gains, copy));
             own
         };
-        // J/m = (0.05, 0.1, 0.15); KR at most 15, and samples at most 8 ms old and a tick.
+        // J/m = (0.05, 0.1, 0.15). KR is at most 15, and samples are at most 8 ms and one tick old.
         let close = |found: [f64; 3], expected: [f64; 3]| (0..3).all(|axis| (found[axis] - expected[axis]).abs() <= 1e-15 * expected[axis]);
         let given = damped(&["coordination.local-damping.damping=8"]);
         assert!(close(given, [0.4, 0.8, 1.2]), "{given:?}");
@@ -308,7 +315,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         let scene = scene(&["timeline=[{at=\"0.1s\", coordination={stiffness=200}}, {at=\"0.2s\", coordination={rotational-stiffness=[1, 2, 3]}}, \
              {at=\"0.3s\", coordination={stiffness=400, damping=40}}, {at=\"0.4s\", coordination={damping=80, rotational-damping=5}}]"])
         .unwrap();
-        // Three others; J/m = (0.05, 0.1, 0.15).
+        // Three other peers; J/m = (0.05, 0.1, 0.15).
         let found: Vec<_> = scene.rotation_gains_in_time().map(|gains| (gains.stiffness, gains.damping)).collect();
         let expected = [
             ([15.0, 30.0, 45.0], [3.0, 6.0, 9.0]),
@@ -324,7 +331,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
     #[test]
     fn a_device_begins_at_its_grasp_point() {
         let scene = scene(&["peers=[{name=\"peer1\", orientation=[1, 0, 0, 1]}]"]).unwrap();
-        // A quarter turn about z: x goes to y; ω×r has the length 3 rad/s · 0.1 m, and points to −x.
+        // A quarter turn about z takes x to y. ω×r has the length 3 rad/s · 0.1 m and points to −x.
         let State { position, velocity } = scene.initial_device::<3>(0);
         let apart = |a: [f64; 3], b: [f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).abs()).fold(0.0, f64::max);
         assert!(apart(position, [0.0, 0.1, 0.0]) < 1e-16 && apart(velocity, [-0.3, 0.0, 0.0]) < 1e-15, "{position:?} {velocity:?}");

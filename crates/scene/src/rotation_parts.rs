@@ -1,15 +1,15 @@
-//! The one-axis scenes into which an object that turns splits exactly, linearised at rest.
+//! One-axis scenes into which the motion of an object that turns splits exactly, linearised at rest.
 //!
-//! A copy has y = (δp, δθ) in body axes, mass matrix M = diag(m·I, J), and is grasped at z = G·y with G = \[I, −\[r\]\]:
-//! M·ÿ = Gᵀ·FC + (0, τC) − diag(KT·I, KR)·(y − ȳ) − … (docs/stability.md).
+//! A copy has the coordinates y = (δp, δθ) in body axes and the mass matrix M = diag(m·I, J), and is grasped at z = G·y with G = \[I, −\[r\]\]: M·ÿ = Gᵀ·FC +
+//! (0, τC) − diag(KT·I, KR)·(y − ȳ) − … (docs/stability.md).
 //!
-//! **Grasped at the centre**, r = 0, nothing of this mixes two of the six components: each is a scene of one axis.
+//! **Grasped at the centre**, r = 0, no term mixes two of the six components: each component is a scene of one axis.
 //!
-//! **One grasp r, default gains.** Gains and damping are multiples of M then, diag(KT·I, KR) = KT/m·M and so on, and all that drives the copies is Gᵀ·FC. With
-//! W = G·M⁻¹·Gᵀ = I/m − \[r\]·J⁻¹·\[r\] the grasp point obeys z̈ = W·FC − KT/m·(z − z̄) − BT/m·(ż − ż̄) − bO/m·ż. Device and coupling are equal along all directions, so
-//! along an eigenvector of W with the eigenvalue μ this is a scene of mass 1/μ with KT, BT and bO divided by m·μ. Of y three components N·y are left, with
-//! N·M⁻¹·Gᵀ = 0: no hand drives them, and they obey the equation of a copy of mass m that nobody touches. Held samples, means and step maps act on all components
-//! alike, so the split holds for any links, clocks and delays.
+//! **One grasp r, default gains.** Gains and damping are then multiples of M, diag(KT·I, KR) = KT/m·M and so on, and Gᵀ·FC alone drives the copies. With W =
+//! G·M⁻¹·Gᵀ = I/m − \[r\]·J⁻¹·\[r\] the grasp point obeys z̈ = W·FC − KT/m·(z − z̄) − BT/m·(ż − ż̄) − bO/m·ż. Device and coupling are equal along all
+//! directions, so that along an eigenvector of W with the eigenvalue μ this is a scene of mass 1/μ with KT, BT and bO divided by m·μ. Three components N·y of
+//! y remain, with N·M⁻¹·Gᵀ = 0: no hand drives these components, and they obey the equation of a copy of mass m that nobody touches. Held samples, means and
+//! step maps act on all components alike, so that the split holds for any links, clocks and delays.
 
 use cohaptic_peer::coordination::LawValue;
 use cohaptic_peer::rotation::Triple;
@@ -17,30 +17,31 @@ use cohaptic_peer::{Contact, Coordination, DeviceConfig, Direction, Enclosure, G
 
 use crate::{Axes, CoordinationSpec, ObjectSpec, PeerKind, PeerSpec, RotationSpec, Scene};
 
-/// How the motion of an object that turns splits.
+/// Split of the motion of an object that turns into one-axis scenes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RotationParts {
-    /// Why it does, in words.
+    /// Reason why the motion splits, in words.
     pub reason: &'static str,
-    /// The scenes.
+    /// The one-axis scenes, each with the components whose motion it describes. No two parts are equal.
     pub parts: Vec<RotationPart>,
 }
 
 /// One or several equal components of the motion of an object that turns, as a scene of one axis, at rest.
 ///
-/// About an axis that turns, "mass" means an inertia, and so on: the numbers are those of the turn, in its units.
+/// If the component is a rotation, the fields of `scene` hold rotational quantities in rotational units: the mass is an inertia [kg·m²], and so on.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RotationPart {
-    /// The equal components: `x`, `y`, `z`, `rx`, `ry`, `rz`; or `touched 1` to `touched 3` and `pivot 1` to `pivot 3`.
+    /// Names of the equal components: `x`, `y`, `z`, `rx`, `ry`, `rz`; or `touched 1` to `touched 3` and `pivot 1` to `pivot 3`.
     pub components: Vec<String>,
-    /// The scene of each of them.
+    /// Scene of each component.
     pub scene: Scene,
-    /// For each peer, whether it has a device in this component; where not, that of the scene stands for nothing.
+    /// True for each peer that has a device in this component, indexed as [`Scene::peers`]. If false, the peer's device in `scene` is a placeholder without
+    /// meaning.
     pub devices: Vec<bool>,
 }
 
 impl RotationPart {
-    /// Its components, in words.
+    /// Returns the names of the components, separated by commas.
     #[must_use]
     pub fn name(&self) -> String {
         self.components.join(", ")
@@ -48,15 +49,16 @@ impl RotationPart {
 }
 
 impl Scene {
-    /// The one-axis scenes into which the motion near rest splits exactly, or why there are none; `None` if the object does not turn.
+    /// Returns the one-axis scenes into which the motion near rest splits exactly, or the reason why it does not split; `None` if the object does not turn.
     ///
-    /// Hands that only push are left out, and so are the timeline and initial motions. Samples of the whole scene are longer than those of a part.
+    /// Forces of hands without an arm, the timeline and initial motions are left out. The samples of the whole scene are longer than the samples of a part.
     #[must_use]
     pub fn rotation_parts(&self) -> Option<Result<RotationParts, &'static str>> {
         let rotation = self.rotation.as_ref()?;
         if matches!(self.integrator, Integrator::SemiImplicitEuler { .. }) {
             return Some(Err("with semi-implicit-euler turns move by another step than translations"));
         }
+        // The grasp of a peer that touches nothing has no influence.
         let grasps = || rotation.peers.iter().zip(&self.peers).filter(|(_, spec)| spec.contact != Contact::None).map(|(peer, _)| peer.grasp);
         if grasps().all(is_zero) {
             let damped = self.own_rotational_damping(0);
@@ -66,6 +68,7 @@ impl Scene {
             let parts = merged((0..3).map(|axis| self.translation(axis)).chain((0..3).map(|axis| self.turn(rotation, axis))));
             return Some(Ok(RotationParts { reason: "the object is held at its centre alone, so no force turns it", parts }));
         }
+        // Some peer touches: with none, `all` above is true.
         let grasp = grasps().next()?;
         Some(self.why_not_pivots(rotation, grasp).map_or_else(
             || {
@@ -79,8 +82,8 @@ impl Scene {
         ))
     }
 
-    /// Whether small motions near rest are all that an object that turns does: copies begin together and at rest, and no hand pushes. Also true if the object does
-    /// not turn.
+    /// Returns true if the motion of an object that turns is small and near rest: copies begin together and at rest, and no hand pushes. Also true if the
+    /// object does not turn.
     #[must_use]
     pub fn turns_about_rest(&self) -> bool {
         let Some(rotation) = &self.rotation else { return true };
@@ -92,7 +95,7 @@ impl Scene {
             let idle = match &spec.hand {
                 None => true,
                 Some(Hand::Force(force)) => is_idle(force),
-                // An arm that wants its device where it begins.
+                // An arm that wants its device at the initial position pulls nothing.
                 Some(Hand::Arm { follows, .. }) => matches!(follows, Signal::Constant(wanted) if same(*wanted, start)),
             };
             let untwisted = peer.device.as_ref().and_then(|device| device.torque.as_ref()).is_none_or(is_idle);
@@ -100,7 +103,7 @@ impl Scene {
         })
     }
 
-    /// Why the scene does not split into touched scenes and pivots.
+    /// Returns why the scene does not split into touched scenes and pivots; `None` if it does. `grasp` is the grasp of the first peer that touches.
     fn why_not_pivots(&self, rotation: &RotationSpec, grasp: Triple) -> Option<&'static str> {
         let mut peers = rotation.peers.iter().zip(&self.peers);
         let touches = |spec: &PeerSpec| spec.contact != Contact::None;
@@ -123,13 +126,14 @@ impl Scene {
         }
     }
 
-    /// The translation along an axis.
+    /// Returns the part of the translation along an axis, 0 for x.
     fn translation(&self, axis: usize) -> RotationPart {
         let along = |number: f64| [number, 0.0, 0.0];
         let enclosure = self.object.enclosure.map(|wall| Enclosure { min: along(wall.min[axis]), max: along(wall.max[axis]), ..wall });
         let object = ObjectSpec { enclosure, ..self.object_at_rest() };
         let peers = self.peers.iter().map(|spec| {
             let contact = match spec.contact {
+                // A finger that pushes along another axis exerts no force along this axis.
                 Contact::Push(direction) if direction.axis == axis => Contact::Push(Direction { axis: 0, ..direction }),
                 Contact::Push(_) | Contact::None => Contact::None,
                 Contact::Grasp => Contact::Grasp,
@@ -140,7 +144,7 @@ impl Scene {
         RotationPart { components: vec![["x", "y", "z"][axis].to_owned()], scene, devices: vec![true; self.peers.len()] }
     }
 
-    /// The turn about an axis of an object that is held at its centre.
+    /// Returns the part of the rotation about an axis, 0 for x, of an object that is held at its centre.
     fn turn(&self, rotation: &RotationSpec, axis: usize) -> RotationPart {
         let over_mass = |number: f64| number * rotation.inertia[axis] / self.object.mass;
         let of = |own: Option<Triple>, usual: f64| own.map_or_else(|| over_mass(usual), |own| own[axis]);
@@ -148,13 +152,13 @@ impl Scene {
         let object = ObjectSpec { mass: rotation.inertia[axis], damping, enclosure: None, ..self.object_at_rest() };
         let (usual, own) = (self.coordination.gains, &rotation.gains);
         let gains = Gains { stiffness: of(own.stiffness, usual.stiffness), damping: of(own.damping, usual.damping) };
-        // Orientations are held as they came.
+        // The strategy extrapolates positions and holds orientations as received, as average-position does.
         let is_extrapolated = self.coordination.strategy == Coordination::Extrapolated;
         let strategy = if is_extrapolated { Coordination::AveragePosition } else { self.coordination.strategy };
         let peers = rotation.peers.iter().zip(&self.peers).map(|(peer, spec)| {
             let spec = PeerSpec { hand: None, ..at_rest(spec) };
             match &peer.device {
-                // A frictionless finger turns nothing.
+                // A frictionless finger exerts no torque.
                 Some(device) => {
                     let contact = if spec.contact == Contact::Grasp { Contact::Grasp } else { Contact::None };
                     let handle = DeviceConfig { mass: device.handle.inertia[axis], damping: device.handle.damping[axis] };
@@ -165,6 +169,7 @@ impl Scene {
         });
         let coordination = self.coordination.with_own_damping(|_| self.own_rotational_damping(0)[axis]);
         let mut scene = Self { object, peers: peers.collect(), ..self.without_turns(CoordinationSpec { strategy, gains, ..coordination }) };
+        // The integrator of a scene has one number of steps, so that the steps of the rotation are multiplied in.
         if let Integrator::RungeKutta4 { steps } = self.integrator {
             scene.integrator = Integrator::RungeKutta4 { steps: steps.saturating_mul(rotation.steps) };
         }
@@ -172,11 +177,11 @@ impl Scene {
         RotationPart { components: vec![["rx", "ry", "rz"][axis].to_owned()], scene, devices }
     }
 
-    /// The scene with an object of that mass, and gains and damping in proportion.
+    /// Returns the scene with an object of this mass, and with gains and damping in proportion. `touched` is false for a component that no hand drives.
     fn with_mass(&self, component: String, mass: f64, touched: bool) -> RotationPart {
         let share = mass / self.object.mass;
         let object = ObjectSpec { mass, damping: self.object.damping * share, ..self.object_at_rest() };
-        // An automatic damping is made from the stiffness.
+        // An automatic damping follows from the stiffness, which is scaled below, and must not be scaled twice.
         let coordination = if self.has_automatic_damping() { self.coordination } else { self.coordination.with_own_damping(|own| own * share) };
         let coordination = CoordinationSpec { gains: self.coordination.gains.scaled(share), ..coordination };
         let peers = self.peers.iter().map(|spec| if touched { at_rest(spec) } else { untouched(at_rest(spec)) });
@@ -188,24 +193,25 @@ impl Scene {
         ObjectSpec { position: [0.0; 3], velocity: [0.0; 3], ..self.object.clone() }
     }
 
-    /// The scene along one axis with that coordination, without timeline, measures and expectations.
+    /// Returns the scene along one axis with this coordination, without timeline, measures and expectations.
     fn without_turns(&self, coordination: CoordinationSpec) -> Self {
         Self { axes: Axes::One, rotation: None, coordination, timeline: Vec::new(), measure: None, expect: None, ..self.clone() }
     }
 }
 
 impl CoordinationSpec {
-    /// With another damping of each copy by the strategy, if it has one [N·s/m].
+    /// Returns the coordination with the damping β of each copy by the strategy replaced by `other(β)` [N·s/m], if the strategy has a given damping.
     fn with_own_damping(mut self, other: impl FnOnce(f64) -> f64) -> Self {
         let own = self.settings.of_mut(Coordination::LocalDamping);
         if self.strategy == Coordination::LocalDamping {
+            // Parameter 0 of local-damping is the damping.
             own.set(0, LawValue::Number(other(own.number(0))));
         }
         self
     }
 }
 
-/// Whether two vectors have equal numbers.
+/// Returns true if two vectors have equal components; 0 and −0 are equal.
 fn same(one: Triple, other: Triple) -> bool {
     is_zero(std::array::from_fn(|axis| one[axis] - other[axis]))
 }
@@ -214,19 +220,19 @@ fn is_zero(vector: Triple) -> bool {
     vector.iter().all(|component| *component == 0.0)
 }
 
-/// A peer that begins at rest, whose hand does nothing but hold.
+/// Returns the peer at rest at the origin. A hand with an arm keeps the arm and wants the origin; any other hand is left out.
 fn at_rest(spec: &PeerSpec) -> PeerSpec {
     let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
     let (position, velocity) = ([0.0; 3], [0.0; 3]);
     PeerSpec { kind: PeerKind::Simulated, hand, position, velocity, device_position: None, device_velocity: None, ..spec.clone() }
 }
 
-/// A peer without a device: one that touches nothing and is equal to all others of that kind.
+/// Returns the peer without a device: it touches nothing and equals all other peers without a device.
 fn untouched(spec: PeerSpec) -> PeerSpec {
     PeerSpec { contact: Contact::None, device: DeviceConfig { mass: 1.0, damping: 0.0 }, hand: None, ..spec }
 }
 
-/// Parts with equal scenes as one, in the order of the first of each.
+/// Merges parts with equal scenes, in the order of the first of each.
 fn merged(parts: impl Iterator<Item = RotationPart>) -> Vec<RotationPart> {
     let mut merged: Vec<RotationPart> = Vec::new();
     for part in parts {
@@ -238,23 +244,24 @@ fn merged(parts: impl Iterator<Item = RotationPart>) -> Vec<RotationPart> {
     merged
 }
 
-/// 1/μ of the eigenvalues μ of W = I/m − \[r\]·J⁻¹·\[r\], r ≠ 0: along r first, then across it, the larger mass first.
+/// Returns 1/μ for the eigenvalues μ of W = I/m − \[r\]·J⁻¹·\[r\], r ≠ 0 \[kg\]: along r first, then across r, the larger mass first.
 ///
 /// Along r, μ = 1/m. With unit vectors u, v across it, uᵀWu = 1/m + r²·vᵀJ⁻¹v, vᵀWv = 1/m + r²·uᵀJ⁻¹u and uᵀWv = −r²·uᵀJ⁻¹v.
 fn effective_masses(mass: f64, inertia: Triple, grasp: Triple) -> [f64; 3] {
     let cross = |a: Triple, b: Triple| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    // Roots of sums of squares are the same on all platforms, which the hypot of the standard library is not.
+    // A root of a sum of squares is the same on all platforms; `hypot` of the standard library is not.
     let hypot = |a: f64, b: f64| (a * a + b * b).sqrt();
     let length = |a: Triple| hypot(hypot(a[0], a[1]), a[2]);
     let unit = |a: Triple| a.map(|component| component / length(a));
     let radius = length(grasp);
     let along = unit(grasp);
-    // The axis that is farthest from r gives the first vector across it.
+    // The axis least parallel to r has the longest cross product with r, and so gives the most accurate vector across r.
     let least = (0..3).min_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs())).unwrap_or(0);
     let axis = std::array::from_fn(|component| if component == least { 1.0 } else { 0.0 });
     let u = unit(cross(along, axis));
     let v = cross(along, u);
     let weighed = |a: Triple, b: Triple| radius * radius * (0..3).map(|axis| a[axis] * b[axis] / inertia[axis]).sum::<f64>();
+    // Eigenvalues of the symmetric matrix of W across r, from its mean and half its difference.
     let (of_u, of_v, of_both) = (weighed(v, v), weighed(u, u), -weighed(u, v));
     let (middle, apart) = (1.0 / mass + 0.5 * (of_u + of_v), hypot(0.5 * (of_u - of_v), of_both));
     [mass, 1.0 / (middle - apart), 1.0 / (middle + apart)]
@@ -281,7 +288,7 @@ mod tests {
         scene.rotation_parts().unwrap().unwrap().parts.iter().map(RotationPart::name).collect()
     }
 
-    /// Trace, sum of the squares of all entries, and determinant of W, entry by entry.
+    /// The eigenvalues have the trace, the sum of the squares of all entries, and the determinant of W, which is computed here entry by entry.
     #[test]
     fn the_effective_masses_are_those_of_the_matrix() {
         let (mass, inertia) = (0.45, [1.2e-4, 2e-4, 2.6e-4]);
@@ -305,14 +312,14 @@ mod tests {
     #[test]
     fn held_at_the_centre_translations_and_turns_are_apart() {
         assert_eq!(names(&scene(&[])), ["x, y, z", "rx", "ry", "rz"]);
-        // Of the peer that touches nothing the grasp says nothing.
+        // The grasp of a peer that touches nothing has no influence.
         assert_eq!(names(&scene(&["peers.peer1.grasp=[0.1, 0, 0]", "peers.peer1.contact=none", "object.inertia=1e-4"])), ["x, y, z", "rx, ry, rz"]);
         let split = scene(&["object.split-mass=true", "coordination.rotational-damping=0.25", "coordination.scaling=inverse-n"]);
         let parts = split.rotation_parts().unwrap().unwrap().parts;
         let rx = &parts[1].scene;
         assert_eq!((rx.copy_mass(), rx.object.damping), (0.4e-4, 2.0 * 1.2e-4 / 0.5));
         let whole = split.rotation_gains_in_time().next().unwrap();
-        // N − 1 of the strategy is in its law.
+        // The law of the strategy contains the factor N − 1.
         let gains = rx.coordination_gains(rx.coordination.gains, 0);
         assert!((2.0 * gains.stiffness / whole.stiffness[0] - 1.0).abs() < 1e-15 && (2.0 * gains.damping / whole.damping[0] - 1.0).abs() < 1e-15);
         assert_eq!(parts.iter().map(|part| part.devices[0]).collect::<Vec<_>>(), [true, false, false, false]);
@@ -323,7 +330,7 @@ mod tests {
         let own = |part: &RotationPart| part.scene.own_damping(0);
         let centre = scene(&["coordination.strategy=local-damping", "object.split-mass=true"]);
         let parts = centre.rotation_parts().unwrap().unwrap().parts;
-        // β of translations is KT·(m + 1)·Tc, that of every turn is made from the largest KR.
+        // β of translations is KT·(m + 1)·Tc; β of every rotation follows from the largest KR.
         assert_eq!(own(&parts[0]).to_bits(), centre.own_damping(0).to_bits());
         assert!(parts[1..].iter().all(|part| (own(part) / centre.own_damping(0) / (2.6e-4 / 0.5) - 1.0).abs() < 1e-14));
         let held = |more: &[&str]| {

@@ -1,4 +1,4 @@
-//! Which strategy each peer runs: the scene's, or one of the caller's own.
+//! Choice of the strategy of each peer: the strategy of the scene, or a strategy of the caller.
 
 use cohaptic_peer::coordination::{BuiltIn, BuiltInStrategy, LawParameters, LawSettings, LawValue, SessionParameters};
 use cohaptic_peer::rotation::Triple;
@@ -7,27 +7,27 @@ use cohaptic_peer::{Coordination, Gains, Strategy};
 
 use crate::{ChangeKind, CoordinationSpec, Scene};
 
-/// Makes the coordination strategy of each peer, for as many axes as are simulated.
+/// Factory of the coordination strategy of each peer, for any number of axes.
 ///
-/// [`FromScene`] makes what the scene names. Implement this to simulate or to analyse a scene with a strategy of your own.
+/// [`FromScene`] makes the strategy that the scene names. Implement this trait to simulate or to analyse a scene with a strategy of your own.
 pub trait Strategies {
-    /// The strategy for A axes.
+    /// Type of the strategy for A axes.
     type Strategy<const A: usize>: Strategy<A>;
 
-    /// Whether they are [`FromScene`], for which the loops of a run are compiled once, and not again for each crate that runs scenes.
+    /// True for [`FromScene`] alone. The loops of a run are compiled once for [`FromScene`], and not again for each crate that runs scenes.
     const OF_SCENE: bool = false;
 
-    /// Makes the strategy of the peer in that place of [`Scene::peers`].
+    /// Makes the strategy of a peer. `peer` is the index in [`Scene::peers`].
     fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> Self::Strategy<A>;
 
-    /// The law of the peer in that place of [`Scene::peers`], if these strategies are one of the registry: it gives their forces to the bit, so a run can do
-    /// without the strategies.
+    /// Returns the law of a peer, if the strategies are a law of the registry. The law gives the forces of the strategies to the bit, so that a run can use
+    /// the law in place of the strategies. `peer` is the index in [`Scene::peers`].
     fn law(&self, _scene: &Scene, _peer: usize) -> Option<BuiltIn> {
         None
     }
 }
 
-/// The strategy that the scene names, with its gains scaled by the number of peers.
+/// Factory of the strategy that the scene names, with gains scaled by the number of peers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct FromScene;
 
@@ -46,7 +46,7 @@ impl Strategies for FromScene {
 }
 
 impl Scene {
-    /// The coordination law of a peer; `None` if the strategy of the scene is not a law.
+    /// Returns the coordination law of a peer; `None` if the strategy of the scene is not a law.
     ///
     /// # Panics
     ///
@@ -56,7 +56,7 @@ impl Scene {
         self.coordination.strategy.law(&self.law_parameters(peer))
     }
 
-    /// [`Scene::law`] at the beginning and after each change of the timeline; nothing if the strategy of the scene is not a law.
+    /// Iterates over [`Scene::law`] at the beginning and after each change of the timeline. Empty if the strategy of the scene is not a law.
     ///
     /// # Panics
     ///
@@ -67,6 +67,7 @@ impl Scene {
                 match &change.what {
                     ChangeKind::Coordination(gains) => then.coordination.gains = *gains,
                     ChangeKind::Parameters(settings) => then.coordination.settings = **settings,
+                    // These changes do not concern the law. The item repeats, so that there is one law for each change.
                     ChangeKind::Link(_)
                     | ChangeKind::AllLinks(_)
                     | ChangeKind::Contact { .. }
@@ -82,7 +83,7 @@ impl Scene {
         self.law(peer).into_iter().chain(changes)
     }
 
-    /// β [N·s/m]: by how much the strategy damps the copy of a peer.
+    /// Returns β [N·s/m], the damping that the strategy adds to the copy of a peer.
     ///
     /// # Panics
     ///
@@ -92,7 +93,8 @@ impl Scene {
         self.coordination.strategy.damping(&self.law_parameters(peer))
     }
 
-    /// The law of the turns of a peer, with gains of one: it makes the torque from those of spring and damper. `None` if the strategy of the scene is not a law.
+    /// Returns the law of a peer's rotation, with gains of one: the law makes the torque from the torques of spring and damper. `None` if the strategy of the
+    /// scene is not a law.
     ///
     /// # Panics
     ///
@@ -100,14 +102,15 @@ impl Scene {
     #[must_use]
     pub fn turn_law(&self, peer: usize) -> Option<BuiltIn> {
         let gains = Gains { stiffness: 1.0, damping: 1.0 };
-        // The number of the others counts in the gains of the turns.
+        // Two peers, N − 1 = 1: the gains of rotations contain the number of the other peers already.
         self.coordination.strategy.law(&LawParameters { gains, peers: 2, ..self.law_parameters(peer) })
     }
 
-    /// By how much the strategy damps the turn of the copy of a peer about each body axis [N·m·s/rad]; zero if the object does not turn.
+    /// Returns the damping that the strategy adds to the rotation of a peer's copy about each body axis [N·m·s/rad]; zero if the object does not turn.
     ///
-    /// A β that is given is damping of the mass, and counts times inertia over mass. An automatic one is made about every axis from the largest component of KR: no
-    /// radian of turn, about whatever axis, changes the torque by more, so the springs of turns inject no energy at any angle.
+    /// A given β is a damping of the mass, so that it is multiplied by inertia over mass. An automatic β is the same about every axis, from the largest
+    /// component of KR: a radian of rotation about any axis changes the torque by at most this component, so that the springs of rotations inject no energy
+    /// at any angle.
     ///
     /// # Panics
     ///
@@ -123,37 +126,38 @@ impl Scene {
         rotation.over_mass(self.object.mass, self.own_damping(peer))
     }
 
-    /// Whether the strategy damps each copy by as much as its stiffness asks for.
+    /// Returns true if the strategy computes the damping of each copy from the stiffness.
     pub(crate) fn has_automatic_damping(&self) -> bool {
         let CoordinationSpec { strategy, settings, .. } = &self.coordination;
+        // Parameter 0 of local-damping is the damping.
         *strategy == Coordination::LocalDamping && settings.of(*strategy).get(0) == LawValue::Automatic
     }
 
-    /// The peer that alone has the object; `None` if every peer has a copy.
+    /// Returns the peer that alone has the object, as an index in [`Scene::peers`]; `None` if every peer has a copy.
     #[must_use]
     pub fn server(&self) -> Option<usize> {
         let CoordinationSpec { strategy, settings, .. } = &self.coordination;
         (*strategy == Coordination::ClientServer).then(|| settings.of(*strategy).place(0))
     }
 
-    /// What samples carry beyond the state.
+    /// Returns the kind of samples: the values that samples carry in addition to the state.
     #[must_use]
     pub const fn sample_kind(&self) -> SampleKind {
         if self.rotation.is_some() { SampleKind::Attitude } else { self.coordination.strategy.kind() }
     }
 
-    /// The scene with these parameters of strategies.
+    /// Returns the scene with these own parameters of strategies.
     #[must_use]
     pub fn with_parameters(&self, settings: &LawSettings) -> Self {
         Self { coordination: CoordinationSpec { settings: *settings, ..self.coordination }, ..self.clone() }
     }
 
-    /// Whether there are dead bands, at the beginning or later.
+    /// Returns true if dead bands leave out samples, at the beginning or after a change of the timeline.
     pub(crate) fn leaves_out_samples(&self) -> bool {
         self.coordination.send_when.is_some() || self.timeline.iter().any(|change| matches!(change.what, ChangeKind::SendWhen(_)))
     }
 
-    /// How many of its ticks are between two samples of a peer.
+    /// Returns the number of a peer's ticks from sample to sample.
     ///
     /// # Panics
     ///
@@ -163,24 +167,25 @@ impl Scene {
         u64::try_from(self.coordination.update.as_nanos() / self.peers[peer].clock.tick.as_nanos()).unwrap_or(u64::MAX)
     }
 
-    /// What the law of a peer is made from: the gains scaled by the number of peers, its tick, and the parameters of the law itself.
+    /// Returns the parameters of a peer's law: gains scaled by the number of peers, the tick of the peer, and the law's own parameters.
     fn law_parameters(&self, peer: usize) -> LawParameters {
         let CoordinationSpec { strategy, gains, settings, .. } = &self.coordination;
         let own = settings.of(*strategy);
         LawParameters {
             gains: self.coordination_gains(*gains, peer),
-            // On a topology the number of those heard counts in the gains.
+            // On a topology the gains contain the number of peers that are heard. The law is made for two peers, N − 1 = 1.
             peers: if self.topology.is_some() { 2 } else { self.number() },
             tick: self.peers[peer].clock.tick,
+            // Both ages look at every link, and only automatic parameters need the ages.
             oldest: if own.any_automatic() { self.oldest_sample() } else { None },
             middle: if own.any_automatic() { self.middle_age() } else { None },
             own: *own,
         }
     }
 
-    /// What the strategy of a peer is made from.
+    /// Returns the parameters of a peer's strategy.
     fn session_parameters<const A: usize>(&self, peer: usize) -> SessionParameters<A> {
-        // A topology has laws alone, which need no more than their parameters.
+        // A topology admits laws alone, which need no more than the parameters of the law.
         let places = 0..if self.topology.is_some() { 0 } else { self.peers.len() };
         SessionParameters {
             law: self.law_parameters(peer),

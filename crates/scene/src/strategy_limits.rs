@@ -1,4 +1,4 @@
-//! What strategies cannot have, and why.
+//! Limits of strategies: scenes in which a strategy cannot work, and the reasons.
 
 use cohaptic_peer::coordination::Law;
 use cohaptic_peer::{Coordination, Drift, Integrator};
@@ -6,12 +6,12 @@ use cohaptic_peer::{Coordination, Drift, Integrator};
 use crate::{ChangeKind, Scene};
 
 impl Scene {
-    /// Why the coordination cannot be as it is at the beginning; `None` if it can.
+    /// Returns why the coordination cannot work with the parameters of the beginning; `None` if it can.
     pub(crate) fn refused_coordination(&self) -> Option<String> {
         self.refused_automatic().or_else(|| self.refused_lag()).map(str::to_owned).or_else(|| self.refused_strategy())
     }
 
-    /// Why the timeline cannot change parameters of the strategy as it does; `None` if it can.
+    /// Returns why the timeline cannot change parameters of the strategy as it does; `None` if it can.
     pub(crate) fn refused_changes(&self) -> Option<String> {
         let settings = self.timeline.iter().filter_map(|change| match &change.what {
             ChangeKind::Parameters(settings) => Some(settings),
@@ -24,6 +24,7 @@ impl Scene {
             | ChangeKind::RotationalGains(_)
             | ChangeKind::SendWhen(_) => None,
         });
+        // A law with a horizon extrapolates, so that peers keep the send times of samples.
         let keeps_ages = |scene: &Self| scene.law(0).is_some_and(|law| Law::<f64>::horizon(&law).is_some());
         let refused = |scene: Self| {
             let begins = keeps_ages(&scene) != keeps_ages(self);
@@ -37,7 +38,7 @@ impl Scene {
         settings.map(|settings| self.with_parameters(settings)).find_map(refused)
     }
 
-    /// Why the strategy cannot work in this scene; `None` if it can.
+    /// Returns why the strategy cannot work in this scene; `None` if it can.
     pub(crate) fn refused_strategy(&self) -> Option<String> {
         let strategy = self.coordination.strategy;
         let (predicts, exchanges_waves, modulates) =

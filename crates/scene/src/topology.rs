@@ -1,4 +1,4 @@
-//! Which peers send to which, if not all to all.
+//! Topologies: the peers to which each peer sends, in scenes in which not every peer sends to every other peer.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,50 +10,53 @@ use cohaptic_wan::LinkModel;
 
 use crate::{LinkTable, Scene};
 
-/// The neighbours of each peer: those to which it sends, and from which it hears. Both are the same peers, with weights that are mutual.
+/// Neighbours of each peer: the peers to which it sends and from which it hears. Neighbours are mutual, and so are weights.
 ///
-/// It takes memory for each pair of neighbours, and none for others.
+/// Memory grows with the number of pairs of neighbours, not with the number of pairs of peers.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Topology {
     kind: TopologyKind,
-    /// By peer where its neighbours begin, and at last where they end.
+    /// Index in `neighbours` of the first neighbour of each peer, indexed by peer. Has one more entry than there are peers, the length of `neighbours`, so
+    /// that the neighbours of peer `p` are `first[p]..first[p + 1]`.
     first: Vec<usize>,
+    /// Neighbours of peer 0, then of peer 1 and so on; ascending for each peer, so that a binary search finds a neighbour.
     neighbours: Vec<u32>,
-    /// Beside the neighbours; empty if all weigh 1.
+    /// Weights, indexed as `neighbours`. Empty if all weights are 1.
     weights: Vec<f64>,
 }
 
-/// The form of a topology.
+/// Form of a topology.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TopologyKind {
-    /// Each peer has as many neighbours before it as behind it.
+    /// A ring: half of the neighbours of a peer come before it, half after it.
     Ring {
-        /// How many it has.
+        /// Number of neighbours of each peer.
         neighbours: usize,
     },
-    /// One peer has all others for neighbours, and they have no other.
+    /// A star: the hub has all other peers as neighbours, and every other peer has the hub alone.
     Star {
-        /// Its place in [`Scene::peers`].
+        /// Index of the hub in [`Scene::peers`].
         hub: usize,
     },
-    /// As a matrix of weights says.
+    /// A graph given by a matrix of weights.
     Graph,
 }
 
-/// Why numbers are no weights between peers, and which of them is wrong.
+/// Fault of a matrix that cannot be weights between peers, with its place in the matrix.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error("{message}")]
 pub struct WeightsError {
-    /// The row of the number, from 0.
+    /// Row of the fault, from 0.
     pub row: usize,
-    /// Its column; `None`: the row as a whole.
+    /// Column of the fault, from 0; `None` if the row as a whole is at fault.
     pub column: Option<usize>,
-    /// The fault, and what was expected.
+    /// Description of the fault and of the expected number.
     pub message: String,
 }
 
 impl Topology {
-    /// A ring on which each of `peers` has that number of neighbours, half of them on either side; `None` unless it is even, above 0 and below `peers`.
+    /// Returns a ring of `peers` peers with `neighbours` neighbours each, half of them on either side. `None` unless `neighbours` is even, above 0 and below
+    /// `peers`.
     #[must_use]
     pub fn ring(peers: usize, neighbours: usize) -> Option<Self> {
         let fits = neighbours > 0 && neighbours.is_multiple_of(2) && neighbours < peers;
@@ -68,19 +71,19 @@ impl Topology {
         })
     }
 
-    /// A star of `peers` around one of them; `None` if that is none of them, or they are fewer than two.
+    /// Returns a star of `peers` peers around the peer `hub`. `None` if `hub` is not below `peers`, or for fewer than two peers.
     #[must_use]
     pub fn star(peers: usize, hub: usize) -> Option<Self> {
         let of = |peer: usize| if peer == hub { (0..peers).filter(|other| *other != hub).collect() } else { vec![hub] };
         (hub < peers && peers >= 2).then(|| Self::unweighted(TopologyKind::Star { hub }, (0..peers).map(of)))
     }
 
-    /// The graph of these weights, a row a peer: those above zero are of neighbours.
+    /// Returns the graph of a matrix of weights, one row per peer. A weight above zero makes two peers neighbours.
     ///
     /// # Errors
     ///
-    /// [`WeightsError`] unless the rows are as long as there are of them, no weight is negative or not finite, those between two peers are equal both ways, none
-    /// is of a peer with itself, and each peer is reached from each other.
+    /// [`WeightsError`] unless the matrix is square, every weight is finite and not negative, weights between two peers are equal both ways, the weight of
+    /// each peer with itself is 0, and a chain of neighbours connects all peers.
     pub fn graph(rows: &[Vec<f64>]) -> Result<Self, WeightsError> {
         let peers = rows.len();
         let refuse = |row, column, message| Err(WeightsError { row, column, message });
@@ -90,6 +93,7 @@ impl Topology {
                 return refuse(row, None, message);
             }
             for (column, weight) in weights.iter().enumerate() {
+                // `get`, because the row of the mirrored weight may be too short: its length is checked later, when the loop gets there.
                 let mutual = rows[column].get(row).copied();
                 let wrong = if !weight.is_finite() || *weight < 0.0 {
                     "expected a finite number that is not negative".to_owned()
@@ -106,6 +110,7 @@ impl Topology {
         let neighbours = |row: &Vec<f64>| row.iter().enumerate().filter(|(_, weight)| **weight > 0.0).map(|(peer, _)| peer).collect();
         let mut graph = Self::unweighted(TopologyKind::Graph, rows.iter().map(neighbours));
         let weights: Vec<f64> = rows.iter().flatten().copied().filter(|weight| *weight > 0.0).collect();
+        // An empty list for weights that are all 1, so that such a graph prints and computes as a graph without weights.
         if weights.iter().any(|weight| weight.to_bits() != 1.0_f64.to_bits()) {
             graph.weights = weights;
         }
@@ -118,6 +123,7 @@ impl Topology {
         }
     }
 
+    /// Returns a topology without weights. `rows` has the neighbours of each peer in ascending order.
     fn unweighted(kind: TopologyKind, rows: impl Iterator<Item = Vec<usize>>) -> Self {
         let (mut first, mut neighbours) = (vec![0], Vec::new());
         for row in rows {
@@ -127,7 +133,7 @@ impl Topology {
         Self { kind, first, neighbours, weights: Vec::new() }
     }
 
-    /// The first peer that no chain of neighbours leads to from the first.
+    /// Returns the first peer to which no chain of neighbours leads from peer 0; `None` if the graph is connected.
     fn unreached(&self) -> Option<usize> {
         let mut reached = vec![false; self.peers()];
         let mut next = vec![0];
@@ -139,25 +145,27 @@ impl Topology {
         reached.iter().position(|reached| !reached)
     }
 
-    /// Its form.
+    /// Returns the form.
     #[must_use]
     pub const fn kind(&self) -> TopologyKind {
         self.kind
     }
 
-    /// The number of peers.
+    /// Returns the number of peers.
     #[must_use]
     pub const fn peers(&self) -> usize {
+        // `first` is never empty: `unweighted` begins it with 0.
         self.first.len() - 1
     }
 
-    /// The number of directed links.
+    /// Returns the number of directed links: twice the number of pairs of neighbours.
     #[must_use]
     pub const fn links(&self) -> usize {
         self.neighbours.len()
     }
 
-    /// The places of links from a peer, or to it, if links are counted by sender, then receiver, or the other way round.
+    /// Returns the places of the links from a peer, if links are counted by sender, then receiver. The links to the peer have the same places if links are
+    /// counted by receiver, then sender.
     ///
     /// # Panics
     ///
@@ -167,7 +175,7 @@ impl Topology {
         self.first[peer]..self.first[peer + 1]
     }
 
-    /// The neighbours of a peer, in order.
+    /// Returns the neighbours of a peer in ascending order.
     ///
     /// # Panics
     ///
@@ -177,7 +185,7 @@ impl Topology {
         &self.neighbours[self.places(peer)]
     }
 
-    /// The place of another peer among the neighbours of one; `None` if it is none of them.
+    /// Returns the index of `other` among the neighbours of `peer`; `None` if the two are not neighbours.
     #[must_use]
     pub fn place(&self, peer: usize, other: usize) -> Option<usize> {
         if peer >= self.peers() {
@@ -186,29 +194,29 @@ impl Topology {
         self.neighbours(peer).binary_search(&u32::try_from(other).ok()?).ok()
     }
 
-    /// Whether there is a link from one peer to another.
+    /// Returns true if there is a link from `from` to `to`.
     #[must_use]
     pub fn has_link(&self, from: usize, to: usize) -> bool {
         self.place(from, to).is_some()
     }
 
-    /// Every directed link, by sender, then receiver.
+    /// Iterates over the directed links (sender, receiver), by sender, then receiver.
     pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.peers()).flat_map(|from| self.neighbours(from).iter().map(move |to| (from, *to as usize)))
     }
 
-    /// The weights of the neighbours of a peer; `None` if all peers weigh 1.
+    /// Returns the weights of the neighbours of a peer, indexed as [`Topology::neighbours`]; `None` if all weights are 1.
     fn weights(&self, peer: usize) -> Option<&[f64]> {
         self.weights.get(self.places(peer)).filter(|_| !self.weights.is_empty())
     }
 
-    /// The weight between two peers; 0 if they are no neighbours.
+    /// Returns the weight between two peers; 0 if the two are not neighbours.
     #[must_use]
     pub fn weight(&self, peer: usize, other: usize) -> f64 {
         self.place(peer, other).map_or(0.0, |place| self.weights(peer).map_or(1.0, |weights| weights[place]))
     }
 
-    /// The sum of the weights of the neighbours of a peer: their number, if all weigh 1.
+    /// Returns the sum of the weights of a peer's neighbours: the number of neighbours, if all weights are 1.
     ///
     /// # Panics
     ///
@@ -219,7 +227,8 @@ impl Topology {
         self.weights(peer).map_or_else(|| self.neighbours(peer).len() as f64, |weights| weights.iter().sum())
     }
 
-    /// The weights of the neighbours of a peer over their mean, so that the mean of what they weigh is the weighted mean; `None` if they are equal.
+    /// Returns the weights of a peer's neighbours divided by their mean, so that the mean of weighted values is the weighted mean of the values. `None` if
+    /// the weights are equal.
     ///
     /// # Panics
     ///
@@ -232,34 +241,35 @@ impl Topology {
         Some(weights.iter().map(|weight| weight / mean).collect())
     }
 
-    /// Whether the neighbours of each peer weigh as much.
+    /// Returns true if all peers have the same sum of weights ([`Topology::degree`]), to the bit.
     #[must_use]
     pub fn is_regular(&self) -> bool {
         (1..self.peers()).all(|peer| self.degree(peer).to_bits() == self.degree(0).to_bits())
     }
 }
 
-/// The numbers of a text: a row a line, numbers between commas; empty lines are left out.
+/// Reads a matrix of weights from a text: one row per line, numbers between commas. Empty lines are skipped.
 ///
 /// # Errors
 ///
-/// The place of the first field that is no number.
+/// [`Fault`] at the first field that is not a number.
 pub fn read_weights(text: &str) -> Result<Vec<Vec<f64>>, Fault> {
     let rows = rows_of(text);
     let number = |(line, row): &(usize, &str), field: &str| {
         let message = || format!("found {:?}: expected numbers between commas", field.trim());
+        // `field` is a part of `row`, so that the difference of the two addresses is the offset of the field in the line.
         let start = line_span(text, *line).start + field.as_ptr() as usize - row.trim_start().as_ptr() as usize;
         field.trim().parse().map_err(|_| Fault { span: start..start + field.len(), message: message() })
     };
     rows.iter().map(|row| row.1.trim().split(',').map(|field| number(row, field)).collect()).collect()
 }
 
-/// The lines that are not empty, with their numbers from 1.
+/// Returns the lines that are not empty, with line numbers from 1.
 fn rows_of(text: &str) -> Vec<(usize, &str)> {
     text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(|(number, line)| (number + 1, line)).collect()
 }
 
-/// The graph that a text is of that number of peers.
+/// Reads the graph of `peers` peers from a text of weights. Faults have the span of the wrong field, of the wrong row, or of the end of the text.
 pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fault> {
     let rows = read_weights(text)?;
     let lines = rows_of(text);
@@ -270,6 +280,7 @@ pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fau
     }
     Topology::graph(&rows).map(Arc::new).map_err(|WeightsError { row, column, message }| {
         let line = at(row);
+        // Sum of the lengths of the fields before `column`, each with its comma.
         let before = |column: usize| text[line.clone()].split(',').take(column).map(|field| field.len() + 1).sum::<usize>();
         let span = column.map_or_else(
             || line.clone(),
@@ -283,7 +294,7 @@ pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fau
 }
 
 impl Scene {
-    /// The links that there are, by sender, then receiver.
+    /// Iterates over the links of the scene (sender, receiver), by sender, then receiver.
     pub fn linked_pairs(&self) -> Box<dyn Iterator<Item = (usize, usize)> + '_> {
         match &self.topology {
             Some(topology) => Box::new(topology.pairs()),
@@ -291,19 +302,20 @@ impl Scene {
         }
     }
 
-    /// How many links there are.
+    /// Returns the number of links of the scene.
     #[must_use]
     pub fn link_count(&self) -> u64 {
         let peers = self.peers.len() as u64;
         self.topology.as_ref().map_or(peers * (peers - 1), |topology| topology.links() as u64)
     }
 
-    /// The configurations of the links that there are, and how many have each: at least one.
+    /// Returns the configurations of the links of the scene, each with the number of links that have it, which is at least one.
     #[must_use]
     pub fn used_links(&self) -> Vec<(&Arc<LinkModel>, u64)> {
         let Some(topology) = &self.topology else { return self.links.used().collect() };
         let configs = self.links.configs();
         let mut counts = vec![0; configs.len()];
+        // With one configuration for all links, the links need not be counted one by one.
         if self.links.is_uniform() {
             counts[0] = topology.links() as u64;
         } else {
@@ -312,17 +324,20 @@ impl Scene {
         configs.iter().zip(counts).filter(|(_, count)| *count > 0).collect()
     }
 
-    /// The scene with all peers sending to all, over links as they have them now if all are alike.
+    /// Returns the scene without its topology: all peers send to all. If all links of the topology have one configuration, all links of the returned scene
+    /// have it; otherwise the table of links stays as it is.
     #[must_use]
     pub fn without_topology(&self) -> Self {
         let links = match self.used_links().as_slice() {
+            // The table may hold other configurations for pairs that are not neighbours. Those pairs become linked, and must not get links that the scene
+            // never used.
             [(only, _)] if !self.links.is_uniform() => LinkTable::new(self.peers.len(), Arc::clone(only), []),
             _ => self.links.clone(),
         };
         Self { topology: None, links, ..self.clone() }
     }
 
-    /// Why the scene cannot have its topology; `None` if it can.
+    /// Returns why the scene cannot have its topology or its relay; `None` if it can.
     pub(crate) fn refused_topology(&self) -> Option<String> {
         let strategy = self.coordination.strategy;
         if self.relay && (self.sample_kind().is_personal() || strategy == Coordination::ClientServer) {
@@ -332,6 +347,7 @@ impl Scene {
             ));
         }
         self.topology.as_ref()?;
+        // Only a law follows a mean of the peers that are heard. Every other strategy needs all peers.
         if self.law(0).is_none() {
             return Some(format!(
                 "the strategy {} has every peer hear every other: expected kind = \"full\", or a strategy that follows the mean of what it hears",
@@ -343,13 +359,14 @@ impl Scene {
             .then(|| "an object that turns is followed only where all peers send to all: expected kind = \"full\", or no object.inertia".to_owned())
     }
 
-    /// What the gains of a peer are multiplied by where they count once for each peer that it hears.
+    /// Returns the number by which a sum over heard peers multiplies the gains of a peer: the sum of the weights of its neighbours, or N − 1 without a
+    /// topology.
     #[must_use]
     pub(crate) fn heard_by(&self, peer: usize) -> f64 {
         self.topology.as_ref().map_or_else(|| crate::assembly::count(self.number() - 1), |topology| topology.degree(peer))
     }
 
-    /// Whether the gains of peers depend on what they hear, and so differ from peer to peer.
+    /// Returns true if the gains of peers depend on the peers that each peer hears, and so differ from peer to peer.
     #[must_use]
     pub fn has_gains_by_peer(&self) -> bool {
         let sums = [self.coordination.strategy.pull(), self.coordination.pull].contains(&Pull::Sum);
@@ -382,7 +399,7 @@ mod tests {
         assert_eq!((Topology::star(4, 4), Topology::star(1, 0)), (None, None));
     }
 
-    /// Weights 1 and 3 are 0.5 and 1.5 times their mean; equal ones are no weights.
+    /// Weights 1 and 3 are 0.5 and 1.5 times their mean. A single weight equals its mean, so that it counts as no weight.
     #[test]
     fn weights_count_over_their_mean() {
         let graph = Topology::graph(&[vec![0.0, 1.0, 3.0], vec![1.0, 0.0, 0.0], vec![3.0, 0.0, 0.0]]).unwrap();
