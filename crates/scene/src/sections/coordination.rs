@@ -1,4 +1,4 @@
-//! `[coordination]`, and its changes in the timeline.
+//! Reader of `[coordination]`, and of its changes in the timeline.
 
 use std::sync::LazyLock;
 
@@ -55,11 +55,11 @@ const STRATEGIES: Choices<Coordination, { Coordination::ALL.len() }> = {
 const PULLS: Choices<Pull, 2> =
     [("mean", Pull::Mean, "once"), ("sum", Pull::Sum, "times N-1 among N peers; average-position is proportional-derivative then")];
 pub(super) const SCALING: Form = Form::Words(const { &words(&SCALINGS) });
-/// How gains follow the number of peers.
+/// Rules by which gains follow the number of peers.
 pub(super) const SCALINGS: Choices<Scaling, 2> =
     [("none", Scaling::None, "as they are written"), ("inverse-n", Scaling::InverseN, "times 4(N-1)/N^2 among N peers; of a coupling times 2/N")];
 
-/// What the timeline changes at every peer.
+/// Keys of `coordination` in an entry of the timeline.
 pub(super) static CHANGES: Table = Table::of(&[&[
     optional("stiffness", number(STIFFNESS), "Gain on the difference of positions; without it as it was"),
     optional("damping", number(DAMPING), "Gain on the difference of velocities; without it as it was"),
@@ -70,7 +70,7 @@ pub(super) static CHANGES: Table = Table::of(&[&[
 .and(|| &CHANGING_LAWS);
 static CHANGING_LAWS: LazyLock<Vec<Key>> = LazyLock::new(|| law_keys(true));
 
-/// A key for each strategy with parameters of its own: a table of all parameters, or of those that the timeline may change.
+/// Returns a key for each strategy with own parameters: its table of all parameters or, with `changing`, of the parameters that the timeline may change.
 fn law_keys(changing: bool) -> Vec<Key> {
     let key_of = |parameter: &LawParameter| match (changing, parameter.default) {
         (true, _) => optional(parameter.key, form_of(parameter.form.without_automatic()), "From then on"),
@@ -79,7 +79,7 @@ fn law_keys(changing: bool) -> Vec<Key> {
     };
     let table_of = |law: &Coordination| {
         let keys: Vec<Key> = law.parameters().iter().filter(|parameter| !changing || parameter.can_change).map(key_of).collect();
-        // Declarations live as long as the program; these are made once.
+        // Declarations are `'static`. The two callers are `LazyLock`s, so that each of them leaks its declarations once.
         let groups: &'static [&'static [Key]] = vec![&*keys.leak()].leak();
         (!groups[0].is_empty()).then(|| optional(law.name(), Form::Table(Box::leak(Box::new(Table::of(groups)))), "Own parameters"))
     };
@@ -100,9 +100,10 @@ const fn form_of(form: LawForm) -> Form {
     }
 }
 
-/// `[coordination]`: the controller, and the gains on turns as written.
+/// Reads `[coordination]`: the controller, and the gains of rotations as written. `None` after a fault.
 pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<(CoordinationSpec, Gains<Option<Triple>>)> {
     let mut table = TableReader::new(node, context, &COORDINATION, "a table such as [coordination]")?;
+    // Short names, such as PD, are accepted beside the names in the catalogue.
     let strategy = table.read("strategy", |node, context| {
         let short = node.as_text().and_then(Coordination::named).filter(|strategy| strategy.short_name() == node.as_text());
         short.or_else(|| values::word(node, context, &STRATEGIES))
@@ -126,12 +127,13 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<(Co
     Some((spec, Gains { stiffness: stiffness_of_turns?, damping: damping_of_turns? }))
 }
 
-/// `send-when`.
+/// Reads `send-when`. `None` after a fault.
 fn read_send_when(node: &Node, context: Context<'_>) -> Option<SendWhen> {
     const EXPECTED: &str = "a table such as { velocity = \"10%\", position = 0.0005, heartbeat = \"1s\" }";
     let mut table = TableReader::new(node, context, &SEND_WHEN, EXPECTED)?;
     let velocity = table.maybe("velocity", |node, context| {
         let part = values::probability(node, context)?;
+        // A peer that stops differs from the velocity sent last by all of this velocity, so that no larger difference can be asked for.
         if part.get() >= 1.0 {
             context.fault_at(node, "with a dead band of 100% a peer that stops is not heard of: expected less than 100%");
             return None;
@@ -148,11 +150,13 @@ fn read_send_when(node: &Node, context: Context<'_>) -> Option<SendWhen> {
     Some(SendWhen { velocity: velocity?, position: position?, heartbeat: heartbeat? })
 }
 
-/// The tables `[coordination.NAME]`, each with the parameters that a strategy has of its own. They may stand there whatever the strategy of the scene is.
+/// Reads the tables `[coordination.NAME]` of own parameters of strategies. A table may be given whatever the strategy of the scene is, so that a scene can be
+/// run with several strategies.
 fn read_settings(coordination: &mut TableReader<'_>) -> Option<LawSettings> {
     let mut settings = LawSettings::default();
     let mut is_read = true;
     for law in Coordination::ALL.iter().copied().filter(|law| !law.parameters().is_empty()) {
+        // `None` is a fault. The loop goes on, so that the faults of all tables are reported.
         let values = coordination.maybe(law.name(), |node, context| read_values(node, context, law));
         is_read &= values.is_some();
         if let Some(Some(values)) = values {
@@ -178,10 +182,10 @@ fn read_values(node: &Node, context: Context<'_>, law: Coordination) -> Option<L
     is_read.then_some(values)
 }
 
-/// A parameter that changes: of which strategy, its place among those of the strategy, and its value.
+/// A changed parameter: its strategy, its index among the parameters of the strategy, and the new value.
 pub(super) type ParameterChange = (Coordination, usize, LawValue);
 
-/// The tables of strategies in an entry of the timeline, each with the parameters that change.
+/// Reads the tables of strategies in an entry of the timeline. Returns the parameters that change.
 fn read_parameter_changes(coordination: &mut TableReader<'_>) -> Option<Vec<ParameterChange>> {
     let (mut changes, mut is_read) = (Vec::new(), true);
     for law in Coordination::ALL.iter().copied().filter(|law| law.parameters().iter().any(|parameter| parameter.can_change)) {
@@ -208,6 +212,7 @@ fn read_changes(node: &Node, law: Coordination, changes: &mut Vec<ParameterChang
 }
 
 fn read_change(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawValue> {
+    // Without this branch the message would ask for a value, and not say why "auto" is refused.
     if form != form.without_automatic() && node.as_text() == Some("auto") {
         context.fault_at(node, "\"auto\" is computed once, from the links at the beginning: expected a value");
         return None;
@@ -238,7 +243,7 @@ fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawVal
     }
 }
 
-/// What an entry of the timeline changes at every peer.
+/// Changes of the coordination at every peer, from one entry of the timeline. A gain that is `None` stays as it was.
 #[derive(Debug)]
 pub(super) struct CoordinationChanges {
     pub(super) gains: Gains<Option<f64>>,

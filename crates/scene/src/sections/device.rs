@@ -1,4 +1,4 @@
-//! `device`, `coupling`, `contact` and `clock` of a peer.
+//! Readers of `device`, `coupling`, `contact` and `clock` of a peer.
 
 use core::time::Duration;
 
@@ -51,7 +51,7 @@ const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number
 
 pub(super) const A_COUPLING: &str = "a table such as { stiffness = 3500.0, damping = 5.0 }";
 
-/// A contact.
+/// Reads a contact. `None` after a fault.
 pub(super) fn read_contact(node: &Node, context: SceneContext<'_>) -> Option<Contact> {
     const EXPECTED: &str = "\"grasp\", \"none\" or { push = \"+x\" }";
     if let Some(text) = node.as_text() {
@@ -76,7 +76,7 @@ fn read_direction(node: &Node, context: SceneContext<'_>) -> Option<Direction> {
     Some(direction)
 }
 
-/// A device, and how it turns if it does.
+/// Reads a device and its rotational part; `Some((_, None))` for a device that does not turn.
 pub(super) fn read_device(node: &Node, context: Context<'_>, expected: &str) -> Option<(DeviceConfig, Option<Spin>)> {
     let mut table = TableReader::new(node, context, &DEVICE, expected)?;
     let (mass, damping) = (table.value("mass"), table.value("damping"));
@@ -85,7 +85,7 @@ pub(super) fn read_device(node: &Node, context: Context<'_>, expected: &str) -> 
     Some((DeviceConfig { mass: mass?, damping: damping? }, turned?))
 }
 
-/// A coupling, how it is scaled, and how it turns if it does.
+/// Reads a coupling: its gains, their scaling, and its rotational gains if it has any.
 pub(super) fn read_coupling(node: &Node, context: Context<'_>) -> Option<(Gains, Scaling, Option<Gains>)> {
     let mut table = TableReader::new(node, context, &COUPLING, A_COUPLING)?;
     let (stiffness, damping) = (table.value("stiffness"), table.value("damping"));
@@ -102,7 +102,7 @@ pub(super) fn read_clock(node: &Node, context: Context<'_>) -> Option<(Duration,
     Some((offset?, drift?))
 }
 
-/// A drift: a number, or text in parts per million.
+/// Reads a drift: a number in seconds gained per second, or a text in parts per million.
 fn read_drift(node: &Node, context: Context<'_>) -> Option<Drift> {
     const EXPECTED: &str = "a drift such as \"20ppm\" or \"-20ppm\", or a number, seconds gained in a second";
     let fraction = match &node.value {
@@ -122,8 +122,9 @@ fn read_drift(node: &Node, context: Context<'_>) -> Option<Drift> {
 
 fn parts_per_million(text: &str) -> Option<f64> {
     let number = text.trim().strip_suffix("ppm")?.trim_end();
+    // A text of digits, at most with a sign and points. Forms such as 1e3 or inf, which `parse` would accept, are refused.
     let digits = number.strip_prefix(['+', '-']).unwrap_or(number);
     let plain = digits.starts_with(|c: char| c.is_ascii_digit()) && digits.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
-    // Divided, not multiplied: 20 / 1e6 is the double nearest to 0.00002.
+    // A quotient, because 20 / 1e6 is the double nearest to 0.00002, and 20 * 1e-6 need not be.
     plain.then(|| number.parse::<f64>().ok()).flatten().map(|millionths| millionths / 1e6)
 }

@@ -1,4 +1,4 @@
-//! `[expect]`: what must come out.
+//! Reader of `[expect]`: the results that a run must have.
 
 use core::time::Duration;
 
@@ -71,7 +71,7 @@ const CAUSES: Choices<DropCause, { DropCause::ALL.len() }> = {
     causes
 };
 
-/// Reads the expectations. `duration` and `peers` are `None` where they were refused; `has_probe` says whether the impedance of a hand is measured.
+/// Reads the expectations. `duration` and `peers` are `None` if they were refused. `has_probe` is true if the scene measures the impedance of a hand.
 pub(crate) fn read_expect(
     node: &Node,
     duration: Option<Duration>,
@@ -104,9 +104,10 @@ pub(crate) fn read_expect(
     })
 }
 
-/// Reads every table of a list, also after one that was refused; without the list none.
+/// Reads every table of a list, also after a refused table, so that every fault is reported. An empty vector without the list; `None` after a fault.
 fn each<T>(table: &mut TableReader<'_>, key: &'static str, read: impl Fn(&Node) -> Option<T>) -> Option<Vec<T>> {
     let entries = table.maybe(key, |node, context| values::list(node, context, "a list of tables"))?.unwrap_or_default();
+    // Two steps: collecting into an `Option` directly would stop at the first `None`.
     let read: Vec<Option<T>> = entries.into_iter().map(read).collect();
     read.into_iter().collect()
 }
@@ -175,14 +176,14 @@ fn read_delay(node: &Node, peers: Option<&[PeerSpec]>, context: Context<'_>) -> 
 fn read_measure(node: &Node, has_probe: bool, context: Context<'_>) -> Option<ExpectMeasure> {
     let mut table = TableReader::new(node, context, &MEASURE, "a table such as { name = \"energy_j\", max = 0.01 }")?;
     let name = table.read("name", |node, context| read_measure_name(node, has_probe, context));
-    // The unit of the bounds is that of the measure.
+    // Bounds have the unit of the measure. After a fault in the name the unit does not matter.
     let quantity = Quantity::any(name.map_or("", |name| name.measure.unit()));
     let ends = read_ends(&mut table, node, context, |table, key| table.maybe(key, |node, context| quantity.read(node, context)));
     table.finish();
     Some(ExpectMeasure { name: name?, bounds: bounds(ends)? })
 }
 
-/// A link or an access line that the scene has: nothing can be expected of a line that is not there.
+/// Reads a link or an access line that the scene has. A line that the scene does not have is a fault, because nothing passes it.
 fn read_existing_link(node: &Node, peers: Option<&[PeerSpec]>, context: Context<'_>) -> Option<LinkSelector> {
     let link = read_link_or_line(node, context)?;
     let (peer, line, there) = match link {
@@ -201,7 +202,7 @@ fn bounds(ends: Option<(Option<f64>, Option<f64>)>) -> Option<Bounds> {
     ends.map(|(min, max)| Bounds { min, max })
 }
 
-/// `min` and `max`: at least one of them, and not the wrong way round.
+/// Reads `min` and `max`. A fault if both are absent, or if `max` is below `min`.
 fn read_ends<'a, T: PartialOrd>(
     table: &mut TableReader<'a>,
     node: &Node,

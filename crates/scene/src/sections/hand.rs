@@ -1,4 +1,4 @@
-//! What a hand does: `hand` of a peer.
+//! Reader of `hand` of a peer: the force or the arm of a hand.
 
 use std::time::Duration;
 
@@ -45,7 +45,7 @@ static FOLLOWS: Table = Table::of(&[&[
 
 const EXPECTED: &str = "\"none\", { force = … }, { sine = … }, { file = … } or { arm = …, follows = … }";
 
-/// A hand; `Some(None)` for "none".
+/// Reads a hand; `Some(None)` for "none". `None` after a fault.
 pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option<Hand>> {
     match node.as_text() {
         Some("none") => return Some(None),
@@ -63,6 +63,7 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     let follows = table.entry("follows");
     let torque = table.entry("torque");
     table.finish();
+    // A torque alone is a hand without a force. `read_hand_torque` reads the torque.
     if torque.is_some() && [force, sine, file, arm].iter().all(Option::is_none) {
         return Some(None);
     }
@@ -88,18 +89,18 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     Some(Some(Hand::Force(signal)))
 }
 
-/// The vector under a key of that table.
+/// Reads the vector of an entry of the table that `declaration` declares.
 fn constant(declaration: &Table, entry: &Entry, context: SceneContext<'_>) -> Option<[f64; 3]> {
     read_vector(declaration.key(&entry.name)?.quantity(), &entry.node, context, Spread::Refused)
 }
 
-/// The torque of a hand; `Some(None)` without one.
+/// Reads the torque of a hand; `Some(None)` for a hand without a torque. `None` after a fault.
 pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option<Option<Signal>> {
     let Some(table) = hand.as_table() else { return Some(None) };
     let within = |key: &str| table.get(key).filter(|entry| entry.node.as_table().is_some());
     let sine = within("sine").and_then(|sine| Some((&sine.node, sine.node.as_table()?.get("torque")?)));
     let file = |table: Option<&DocumentTable>, columns: Columns| {
-        // Faults of a file are those of its other columns.
+        // `read_hand` reads the same file and reports its faults. Here, a file with a fault has no torque.
         let torque = table.and_then(|table| table.get("file")).and_then(|file| read_motion_file(&file.node, context, columns)?.torque);
         torque.map(Signal::Table)
     };
@@ -116,14 +117,14 @@ pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option
     }
     let Some((sine, torque)) = sine else { return Some(file) };
     let amplitude = constant(&FORCE_SINE, torque, context);
-    // Faults of these two are those of the force, and so are missing and unknown keys: the table is not finished.
+    // `read_hand` reports faults of these two keys, and missing and unknown keys. So this table is not finished.
     let mut table = TableReader::new(sine, *context, &FORCE_SINE, EXPECTED)?;
     let (frequency, phase): (Option<f64>, _) = (table.value("frequency"), table.value("phase"));
     Some(Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency?), phase: phase? }))
 }
 
-/// Refuses a sine that the ticks of its peer cannot show, and returns whether the hand has none. A hand is computed once a tick, so that at half the rate of ticks
-/// and above its values are those of a slower sine, or all zero (Shannon 1949).
+/// Returns false after a fault if the hand has a sine that the ticks of its peer cannot sample, otherwise true. A hand is computed once per tick, so that a
+/// sine of half the rate of ticks or faster has the values of a slower sine, or zeros alone (Shannon 1949).
 pub(crate) fn hand_is_sampled(hand: Option<&Hand>, tick: Duration, node: &Node, context: Context<'_>) -> bool {
     let (signal, path): (&Signal, &[&str]) = match hand {
         Some(Hand::Force(signal)) => (signal, &["sine", "frequency"]),
@@ -167,9 +168,10 @@ fn read_follows(node: &Node, context: SceneContext<'_>) -> Option<Signal> {
     }
 }
 
-/// A sine. The torque of one is read by [`read_hand_torque`].
+/// Reads a sine. [`read_hand_torque`] reads its torque.
 fn read_sine(node: &Node, context: SceneContext<'_>, declaration: &'static Table) -> Option<Signal> {
     let mut table = TableReader::new(node, *context, declaration, "a table such as { amplitude = 2.0, frequency = 0.7, phase = 0.0 }")?;
+    // Marks the key as known, so that `finish` does not refuse it.
     if declaration.key("torque").is_some() {
         table.get("torque");
     }

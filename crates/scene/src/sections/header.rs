@@ -1,4 +1,4 @@
-//! `[scene]` and `[simulation]`.
+//! Readers of `[scene]` and `[simulation]`.
 
 use core::time::Duration;
 
@@ -15,7 +15,7 @@ pub(crate) static SCENE: Table = Table::of(&[&[
     required("duration", Form::PositiveDuration, "How long the scene lasts, above zero").expecting("a duration above zero such as \"7s\""),
     usual("seed", Form::Integer(0, MOST), "0", "Seed of all random numbers"),
     usual("axes", Form::Integer(1, 3), "1", "How many translational axes: x, then y, then z").expecting("a number of axes: 1, 2 or 3"),
-    // A slip of the finger must not take all memory: each peer takes about two kilobytes.
+    // Bounds the memory, so that a mistyped count does not exhaust it: each peer takes about two kilobytes.
     optional(
         "count",
         Form::Integer(2, 1_000_000),
@@ -27,7 +27,7 @@ pub(crate) static SCENE: Table = Table::of(&[&[
 pub(crate) static SIMULATION: Table = Table::of(&[&[
     usual("integrator", Form::Words(const { &words(&INTEGRATORS) }), "\"exact\"", "How motion between ticks is computed"),
     usual("substeps", Form::Integer(1, u32::MAX as u64), "1", "Steps a tick; not with exact").expecting(STEPS),
-    // A tick may not take for ever.
+    // Bounds the computing time of a tick.
     usual("rotation-steps", Form::Integer(1, 10_000), "1", "Steps of a turn in a tick, times substeps").expecting(STEPS),
 ]]);
 const INTEGRATORS: Choices<Method, 3> = [
@@ -37,23 +37,23 @@ const INTEGRATORS: Choices<Method, 3> = [
 ];
 const STEPS: &str = "a number of steps a tick, {}";
 
-/// `[scene]`. A field is `None` where it was refused.
+/// Values of `[scene]`. A field is `None` if its value was refused.
 #[derive(Debug, Default)]
 pub(crate) struct Header {
-    /// `Some(None)`: not given.
+    /// `Some(None)` if the scene has no title.
     pub(crate) title: Option<Option<String>>,
     pub(crate) duration: Option<Duration>,
     pub(crate) seed: Option<u64>,
     pub(crate) axes: Option<Axes>,
-    /// `Some(None)`: not given.
+    /// `Some(None)` if the scene has no count.
     pub(crate) count: Option<Option<u64>>,
 }
 
-/// `[simulation]`.
+/// Values of `[simulation]`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Stepping {
     pub(crate) integrator: Integrator,
-    /// Steps a tick of what turns.
+    /// Steps of the rotation per tick, multiplied by the substeps of the integrator.
     pub(crate) rotation_steps: u32,
 }
 
@@ -71,7 +71,7 @@ pub(crate) fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
     Some(Header { title, duration, seed, axes, count })
 }
 
-/// `[simulation]`.
+/// Reads `[simulation]`. `None` after a fault.
 pub(crate) fn read_stepping(node: &Node, context: Context<'_>) -> Option<Stepping> {
     const NO_STEPS: &str = "the integrator \"exact\" takes no substeps: expected no such key, or \"semi-implicit-euler\" or \"rk4\"";
     let mut table = TableReader::new(node, context, &SIMULATION, "a table such as [simulation]")?;

@@ -1,4 +1,4 @@
-//! Where a peer lives: `kind`, `silence`, `falcon` and `pointer` of a peer.
+//! Readers of `kind`, `silence`, `falcon` and `pointer` of a peer: the place where the peer runs.
 
 use cohaptic_linkfile::document::{Node, quote};
 use cohaptic_linkfile::reading::values::ReadNumber as _;
@@ -10,10 +10,10 @@ use cohaptic_units::print::Counted;
 use crate::model::{FalconDevice, FalconSpec, PeerKind, PointerSpec, Silence};
 use crate::quantities::{DAMPING, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS};
 
-/// The model of a Falcon in Rakhsha & Constantinescu (2015): for virtual time, and for the device that a pointer pulls.
+/// Model of a Falcon in Rakhsha & Constantinescu (2015): mass 0.1 kg, damping 5 N·s/m. For virtual time, and for the device that a pointer pulls.
 pub(crate) const FALCON_DEVICE: DeviceConfig = DeviceConfig { mass: 0.1, damping: 5.0 };
 
-/// What a peer has that lives elsewhere and was given no device: something that nobody moves and that touches nothing.
+/// Device of a peer that runs elsewhere and was given no device. Nobody moves this device, and it touches nothing.
 pub(crate) const STILL_DEVICE: DeviceConfig = DeviceConfig { mass: 1.0, damping: 0.0 };
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -35,14 +35,16 @@ pub(super) static SILENCE: Table = Table::of(&[&[
     usual("after", Form::PositiveDuration, "\"100ms\"", "After how long a silence the pull fades"),
     usual("fade", Form::PositiveDuration, "\"250ms\"", "How long that takes"),
 ]]);
-/// With the device of a Falcon nearly without overshoot, and no stronger than an adult's wrist.
+/// Keys of a pointer. With the defaults the device of a Falcon follows nearly without overshoot, and the largest force is no greater than that of an adult's
+/// wrist.
 pub(super) static POINTER: Table = Table::of(&[&[
     usual("stiffness", number(STIFFNESS), "400", "Stiffness of the arm between pointer and device"),
     usual("damping", number(DAMPING), "20", "Its damping"),
     usual("force-limit", number(POSITIVE_FORCE), "20", "The arm pulls with no greater force"),
     usual("held", Form::Boolean, "false", "Whether the pointer holds the device from the beginning"),
 ]]);
-/// With 10,000 counts full scale is about what the maker names; 4 N are half of what the device is said to give; the origin is the middle of the workspace.
+/// Keys of a Falcon. With 10,000 counts per newton metre, full scale is about the force that the maker names. The limit of 4 N is half of the force that the
+/// device is said to give. The origin is the middle of the workspace.
 pub(super) static FALCON: Table = Table::of(&[&[
     usual("device", Form::Like(&["first", "simulated"]), "\"first\"", "The first that no other peer has, one that is simulated, or a serial number"),
     usual("counts-per-newton-metre", number(POSITIVE_COUNTS), "10000", "Motor counts for a torque at the joint of an arm"),
@@ -68,12 +70,13 @@ impl Default for FalconSpec {
     }
 }
 
-/// Reads the four keys. All but `kind` may come from `[peer]` and say nothing to a peer of another kind; they are checked all the same.
+/// Reads the four keys. All but `kind` may come from `[peer]`: they are checked for every peer, and have no effect on a peer of another kind.
 pub(crate) fn read_kind(table: &mut TableReader<'_>) -> Option<PeerKind> {
     let word = table.choice("kind", &KINDS);
     let silence = table.table("silence", read_silence);
     let falcon = table.table("falcon", read_falcon);
     let pointer = table.table("pointer", read_pointer);
+    // All three are read before the first `?`, so that the faults of all tables are reported.
     let (silence, falcon, pointer) = (silence?, falcon?, pointer?);
     Some(match word? {
         Word::Simulated => PeerKind::Simulated,
@@ -121,7 +124,7 @@ fn read_device(node: &Node, context: Context<'_>) -> Option<FalconDevice> {
     }
 }
 
-/// A device has three axes, however many the scene has.
+/// Reads the origin of a device: three numbers, because a device has three axes, however many the scene has.
 fn read_origin(node: &Node, context: Context<'_>) -> Option<[f64; 3]> {
     const EXPECTED: &str = "a list of three numbers [m], a place in the coordinates of the device";
     let elements = values::list(node, context, EXPECTED)?;

@@ -1,4 +1,4 @@
-//! `[measure]`: what a run is summed up by.
+//! Reader of `[measure]`: the measures of a run and their settings.
 
 use cohaptic_linkfile::document::{Node, Value, quote};
 use cohaptic_linkfile::mesh::read_peer_name;
@@ -25,7 +25,7 @@ static TRAVEL: Table = Table::of(&[&[
 static PROBE: Table = Table::of(&[&[
     required("peer", Form::Text, "The name of a peer whose hand is a sine from the beginning to the end").expecting("the name of a peer")
 ]]);
-/// Words for the measures of a run, and an example for those of a peer.
+/// Words for the measures of the run as a whole, and an example for the measures of a peer.
 pub(super) const MEASURE_NAME_FORM: Form = Form::AnyOf(&[Form::Words(&MEASURES), Form::Like(&["peers.left.energy_j"])]);
 static MEASURE_NAME: Form = MEASURE_NAME_FORM;
 const MEASURES_OF_RUN: usize = {
@@ -52,7 +52,7 @@ const MEASURES: [(&str, &str); MEASURES_OF_RUN] = {
 };
 
 impl Default for MeasureSettings {
-    /// Those of a scene that does not say them: the first peer's copy along x over 20 mm, a band of 1 mm, no probe.
+    /// Returns the settings of a scene without `[measure]`: the copy of the first peer, 20 mm along x; a band of 1 mm; no probe.
     fn default() -> Self {
         defaults(|node, file| {
             let context = SceneContext { file, axes: Some(Axes::One), live: false, turns: false };
@@ -61,7 +61,7 @@ impl Default for MeasureSettings {
     }
 }
 
-/// The parts of the scene that measures are about. Each is `None` if it was refused.
+/// Parts of the scene that measures refer to. Each is `None` if it was refused.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measured<'a> {
     pub(crate) peers: Option<&'a [PeerSpec]>,
@@ -73,6 +73,7 @@ pub(crate) fn read_measure(node: &Node, of: Measured<'_>, context: SceneContext<
     let travel = table.table("travel", |node, _| read_travel(node, context));
     let band = table.value("band");
     let probe = table.maybe("probe", |node, _| read_probe(node, of, context));
+    // A refused probe counts as a probe, so that measures that need a probe are not refused for a second reason.
     let names = table.read("names", |node, context| read_names(node, probe.is_none_or(|probe| probe.is_some()), context));
     table.finish();
     let names = match names? {
@@ -82,7 +83,7 @@ pub(crate) fn read_measure(node: &Node, of: Measured<'_>, context: SceneContext<
     Some(MeasureSpec { names, settings: MeasureSettings { travel: travel?, band: band?, probe: probe? } })
 }
 
-/// `Some(None)`: all.
+/// Reads the names of measures, sorted and without duplicates; `Some(None)` for all measures. `None` after a fault.
 fn read_names(node: &Node, has_probe: bool, context: Context<'_>) -> Option<Option<Vec<MeasureName>>> {
     const EXPECTED: &str = "\"all\" or a list of names such as [\"energy_j\", \"travel_s\"]";
     match &node.value {
@@ -105,7 +106,7 @@ fn read_names(node: &Node, has_probe: bool, context: Context<'_>) -> Option<Opti
     Some(Some(names))
 }
 
-/// A measure that the scene has.
+/// Reads the name of a measure that the scene has. `has_probe` is true if the scene has a probe, which some measures need.
 pub(crate) fn read_measure_name(node: &Node, has_probe: bool, context: Context<'_>) -> Option<MeasureName> {
     let text = values::text(node, context, "the name of a measure such as \"energy_j\"")?;
     let of_run = Measure::ALL.iter().find(|measure| measure.scope() == Scope::Run && measure.name() == text);
@@ -128,7 +129,7 @@ pub(crate) fn read_measure_name(node: &Node, has_probe: bool, context: Context<'
         context.fault_at(node, format!("unknown measure {}: expected {}", quote(text), one_of(names, text)));
         return None;
     };
-    // Without the list of peers, the fault is there.
+    // No names: a fault of a name of a peer was reported already.
     let peers = context.names?;
     let place = peers.index(peer);
     if place.is_none() {
@@ -147,7 +148,7 @@ fn read_travel(node: &Node, context: SceneContext<'_>) -> Option<MeasureTravel> 
     Some(MeasureTravel { peer: peer?.unwrap_or(0), distance: distance?, axis: axis? })
 }
 
-/// A peer whose hand pushes with one sine from the beginning to the end.
+/// Reads a probe: a peer whose hand pushes with one sine during the whole scene. Returns its index.
 fn read_probe(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Option<usize> {
     const EXPECTED: &str = "a peer with hand = { sine = { amplitude, frequency } } above 0 Hz";
     let mut table = TableReader::new(node, *context, &PROBE, "a table such as { peer = \"left\" }")?;

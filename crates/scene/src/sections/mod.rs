@@ -1,4 +1,4 @@
-//! The parts of a scene file, each read by a function of its own.
+//! Readers of the parts of a scene file, one function for each part.
 
 mod coordination;
 mod device;
@@ -26,5 +26,5 @@ pub(crate) use rotation::{refuse_rotational_keys, rotation};
 pub(crate) use timeline::{TIMELINE, read_timeline};
 pub(crate) use topology::{TOPOLOGY, Ways, read_topology, refuse_unlinked};
 
-/// The largest integer of TOML.
+/// Largest integer of TOML.
 const MOST: u64 = i64::MAX.unsigned_abs();

@@ -1,4 +1,4 @@
-//! Files of recorded motion or force, with torques beside them or not: rows of comma-separated numbers, the time first.
+//! Reader of files of recorded motions or forces, with or without torques: rows of comma-separated numbers, the time first.
 
 use core::ops::Range;
 use std::sync::Arc;
@@ -11,12 +11,12 @@ use cohaptic_units::{Instant, parse};
 
 use crate::context::SceneContext;
 
-/// What the columns after the time hold.
+/// Quantity in the columns after the time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Columns {
-    /// fx, fy, fz \[N\].
+    /// Columns fx, fy, fz \[N\].
     Force,
-    /// x, y, z \[m\].
+    /// Columns x, y, z \[m\].
     Position,
 }
 
@@ -30,15 +30,15 @@ impl Columns {
     }
 }
 
-/// The columns of a torque in world axes \[N·m\], behind all others.
+/// Columns of a torque in world axes \[N·m\], after all other columns.
 const TORQUE: [&str; 3] = ["tx", "ty", "tz"];
 
-/// What a file holds.
+/// Content of a file.
 #[derive(Clone, Debug)]
 pub(crate) struct Recorded {
-    /// Force or position, as asked for.
+    /// Force \[N\] or position \[m\], as the caller asked.
     pub(crate) motion: Arc<MotionTable>,
-    /// The torque beside it in world axes \[N·m\], if the file has these columns.
+    /// Torque in world axes \[N·m\]; `None` if the file has no such columns.
     pub(crate) torque: Option<Arc<MotionTable>>,
 }
 
@@ -46,7 +46,7 @@ pub(crate) struct Recorded {
 pub(crate) fn read_motion_file(node: &Node, context: SceneContext<'_>, columns: Columns) -> Option<Recorded> {
     let path = file_path(node, *context, "the name of a CSV file, relative to the folder of the scene")?;
     let header = columns.header(context.axes?.count());
-    // The same file with other columns is another matter, and is refused by its header.
+    // Files are kept by path and form. The same path with other columns must be parsed again, to be refused by its header.
     let form = format!("{}{}", header.join(","), if context.turns { " and torques" } else { "" });
     read_file(node, *context, &path, &form, |text| parse_rows(text, &header, context.turns))
 }
@@ -58,6 +58,7 @@ fn parse_rows(text: &str, motion: &[&str], turns: bool) -> Result<Recorded, Faul
     let (mut header, with_torque) = (motion, [motion, &TORQUE].concat());
     let columns = motion.join(",");
     for record in reader.records() {
+        // End of the last line that was read, for faults without a position of their own.
         let from = lines.last().map_or(0, |line| line.end);
         let record = record.map_err(|error| Fault { span: from..from, message: format!("{error}: expected the columns {columns}") })?;
         let at = record.position().and_then(|position| usize::try_from(position.byte()).ok()).unwrap_or(from);
@@ -69,6 +70,7 @@ fn parse_rows(text: &str, motion: &[&str], turns: bool) -> Result<Recorded, Faul
                     let message = format!("a torque needs an object that turns: expected object.inertia, or the columns {columns}");
                     return Err(fault(motion.len(), TORQUE[0], message));
                 }
+                // From here on a row has the columns of the torque too.
                 header = &with_torque;
             } else if record.iter().ne(motion.iter().copied()) {
                 let torques = if turns { format!(", or {}", with_torque.join(",")) } else { String::new() };
@@ -104,7 +106,7 @@ fn parse_rows(text: &str, motion: &[&str], turns: bool) -> Result<Recorded, Faul
 }
 
 fn table_fault(text: &str, lines: &[Range<usize>], error: &TableError) -> Fault {
-    // The header is the first line.
+    // Line 0 is the header, so that row `n` is line `n + 1`.
     let at = |row: usize| lines.get(row + 1).map_or(0..0, |line| field_at(text, line, 0));
     match error {
         TableError::NotLater { row, at: time, before } => {
@@ -118,7 +120,8 @@ fn table_fault(text: &str, lines: &[Range<usize>], error: &TableError) -> Fault 
     }
 }
 
-/// The line in which the record begins that is announced at that byte; empty lines before it belong to the announcement.
+/// Returns the span of the line in which a record begins, without the line end. `at` is the byte position that the CSV reader gives for the record. Line ends
+/// and empty lines at this position are skipped.
 fn line_at(text: &str, at: usize) -> Range<usize> {
     let bytes = text.as_bytes();
     let mut start = at.min(bytes.len());
@@ -129,7 +132,8 @@ fn line_at(text: &str, at: usize) -> Range<usize> {
     start..end
 }
 
-/// The field after this number of commas of a line, without the space around it.
+/// Returns the span of a field in a line, without the space around the field. `column` is the number of commas before the field. The whole line if there is
+/// no such field.
 fn field_at(text: &str, line: &Range<usize>, column: usize) -> Range<usize> {
     let mut start = line.start;
     let Some(content) = text.get(line.clone()) else { return line.clone() };
@@ -152,9 +156,10 @@ fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Seconds as an instant: read exactly as a decimal, also with an exponent, and rounded once.
+/// Reads seconds as an instant. The decimal number, also with an exponent, is read exactly and rounded once.
 fn seconds(text: &str) -> Result<Instant, String> {
     const EXPECTED: &str = "expected a time in seconds such as 0.25";
+    // Also refuses texts that are not numbers: below, only the notation is changed.
     let value = finite(text)?;
     if value < 0.0 {
         return Err(format!("{} is negative: {EXPECTED}", shorten(text)));
@@ -164,7 +169,7 @@ fn seconds(text: &str) -> Result<Instant, String> {
     Instant::ZERO.checked_add(span).ok_or_else(|| format!("{} is out of range: {EXPECTED}", shorten(text)))
 }
 
-/// Moves the decimal point to where the exponent says: `1.25e-1` is `0.125`. `None` beyond what any time in seconds needs.
+/// Returns the number without an exponent: `0.125` for `1.25e-1`. `None` for exponents beyond ±400, which no time in seconds needs.
 fn without_exponent(text: &str) -> Option<String> {
     let Some((mantissa, exponent)) = text.split_once(['e', 'E']) else { return Some(text.to_owned()) };
     let exponent: i64 = exponent.parse().ok().filter(|exponent| (-400..=400).contains(exponent))?;

@@ -1,4 +1,4 @@
-//! `[object]`: the shared virtual object.
+//! Reader of `[object]`: the shared virtual object.
 
 use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::reading::TableReader;
@@ -39,7 +39,7 @@ static ENCLOSURE: Table = Table::of(&[&[
 ]]);
 const ENDS: &str = "{}, or a list of one for each axis";
 
-/// The object, and how it turns if it does.
+/// Reads the object and its rotational part; `Some((_, None))` for an object that does not turn.
 pub(crate) fn read_object(node: &Node, context: SceneContext<'_>) -> Option<(ObjectSpec, Option<ObjectRotation>)> {
     let mut table = TableReader::new(node, *context, &OBJECT, "a table such as [object]")?;
     let (mass, damping, split_mass) = (table.value("mass"), table.value("damping"), table.value("split-mass"));
@@ -59,6 +59,7 @@ fn read_enclosure(node: &Node, context: SceneContext<'_>) -> Option<Enclosure> {
     let (stiffness, damping) = (table.value("stiffness"), table.value("damping"));
     table.finish();
     let (min, max) = (min?, max?);
+    // Components beyond the axes are zero in both ends, which is no fault.
     let axes = context.axes?.count();
     if let Some(axis) = (0..axes).find(|&axis| min[axis] >= max[axis]) {
         let name = ["x", "y", "z"][axis];

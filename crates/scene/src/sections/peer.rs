@@ -1,4 +1,4 @@
-//! The keys of a peer, its own laid over those of `[peer]`.
+//! Reader of the keys of a peer. Its own keys are laid over the keys of `[peer]` before they are read.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -21,9 +21,9 @@ use crate::context::SceneContext;
 use crate::model::{PeerKind, Scaling};
 use crate::quantities::{POSITION, RATE, Spread, VELOCITY, maybe_vector_of};
 
-/// The keys that hold for every peer which does not say otherwise.
+/// Keys of `[peer]`, which hold for every peer that does not give the key itself.
 pub(crate) static PEER: Table = Table::of(&[&KEYS]);
-/// The keys of one peer.
+/// Keys of an entry `[[peers]]`.
 pub(crate) static PEERS: Table =
     Table::over(&[&[required("name", Form::Text, "Its name: unique, not all, without space and without . > / , and quotes")], &KEYS]);
 const KEYS: [Key; 21] = [
@@ -51,12 +51,12 @@ const KEYS: [Key; 21] = [
     optional("pointer", Form::Table(&POINTER), "The arm through which a pointer pulls the device of a peer of kind pointer"),
 ];
 
-/// The keys whose tables are laid over each other key by key; every other key replaces the one below.
+/// Returns the keys whose tables are laid over each other key by key. Every other key replaces the key below as a whole.
 pub(crate) fn nested() -> Vec<&'static str> {
     KEYS.iter().filter(|key| matches!(key.form, Form::Table(_))).map(|key| key.name).collect()
 }
 
-/// What the keys of a peer say, without its name.
+/// Values of the keys of a peer, without its name.
 #[derive(Clone, Debug)]
 pub(crate) struct PeerKeys {
     pub(crate) kind: PeerKind,
@@ -76,8 +76,8 @@ pub(crate) struct PeerKeys {
     pub(crate) downlink: Option<Arc<LinkModel>>,
 }
 
-/// Reads the keys of a peer. `declaration` is [`PEER`], or [`PEERS`] with a name, which somebody else reads. `update`: the period of sending and where it is
-/// written.
+/// Reads the keys of a peer. `declaration` is [`PEER`], or [`PEERS`] for a node with a name, which the module `peers` reads. `update` is the period of
+/// sending and the node of the period. `None` after a fault.
 pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'static Table, update: Option<(Duration, &Node)>) -> Option<PeerKeys> {
     const A_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }";
     const UDP_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }, from which this peer of kind \"udp\", another process, can be simulated; \
@@ -94,6 +94,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     let phase = table.value("phase");
     let contact = table.read("contact", |node, _| read_contact(node, context));
     let device = table.maybe("device", |node, context| read_device(node, context, A_DEVICE));
+    // Device of a peer that was given none. A simulated peer needs a device, and so does another process in virtual time, where the peer is simulated.
     let absent = match &kind {
         None => None,
         Some(PeerKind::Simulated) => {
@@ -108,7 +109,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
         }
         Some(PeerKind::Falcon(..) | PeerKind::Pointer(..)) => Some(FALCON_DEVICE),
     };
-    // What lives elsewhere and has no device here touches nothing here.
+    // A peer that runs elsewhere and has no device here touches nothing here.
     let contact = if elsewhere && table.get("device").is_none() { Some(Contact::None) } else { contact };
     let coupling = table.maybe("coupling", read_coupling);
     let needs_coupling = contact.is_some_and(|contact| contact != Contact::None) && !(elsewhere && context.live);
@@ -125,6 +126,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     let [uplink, downlink] = ["uplink", "downlink"].map(|key| table.maybe(key, |node, context| read_link(node, context).map(Arc::new)));
     table.finish();
 
+    // Not for `[peer]` on its own: an entry may replace tick or phase.
     if let (Some(tick), Some((update, update_node)), false) = (tick, update, context.partial) {
         let Some(frame) = whole_multiple(update, tick) else {
             let message = format!("coordination.update, {}, is not a whole multiple of the tick, {}: expected one that is", Span(update), Span(tick));
@@ -170,7 +172,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     })
 }
 
-/// How many times `part` goes into `whole`, if it does without a rest and at least once.
+/// Returns `whole` / `part` if it is a whole number above zero.
 fn whole_multiple(whole: Duration, part: Duration) -> Option<u64> {
     let (whole, part) = (whole.as_nanos(), part.as_nanos());
     if part == 0 || whole % part != 0 {

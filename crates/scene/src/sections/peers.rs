@@ -1,4 +1,4 @@
-//! `[\[peers\]]` and `count`: the peers of the scene.
+//! Reader of `[\[peers\]]` and `count`: names and keys of all peers.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use super::rotation::PeerRotationKeys;
 use crate::context::SceneContext;
 use crate::model::{ObjectSpec, PeerSpec, Scaling};
 
-/// The names of the peers; `None` where they are not known for certain. `count`: as given under `[scene]`.
+/// Reads the names of the peers; `None` if any name was refused. `count` is the number given under `[scene]`.
 pub(crate) fn read_names(peers: Option<&Node>, count: Option<u64>, context: Context<'_>) -> Option<Names> {
     let mut names = Names::default();
     let mut given = Names::default();
@@ -31,6 +31,7 @@ pub(crate) fn read_names(peers: Option<&Node>, count: Option<u64>, context: Cont
             continue;
         };
         let (name, node) = name;
+        // With a count, `names` holds every name already, so that duplicates are found in `given`.
         if !given.push(name) {
             context.fault_at(node, format!("there is a peer {} already: expected another name", quote(name)));
             complete = false;
@@ -47,7 +48,7 @@ pub(crate) fn read_names(peers: Option<&Node>, count: Option<u64>, context: Cont
     complete.then_some(names)
 }
 
-/// Reports a scene with fewer than two peers, at the first place that has to do with it.
+/// Reports a scene with fewer than two peers, at the list of peers or, without a list, at the beginning of the file.
 pub(crate) fn check_enough(names: &Names, peers: Option<&Node>, context: Context<'_>) {
     if names.len() < 2 {
         let (place, path) = peers.map_or((BEGINNING, "peers"), |node| (node.place, node.path.as_str()));
@@ -56,11 +57,11 @@ pub(crate) fn check_enough(names: &Names, peers: Option<&Node>, context: Context
     }
 }
 
-/// The name of an entry, and where it is written.
+/// Returns the name of an entry and the node of the name. `None` for an entry without a name, and after a fault.
 fn entry_name<'a>(entry: &'a Node, context: Context<'a>) -> Option<(&'a str, &'a Node)> {
     const EXPECTED: &str = "a name, without space and none of . > / , \" and not \"all\"";
     let Some(name) = entry.as_table().and_then(|table| table.get("name")) else {
-        // Whatever else is wrong with the entry is said when its other keys are read.
+        // The missing name is reported by `read_entry`, which reads the other keys.
         return None;
     };
     let text = values::text(&name.node, context, EXPECTED)?;
@@ -72,33 +73,33 @@ fn entry_name<'a>(entry: &'a Node, context: Context<'a>) -> Option<(&'a str, &'a
     Some((text, &name.node))
 }
 
-/// The parts of the document that say what the peers are like.
+/// Parts of the document from which the peers are made.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PeerSources<'a> {
-    /// `[peer]`.
+    /// Node of `[peer]`.
     pub(crate) defaults: Option<&'a Node>,
-    /// `[\[peers\]]`.
+    /// Node of `[\[peers\]]`.
     pub(crate) entries: Option<&'a Node>,
-    /// `count` under `[scene]`.
+    /// Entry `count` under `[scene]`.
     pub(crate) count: Option<&'a Entry>,
-    /// The period of sending, and where it is written.
+    /// Period of sending, and the node of the period.
     pub(crate) update: Option<(Duration, &'a Node)>,
 }
 
-/// A peer as it is written.
+/// A peer as written.
 #[derive(Clone, Debug)]
 pub(crate) struct PeerRead {
     pub(crate) spec: PeerSpec,
-    /// What it says of an object that turns.
+    /// Keys of the peer about an object that turns.
     pub(crate) rotation: PeerRotationKeys,
-    /// Where it is made.
+    /// Place of the peer in the text: of its entry or, without an entry, of `scene.count`.
     pub(crate) place: Place,
 }
 
-/// Every peer, in the order of the names. `None` where one was refused.
+/// Reads every peer, in the order of the names. `None` if any peer was refused.
 pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, context: SceneContext<'_>) -> Option<Vec<PeerRead>> {
     if let Some(node) = sources.defaults {
-        // On their own, so that a fault in a default that every peer replaces is found too.
+        // `[peer]` is also read on its own, so that a fault in a default is found even if every peer replaces this default.
         read_peer(node, context.of_part(), &PEER, None);
     }
     let nothing = Node::empty_table(sources.count.map_or(BEGINNING, |entry| entry.key), "peer".to_owned());
@@ -109,7 +110,7 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
     };
     let own: Vec<Option<PeerKeys>> = entries.iter().map(|entry| read_entry(entry, base, sources.update, context)).collect();
     let names = context.names?;
-    // What a peer without an entry is like; read only if there is one.
+    // Keys of a peer without an entry. Read only if there is such a peer, because defaults alone need not be complete.
     let shared = if entries.len() < names.len() { Some(read_peer(base, context, &PEER, sources.update)?) } else { None };
     let mut keys: BTreeMap<usize, (PeerKeys, Place)> = BTreeMap::new();
     for (entry, own) in entries.iter().zip(own) {

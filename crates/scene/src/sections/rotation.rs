@@ -1,4 +1,4 @@
-//! The keys of an object that turns, which stand in several tables and all need `object.inertia`.
+//! Readers of the keys of an object that turns. The keys stand in several tables, and all need `object.inertia`.
 
 use cohaptic_linkfile::document::{Entry, Node, Value};
 use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
@@ -13,11 +13,11 @@ use crate::model::Axes;
 use crate::quantities::{COMPONENT, INERTIA, ROTATIONAL_STIFFNESS};
 use crate::{DeviceRotationSpec, PeerRotation, RotationSpec};
 
-/// Keys that have no meaning without an inertia of the object, wherever they stand.
+/// Keys that have no meaning without an inertia of the object, in any table.
 const ROTATIONAL: [&str; 8] =
     ["rotational-damping", "rotational-stiffness", "orientation", "angular-velocity", "grasp", "torque", "rotation-steps", "rotation-discrepancy"];
 
-/// The keys under `[object]`.
+/// Rotational keys of `[object]`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct ObjectRotation {
     inertia: Triple,
@@ -25,7 +25,7 @@ pub(crate) struct ObjectRotation {
     attitude: Attitude,
 }
 
-/// The keys of a peer; each but `grasp` is `None` where it is not given.
+/// Rotational keys of a peer. Each field but `grasp` is `None` if the key is not given.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct PeerRotationKeys {
     pub(crate) grasp: Triple,
@@ -36,7 +36,7 @@ pub(crate) struct PeerRotationKeys {
     pub(crate) torque: Option<Signal>,
 }
 
-/// The keys of `[object]`; `Some(None)` without an inertia.
+/// Reads the rotational keys of `[object]`; `Some(None)` without an inertia. `None` after a fault.
 pub(super) fn read_object_rotation(table: &mut TableReader<'_>, context: SceneContext<'_>) -> Option<Option<ObjectRotation>> {
     let inertia = table.maybe("inertia", |node, file| read_inertia(node, file, context.axes));
     let damping = maybe_triple(table, "rotational-damping");
@@ -55,10 +55,10 @@ fn read_inertia(node: &Node, file: Context<'_>, axes: Option<Axes>) -> Option<Tr
     check_triangle(&inertia, "a moment of inertia", node, file).then_some(inertia)
 }
 
-/// Refuses three numbers of which one is above the sum of the others.
+/// Returns true if none of three numbers is above the sum of the two others, otherwise false after a fault.
 fn check_triangle(numbers: &Triple, name: &str, node: &Node, context: Context<'_>) -> bool {
     let sum: f64 = numbers.iter().sum();
-    // Equal but for rounding is a body without thickness.
+    // The tolerance admits a body without thickness, whose largest moment equals the sum of the two others but for rounding.
     let above = numbers.iter().any(|number| *number > 0.5 * sum * (1.0 + 1e-12));
     if above {
         context.fault_at(node, format!("{name} is above the sum of the two others: expected three numbers of which none is"));
@@ -66,7 +66,7 @@ fn check_triangle(numbers: &Triple, name: &str, node: &Node, context: Context<'_
     !above
 }
 
-/// A number for all three axes of a body, or a list of three.
+/// Reads a number that holds for all three axes of a body, or a list of three numbers.
 fn read_triple(quantity: Quantity, node: &Node, context: Context<'_>) -> Option<Triple> {
     let Value::List(elements) = &node.value else { return quantity.read(node, context).map(|number| [number; 3]) };
     let numbers: Vec<Option<f64>> = elements.iter().map(|element| quantity.read(element, context)).collect();
@@ -78,19 +78,19 @@ fn read_triple(quantity: Quantity, node: &Node, context: Context<'_>) -> Option<
     triple
 }
 
-/// The numbers for all three axes of a body under a key, or the declared default.
+/// Reads the three numbers under a key, or the declared default.
 fn triple(table: &mut TableReader<'_>, key: &'static str) -> Option<Triple> {
     let quantity = table.key(key).quantity();
     table.read(key, |node, context| read_triple(quantity, node, context))
 }
 
-/// Such numbers under a key that may be left out.
+/// Reads the three numbers under an optional key; `Some(None)` if the key is absent.
 pub(super) fn maybe_triple(table: &mut TableReader<'_>, key: &'static str) -> Option<Option<Triple>> {
     let quantity = table.key(key).quantity();
     table.maybe(key, |node, context| read_triple(quantity, node, context))
 }
 
-/// KR: of its three numbers none may be above the sum of the others.
+/// Reads KR [N·m/rad]. None of its three numbers may be above the sum of the two others.
 pub(super) fn read_rotational_stiffness(node: &Node, context: Context<'_>) -> Option<Triple> {
     let stiffness = read_triple(ROTATIONAL_STIFFNESS, node, context)?;
     check_triangle(&stiffness, "a stiffness", node, context).then_some(stiffness)
@@ -98,14 +98,14 @@ pub(super) fn read_rotational_stiffness(node: &Node, context: Context<'_>) -> Op
 
 pub(super) const QUATERNION: Form = Form::List(&number(COMPONENT));
 
-/// A quaternion of any length above zero, as one of length 1.
+/// Reads a quaternion of any length above zero. Returns the unit quaternion.
 pub(super) fn read_orientation(node: &Node, context: Context<'_>) -> Option<[f64; 4]> {
     const EXPECTED: &str = "a quaternion, a list of four numbers w, x, y, z that are not all zero";
     let elements = values::list(node, context, EXPECTED)?;
     let numbers: Vec<Option<f64>> = elements.iter().map(|element| COMPONENT.read(element, context)).collect();
     let numbers: Vec<f64> = numbers.into_iter().collect::<Option<_>>()?;
     let unit = <[f64; 4]>::try_from(numbers).ok().and_then(|quaternion| {
-        // Scaled first, so that no square overflows or vanishes.
+        // Scaled by the largest component first, so that no square overflows or vanishes.
         let largest = quaternion.iter().fold(0.0_f64, |largest, component| largest.max(component.abs()));
         let scaled = quaternion.map(|component| component / largest);
         let norm = scaled.iter().map(|component| component * component).sum::<f64>().sqrt();
@@ -117,7 +117,7 @@ pub(super) fn read_orientation(node: &Node, context: Context<'_>) -> Option<[f64
     unit
 }
 
-/// `grasp`, `orientation` and `angular-velocity` of a peer.
+/// Reads `grasp`, `orientation` and `angular-velocity` of a peer. The other fields are left at their defaults.
 pub(super) fn read_peer_rotation(table: &mut TableReader<'_>) -> Option<PeerRotationKeys> {
     let grasp = triple(table, "grasp");
     let orientation = table.maybe("orientation", read_orientation);
@@ -125,7 +125,7 @@ pub(super) fn read_peer_rotation(table: &mut TableReader<'_>) -> Option<PeerRota
     Some(PeerRotationKeys { grasp: grasp?, orientation: orientation?, rate: rate?, ..PeerRotationKeys::default() })
 }
 
-/// `inertia` and `rotational-damping` of a device; `Some(None)` for one that does not turn.
+/// Reads `inertia` and `rotational-damping` of a device; `Some(None)` for a device that does not turn.
 pub(super) fn read_device_rotation(table: &mut TableReader<'_>) -> Option<Option<Spin>> {
     let inertia = table.maybe("inertia", |node, context| {
         let inertia = read_triple(INERTIA, node, context)?;
@@ -137,7 +137,7 @@ pub(super) fn read_device_rotation(table: &mut TableReader<'_>) -> Option<Option
     Some(inertia.map(|inertia| Spin { inertia, damping }))
 }
 
-/// `rotational-stiffness` and `rotational-damping` of a coupling; `Some(None)` without a stiffness.
+/// Reads `rotational-stiffness` and `rotational-damping` of a coupling; `Some(None)` without a stiffness.
 pub(super) fn read_coupling_rotation(table: &mut TableReader<'_>) -> Option<Option<Gains>> {
     let stiffness = table.maybe_value("rotational-stiffness");
     let needs = "a coupling that turns needs a stiffness: expected rotational-stiffness beside it";
@@ -146,7 +146,8 @@ pub(super) fn read_coupling_rotation(table: &mut TableReader<'_>) -> Option<Opti
     Some(stiffness.map(|stiffness| Gains { stiffness, damping }))
 }
 
-/// How the object and the peers turn; `Some(None)` without an inertia. `object` has the keys under `[object]`, `gains` those under `[coordination]`.
+/// Returns the rotation of the object with the rotational parts of the peers; `Some(None)` without an inertia. `object` has the keys of `[object]`, `gains`
+/// the keys of `[coordination]`. `None` after a fault.
 pub(crate) fn rotation(
     object: Option<ObjectRotation>,
     gains: Gains<Option<Triple>>,
@@ -174,6 +175,7 @@ fn peer_rotation(read: &PeerRead, attitude: Attitude, context: Context<'_>) -> O
         }
         Some(handle) => {
             let touches = read.spec.contact == cohaptic_peer::Contact::Grasp;
+            // A device that does not grasp exerts no torque, so that its coupling may have no rotational gains.
             let Some(coupling) = coupling.or((!touches).then_some(Gains { stiffness: 0.0, damping: 0.0 })) else {
                 return refuse(format!("peer \"{name}\": a device that turns needs a coupling that turns: expected coupling.rotational-stiffness"));
             };
@@ -188,13 +190,14 @@ fn peer_rotation(read: &PeerRead, attitude: Attitude, context: Context<'_>) -> O
     Some(PeerRotation { grasp: *grasp, attitude: own, device })
 }
 
-/// Refuses keys of an object that turns in a scene whose object does not.
+/// Refuses every rotational key in a scene whose object does not turn, at any depth of the document.
 pub(crate) fn refuse_rotational_keys(document: &Node, context: Context<'_>) {
     const MESSAGE: &str = "this is about an object that turns: expected object.inertia, or no such key";
     let refuse = |entry: &Entry| context.fault(entry.key, &entry.node.path, MESSAGE);
     match &document.value {
         Value::Table(table) => {
             for entry in &table.0 {
+                // `inertia` has two meanings: of a device it needs the inertia of the object, and of the object it is that inertia.
                 let of_device = entry.name == "inertia" && entry.node.path != "object.inertia";
                 if of_device || ROTATIONAL.contains(&entry.name.as_str()) {
                     refuse(entry);

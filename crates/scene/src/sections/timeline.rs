@@ -1,4 +1,4 @@
-//! `[\[timeline\]]`: what changes while the scene runs.
+//! Reader of `[\[timeline\]]`: the changes during the run.
 
 use core::time::Duration;
 
@@ -25,13 +25,13 @@ pub(crate) static TIMELINE: Table = Table::of(&[&[
     optional("set", Form::Table(&SET), "The keys that change: of the link, or contact and hand of the peer"),
     optional("coordination", Form::Table(&CHANGES), "In place of link or peer, and without set: what changes at every peer"),
 ]]);
-/// The key of a link or of a peer that is set: another key says which of the two.
+/// Keys under `set`, of a link or of a peer. The key `link` or `peer` beside `set` tells which of the two.
 static SET: Table = Table::over(&joined::<16>(&[LINK.as_slice(), &[&OF_PEER]]));
 static SET_OF_PEER: Table = Table::over(&[&OF_PEER]);
 const OF_PEER: [Key; 2] =
     [optional("contact", CONTACT, "Of a peer: how the device touches the object"), optional("hand", HAND, "Of a peer: what the user does")];
 
-/// An entry, before it is known what stands before it in time.
+/// An entry as read on its own, before the entries are in order of time. The changes before it determine its meaning.
 #[derive(Debug)]
 struct Planned<'a> {
     at: Instant,
@@ -45,7 +45,8 @@ enum PlannedKind<'a> {
     Coordination(CoordinationChanges),
 }
 
-/// Reads the changes and puts them in order of time. The arguments say how things stand at the beginning; each is `None` if it was refused.
+/// Reads the changes and returns them in order of time. `links`, `peers` and `coordination` are the state at the beginning, `None` if it was refused. Calls
+/// `on_links` for each change of links.
 pub(crate) fn read_timeline(
     node: Option<&Node>,
     duration: Option<Duration>,
@@ -59,9 +60,10 @@ pub(crate) fn read_timeline(
     let entries = values::list(node, *context, "entries [[timeline]]")?;
     let planned: Vec<_> = entries.iter().map(|entry| read_entry(entry, duration, context)).collect();
     let mut planned: Vec<Planned<'_>> = planned.into_iter().collect::<Option<_>>()?;
-    // Stable: equal instants stay in the order of the file.
+    // A stable sort: changes at the same instant stay in the order of the file.
     planned.sort_by_key(|entry| entry.at);
 
+    // The state of links, gains and parameters is carried along, because each change is laid over the state that the change before it left.
     let (mut links, CoordinationSpec { mut gains, mut settings, .. }) = (links?.clone(), *coordination?);
     let mut changes = Vec::with_capacity(planned.len());
     let mut complete = true;
@@ -110,7 +112,7 @@ pub(crate) fn read_timeline(
     complete.then_some(changes)
 }
 
-/// A time within the scene.
+/// Reads an instant within the scene. `None` after a fault, or if the duration was refused.
 pub(super) fn read_instant(node: &Node, duration: Option<Duration>, context: Context<'_>) -> Option<Instant> {
     let at = values::instant(node, context)?;
     let last = Instant::ZERO.saturating_add(duration?);
@@ -169,7 +171,8 @@ fn read_peer_changes<'a>(node: &'a Node, context: SceneContext<'a>) -> Option<(O
     Some((contact?, hand?))
 }
 
-/// A peer without a coupling cannot begin to touch: it would do so without force.
+/// Returns true if the peer can have this contact, otherwise false after a fault. A peer without a coupling cannot begin to touch: it would touch without a
+/// force.
 fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: Context<'_>) -> bool {
     let touches = contact != Contact::None;
     let coupled = peer.contact != Contact::None || peer.coupling.stiffness > 0.0 || peer.coupling.damping > 0.0;
@@ -179,7 +182,8 @@ fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: 
     !touches || coupled
 }
 
-/// An arm adds its mass to the device: it cannot appear, vanish or change while the scene runs.
+/// Returns true if the peer can have this hand, otherwise false after a fault. An arm adds its mass to the device, so that it cannot appear, vanish or change
+/// during the run.
 fn hand_is_possible(peer: &PeerSpec, hand: Option<&Hand>, node: &Node, context: Context<'_>) -> bool {
     let arm = peer.hand.as_ref().and_then(Hand::arm);
     let same = arm == hand.and_then(Hand::arm);

@@ -1,4 +1,4 @@
-//! `[topology]`: the peers to which each peer sends.
+//! Reader of `[topology]`: the peers to which each peer sends.
 
 use std::sync::Arc;
 
@@ -34,23 +34,23 @@ const KINDS: Choices<Kind, 4> = [
 ];
 const ROLES: Choices<Role, 2> = [("peer", Role::Peer, "has a copy"), ("relay", Role::Relay, "no peer: hands samples on")];
 
-/// The receivers of each peer, and the way to them.
+/// Receivers of each peer, and the way of samples to the receivers.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Ways {
-    /// `None`: everybody sends to everybody.
+    /// Neighbours of each peer; `None` if every peer sends to every other peer.
     pub(crate) neighbours: Option<Arc<Topology>>,
-    /// What a peer sends to all passes its uplink once, to a relay.
+    /// True if a sample to all receivers passes the sender's uplink once, to a relay.
     pub(crate) relay: bool,
 }
 
-/// What the hub of a star does.
+/// Role of the hub of a star.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Role {
     Peer,
     Relay,
 }
 
-/// The topology.
+/// Reads the topology. `None` after a fault.
 pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
     let mut table = TableReader::new(node, context, &TOPOLOGY, "a table such as { kind = \"ring\", neighbours = 2 }")?;
     let kind = table.choice("kind", &KINDS);
@@ -77,6 +77,7 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
     }
     table.finish();
     let (neighbours, hub, role, file, peers) = (neighbours?, hub?, role?, file?, peers?);
+    // A star whose hub is a relay is a topology of all to all: the relay hands on each sample to everybody.
     if role == Some(Role::Relay) {
         if let Some((_, node)) = hub {
             context.fault_at(node, "a relay passes on what it hears, and is no peer: expected no hub, or role = \"peer\"");
@@ -86,7 +87,7 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
     }
     let neighbours = match kind? {
         Kind::Full => Some(None),
-        // Fewer than two peers are refused elsewhere.
+        // A scene with fewer than two peers is refused by `check_enough`.
         Kind::Star => Topology::star(peers, hub.map_or(0, |(hub, _)| hub)).map(Arc::new).map(Some),
         Kind::Ring => {
             let (count, node) = neighbours.map_or((2, node), |(count, node)| (count, node));
@@ -113,7 +114,8 @@ fn read_neighbours(node: &Node, context: Context<'_>) -> Option<usize> {
     usize::try_from(count).ok()
 }
 
-/// Refuses each entry of a list that names the ends of a link which the topology does not have. `within`: the key of the ends in an entry, if they are not its own.
+/// Refuses each entry of a list that names a link which the topology does not have. `within` is the key of the ends `from` and `to` in an entry; `None` if
+/// the entry itself has them.
 pub(crate) fn refuse_unlinked(entries: Option<&Node>, within: Option<&str>, topology: &Topology, context: Context<'_>) {
     let (Some(entries), Some(names)) = (entries, context.names) else { return };
     let Value::List(entries) = &entries.value else { return };
@@ -126,6 +128,7 @@ pub(crate) fn refuse_unlinked(entries: Option<&Node>, within: Option<&str>, topo
             let node = &ends?.as_table()?.get(key)?.node;
             Some((node, names.index(node.as_text()?)?))
         };
+        // An entry without both ends names all links or an access line, or its fault was reported where the entry was read.
         let (Some((_, from)), Some((node, to))) = (end("from"), end("to")) else { continue };
         if from != to && !topology.has_link(from, to) {
             let name = |peer: usize| quote(&names.as_slice()[peer]);
