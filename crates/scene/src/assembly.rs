@@ -131,6 +131,7 @@ impl Scene {
     /// Returns the mass of each copy of the object \[kg\]. A server that alone has the object has the whole mass, also with `split-mass`.
     #[must_use]
     pub fn copy_mass(&self) -> f64 {
+        // There is one copy where a server alone has the object.
         if self.object.split_mass && self.server().is_none() { self.object.mass / count(self.number()) } else { self.object.mass }
     }
 }

@@ -51,6 +51,7 @@ pub fn scene_content_of_text(text: &str, file: &Path, overrides: &[String]) -> R
     let mut keys = BTreeMap::new();
     collect(&document, "", &mut keys);
     let is_of = |key: &str, table: &str| key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+    // `is_of` compares whole names, so that a key such as `measured` would stay.
     keys.retain(|key, _| key != "scene.title" && !is_of(key, "expect") && !is_of(key, "measure"));
     // Paths relative to the scene's folder: a scene that moves together with its files keeps its content.
     let folder = file.parent().unwrap_or_else(|| Path::new(""));
@@ -106,6 +107,7 @@ impl SceneContent {
     /// Returns name and value of a line, the value as TOML. `None` if the text is not exactly one key with a value.
     #[must_use]
     pub fn read_line(line: &str) -> Option<(String, String)> {
+        // The line is TOML, so that the parser undoes the quotes of names and values.
         let document = Node::document(toml::de::DeTable::parse(line).ok()?.get_ref()).ok()?;
         let [only] = document.as_table()?.0.as_slice() else { return None };
         Some((only.name.clone(), value_text(&only.node)))

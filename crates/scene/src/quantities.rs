@@ -66,7 +66,7 @@ pub(crate) fn maybe_vector_of(table: &mut TableReader<'_>, key: &'static str, co
 }
 
 /// Reads a number for each axis; components beyond the axes are zero. A single number stands for a list of one number or, with [`Spread::EveryAxis`], for the
-/// same number on every axis. `None` after a fault.
+/// same number on every axis.
 pub(crate) fn read_vector(quantity: Quantity, node: &Node, context: SceneContext<'_>, spread: Spread) -> Option<[f64; 3]> {
     let count = context.axes.map(Axes::count);
     let mut vector = [0.0; 3];

@@ -235,12 +235,14 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
 /// [`FileError::Read`] if the path or a folder below it cannot be read, [`FileError::NoFile`] for a folder without a scene.
 pub fn scene_files(path: &Path) -> Result<Vec<PathBuf>, FileError> {
     let unreadable = |path: &Path, source| FileError::Read { path: path.to_path_buf(), source, place: None };
+    // Follows a link in `path` itself, unlike `file_type` below.
     let kind = std::fs::metadata(path).map_err(|source| unreadable(path, source))?;
     if !kind.is_dir() {
         return Ok(vec![path.to_path_buf()]);
     }
     let mut files = Vec::new();
     let mut folders = vec![path.to_path_buf()];
+    // A stack of folders instead of recursion. The order does not matter, because the files are sorted below.
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).map_err(|source| unreadable(&folder, source))? {
             let entry = entry.map_err(|source| unreadable(&folder, source))?;
@@ -253,6 +255,7 @@ pub fn scene_files(path: &Path) -> Result<Vec<PathBuf>, FileError> {
             }
         }
     }
+    // The order in which a system lists files is not defined.
     files.sort();
     if files.is_empty() { Err(FileError::NoFile { folder: path.to_path_buf(), kind: "scene" }) } else { Ok(files) }
 }

@@ -53,6 +53,7 @@ impl Scene {
     pub fn rotation_of(&self, place: usize) -> Option<Rotation> {
         let rotation = self.rotation.as_ref()?;
         let others = rotation.peers.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, peer)| peer.attitude);
+        // Before the first sample, a peer holds the initial attitudes of the other peers.
         let held = HeldAttitudes::new(others);
         let turning = Rotation::new(self.rotation_config(place)?, rotation.peers[place].attitude, held, &self.peers[place].clock);
         Some(turning.with_law(&self.turn_law(place)?, self.own_rotational_damping(place)))
@@ -100,6 +101,7 @@ impl Scene {
     #[must_use]
     pub fn copy_spin(&self) -> Option<Spin> {
         let rotation = self.rotation.as_ref()?;
+        // 1/N where the mass is split, otherwise 1. The damping is that of each copy, and is not split.
         let share = self.copy_mass() / self.object.mass;
         let damping = rotation.damping.unwrap_or_else(|| rotation.over_mass(self.object.mass, self.object.damping));
         Some(Spin { inertia: rotation.inertia.map(|moment| moment * share), damping })
@@ -159,6 +161,7 @@ impl Scene {
                         true
                     }
                     ChangeKind::RotationalGains(changed) => {
+                        // A gain that the change does not name stays as it was: given, or following KT and BT.
                         *given = Gains { stiffness: changed.stiffness.or(given.stiffness), damping: changed.damping.or(given.damping) };
                         true
                     }
@@ -209,6 +212,7 @@ impl Scene {
             ));
         }
         let turns = |place: usize| rotation.peers[place].device.is_some();
+        // The hand at the beginning was checked by the readers. Only the timeline is left.
         let pushes = |change: &&Change| matches!(change.what, ChangeKind::HandTorque { peer, torque: Some(_) } if !turns(peer));
         if let Some(Change { what: ChangeKind::HandTorque { peer, .. }, .. }) = self.timeline.iter().find(pushes) {
             let name = &self.peers[*peer].name;

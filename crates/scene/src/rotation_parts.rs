@@ -55,12 +55,14 @@ impl Scene {
     #[must_use]
     pub fn rotation_parts(&self) -> Option<Result<RotationParts, &'static str>> {
         let rotation = self.rotation.as_ref()?;
+        // A part has one step map. With this integrator translations and rotations have different ones.
         if matches!(self.integrator, Integrator::SemiImplicitEuler { .. }) {
             return Some(Err("with semi-implicit-euler turns move by another step than translations"));
         }
         // The grasp of a peer that touches nothing has no influence.
         let grasps = || rotation.peers.iter().zip(&self.peers).filter(|(_, spec)| spec.contact != Contact::None).map(|(peer, _)| peer.grasp);
         if grasps().all(is_zero) {
+            // `turn` gives every peer of a part the damping of peer 0.
             let damped = self.own_rotational_damping(0);
             if (1..self.peers.len()).any(|peer| !same(self.own_rotational_damping(peer), damped)) {
                 return Some(Err("the strategy damps the turns of copies with other ticks by other numbers"));
@@ -73,6 +75,7 @@ impl Scene {
         Some(self.why_not_pivots(rotation, grasp).map_or_else(
             || {
                 let touched = effective_masses(self.object.mass, rotation.inertia, grasp).into_iter().enumerate();
+                // Masses 1/μ along the eigenvectors, which the hands drive, then three times the mass of the object, which no hand drives.
                 let touched = touched.map(|(place, mass)| self.with_mass(format!("touched {}", place + 1), mass, true));
                 let pivots = (1..=3).map(|place| self.with_mass(format!("pivot {place}"), self.object.mass, false));
                 let reason = "all who touch the object do so at one point, and gains and damping of turns are the default ones";
@@ -146,6 +149,7 @@ impl Scene {
 
     /// Returns the part of the rotation about an axis, 0 for x, of an object that is held at its centre.
     fn turn(&self, rotation: &RotationSpec, axis: usize) -> RotationPart {
+        // As in `RotationSpec::over_mass`, about one axis.
         let over_mass = |number: f64| number * rotation.inertia[axis] / self.object.mass;
         let of = |own: Option<Triple>, usual: f64| own.map_or_else(|| over_mass(usual), |own| own[axis]);
         let damping = of(rotation.damping, self.object.damping);
@@ -173,6 +177,7 @@ impl Scene {
         if let Integrator::RungeKutta4 { steps } = self.integrator {
             scene.integrator = Integrator::RungeKutta4 { steps: steps.saturating_mul(rotation.steps) };
         }
+        // A device that does not turn has no part in this component.
         let devices = rotation.peers.iter().map(|peer| peer.device.is_some()).collect();
         RotationPart { components: vec![["rx", "ry", "rz"][axis].to_owned()], scene, devices }
     }
@@ -236,6 +241,7 @@ fn untouched(spec: PeerSpec) -> PeerSpec {
 fn merged(parts: impl Iterator<Item = RotationPart>) -> Vec<RotationPart> {
     let mut merged: Vec<RotationPart> = Vec::new();
     for part in parts {
+        // Equal scenes are not enough: the device of a peer may be real in one scene and a placeholder in the other.
         match merged.iter_mut().find(|one| one.scene == part.scene && one.devices == part.devices) {
             Some(one) => one.components.extend(part.components),
             None => merged.push(part),

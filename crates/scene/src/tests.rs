@@ -1,4 +1,4 @@
-//! What is refused, and what is said about it.
+//! Tests of refused scenes: the place of each fault, its key and its message.
 
 mod form;
 mod strategies;
@@ -11,7 +11,7 @@ use cohaptic_peer::Contact;
 
 use crate::{Scene, SceneError};
 
-/// A scene to which faults are done. Its lines are numbered so that the tables below can be read.
+/// A valid scene, into which the tests put faults. The places in the tables below count lines from `[scene]`, line 1.
 const SCENE: &str = r#"[scene]
 duration = "7s"
 [object]
@@ -43,7 +43,7 @@ fn refused(text: &str, overrides: &[&str]) -> SceneError {
     }
 }
 
-/// Checks place, key and the beginning of the message, and that the right line is shown.
+/// Checks that a scene is refused: place, key and beginning of the message are `expected`, and the message shows the line of the fault.
 fn check(text: &str, expected: &str) {
     let error = refused(text, &[]);
     let shown = error.to_string();
@@ -52,7 +52,7 @@ fn check(text: &str, expected: &str) {
     assert_eq!(place.shown_line(), text.lines().nth(place.line() - 1).unwrap_or(""), "{shown}");
 }
 
-/// Checks scenes in which one text is replaced by another.
+/// Checks that [`SCENE`] is refused after a replacement. Each entry is the old text, the new text and the expected message.
 fn check_replaced(faults: &[(&str, &str, &str)]) {
     for (old, new, expected) in faults {
         assert!(SCENE.contains(old), "{old}");
@@ -377,7 +377,7 @@ fn a_measure_of_what_does_not_exist_is_refused() {
     ]);
 }
 
-/// At 500 Hz and a tick of 1 ms all samples of a sine are zero, and at 998 Hz they are those of 2 Hz.
+/// With a tick of 1 ms, a sine of 500 Hz has the value zero at every tick, and a sine of 998 Hz has the values of a sine of 2 Hz.
 #[test]
 fn a_sine_is_slower_than_half_the_rate_of_ticks() {
     let hand = |frequency: &str| SCENE.replacen("[peer]", &format!("[peer]\nhand = {{ sine = {{ amplitude = 1, frequency = {frequency} }} }}"), 1);
@@ -458,7 +458,7 @@ fn a_default_is_checked_even_where_every_peer_replaces_it() {
     assert!(parse(&text, &[]).is_ok());
 }
 
-/// A process elsewhere can be simulated only from the model of a device; a live session does without.
+/// In virtual time another process is simulated, which needs the model of a device. A live session does not need one.
 #[test]
 fn a_peer_of_another_process_needs_a_device_only_in_virtual_time() {
     let udp = SCENE
@@ -471,7 +471,7 @@ fn a_peer_of_another_process_needs_a_device_only_in_virtual_time() {
     let silence = crate::Silence { after: Duration::from_millis(50), fade: Duration::from_secs(1) };
     assert_eq!(scene.peers[0].kind, crate::PeerKind::Udp(silence));
     assert_eq!((scene.peers[0].contact, scene.peers[1].kind.silence()), (Contact::None, None));
-    // With device and coupling it is simulated as any other.
+    // With device and coupling, the peer is simulated as every other peer.
     let modelled = SCENE.replace("name = \"left\"", "name = \"left\"\nkind = \"udp\"");
     let (virtual_time, live) = (parse(&modelled, &[]).unwrap(), Scene::parse_live(&modelled, Path::new("x.toml"), &[]).unwrap());
     assert_eq!(virtual_time, live);
@@ -506,7 +506,7 @@ fn a_falcon_has_usable_defaults_and_its_keys_are_checked() {
     }
 }
 
-/// Rakhsha & Constantinescu (2015) call their two laws AP and PD.
+/// The short names are AP and PD, as in Rakhsha & Constantinescu (2015).
 #[test]
 fn the_two_laws_of_the_paper_have_short_names() {
     let strategy = |name: &str| parse(SCENE, &[&format!("coordination.strategy={name}")]).unwrap().coordination.strategy;
@@ -514,7 +514,7 @@ fn the_two_laws_of_the_paper_have_short_names() {
     refused(SCENE, &["coordination.strategy=ap"]);
 }
 
-/// A wrong key is told before a table that the whole file lacks.
+/// A file may have a wrong key and lack a table. The wrong key is reported.
 #[test]
 fn a_wrong_key_is_told_before_a_missing_table() {
     check("scene.duration=\"1s\"\nscene.count=2\n[object]\nmas = 0.45\n", "4:1: object.mas: unknown key");

@@ -59,11 +59,13 @@ impl Topology {
     /// `peers`.
     #[must_use]
     pub fn ring(peers: usize, neighbours: usize) -> Option<Self> {
+        // Below `peers`, the steps to both sides never reach the same peer.
         let fits = neighbours > 0 && neighbours.is_multiple_of(2) && neighbours < peers;
         fits.then(|| {
             let half = neighbours / 2;
             let of = |peer: usize| {
                 let mut near: Vec<usize> = (1..=half).flat_map(|step| [(peer + step) % peers, (peer + peers - step) % peers]).collect();
+                // Steps to both sides alternate and wrap around the ring, so that the neighbours are not in order yet.
                 near.sort_unstable();
                 near
             };
@@ -107,6 +109,7 @@ impl Topology {
                 return refuse(row, Some(column), format!("the weight in row {}, column {} is {weight}: {wrong}", row + 1, column + 1));
             }
         }
+        // Rows are square and mutual from here on, so that neighbours and weights are mutual.
         let neighbours = |row: &Vec<f64>| row.iter().enumerate().filter(|(_, weight)| **weight > 0.0).map(|(peer, _)| peer).collect();
         let mut graph = Self::unweighted(TopologyKind::Graph, rows.iter().map(neighbours));
         let weights: Vec<f64> = rows.iter().flatten().copied().filter(|weight| *weight > 0.0).collect();
@@ -138,6 +141,7 @@ impl Topology {
         let mut reached = vec![false; self.peers()];
         let mut next = vec![0];
         while let Some(peer) = next.pop() {
+            // A peer may be in `next` several times. Only its first visit continues.
             if !std::mem::replace(&mut reached[peer], true) {
                 next.extend(self.neighbours(peer).iter().map(|other| *other as usize).filter(|other| !reached[*other]));
             }
@@ -191,6 +195,7 @@ impl Topology {
         if peer >= self.peers() {
             return None;
         }
+        // A number above 32 bits is no peer, and so no neighbour.
         self.neighbours(peer).binary_search(&u32::try_from(other).ok()?).ok()
     }
 
@@ -207,6 +212,7 @@ impl Topology {
 
     /// Returns the weights of the neighbours of a peer, indexed as [`Topology::neighbours`]; `None` if all weights are 1.
     fn weights(&self, peer: usize) -> Option<&[f64]> {
+        // `get` alone is not enough: the range 0..0 of a peer without neighbours is valid in an empty list too.
         self.weights.get(self.places(peer)).filter(|_| !self.weights.is_empty())
     }
 
@@ -236,6 +242,7 @@ impl Topology {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub fn relative_weights(&self, peer: usize) -> Option<Vec<f64>> {
+        // Compared by bits: weights that are equal change no mean, and weights are never NaN.
         let weights = self.weights(peer).filter(|weights| weights.windows(2).any(|pair| pair[0].to_bits() != pair[1].to_bits()))?;
         let mean = self.degree(peer) / weights.len() as f64;
         Some(weights.iter().map(|weight| weight / mean).collect())
@@ -252,7 +259,7 @@ impl Topology {
 ///
 /// # Errors
 ///
-/// [`Fault`] at the first field that is not a number.
+/// A fault at the first field that is not a number.
 pub fn read_weights(text: &str) -> Result<Vec<Vec<f64>>, Fault> {
     let rows = rows_of(text);
     let number = |(line, row): &(usize, &str), field: &str| {
@@ -274,6 +281,7 @@ pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fau
     let rows = read_weights(text)?;
     let lines = rows_of(text);
     let at = |row: usize| lines.get(row).map_or(text.len()..text.len(), |line| line_span(text, line.0));
+    // At the first row too many, or at the end of the text if rows are missing.
     if rows.len() != peers {
         let message = format!("the file has {} rows of weights: expected {peers}, one for each peer", rows.len());
         return Err(Fault { span: at(rows.len().min(peers)), message });
@@ -286,6 +294,7 @@ pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fau
             || line.clone(),
             |column| {
                 let start = line.start + before(column);
+                // Without the comma after the field; the last field has none, and its end is the end of the line.
                 start..(line.start + before(column + 1)).saturating_sub(1).max(start)
             },
         );

@@ -1,4 +1,4 @@
-//! The kinds of files and their catalogues of keys: see [`cohaptic_linkfile::schema`].
+//! Kinds of files and their catalogues of keys. [`cohaptic_linkfile::schema`] has the types of the catalogue.
 
 #[cfg(test)]
 mod tests;
@@ -9,19 +9,19 @@ use serde_json::Value;
 /// A kind of file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum FileSchema {
-    /// A scene.
+    /// A scene file.
     Scene,
-    /// What `cohaptic relay` reads.
+    /// A relay file, which `cohaptic relay` reads.
     Relay,
-    /// What `cohaptic router` reads.
+    /// A router file, which `cohaptic router` reads.
     Router,
 }
 
 impl FileSchema {
-    /// All kinds.
+    /// Every kind of file.
     pub const ALL: [Self; 3] = [Self::Scene, Self::Relay, Self::Router];
 
-    /// The keys at the top of such a file.
+    /// Returns the keys at the top level of a file of this kind.
     #[must_use]
     pub const fn root(self) -> &'static Table {
         match self {
@@ -31,7 +31,7 @@ impl FileSchema {
         }
     }
 
-    /// The title of such a file in its schema.
+    /// Returns the title of the JSON Schema.
     #[must_use]
     pub const fn title(self) -> &'static str {
         match self {
@@ -41,21 +41,21 @@ impl FileSchema {
         }
     }
 
-    /// The unit in which the value of a key is a plain number: `"N/m"` of `coordination.stiffness` and of `peers.anna.coupling.stiffness`. Empty for a key
-    /// whose values carry their units (`link.delay`), are no numbers or have no unit, and for a text that names no key.
+    /// Returns the unit of a key whose value is a plain number: `"N/m"` of `coordination.stiffness` and of `peers.anna.coupling.stiffness`. Empty for a key
+    /// whose value carries its own unit (`link.delay`), is not a number or has no unit, and for a text that names no key.
     #[must_use]
     pub fn unit_of(self, key: &str) -> &'static str {
         self.root().form(key).map_or("", unit)
     }
 
-    /// The catalogue as a JSON Schema of draft 7.
+    /// Returns the catalogue as a JSON Schema of draft 7.
     #[must_use]
     pub fn json(self) -> Value {
         schema::json_schema(self.root(), self.title())
     }
 }
 
-/// The unit of a number that may stand there.
+/// Returns the unit of a number of this form; empty if the form admits no number with a unit.
 fn unit(form: &'static Form) -> &'static str {
     let Form::AnyOf(forms) = form else { return form.unit() };
     forms.iter().map(unit).find(|unit| !unit.is_empty()).unwrap_or_default()

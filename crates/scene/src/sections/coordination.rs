@@ -73,7 +73,9 @@ static CHANGING_LAWS: LazyLock<Vec<Key>> = LazyLock::new(|| law_keys(true));
 /// Returns a key for each strategy with own parameters: its table of all parameters or, with `changing`, of the parameters that the timeline may change.
 fn law_keys(changing: bool) -> Vec<Key> {
     let key_of = |parameter: &LawParameter| match (changing, parameter.default) {
+        // In the timeline, an absent parameter stays as it was, so that its default is not shown.
         (true, _) => optional(parameter.key, form_of(parameter.form.without_automatic()), "From then on"),
+        // A parameter without a default is optional, and one with a default shows it.
         (false, "") => optional(parameter.key, form_of(parameter.form), parameter.about),
         (false, default) => usual(parameter.key, form_of(parameter.form), default, parameter.about),
     };
@@ -100,7 +102,7 @@ const fn form_of(form: LawForm) -> Form {
     }
 }
 
-/// Reads `[coordination]`: the controller, and the gains of rotations as written. `None` after a fault.
+/// Reads `[coordination]`: the controller, and the gains of rotations as written.
 pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<(CoordinationSpec, Gains<Option<Triple>>)> {
     let mut table = TableReader::new(node, context, &COORDINATION, "a table such as [coordination]")?;
     // Short names, such as PD, are accepted beside the names in the catalogue.
@@ -127,7 +129,7 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<(Co
     Some((spec, Gains { stiffness: stiffness_of_turns?, damping: damping_of_turns? }))
 }
 
-/// Reads `send-when`. `None` after a fault.
+/// Reads `send-when`.
 fn read_send_when(node: &Node, context: Context<'_>) -> Option<SendWhen> {
     const EXPECTED: &str = "a table such as { velocity = \"10%\", position = 0.0005, heartbeat = \"1s\" }";
     let mut table = TableReader::new(node, context, &SEND_WHEN, EXPECTED)?;
@@ -141,6 +143,7 @@ fn read_send_when(node: &Node, context: Context<'_>) -> Option<SendWhen> {
         Some(part.get())
     });
     let (position, heartbeat) = (table.maybe_value("position"), table.maybe_value("heartbeat"));
+    // A heartbeat alone only makes sending slower, as a longer `update` does.
     let is_empty = table.get("velocity").is_none() && table.get("position").is_none();
     table.finish();
     if is_empty {

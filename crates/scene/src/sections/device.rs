@@ -51,7 +51,7 @@ const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number
 
 pub(super) const A_COUPLING: &str = "a table such as { stiffness = 3500.0, damping = 5.0 }";
 
-/// Reads a contact. `None` after a fault.
+/// Reads a contact.
 pub(super) fn read_contact(node: &Node, context: SceneContext<'_>) -> Option<Contact> {
     const EXPECTED: &str = "\"grasp\", \"none\" or { push = \"+x\" }";
     if let Some(text) = node.as_text() {

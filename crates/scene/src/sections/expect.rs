@@ -104,7 +104,7 @@ pub(crate) fn read_expect(
     })
 }
 
-/// Reads every table of a list, also after a refused table, so that every fault is reported. An empty vector without the list; `None` after a fault.
+/// Reads every table of a list, also after a refused table, so that every fault is reported. An empty vector without the list;
 fn each<T>(table: &mut TableReader<'_>, key: &'static str, read: impl Fn(&Node) -> Option<T>) -> Option<Vec<T>> {
     let entries = table.maybe(key, |node, context| values::list(node, context, "a list of tables"))?.unwrap_or_default();
     // Two steps: collecting into an `Option` directly would stop at the first `None`.
@@ -209,6 +209,7 @@ fn read_ends<'a, T: PartialOrd>(
     context: Context<'_>,
     read: impl Fn(&mut TableReader<'a>, &'static str) -> Option<Option<T>>,
 ) -> Option<(Option<T>, Option<T>)> {
+    // Asked of the nodes, not of the values: a value that was refused is given.
     let (min_node, max_node) = (table.get("min"), table.get("max"));
     if min_node.is_none() && max_node.is_none() {
         context.fault_at(node, "neither min nor max is given: expected at least one of them");

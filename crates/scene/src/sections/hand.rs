@@ -45,7 +45,7 @@ static FOLLOWS: Table = Table::of(&[&[
 
 const EXPECTED: &str = "\"none\", { force = … }, { sine = … }, { file = … } or { arm = …, follows = … }";
 
-/// Reads a hand; `Some(None)` for "none". `None` after a fault.
+/// Reads a hand; `Some(None)` for "none".
 pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option<Hand>> {
     match node.as_text() {
         Some("none") => return Some(None),
@@ -94,7 +94,7 @@ fn constant(declaration: &Table, entry: &Entry, context: SceneContext<'_>) -> Op
     read_vector(declaration.key(&entry.name)?.quantity(), &entry.node, context, Spread::Refused)
 }
 
-/// Reads the torque of a hand; `Some(None)` for a hand without a torque. `None` after a fault.
+/// Reads the torque of a hand; `Some(None)` for a hand without a torque.
 pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option<Option<Signal>> {
     let Some(table) = hand.as_table() else { return Some(None) };
     let within = |key: &str| table.get(key).filter(|entry| entry.node.as_table().is_some());

@@ -71,7 +71,7 @@ pub(crate) fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
     Some(Header { title, duration, seed, axes, count })
 }
 
-/// Reads `[simulation]`. `None` after a fault.
+/// Reads `[simulation]`.
 pub(crate) fn read_stepping(node: &Node, context: Context<'_>) -> Option<Stepping> {
     const NO_STEPS: &str = "the integrator \"exact\" takes no substeps: expected no such key, or \"semi-implicit-euler\" or \"rk4\"";
     let mut table = TableReader::new(node, context, &SIMULATION, "a table such as [simulation]")?;

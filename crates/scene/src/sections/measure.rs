@@ -83,7 +83,7 @@ pub(crate) fn read_measure(node: &Node, of: Measured<'_>, context: SceneContext<
     Some(MeasureSpec { names, settings: MeasureSettings { travel: travel?, band: band?, probe: probe? } })
 }
 
-/// Reads the names of measures, sorted and without duplicates; `Some(None)` for all measures. `None` after a fault.
+/// Reads the names of measures, sorted and without duplicates; `Some(None)` for all measures.
 fn read_names(node: &Node, has_probe: bool, context: Context<'_>) -> Option<Option<Vec<MeasureName>>> {
     const EXPECTED: &str = "\"all\" or a list of names such as [\"energy_j\", \"travel_s\"]";
     match &node.value {
@@ -120,6 +120,7 @@ pub(crate) fn read_measure_name(node: &Node, has_probe: bool, context: Context<'
         return Some(MeasureName { measure, peer: None });
     }
     let of_peer = text.strip_prefix("peers.").and_then(|rest| rest.rsplit_once('.'));
+    // Split at the last point: the name of a measure has none.
     let known = of_peer.and_then(|(peer, name)| {
         let measure = Measure::ALL.iter().find(|measure| measure.scope() == Scope::Peer && measure.name() == name)?;
         Some((peer, *measure))
@@ -159,6 +160,7 @@ fn read_probe(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Optio
     let spec = of.peers?.get(peer)?;
     let changes = of.timeline?.iter().any(|change| matches!(&change.what, ChangeKind::Hand { peer: changed, .. } if *changed == peer));
     let refused = match &spec.hand {
+        // First, because the hand of the beginning says nothing of a hand that changes.
         _ if changes => Some("changes in the timeline"),
         Some(Hand::Force(Signal::Sine { amplitude, frequency, .. })) => {
             let pushes = frequency.0 > 0.0 && amplitude.iter().any(|amplitude| *amplitude != 0.0);

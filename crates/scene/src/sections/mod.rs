@@ -1,4 +1,5 @@
-//! Readers of the parts of a scene file, one function for each part.
+//! Readers of the parts of a scene file, one function for each part. A reader that returns an `Option` reports each fault where it finds the fault, and then
+//! returns `None`; a reader of a key that may be absent returns `Some(None)` without the key.
 
 mod coordination;
 mod device;

@@ -52,6 +52,7 @@ pub(crate) fn read_motion_file(node: &Node, context: SceneContext<'_>, columns: 
 }
 
 fn parse_rows(text: &str, motion: &[&str], turns: bool) -> Result<Recorded, Fault> {
+    // `flexible`: rows of another length are refused below, with a message that names the columns.
     let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(text.as_bytes());
     let mut lines: Vec<Range<usize>> = Vec::new();
     let (mut rows, mut torques) = (Vec::new(), Vec::new());
@@ -61,10 +62,12 @@ fn parse_rows(text: &str, motion: &[&str], turns: bool) -> Result<Recorded, Faul
         // End of the last line that was read, for faults without a position of their own.
         let from = lines.last().map_or(0, |line| line.end);
         let record = record.map_err(|error| Fault { span: from..from, message: format!("{error}: expected the columns {columns}") })?;
+        // The position is before empty lines, which `line_at` skips.
         let at = record.position().and_then(|position| usize::try_from(position.byte()).ok()).unwrap_or(from);
         let line = line_at(text, at);
         let fault = |column: usize, name: &str, message| Fault { span: field_at(text, &line, column), message: format!("column {name}: {message}") };
         if lines.is_empty() {
+            // A header with torques is valid only if the object turns.
             if record.iter().eq(with_torque.iter().copied()) {
                 if !turns {
                     let message = format!("a torque needs an object that turns: expected object.inertia, or the columns {columns}");
@@ -90,6 +93,7 @@ fn parse_rows(text: &str, motion: &[&str], turns: bool) -> Result<Recorded, Faul
                 }
                 Ok(values)
             };
+            // The length was checked above, so that the columns exist. Components beyond the axes stay zero.
             rows.push((time, triple(1..motion.len())?));
             if header.len() > motion.len() {
                 torques.push((time, triple(motion.len()..header.len())?));
@@ -164,6 +168,7 @@ fn seconds(text: &str) -> Result<Instant, String> {
     if value < 0.0 {
         return Err(format!("{} is negative: {EXPECTED}", shorten(text)));
     }
+    // The sign is that of zero, or a plus.
     let plain = without_exponent(text.trim_start_matches(['+', '-'])).ok_or_else(|| format!("{} is out of range: {EXPECTED}", shorten(text)))?;
     let span = parse::duration(&format!("{plain}s")).map_err(|_| format!("{} is out of range: {EXPECTED}", shorten(text)))?;
     Instant::ZERO.checked_add(span).ok_or_else(|| format!("{} is out of range: {EXPECTED}", shorten(text)))
@@ -173,6 +178,7 @@ fn seconds(text: &str) -> Result<Instant, String> {
 fn without_exponent(text: &str) -> Option<String> {
     let Some((mantissa, exponent)) = text.split_once(['e', 'E']) else { return Some(text.to_owned()) };
     let exponent: i64 = exponent.parse().ok().filter(|exponent| (-400..=400).contains(exponent))?;
+    // The exponent moves digits from one side of the point to the other. Missing digits are zeros.
     let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
     let shift = usize::try_from(exponent.unsigned_abs()).ok()?;
     Some(if exponent >= 0 {

@@ -77,7 +77,7 @@ pub(crate) struct PeerKeys {
 }
 
 /// Reads the keys of a peer. `declaration` is [`PEER`], or [`PEERS`] for a node with a name, which the module `peers` reads. `update` is the period of
-/// sending and the node of the period. `None` after a fault.
+/// sending and the node of the period.
 pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'static Table, update: Option<(Duration, &Node)>) -> Option<PeerKeys> {
     const A_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }";
     const UDP_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }, from which this peer of kind \"udp\", another process, can be simulated; \

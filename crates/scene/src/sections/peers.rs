@@ -102,7 +102,9 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
         // `[peer]` is also read on its own, so that a fault in a default is found even if every peer replaces this default.
         read_peer(node, context.of_part(), &PEER, None);
     }
+    // Stands for an absent `[peer]`. Faults such as a missing device are shown at `count`.
     let nothing = Node::empty_table(sources.count.map_or(BEGINNING, |entry| entry.key), "peer".to_owned());
+    // A `[peer]` that is no table was refused above.
     let base = sources.defaults.filter(|node| node.as_table().is_some()).unwrap_or(&nothing);
     let entries = match sources.entries {
         Some(node) => values::list(node, *context, "entries [[peers]]")?,

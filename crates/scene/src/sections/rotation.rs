@@ -36,7 +36,7 @@ pub(crate) struct PeerRotationKeys {
     pub(crate) torque: Option<Signal>,
 }
 
-/// Reads the rotational keys of `[object]`; `Some(None)` without an inertia. `None` after a fault.
+/// Reads the rotational keys of `[object]`; `Some(None)` without an inertia.
 pub(super) fn read_object_rotation(table: &mut TableReader<'_>, context: SceneContext<'_>) -> Option<Option<ObjectRotation>> {
     let inertia = table.maybe("inertia", |node, file| read_inertia(node, file, context.axes));
     let damping = maybe_triple(table, "rotational-damping");
@@ -147,7 +147,7 @@ pub(super) fn read_coupling_rotation(table: &mut TableReader<'_>) -> Option<Opti
 }
 
 /// Returns the rotation of the object with the rotational parts of the peers; `Some(None)` without an inertia. `object` has the keys of `[object]`, `gains`
-/// the keys of `[coordination]`. `None` after a fault.
+/// the keys of `[coordination]`.
 pub(crate) fn rotation(
     object: Option<ObjectRotation>,
     gains: Gains<Option<Triple>>,

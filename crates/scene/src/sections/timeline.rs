@@ -88,6 +88,7 @@ pub(crate) fn read_timeline(
                 changes.extend(contact.map(|(contact, _)| Change { at, what: ChangeKind::Contact { peer, contact } }));
                 if let Some((hand, _)) = hand {
                     changes.push(Change { at, what: ChangeKind::Hand { peer, hand } });
+                    // With each hand, also without a torque: the torque of the hand before must end.
                     changes.push(Change { at, what: ChangeKind::HandTorque { peer, torque } });
                 }
             }
@@ -175,6 +176,7 @@ fn read_peer_changes<'a>(node: &'a Node, context: SceneContext<'a>) -> Option<(O
 /// force.
 fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: Context<'_>) -> bool {
     let touches = contact != Contact::None;
+    // The reader of peers has checked the coupling of a peer that touches at the beginning.
     let coupled = peer.contact != Contact::None || peer.coupling.stiffness > 0.0 || peer.coupling.damping > 0.0;
     if touches && !coupled {
         context.fault_at(node, format!("peer \"{}\" has no coupling to touch with: expected \"none\", or a key coupling of this peer", peer.name));
@@ -185,6 +187,7 @@ fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: 
 /// Returns true if the peer can have this hand, otherwise false after a fault. An arm adds its mass to the device, so that it cannot appear, vanish or change
 /// during the run.
 fn hand_is_possible(peer: &PeerSpec, hand: Option<&Hand>, node: &Node, context: Context<'_>) -> bool {
+    // Compared with the hand of the beginning: no change before this one can have another arm.
     let arm = peer.hand.as_ref().and_then(Hand::arm);
     let same = arm == hand.and_then(Hand::arm);
     if !same {

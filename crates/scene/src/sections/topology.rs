@@ -50,11 +50,12 @@ enum Role {
     Relay,
 }
 
-/// Reads the topology. `None` after a fault.
+/// Reads the topology.
 pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
     let mut table = TableReader::new(node, context, &TOPOLOGY, "a table such as { kind = \"ring\", neighbours = 2 }")?;
     let kind = table.choice("kind", &KINDS);
     let peers = context.names.map(|names| names.len());
+    // A key of another kind is refused, not ignored. After a fault in the kind every key is accepted.
     let only_of = |table: &mut TableReader<'_>, of: Kind, word: &str, key: &'static str| {
         let message = format!("only a topology of kind = {} has this key: expected that kind, or no such key", quote(word));
         table.only_if(kind.is_none_or(|kind| kind == of), key, &message)

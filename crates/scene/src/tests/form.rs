@@ -1,4 +1,4 @@
-//! The form in which a fault is shown.
+//! Tests of the printed form of a fault.
 
 use super::{SCENE, check, check_replaced, refused};
 
@@ -41,10 +41,10 @@ fn what_is_no_toml_is_refused_in_the_same_form() {
 fn of_several_faults_the_first_in_the_file_is_said() {
     let text = SCENE.replace("0.45", "-1").replace("\"24ms\"", "\"x\"").replace("\"7s\"", "\"7x\"");
     check(&text, "2:12: scene.duration: ");
-    // Parts are not read in the order of the file: [scene] first, wherever it stands.
+    // [scene] is read first, wherever it stands. The fault that stands first is reported all the same.
     let late = "[link]\ndelay = \"x\"\n".to_owned() + &SCENE.replace("[link]\ndelay = \"24ms\"\n", "").replace("\"7s\"", "7");
     check(&late, "2:9: link.delay: ");
-    // Faults in overrides come last.
+    // A fault in an override comes after every fault in the file.
     assert!(refused(&SCENE.replace("0.45", "-1"), &["link.dlay=1"]).to_string().starts_with("x.toml:4:8: object.mass"));
 }
 

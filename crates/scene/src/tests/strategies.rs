@@ -1,4 +1,4 @@
-//! Strategies and parameters that a scene cannot have.
+//! Tests of strategies and of their parameters: refused combinations, and parameters that depend on the links.
 
 use std::path::Path;
 use std::time::Duration;
@@ -79,7 +79,7 @@ fn a_damping_that_no_link_bounds_is_refused() {
         check(&format!("{local}{added}"), unbounded);
         parse(&format!("{local}{added}"), &["coordination.local-damping.age=\"50ms\""]).unwrap();
         parse(&format!("{local}{added}"), &["coordination.local-damping.damping=60"]).unwrap();
-        // Of a strategy that is not in use nothing is asked.
+        // Parameters of a strategy that is not in use have no conditions.
         parse(&format!("{local}{added}"), &["coordination.strategy=\"average-position\""]).unwrap();
     }
     let gains = "[[timeline]]\nat = \"1s\"\ncoordination = { stiffness = 100.0 }\n";
@@ -99,7 +99,7 @@ fn a_damping_that_no_link_bounds_is_refused() {
 fn a_lag_that_no_links_give_is_refused() {
     let lagging = SCENE.replace("average-position", "local-lag");
     let ticks = |text: &str, changes: &[&str]| Law::<f64>::lag(&parse(text, changes).unwrap().law(0).unwrap());
-    // ⌈24 ms/1 ms⌉ + ⌊(8 − 1)/2⌋, and a delay that ends between two ticks.
+    // ⌈24 ms/1 ms⌉ + ⌊(8 − 1)/2⌋ = 27; a delay that ends between two ticks, rounded up; a sample at every tick.
     assert_eq!([ticks(&lagging, &[]), ticks(&lagging, &["link.delay=\"24.2ms\""]), ticks(&lagging, &["coordination.update=\"1ms\""])], [27, 28, 24]);
     let refused = "5:1: coordination: a lag of \"auto\" needs links that all have one constant delay and do nothing else, and peers whose clocks are alike: expected a lag such as \"16ms\"";
     for added in [
@@ -111,12 +111,12 @@ fn a_lag_that_no_links_give_is_refused() {
     ] {
         check(&format!("{lagging}{added}"), refused);
         assert_eq!(ticks(&format!("{lagging}{added}"), &["coordination.local-lag.lag=\"30.1ms\""]), 31);
-        // Of a strategy that is not in use nothing is asked.
+        // Parameters of a strategy that is not in use have no conditions.
         parse(&format!("{lagging}{added}"), &["coordination.strategy=\"average-position\""]).unwrap();
     }
     check(&lagging.replace("[[peers]]\nname = \"right\"", "[[peers]]\ntick = \"2ms\"\nname = \"right\""), refused);
     check(&lagging.replace("[[peers]]\nname = \"right\"", "[[peers]]\nuplink = { delay = \"1ms\" }\nname = \"right\""), refused);
-    // New gains do not touch it.
+    // New gains do not change the lag.
     parse(&format!("{lagging}[[timeline]]\nat = \"1s\"\ncoordination = {{ stiffness = 100.0 }}\n"), &[]).unwrap();
     let long = "the lag is more than 10000 ticks of a peer, which it does not remember: expected at most 10000 ticks";
     for changes in [["coordination.local-lag.lag=\"10001ms\""], ["link.delay=\"1h\""]] {

@@ -1,4 +1,4 @@
-//! Topologies that a scene has and cannot have.
+//! Tests of `[topology]`: defaults, gains and links of a topology, and refused topologies.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use cohaptic_peer::Gains;
 use super::{check, parse};
 use crate::{Scene, TopologyKind};
 
-/// Four peers; the topology stands in line 6.
+/// Returns a scene of four peers. The keys of `[topology]` begin in line 6.
 fn four(topology: &str) -> String {
     format!(
         "scene = {{ duration = \"1s\", count = 4 }}\nobject.mass = 1\n\
@@ -30,7 +30,7 @@ fn a_topology_is_read_with_its_defaults() {
     assert_eq!(kind("kind = \"star\"\nhub = \"peer3\"\nrole = \"peer\""), Some(TopologyKind::Star { hub: 2 }));
 }
 
-/// A sum is over those heard: three at the hub, one elsewhere. Scaling counts all four: 4·3/16.
+/// A sum counts the peers that are heard: three at the hub, and the hub alone elsewhere. Scaling counts all four peers: 4·3/16.
 #[test]
 fn sums_are_over_neighbours_and_scaling_is_by_all() {
     let gains = |overrides: &[&str]| {
@@ -104,7 +104,7 @@ fn strategies_that_need_all_others_are_refused() {
     assert!(error.contains("an object that turns is followed only where all peers send to all"), "{error}");
 }
 
-/// A relay changes the way of samples alone: everybody hears everybody.
+/// With a relay every peer still hears every other peer, and gains do not change.
 #[test]
 fn a_relay_is_no_peer() {
     let star = scene("kind = \"star\"\nrole = \"relay\"", &[]);
@@ -112,7 +112,7 @@ fn a_relay_is_no_peer() {
     let full = parse(&four(""), &[]).unwrap();
     assert!(!full.relay && !scene("kind = \"star\"\nrole = \"peer\"", &[]).relay);
     assert_eq!(star.coordination_gains(star.coordination.gains, 1), full.coordination_gains(full.coordination.gains, 1));
-    // Records of a scene without a relay have the fingerprint that they had.
+    // Fingerprints are made of this text, so that a scene without a relay must not print the field.
     assert!(format!("{star:?}").contains("relay: true") && !format!("{full:?}").contains("relay"));
     for strategy in ["wave", "client-server"] {
         let overrides = [format!("coordination.strategy={strategy}"), "coordination.wave.impedance=1".to_owned()];

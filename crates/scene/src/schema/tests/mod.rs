@@ -1,4 +1,4 @@
-//! The catalogue, and the JSON Schema against files.
+//! Tests of the catalogue of keys against readers and pages, and of the JSON Schema against files.
 
 mod samples;
 
@@ -16,7 +16,7 @@ use samples::{SCENES, read, root, samples};
 use super::FileSchema;
 use crate::Scene;
 
-/// Every table of the catalogue, each once, with a way to it for messages.
+/// Returns every table of the catalogue once, with a path to the table for messages. The map is indexed by address, because several keys share a table.
 fn tables() -> BTreeMap<*const Table, (String, &'static Table)> {
     fn walk(way: &str, table: &'static Table, all: &mut BTreeMap<*const Table, (String, &'static Table)>) {
         if all.insert(core::ptr::from_ref(table), (way.to_owned(), table)).is_some() {
@@ -41,7 +41,7 @@ fn tables() -> BTreeMap<*const Table, (String, &'static Table)> {
     all
 }
 
-/// The path of every table of a document.
+/// Returns the path of every table of a document.
 fn paths(node: &Node) -> Vec<&str> {
     match &node.value {
         DocumentValue::Table(table) => core::iter::once(node.path.as_str()).chain(table.0.iter().flat_map(|entry| paths(&entry.node))).collect(),
@@ -50,7 +50,8 @@ fn paths(node: &Node) -> Vec<&str> {
     }
 }
 
-/// A reader asks for declared keys alone. This is the other way round: a key that is declared and that no reader asks for is refused as unknown.
+/// Readers ask for every declared key. The test puts an unknown key into each table: the message lists the keys that the reader knows, and must list all
+/// declared keys. Readers cannot ask for a key that is not declared.
 #[test]
 fn readers_take_every_key_that_is_declared() {
     let keys = |declared: &'static Table| declared.keys().map(|key| key.name.to_owned()).collect::<BTreeSet<String>>();
@@ -58,7 +59,7 @@ fn readers_take_every_key_that_is_declared() {
     for sample in &samples() {
         let document = Node::document(DeTable::parse(&sample.text).unwrap().get_ref()).unwrap();
         for path in paths(&document) {
-            // A link has two names in a path, and stands in the catalogue as any entry of a list.
+            // The path of a link holds the two names of its ends; the catalogue has one table for all entries of the list.
             let ends = path.strip_prefix("links.").filter(|_| sample.kind != FileSchema::Router);
             let below = ends.map_or_else(|| path.to_owned(), |ends| format!("links.{}", ends.split_once('.').unwrap().1));
             let declared = if path.is_empty() { sample.kind.root() } else { sample.kind.root().table(&below) };
@@ -76,7 +77,7 @@ fn readers_take_every_key_that_is_declared() {
     }
 }
 
-/// A document as JSON, for the validator.
+/// Returns a TOML document as JSON, for the validator.
 fn json_of(text: &str) -> Value {
     fn table(fields: &DeTable<'_>) -> Value {
         Value::Object(fields.iter().map(|(key, field)| (key.get_ref().to_string(), value(field.get_ref()))).collect::<Map<_, _>>())
@@ -142,7 +143,7 @@ fn the_json_schemas_refuse_what_the_readers_refuse_wherever_it_stands() {
     }
 }
 
-/// The pointers of all objects within a document.
+/// Returns the JSON pointer of every object within a value, with the number of its members.
 fn objects(value: &Value) -> Vec<(String, usize)> {
     let within = |name: String, inner: &Value| {
         objects(inner).into_iter().map(move |(pointer, count)| (format!("/{name}{pointer}"), count)).collect::<Vec<_>>()
@@ -157,7 +158,7 @@ fn objects(value: &Value) -> Vec<(String, usize)> {
     }
 }
 
-/// A key has a hover text that says more than its name, with its unit and default.
+/// Every key has a description, and the schema shows description, unit and default.
 #[test]
 fn every_property_is_described() {
     for (_, (way, table)) in tables() {
@@ -174,7 +175,7 @@ fn every_property_is_described() {
     assert!(!text.contains("$ref") && !text.contains("allOf"), "editors for TOML do not take them");
 }
 
-/// The pages of reference and the catalogue name the same keys.
+/// The reference pages and the catalogue name the same keys.
 #[test]
 fn the_reference_has_the_keys_of_the_catalogue() {
     let page = |name: &str| std::fs::read_to_string(root().join("docs").join(name)).unwrap();
@@ -192,7 +193,7 @@ fn the_reference_has_the_keys_of_the_catalogue() {
             named.insert(name);
         }
     }
-    // The tables at the top of a file are headings.
+    // The tables at the top level of a file are headings of the pages, not entries of a list.
     for heading in pages.lines().filter(|line| line.starts_with("## ") || line.starts_with("### ")) {
         named.extend(heading.split('`').nth(1).map(|name| name.trim_matches(['[', ']']).split('.').next().unwrap_or_default()));
     }

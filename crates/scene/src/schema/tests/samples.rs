@@ -1,4 +1,4 @@
-//! Files in which every table of the catalogue occurs.
+//! Sample files in which every table of the catalogue occurs.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use cohaptic_linkfile::router::RouterFile;
 use crate::schema::FileSchema;
 use crate::{Scene, SceneError, scene_files};
 
-/// Every table and every key that the shipped scenes leave out, in four scenes.
+/// Four scenes with every table and every key that the shipped scenes leave out.
 pub(super) const SCENES: [&str; 4] = [
     r#"
     scene = { duration = "4s" }
@@ -122,7 +122,7 @@ const ROUTER: [&str; 2] = [
     "router.default = \"pass\"\nrouter.memory = {}\nleft.interface = \"eth1\"\nright.interface = \"eth2\"\n",
 ];
 
-/// A text of some kind, and where it is said to stand.
+/// A text of a kind of file, and the path under which the text is read.
 pub(super) struct Sample {
     pub(super) kind: FileSchema,
     pub(super) path: PathBuf,
@@ -133,7 +133,7 @@ pub(super) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The texts above, what the tests of this crate read, and every shipped scene.
+/// Returns the texts above, the data of the integration tests of this crate, and every shipped scene.
 pub(super) fn samples() -> Vec<Sample> {
     let of = |kind, text: &str| Sample { kind, path: root().join("scenarios/network/sample.toml"), text: text.to_owned() };
     let mut samples: Vec<Sample> = SCENES.iter().map(|text| of(FileSchema::Scene, text)).collect();
@@ -145,14 +145,14 @@ pub(super) fn samples() -> Vec<Sample> {
     samples
 }
 
-/// Reads a text, and says what it is: two texts that say the same answer the same.
+/// Reads a sample and returns its content as text. Samples with equal content give equal texts.
 pub(super) fn read(sample: &Sample, overrides: &[String]) -> Result<String, SceneError> {
     let (text, path) = (&sample.text, &sample.path);
     match sample.kind {
         FileSchema::Scene => Scene::parse(text, path, overrides).map(|scene| format!("{scene:?}")),
         FileSchema::Relay => RelayFile::parse(text, path, overrides).map(|relay| format!("{relay:?}")),
         FileSchema::Router => RouterFile::parse(text, path, overrides).map(|router| {
-            // Keys of a link as they are written are shown by live control; what they make is what counts.
+            // The models of the links, not their keys as written, which a router keeps for live control.
             let links: Vec<_> = router.links.iter().map(|link| (&link.name, &link.model)).collect();
             format!("{:?} {:?} {:?} {:?} {links:?} {:?} {:?}", router.seed, router.memory, router.left, router.right, router.rules, router.default)
         }),
