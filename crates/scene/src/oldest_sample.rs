@@ -24,6 +24,7 @@ impl Scene {
         let line = |model: Option<&LinkModel>| {
             model.map_or(Some(Duration::ZERO), |model| bounded(model).filter(|(_, run)| *run == 0).map(|(delay, _)| delay))
         };
+        // The slowest uplink, link and downlink together, also if no sample passes all three: a bound, not the exact age.
         let (mut up, mut down) = (Duration::ZERO, Duration::ZERO);
         for peer in &self.peers {
             up = up.max(line(peer.uplink.as_deref())?);
@@ -35,6 +36,7 @@ impl Scene {
             (slowest, longest) = (slowest.max(delay), longest.max(run));
         }
         let (ticks, update) = self.ticks_of(slowest.saturating_add(up).saturating_add(down), clock)?;
+        // An overflow gives `None` too: no bound that can be used.
         ticks.checked_add(update.checked_mul(longest.checked_add(1)?)?)?.checked_sub(1)
     }
 
@@ -101,6 +103,7 @@ impl Scene {
         if self.timeline.iter().any(|change| matches!(change.what, ChangeKind::Coordination(_))) {
             return Some("the timeline changes the gains, and a damping of \"auto\" does not follow them: expected a damping in N·s/m");
         }
+        // With a given age, the damping does not depend on the links.
         (is_automatic("age") && self.oldest_sample().is_none()).then_some(
             "a damping of \"auto\" needs the age of the oldest sample in use, which the links of this scene do not bound: expected an age, or a damping in N·s/m",
         )
@@ -118,6 +121,7 @@ fn bounded(model: &LinkModel) -> Option<(Duration, u64)> {
     }
     let run = match &config.loss {
         Loss::None => 0,
+        // Only a pattern that counts packets bounds a run of lost packets.
         Loss::Pattern(pattern) if pattern.counts() == Counts::Packets => pattern.longest_run()?,
         Loss::Pattern(_)
         | Loss::Independent(_)

@@ -87,6 +87,7 @@ pub(crate) fn read_vector(quantity: Quantity, node: &Node, context: SceneContext
     }
     let value = quantity.read(node, *context)?;
     match (count, spread) {
+        // With one axis, or after a refused number of axes, a single number is enough.
         (Some(2..), Spread::Refused) => {
             let axes = count.unwrap_or(1);
             context.fault_at(node, format!("{} has one component: expected a list of {axes} numbers [{}]", values::written(node), quantity.unit()));

@@ -94,6 +94,7 @@ pub fn at_peer(text: &str, file: &Path, overrides: &[String], peer: usize, messa
             Some(Value::List(entries)) => entries.get(peer).cloned(),
             _ => None,
         };
+        // With a count, the entry at this index may belong to another peer, so that the count is shown.
         let (place, key) = match count.or(entry).or(peers) {
             Some(node) => (node.place, node.path.clone()),
             None => (BEGINNING, String::new()),
@@ -122,12 +123,14 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let names = count.and_then(|count| read_names(peers_node, count, file));
     let file = file.with_names(names.as_ref()).with_end(duration);
     let topology_node = root.get("topology");
+    // After the names: a hub is a name, and a graph has a row for each peer.
     let topology = match topology_node {
         Some(node) => read_topology(node, file),
         None => Some(Ways::default()),
     };
     let modulators = read_modulators(root.get("modulators"), file);
     let file = file.with_modulators(modulators.as_ref());
+    // Looked up in the document, because the object may be refused and readers of other parts depend on the answer.
     let turns = root.get("object").and_then(Node::as_table).is_some_and(|object| object.get("inertia").is_some());
     let context = SceneContext { file, axes, live, turns };
     // From here on the context holds axes, names and modulators, on which the readers below depend.
@@ -148,6 +151,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     });
     let count_entry = header_node.and_then(Node::as_table).and_then(|table| table.get("count"));
     let peers = read_peers(PeerSources { defaults, entries: peers_node, count: count_entry, update }, object.as_ref(), context);
+    // Needs all four parts. If a part was refused, its fault is reported already.
     let rotation = match (object_rotation, rotation_gains, stepping, &peers) {
         (Some(object), Some(gains), Some(stepping), Some(peers)) => rotation(object, gains, stepping.rotation_steps, peers, file),
         _ => None,

@@ -72,6 +72,7 @@ impl Scene {
         let spec = &self.peers[place];
         let device = device.as_ref().map(|device| DeviceRotation {
             handle: device.handle,
+            // Scaled as the coupling of translations is.
             coupling: device.coupling.scaled(spec.coupling_scaling.coupling_factor(self.number())),
             hand: device.torque.clone(),
         });
@@ -152,6 +153,7 @@ impl Scene {
     /// Default gains follow KT and BT. A gain that the timeline sets is a given gain from then on. No component of KR is above the sum of the two others,
     /// whether KR is given or is J times a number.
     pub fn rotation_gains_in_time(&self) -> impl Iterator<Item = Gains<Triple>> {
+        // `None` if the object does not turn: both iterators below are empty then.
         let begins = self.rotation.as_ref().map(|rotation| (self.coordination.gains, rotation.gains));
         let changes = begins.into_iter().flat_map(|begins| {
             self.timeline.iter().scan(begins, |(gains, given), change| {
@@ -173,6 +175,7 @@ impl Scene {
                     | ChangeKind::Parameters(_)
                     | ChangeKind::SendWhen(_) => false,
                 };
+                // `Some` continues the scan. `flatten` below drops the changes that concern no gain.
                 Some(changed.then_some((*gains, *given)))
             })
         });
@@ -188,6 +191,7 @@ impl Scene {
     pub fn initial_device<const A: usize>(&self, place: usize) -> State<A> {
         let copy = self.initial_state(place);
         let with_copy = match &self.rotation {
+            // The grasp point turns with the copy, so that its velocity contains the angular velocity.
             Some(rotation) => rotation.peers[place].attitude.point(rotation.peers[place].grasp, &copy),
             None => copy,
         };

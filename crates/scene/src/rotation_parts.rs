@@ -91,6 +91,7 @@ impl Scene {
     pub fn turns_about_rest(&self) -> bool {
         let Some(rotation) = &self.rotation else { return true };
         let (first, peers) = (rotation.peers[0].attitude, rotation.peers.iter().zip(&self.peers));
+        // A sine or a table counts as a push, also if all its values are zero.
         let is_idle = |signal: &Signal| matches!(signal, Signal::Constant(constant) if is_zero(*constant));
         peers.enumerate().all(|(place, (peer, spec))| {
             let together = same(spec.position, self.peers[0].position) && peer.attitude.angle_to(&first.orientation) == 0.0;
@@ -132,12 +133,13 @@ impl Scene {
     /// Returns the part of the translation along an axis, 0 for x.
     fn translation(&self, axis: usize) -> RotationPart {
         let along = |number: f64| [number, 0.0, 0.0];
+        // The walls along this axis become the walls along the only axis of the part.
         let enclosure = self.object.enclosure.map(|wall| Enclosure { min: along(wall.min[axis]), max: along(wall.max[axis]), ..wall });
         let object = ObjectSpec { enclosure, ..self.object_at_rest() };
         let peers = self.peers.iter().map(|spec| {
             let contact = match spec.contact {
-                // A finger that pushes along another axis exerts no force along this axis.
                 Contact::Push(direction) if direction.axis == axis => Contact::Push(Direction { axis: 0, ..direction }),
+                // A finger that pushes along another axis exerts no force along this axis.
                 Contact::Push(_) | Contact::None => Contact::None,
                 Contact::Grasp => Contact::Grasp,
             };
@@ -153,6 +155,7 @@ impl Scene {
         let over_mass = |number: f64| number * rotation.inertia[axis] / self.object.mass;
         let of = |own: Option<Triple>, usual: f64| own.map_or_else(|| over_mass(usual), |own| own[axis]);
         let damping = of(rotation.damping, self.object.damping);
+        // Walls act on the centre and exert no torque.
         let object = ObjectSpec { mass: rotation.inertia[axis], damping, enclosure: None, ..self.object_at_rest() };
         let (usual, own) = (self.coordination.gains, &rotation.gains);
         let gains = Gains { stiffness: of(own.stiffness, usual.stiffness), damping: of(own.damping, usual.damping) };
@@ -270,6 +273,7 @@ fn effective_masses(mass: f64, inertia: Triple, grasp: Triple) -> [f64; 3] {
     // Eigenvalues of the symmetric matrix of W across r, from its mean and half its difference.
     let (of_u, of_v, of_both) = (weighed(v, v), weighed(u, u), -weighed(u, v));
     let (middle, apart) = (1.0 / mass + 0.5 * (of_u + of_v), hypot(0.5 * (of_u - of_v), of_both));
+    // W is positive definite, so that `middle` exceeds `apart`.
     [mass, 1.0 / (middle - apart), 1.0 / (middle + apart)]
 }
 

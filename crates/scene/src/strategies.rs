@@ -121,6 +121,7 @@ impl Scene {
         let stiffness = self.rotation_gains(*gains, &rotation.gains).map_or([0.0; 3], |gains| gains.stiffness);
         if self.has_automatic_damping() {
             let gains = Gains { stiffness: stiffness.into_iter().fold(0.0, f64::max), damping: 0.0 };
+            // KR takes the place of KT in the formula of the automatic damping.
             return [strategy.damping(&LawParameters { gains, ..self.law_parameters(peer) }); 3];
         }
         rotation.over_mass(self.object.mass, self.own_damping(peer))

@@ -244,6 +244,7 @@ impl Topology {
     pub fn relative_weights(&self, peer: usize) -> Option<Vec<f64>> {
         // Compared by bits: weights that are equal change no mean, and weights are never NaN.
         let weights = self.weights(peer).filter(|weights| weights.windows(2).any(|pair| pair[0].to_bits() != pair[1].to_bits()))?;
+        // Two weights differ, so that there are at least two and the divisor is not zero.
         let mean = self.degree(peer) / weights.len() as f64;
         Some(weights.iter().map(|weight| weight / mean).collect())
     }
@@ -279,6 +280,7 @@ fn rows_of(text: &str) -> Vec<(usize, &str)> {
 /// Reads the graph of `peers` peers from a text of weights. Faults have the span of the wrong field, of the wrong row, or of the end of the text.
 pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fault> {
     let rows = read_weights(text)?;
+    // The lines of `rows`, for the places of faults.
     let lines = rows_of(text);
     let at = |row: usize| lines.get(row).map_or(text.len()..text.len(), |line| line_span(text, line.0));
     // At the first row too many, or at the end of the text if rows are missing.
@@ -349,6 +351,7 @@ impl Scene {
     /// Returns why the scene cannot have its topology or its relay; `None` if it can.
     pub(crate) fn refused_topology(&self) -> Option<String> {
         let strategy = self.coordination.strategy;
+        // A relay copies each sample to all receivers, so that samples must not differ by receiver.
         if self.relay && (self.sample_kind().is_personal() || strategy == Coordination::ClientServer) {
             return Some(format!(
                 "the strategy {} sends each peer a sample of its own, and a relay hands one on to all: expected another strategy, or no role = \"relay\"",
@@ -378,6 +381,7 @@ impl Scene {
     /// Returns true if the gains of peers depend on the peers that each peer hears, and so differ from peer to peer.
     #[must_use]
     pub fn has_gains_by_peer(&self) -> bool {
+        // A pull towards a mean does not depend on the number of peers that are heard.
         let sums = [self.coordination.strategy.pull(), self.coordination.pull].contains(&Pull::Sum);
         self.topology.as_ref().is_some_and(|topology| sums && !topology.is_regular())
     }

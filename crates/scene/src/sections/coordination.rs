@@ -226,8 +226,10 @@ fn read_change(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawVa
 fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawValue> {
     let is_automatic = node.as_text() == Some("auto");
     match form {
+        // Before the arms of the same forms that read a value.
         LawForm::AutomaticDuration | LawForm::AutomaticDamping if is_automatic => Some(LawValue::Automatic),
         LawForm::Duration | LawForm::AutomaticDuration => values::duration(node, context).map(LawValue::Duration),
+        // A text is a mistyped "auto". The message for a number alone would not name the word.
         LawForm::AutomaticDamping => match node.as_text() {
             Some(word) => {
                 context.fault_at(node, format!("unknown name {}: expected auto, or {}", quote(word), DAMPING.expected()));

@@ -215,6 +215,7 @@ fn read_ends<'a, T: PartialOrd>(
         context.fault_at(node, "neither min nor max is given: expected at least one of them");
         return None;
     }
+    // Both are read before the first `?`, so that the faults of both are reported.
     let (min, max) = (read(table, "min"), read(table, "max"));
     let (min, max) = (min?, max?);
     if let (Some(least), Some(most)) = (&min, &max)

@@ -132,6 +132,7 @@ pub(crate) fn hand_is_sampled(hand: Option<&Hand>, tick: Duration, node: &Node, 
         None => return true,
     };
     let Signal::Sine { frequency: Hertz(frequency), .. } = signal else { return true };
+    // Half the rate of ticks in Hz, the Nyquist frequency.
     let least_refused = 0.5 / tick.as_secs_f64();
     let is_sampled = *frequency < least_refused;
     if !is_sampled {

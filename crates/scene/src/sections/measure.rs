@@ -172,6 +172,7 @@ fn read_probe(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Optio
         context.fault_at(peer_node, format!("the hand of peer {} {refused}: expected {EXPECTED}", quote(&spec.name)));
         return None;
     }
+    // In virtual time every peer is simulated, whatever its kind.
     if context.live && spec.kind != PeerKind::Simulated {
         let kind = spec.kind.name();
         context.fault_at(

@@ -1,5 +1,6 @@
 //! Readers of the parts of a scene file, one function for each part. A reader that returns an `Option` reports each fault where it finds the fault, and then
-//! returns `None`; a reader of a key that may be absent returns `Some(None)` without the key.
+//! returns `None`; a reader of a key that may be absent returns `Some(None)` without the key. Readers go on after a fault, because of all reported faults the
+//! first in the order of the text is shown.
 
 mod coordination;
 mod device;

@@ -84,6 +84,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
         `cohaptic live` runs the scene without it, with the process itself";
     let mut table = TableReader::new(node, *context, declaration, "a table of keys of a peer")?;
     if declaration.key("name").is_some() {
+        // Marks the key as known. The module `peers` reads the name.
         table.get("name");
     }
     let kind = read_kind(&mut table);
@@ -112,6 +113,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     // A peer that runs elsewhere and has no device here touches nothing here.
     let contact = if elsewhere && table.get("device").is_none() { Some(Contact::None) } else { contact };
     let coupling = table.maybe("coupling", read_coupling);
+    // In a live session a process elsewhere couples its own copy.
     let needs_coupling = contact.is_some_and(|contact| contact != Contact::None) && !(elsewhere && context.live);
     if needs_coupling {
         table.require("coupling", A_COUPLING);
@@ -140,6 +142,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
             return None;
         }
     }
+    // Against the tick of this peer, from `[peer]` or from its entry.
     if let (Some(Some(hand)), Some(tick), Some(node)) = (&hand, tick, hand_node)
         && !hand_is_sampled(Some(hand), tick, node, *context)
     {

@@ -110,6 +110,7 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
         Some(node) => values::list(node, *context, "entries [[peers]]")?,
         None => Vec::new(),
     };
+    // Every entry is read before the first `?`, so that the faults of all entries are reported.
     let own: Vec<Option<PeerKeys>> = entries.iter().map(|entry| read_entry(entry, base, sources.update, context)).collect();
     let names = context.names?;
     // Keys of a peer without an entry. Read only if there is such a peer, because defaults alone need not be complete.
@@ -123,6 +124,7 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
     let made = sources.count.map_or(base.place, |entry| entry.key);
     named
         .map(|(place, name)| {
+            // The keys of the entry, otherwise the shared keys, which exist if any peer has no entry.
             let (keys, place) = keys.remove(&place).or_else(|| Some((shared.clone()?, made)))?;
             let rotation = keys.rotation.clone();
             Some(PeerRead { spec: spec(name, keys, object?), rotation, place })

@@ -94,6 +94,7 @@ pub(crate) fn read_timeline(
             }
             PlannedKind::Coordination(CoordinationChanges { gains: Gains { stiffness, damping }, of_turns, send_when, parameters }) => {
                 if stiffness.is_some() || damping.is_some() {
+                    // A change holds both gains. A gain that the entry does not name keeps the value of the change before.
                     gains = Gains { stiffness: stiffness.unwrap_or(gains.stiffness), damping: damping.unwrap_or(gains.damping) };
                     changes.push(Change { at, what: ChangeKind::Coordination(gains) });
                 }
@@ -131,6 +132,7 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneCont
     let at = table.read("at", |node, context| read_instant(node, duration, context));
     let (link, peer, coordination) = (table.entry("link"), table.entry("peer"), table.entry("coordination"));
     let set = table.entry("set");
+    // `coordination` holds its own keys and takes no `set`.
     if set.is_none() && coordination.is_none() {
         table.miss("set", "a table of the keys that change");
     }

@@ -91,6 +91,7 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
         // A scene with fewer than two peers is refused by `check_enough`.
         Kind::Star => Topology::star(peers, hub.map_or(0, |(hub, _)| hub)).map(Arc::new).map(Some),
         Kind::Ring => {
+            // Two neighbours by default. A fault of the default is shown at the table.
             let (count, node) = neighbours.map_or((2, node), |(count, node)| (count, node));
             let ring = Topology::ring(peers, count);
             if ring.is_none() && peers >= 2 {
