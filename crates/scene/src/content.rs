@@ -82,8 +82,8 @@ fn collect(node: &Node, path: &str, keys: &mut BTreeMap<String, String>) {
         Value::List(elements) if !elements.is_empty() && elements.iter().all(|element| element.as_table().is_some()) => {
             let name = |element: &Node| element.as_table()?.get("name").map(|entry| value_text(&entry.node));
             let names: Option<Vec<String>> = elements.iter().map(|element| name(element)).collect();
-            // The paths of named entries do not show their order, so that the list of names is a value too. Entries without names have their place in their
-            // path.
+            // The paths of named entries do not show the order of the entries, so that the list of names is a value too. Paths of other entries contain the
+            // index.
             if let Some(names) = names {
                 keys.insert(path.to_owned(), format!("[{}]", names.join(", ")));
             }

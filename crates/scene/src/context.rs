@@ -8,7 +8,7 @@ use cohaptic_linkfile::schema::{Choices, Form, words};
 
 use crate::model::Axes;
 
-/// Context of a reader of a file, with the facts of the scene on which readers of its parts depend.
+/// Context of a reader of a file, with facts of the scene for the readers of parts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SceneContext<'a> {
     pub(crate) file: Context<'a>,
@@ -21,7 +21,7 @@ pub(crate) struct SceneContext<'a> {
 }
 
 impl<'a> SceneContext<'a> {
-    /// Returns the context for a table that is read on its own, without the table over which it is laid.
+    /// Returns the context for a table read on its own, without the table of defaults below.
     pub(crate) fn of_part(self) -> Self {
         Self { file: self.file.of_part(), ..self }
     }

@@ -100,7 +100,7 @@ registry! {
     AgeP99: Run, "age_p99_s", "s", "Quantile of 99 % of that age";
 }
 
-/// A measure together with its peer, if it is a measure of a peer.
+/// A measure of the run, or a measure together with a peer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct MeasureName {
     /// The measure.

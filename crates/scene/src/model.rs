@@ -17,7 +17,7 @@ use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 use crate::measures::MeasureName;
 use crate::{RotationSpec, Topology};
 
-/// A scene that is ready to run. Every number is checked, and every peer that the scene names exists.
+/// A scene ready to run. Every number is checked, and every named peer exists.
 #[derive(Clone, PartialEq)]
 pub struct Scene {
     /// Path of the scene file, for messages: the argument `file` of [`Scene::parse`].
@@ -259,7 +259,7 @@ pub struct PeerSpec {
     pub clock: Clock,
     /// Phase of sending, in ticks: the peer sends at ticks k for which k − phase is a multiple of update/tick. Below update/tick.
     pub phase: u64,
-    /// True if a force is applied one tick after the tick that computed the force.
+    /// True if a force computed at a tick is applied at the next tick.
     pub compute_delay: bool,
     /// Contact between the device and the object.
     pub contact: Contact,
@@ -384,16 +384,16 @@ pub struct FalconSpec {
 /// Selection of a Falcon.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub enum FalconDevice {
-    /// The first device that is found and that no other peer has.
+    /// The first device that is found and not taken by another peer.
     #[default]
     First,
-    /// A device that is simulated down to the bytes of its protocol.
+    /// A device simulated down to the bytes of its protocol.
     Simulated,
     /// The device with this serial number.
     Serial(String),
 }
 
-/// A change during the run. It takes effect before anything else happens at its instant.
+/// A change during the run, in effect before anything else happens at the same instant.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Change {
     /// Instant of the change, since the beginning of the scene.

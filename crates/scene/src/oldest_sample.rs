@@ -8,7 +8,7 @@ use cohaptic_wan::{Counts, Layout, LinkConfig, LinkModel, Loss, Order};
 
 use crate::{ChangeKind, Scene};
 
-/// Largest number of ticks that a law may look back. Bounds the memory, so that a mistyped lag does not exhaust it.
+/// Largest number of ticks that a law may look back. Bounds the memory of a mistyped lag.
 const MOST_LAG: usize = 10_000;
 
 impl Scene {

@@ -184,7 +184,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     if let Some(topology) = topology.as_ref().and_then(|ways| ways.neighbours.as_ref()) {
         refuse_unlinked(root.get("links"), None, topology, file);
         refuse_unlinked(timeline_node, Some("link"), topology, file);
-        // Every list that names links: no entry may name a link that the topology does not have.
+        // No list of the scene may name a link between peers without a link in the topology.
         let mut expected = |key: &str| Some(&*root.get("expect")?.as_table()?.get(key)?.node);
         for key in ["loss", "delay"] {
             refuse_unlinked(expected(key), Some("link"), topology, file);

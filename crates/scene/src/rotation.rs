@@ -1,4 +1,4 @@
-//! Rotation of the object: its inertia, and the gains, damping and initial states that follow from the inertia.
+//! Rotation of the object: inertia, and the gains, damping and initial states derived from the inertia.
 
 use cohaptic_peer::coordination::{Pull, UsedGains};
 use cohaptic_peer::rotation::{Attitude, DeviceRotation, HeldAttitudes, Rotation, RotationConfig, Spin, Triple};

@@ -55,7 +55,7 @@ impl Scene {
     #[must_use]
     pub fn rotation_parts(&self) -> Option<Result<RotationParts, &'static str>> {
         let rotation = self.rotation.as_ref()?;
-        // A part has one step map. With this integrator translations and rotations have different ones.
+        // A part has one step map. With this integrator, translations and rotations have different step maps.
         if matches!(self.integrator, Integrator::SemiImplicitEuler { .. }) {
             return Some(Err("with semi-implicit-euler turns move by another step than translations"));
         }
@@ -99,7 +99,7 @@ impl Scene {
             let idle = match &spec.hand {
                 None => true,
                 Some(Hand::Force(force)) => is_idle(force),
-                // An arm that wants its device at the initial position pulls nothing.
+                // An arm with the initial position of the device as its wanted position does not pull.
                 Some(Hand::Arm { follows, .. }) => matches!(follows, Signal::Constant(wanted) if same(*wanted, start)),
             };
             let untwisted = peer.device.as_ref().and_then(|device| device.torque.as_ref()).is_none_or(is_idle);
@@ -235,7 +235,7 @@ fn at_rest(spec: &PeerSpec) -> PeerSpec {
     PeerSpec { kind: PeerKind::Simulated, hand, position, velocity, device_position: None, device_velocity: None, ..spec.clone() }
 }
 
-/// Returns the peer without a device: it touches nothing and equals all other peers without a device.
+/// Returns the peer without contact, with a placeholder as its device. The placeholder is the same for all peers.
 fn untouched(spec: PeerSpec) -> PeerSpec {
     PeerSpec { contact: Contact::None, device: DeviceConfig { mass: 1.0, damping: 0.0 }, hand: None, ..spec }
 }

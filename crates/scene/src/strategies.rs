@@ -67,7 +67,7 @@ impl Scene {
                 match &change.what {
                     ChangeKind::Coordination(gains) => then.coordination.gains = *gains,
                     ChangeKind::Parameters(settings) => then.coordination.settings = **settings,
-                    // These changes do not concern the law. The item repeats, so that there is one law for each change.
+                    // These changes do not concern the law. The law before is repeated, so that the iterator has a law for each change.
                     ChangeKind::Link(_)
                     | ChangeKind::AllLinks(_)
                     | ChangeKind::Contact { .. }

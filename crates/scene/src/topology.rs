@@ -42,7 +42,7 @@ pub enum TopologyKind {
     Graph,
 }
 
-/// Fault of a matrix that cannot be weights between peers, with its place in the matrix.
+/// Fault of a matrix of weights, with the place of the fault in the matrix.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error("{message}")]
 pub struct WeightsError {
@@ -296,7 +296,7 @@ pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fau
             || line.clone(),
             |column| {
                 let start = line.start + before(column);
-                // Without the comma after the field; the last field has none, and its end is the end of the line.
+                // Without the comma after the field. `before` counts a comma after the last field too.
                 start..(line.start + before(column + 1)).saturating_sub(1).max(start)
             },
         );
@@ -326,7 +326,7 @@ impl Scene {
         let Some(topology) = &self.topology else { return self.links.used().collect() };
         let configs = self.links.configs();
         let mut counts = vec![0; configs.len()];
-        // With one configuration for all links, the links need not be counted one by one.
+        // All links have the same configuration, so that no loop over the links is needed.
         if self.links.is_uniform() {
             counts[0] = topology.links() as u64;
         } else {
@@ -340,8 +340,8 @@ impl Scene {
     #[must_use]
     pub fn without_topology(&self) -> Self {
         let links = match self.used_links().as_slice() {
-            // The table may hold other configurations for pairs that are not neighbours. Those pairs become linked, and must not get links that the scene
-            // never used.
+            // The table may hold other configurations for pairs that are not neighbours. Links of such pairs appear now, and must not have a configuration
+            // that the scene never used.
             [(only, _)] if !self.links.is_uniform() => LinkTable::new(self.peers.len(), Arc::clone(only), []),
             _ => self.links.clone(),
         };

@@ -73,15 +73,15 @@ static CHANGING_LAWS: LazyLock<Vec<Key>> = LazyLock::new(|| law_keys(true));
 /// Returns a key for each strategy with own parameters: its table of all parameters or, with `changing`, of the parameters that the timeline may change.
 fn law_keys(changing: bool) -> Vec<Key> {
     let key_of = |parameter: &LawParameter| match (changing, parameter.default) {
-        // In the timeline, an absent parameter stays as it was, so that its default is not shown.
+        // In the timeline an absent parameter does not change, so that no default is shown.
         (true, _) => optional(parameter.key, form_of(parameter.form.without_automatic()), "From then on"),
-        // A parameter without a default is optional, and one with a default shows it.
+        // A parameter without a default is optional; for every other parameter the default is shown.
         (false, "") => optional(parameter.key, form_of(parameter.form), parameter.about),
         (false, default) => usual(parameter.key, form_of(parameter.form), default, parameter.about),
     };
     let table_of = |law: &Coordination| {
         let keys: Vec<Key> = law.parameters().iter().filter(|parameter| !changing || parameter.can_change).map(key_of).collect();
-        // Declarations are `'static`. The two callers are `LazyLock`s, so that each of them leaks its declarations once.
+        // Declarations are `'static`. The two callers are `LazyLock`s, so that each `LazyLock` leaks its declarations once.
         let groups: &'static [&'static [Key]] = vec![&*keys.leak()].leak();
         (!groups[0].is_empty()).then(|| optional(law.name(), Form::Table(Box::leak(Box::new(Table::of(groups)))), "Own parameters"))
     };

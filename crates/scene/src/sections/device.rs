@@ -85,7 +85,7 @@ pub(super) fn read_device(node: &Node, context: Context<'_>, expected: &str) -> 
     Some((DeviceConfig { mass: mass?, damping: damping? }, turned?))
 }
 
-/// Reads a coupling: its gains, their scaling, and its rotational gains if it has any.
+/// Reads a coupling: gains, the scaling of the gains, and rotational gains, or `None` for a coupling without rotational gains.
 pub(super) fn read_coupling(node: &Node, context: Context<'_>) -> Option<(Gains, Scaling, Option<Gains>)> {
     let mut table = TableReader::new(node, context, &COUPLING, A_COUPLING)?;
     let (stiffness, damping) = (table.value("stiffness"), table.value("damping"));

@@ -183,7 +183,7 @@ fn read_measure(node: &Node, has_probe: bool, context: Context<'_>) -> Option<Ex
     Some(ExpectMeasure { name: name?, bounds: bounds(ends)? })
 }
 
-/// Reads a link or an access line that the scene has. A line that the scene does not have is a fault, because nothing passes it.
+/// Reads a link or an access line that the scene has. An absent line is a fault, because no packet passes an absent line.
 fn read_existing_link(node: &Node, peers: Option<&[PeerSpec]>, context: Context<'_>) -> Option<LinkSelector> {
     let link = read_link_or_line(node, context)?;
     let (peer, line, there) = match link {

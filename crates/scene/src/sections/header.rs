@@ -15,7 +15,7 @@ pub(crate) static SCENE: Table = Table::of(&[&[
     required("duration", Form::PositiveDuration, "How long the scene lasts, above zero").expecting("a duration above zero such as \"7s\""),
     usual("seed", Form::Integer(0, MOST), "0", "Seed of all random numbers"),
     usual("axes", Form::Integer(1, 3), "1", "How many translational axes: x, then y, then z").expecting("a number of axes: 1, 2 or 3"),
-    // Bounds the memory, so that a mistyped count does not exhaust it: each peer takes about two kilobytes.
+    // Bounds the memory of a mistyped count: each peer takes about two kilobytes.
     optional(
         "count",
         Form::Integer(2, 1_000_000),

@@ -13,7 +13,7 @@ use crate::quantities::{DAMPING, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIF
 /// Model of a Falcon in Rakhsha & Constantinescu (2015): mass 0.1 kg, damping 5 N·s/m. For virtual time, and for the device that a pointer pulls.
 pub(crate) const FALCON_DEVICE: DeviceConfig = DeviceConfig { mass: 0.1, damping: 5.0 };
 
-/// Device of a peer that runs elsewhere and was given no device. Nobody moves this device, and it touches nothing.
+/// Device of a peer that runs elsewhere and was given no device. Nobody moves this device, and the device touches nothing.
 pub(crate) const STILL_DEVICE: DeviceConfig = DeviceConfig { mass: 1.0, damping: 0.0 };
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

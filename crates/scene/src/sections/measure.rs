@@ -61,7 +61,7 @@ impl Default for MeasureSettings {
     }
 }
 
-/// Parts of the scene that measures refer to. Each is `None` if it was refused.
+/// Parts of the scene for checks of measures; a refused part is `None`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measured<'a> {
     pub(crate) peers: Option<&'a [PeerSpec]>,
@@ -73,7 +73,7 @@ pub(crate) fn read_measure(node: &Node, of: Measured<'_>, context: SceneContext<
     let travel = table.table("travel", |node, _| read_travel(node, context));
     let band = table.value("band");
     let probe = table.maybe("probe", |node, _| read_probe(node, of, context));
-    // A refused probe counts as a probe, so that measures that need a probe are not refused for a second reason.
+    // A refused probe counts as a probe, so that a measure with a probe is not refused for a second reason.
     let names = table.read("names", |node, context| read_names(node, probe.is_none_or(|probe| probe.is_some()), context));
     table.finish();
     let names = match names? {

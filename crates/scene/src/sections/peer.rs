@@ -1,4 +1,4 @@
-//! Reader of the keys of a peer. Its own keys are laid over the keys of `[peer]` before they are read.
+//! Reader of the keys of a peer. The keys of an entry are laid over the keys of `[peer]` before the reader is called.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::context::SceneContext;
 use crate::model::{PeerKind, Scaling};
 use crate::quantities::{POSITION, RATE, Spread, VELOCITY, maybe_vector_of};
 
-/// Keys of `[peer]`, which hold for every peer that does not give the key itself.
+/// Keys of `[peer]`: the defaults of all peers.
 pub(crate) static PEER: Table = Table::of(&[&KEYS]);
 /// Keys of an entry `[[peers]]`.
 pub(crate) static PEERS: Table =

@@ -175,7 +175,7 @@ fn peer_rotation(read: &PeerRead, attitude: Attitude, context: Context<'_>) -> O
         }
         Some(handle) => {
             let touches = read.spec.contact == cohaptic_peer::Contact::Grasp;
-            // A device that does not grasp exerts no torque, so that its coupling may have no rotational gains.
+            // Without a grasp the device exerts no torque, so that the coupling may have no rotational gains.
             let Some(coupling) = coupling.or((!touches).then_some(Gains { stiffness: 0.0, damping: 0.0 })) else {
                 return refuse(format!("peer \"{name}\": a device that turns needs a coupling that turns: expected coupling.rotational-stiffness"));
             };
@@ -197,7 +197,7 @@ pub(crate) fn refuse_rotational_keys(document: &Node, context: Context<'_>) {
     match &document.value {
         Value::Table(table) => {
             for entry in &table.0 {
-                // `inertia` has two meanings: of a device it needs the inertia of the object, and of the object it is that inertia.
+                // The inertia of a device is a rotational key. The inertia of the object is not: with it the object would turn.
                 let of_device = entry.name == "inertia" && entry.node.path != "object.inertia";
                 if of_device || ROTATIONAL.contains(&entry.name.as_str()) {
                     refuse(entry);

@@ -31,7 +31,7 @@ static SET_OF_PEER: Table = Table::over(&[&OF_PEER]);
 const OF_PEER: [Key; 2] =
     [optional("contact", CONTACT, "Of a peer: how the device touches the object"), optional("hand", HAND, "Of a peer: what the user does")];
 
-/// An entry as read on its own, before the entries are in order of time. The changes before it determine its meaning.
+/// An entry read on its own, before the entries are sorted by time. The effect of an entry depends on the entries before.
 #[derive(Debug)]
 struct Planned<'a> {
     at: Instant,
